@@ -1,0 +1,1 @@
+"""The wire: times, frames, the exchange, the port and the bus. Knows no MQTT."""

@@ -1,0 +1,1 @@
+"""MQTT: topics, what waits, the connection and the uplink. Knows no Modbus."""

@@ -1,0 +1,143 @@
+"""What the line thread tells: readings, faults, exchanges and the state of the port, as plain values.
+
+Times are monotonic seconds of the line thread's clock; durations are seconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TypeAlias
+
+Number: TypeAlias = int | float
+
+EXCEPTION_BUSY = 0x06
+"""Modbus exception 06, server device busy (Modbus Application Protocol V1.1b3, section 7; EH600 manual)."""
+
+
+class FaultCode(StrEnum):
+    """Why there is no value; the words are the contract's."""
+
+    TIMEOUT = "timeout"
+    CRC = "crc"
+    MALFORMED = "malformed"
+    WRONG_SLAVE = "wrong_slave"
+    WRONG_FUNCTION = "wrong_function"
+    EXCEPTION = "exception"
+    OUT_OF_RANGE = "out_of_range"
+    NOT_FINITE = "not_finite"
+    LATE = "late"
+    COLLISION = "collision"
+    DISABLED = "disabled"
+    OVERRUN = "overrun"
+    PORT_LOST = "port_lost"
+    PORT_BUSY = "port_busy"
+    CONFIG_CONFLICT = "config_conflict"
+    STORAGE_FULL = "storage_full"
+    DUPLICATE_CLIENT = "duplicate_client"
+
+
+ALIVE_CODES = frozenset({FaultCode.EXCEPTION, FaultCode.OUT_OF_RANGE, FaultCode.NOT_FINITE})
+"""Faults that prove the device alive: an error, but online."""
+
+PORT_CODES = frozenset({FaultCode.PORT_LOST, FaultCode.PORT_BUSY})
+"""Faults of the port, not of the device."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """Why an exchange or a poll failed; `message` is for people, `heard` what came instead."""
+
+    code: FaultCode
+    message: str
+    exception_code: int | None = None
+    heard: bytes = b""
+
+    @property
+    def busy(self) -> bool:
+        """The device says that it is busy (exception 06): no error, asked again later."""
+        return self.exception_code == EXCEPTION_BUSY
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One finished poll (or probe) of one device, retries included: one sample.
+
+    Exactly one of `values` and `fault` is None. `at` is when the answer's last byte arrived, or when the poll
+    was given up. `rtt` runs from the request's first bit to the answer's last byte; None for a failed poll.
+    `online` and `response_timeout` are the device's state after this poll. `failed_attempts` are the codes of
+    the attempts before the last. `overruns` counts the points of the grid missed since the reading before.
+    """
+
+    device: str
+    at: float
+    values: Mapping[str, Number] | None
+    fault: Fault | None
+    rtt: float | None
+    online: bool
+    response_timeout: float
+    probe: bool = False
+    failed_attempts: tuple[FaultCode, ...] = ()
+    overruns: int = 0
+
+
+class Errand(StrEnum):
+    """What an exchange was for."""
+
+    POLL = "poll"
+    PROBE = "probe"
+    REQUEST = "request"
+    SCAN = "scan"
+    CHANGE = "change"
+
+
+@dataclass(frozen=True, slots=True)
+class Exchanged:
+    """One exchange on the line, for statistics and traces.
+
+    `asked` is when the line was given to it, `began` when its first byte was sent (None: never sent),
+    `gap` the silence measured before that, `at` when it was over. `unsolicited` counts the bytes heard
+    that were part of no answer to it, before or after the request. `late` counts dropped late answers.
+    """
+
+    at: float
+    asked: float
+    began: float | None
+    gap: float | None
+    slave: int
+    errand: Errand
+    fault: FaultCode | None
+    sent: bytes
+    heard: bytes
+    unsolicited: int = 0
+    late: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class UartCounters:
+    """The driver's counters since it was loaded (TIOCGICOUNT)."""
+
+    framing: int
+    parity: int
+    overrun: int
+    breaks: int
+
+
+@dataclass(frozen=True, slots=True)
+class PortChanged:
+    """The port was opened (`fault` None) or is lost, or is lost for another reason than before."""
+
+    at: float
+    fault: Fault | None
+
+
+@dataclass(frozen=True, slots=True)
+class UartCounted:
+    """The driver's counters, every few seconds where there are any; since this daemon opened the port first."""
+
+    at: float
+    counters: UartCounters
+
+
+Event: TypeAlias = Reading | Exchanged | PortChanged | UartCounted
