@@ -1,0 +1,249 @@
+"""The schema of a device profile: what a YAML file may say about a device, and what it means.
+
+A profile is a fact sheet: registers, limits, how id and rate are set, what may be written at all. Register
+addresses are those on the wire (0x0001 is sent as 00 01). There is no default where a guess would give a
+plausible wrong number.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+
+from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_validator
+
+from lfs10d.profiles.blocks import Block, batch
+from lfs10d.profiles.values import (
+    Fact,
+    Facts,
+    Place,
+    ProfileName,
+    ReadFunction,
+    Register,
+    Registered,
+    Setting,
+    Text,
+    Value,
+    refuse,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from lfs10d.reading import Fault, Number
+
+FramingName: TypeAlias = Literal["rtu", "ascii"]
+ChecksumName: TypeAlias = Literal["crc", "sum"]
+SlaveId: TypeAlias = Annotated[int, Field(ge=1, le=255)]
+Rate: TypeAlias = Literal[1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200]
+
+MOST_WORDS = 125
+"""Registers of one read (Modbus Application Protocol V1.1b3, section 6.3)."""
+
+BYTE_COUNT = 1
+"""Byte before the registers of an answer; it counts as data (Fuling DZB manual, appendix B)."""
+
+
+class Barrier(Registered):
+    """A read whose answer has another shape than any poll's, so that a late answer cannot pass for it."""
+
+    function: ReadFunction = 3
+    count: Annotated[int, Field(ge=1, le=MOST_WORDS)]
+
+
+class IdRegister(Registered):
+    """Where the slave id is set; `locked_by` is what overrules it (`DIP switch`)."""
+
+    locked_by: Text | None = None
+
+
+class RateRegister(Registered):
+    """Where the baud rate is set: `codes` gives the register's content for each rate."""
+
+    codes: dict[Rate, Register]
+    locked_by: Text | None = None
+
+    @field_validator("codes", mode="after")
+    @classmethod
+    def _distinct(cls, codes: dict[int, int]) -> dict[int, int]:
+        if len(codes) == 0 or len(set(codes.values())) < len(codes):
+            refuse([((), "must give at least one rate a code, and no two rates the same")])
+        return codes
+
+
+class Factory(Fact):
+    """How a new device comes: its slave id and baud rate."""
+
+    id: SlaveId
+    baudrate: Rate
+
+
+def _ids(ids: tuple[int, int]) -> tuple[int, int]:
+    if ids[0] > ids[1]:
+        refuse([((), "the first id is greater than the last")])
+    return ids
+
+
+def _unique(texts: tuple[str, ...]) -> tuple[str, ...]:
+    if len(texts) == 0 or len(set(texts)) < len(texts):
+        refuse([((), "must name at least one, each once")])
+    return texts
+
+
+def _repeated(facts: Iterable[Value | Setting]) -> list[tuple[Place, str]]:
+    seen: dict[str, int] = {}
+    problems: list[tuple[Place, str]] = []
+    for index, fact in enumerate(facts):
+        first = seen.setdefault(fact.name, index)
+        if first != index:
+            problems.append(((index, "name"), f"{fact.name!r} is the name of [{first}] already"))
+    return problems
+
+
+class Profile(Facts):
+    """A kind of device. The first of `values` is the primary one; the first of `checksums` is the usual one.
+
+    `ids` are the first and the last slave id it can have, both included. `ascii_max_data` bounds the data
+    bytes of an ASCII answer. `min_interval` is the shortest time between two polls in seconds.
+    `busy_exceptions` are asked again later. `provenance` tells where a plain key's fact comes from.
+    """
+
+    name: ProfileName
+    title: Text
+    sources: Annotated[tuple[Text, ...], Field(strict=False)] = ()
+    ids: Annotated[tuple[SlaveId, SlaveId], Field(strict=False), AfterValidator(_ids)] = (1, 247)
+    broadcast: bool = False
+    framings: Annotated[tuple[FramingName, ...], Field(strict=False), AfterValidator(_unique)] = ("rtu",)
+    checksums: Annotated[tuple[ChecksumName, ...], Field(strict=False), AfterValidator(_unique)] = ("crc",)
+    max_words: Annotated[int, Field(ge=1, le=MOST_WORDS)] = MOST_WORDS
+    ascii_max_data: Annotated[int, Field(ge=3, le=252)] | None = None
+    min_interval: Annotated[float, Field(ge=0, le=86400)] = 0.0
+    busy_exceptions: Annotated[tuple[Annotated[int, Field(ge=1, le=255)], ...], Field(strict=False)] = (6,)
+    factory: Factory | None = None
+    slave_id: IdRegister | None = None
+    baudrate: RateRegister | None = None
+    values: Annotated[tuple[Value, ...], Field(strict=False, min_length=1)]
+    settings: Annotated[tuple[Setting, ...], Field(strict=False)] = ()
+    barrier: Barrier | None = None
+    provenance: dict[str, Text] = Field(default={})
+    notes: Annotated[tuple[Text, ...], Field(strict=False)] = ()
+
+    _blocks: tuple[Block, ...] = PrivateAttr(default=())
+
+    # A field's validator sees those fields above it that have no error. So the order of the fields matters,
+    # and every problem of a file is found at once, though another field is wrong.
+
+    @field_validator("factory", mode="after")
+    @classmethod
+    def _factory_id_is_an_id(cls, factory: Factory | None, info: ValidationInfo) -> Factory | None:
+        ids = info.data.get("ids")
+        if factory and ids and not ids[0] <= factory.id <= ids[1]:
+            refuse([(("id",), f"{factory.id} is none of the ids {ids[0]} to {ids[1]}")])
+        return factory
+
+    @field_validator("baudrate", mode="after")
+    @classmethod
+    def _rate_register_is_another(
+        cls, rate: RateRegister | None, info: ValidationInfo
+    ) -> RateRegister | None:
+        slave_id = info.data.get("slave_id")
+        if rate and slave_id and rate.register == slave_id.register:
+            refuse([(("register",), "is the register of the slave id")])
+        return rate
+
+    @field_validator("values", mode="after")
+    @classmethod
+    def _values_can_be_read(cls, values: tuple[Value, ...], info: ValidationInfo) -> tuple[Value, ...]:
+        problems = _repeated(values)
+        most = _words_per_read(info.data)
+        for index, value in enumerate(values):
+            if value.words > most:
+                wanted = f"needs {value.words} registers, one read of this device brings {most} at most"
+                problems.append(((index, "type"), f"{value.type} {wanted}"))
+        refuse(problems)
+        return values
+
+    @field_validator("settings", mode="after")
+    @classmethod
+    def _settings_are_apart(cls, settings: tuple[Setting, ...], info: ValidationInfo) -> tuple[Setting, ...]:
+        problems = _repeated(settings)
+        taken = {
+            fact.register: key for key in ("slave_id", "baudrate") if (fact := info.data.get(key)) is not None
+        }
+        for index, setting in enumerate(settings):
+            if setting.register in taken:
+                message = f"is set by {taken[setting.register]}; it is no setting"
+                problems.append(((index, "register"), message))
+            taken.setdefault(setting.register, f"settings[{index}]")
+        refuse(problems)
+        return settings
+
+    @field_validator("barrier", mode="after")
+    @classmethod
+    def _barrier_has_its_own_shape(cls, barrier: Barrier | None, info: ValidationInfo) -> Barrier | None:
+        values = info.data.get("values")
+        if barrier and values:
+            most = _words_per_read(info.data)
+            if barrier.count > most:
+                refuse([(("count",), f"one read of this device brings {most} registers at most")])
+            shapes = {(block.function, block.count) for block in batch(values, most)}
+            if (barrier.function, barrier.count) in shapes:
+                refuse(
+                    [
+                        (
+                            ("count",),
+                            "a poll reads as many registers; a late answer could pass for the barrier's",
+                        )
+                    ]
+                )
+        return barrier
+
+    @field_validator("provenance", mode="after")
+    @classmethod
+    def _provenance_is_of_keys(cls, provenance: dict[str, str]) -> dict[str, str]:
+        refuse([((key,), "is no key of a profile") for key in provenance if key not in cls.model_fields])
+        return provenance
+
+    def model_post_init(self, _context: Any, /) -> None:  # noqa: ANN401 - pydantic's signature
+        """Batch the values once; reads and decoding are on the path of every poll."""
+        self._blocks = batch(self.values, _words_per_read(self.__dict__))
+
+    @property
+    def checksum(self) -> ChecksumName:
+        """The check of its RTU frames, unless a slave's `checksum` says otherwise."""
+        return self.checksums[0]
+
+    @property
+    def value_names(self) -> tuple[str, ...]:
+        """Names in the file's order, the primary value first."""
+        return tuple(value.name for value in self.values)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of each value by name."""
+        return {value.name: value.unit for value in self.values}
+
+    @property
+    def id_and_rate_registers(self) -> frozenset[int]:
+        """Registers that only a verified change of id or rate may write."""
+        return frozenset(fact.register for fact in (self.slave_id, self.baudrate) if fact is not None)
+
+    def setting_at(self, register: int) -> Setting | None:
+        """Return the setting at a register; None where the profile knows none: never to be written."""
+        return next((setting for setting in self.settings if setting.register == register), None)
+
+    def reads(self) -> tuple[Block, ...]:
+        """Return the reads of one poll, neighbouring values together; the same objects every time."""
+        return self._blocks
+
+    def decode(self, block: Block, registers: tuple[int, ...]) -> dict[str, Number] | Fault:
+        """Return the values of `block` by name, or the first fault: `not_finite` or `out_of_range`."""
+        return block.decode(registers)
+
+
+def _words_per_read(data: dict[str, Any]) -> int:
+    """Return how many registers one read may bring in any framing; fields with an error do not bind."""
+    most: int = data.get("max_words", MOST_WORDS)
+    limit: int | None = data.get("ascii_max_data")
+    if limit is not None and "ascii" in data.get("framings", ()):
+        most = min(most, (limit - BYTE_COUNT) // 2)
+    return most
