@@ -1,0 +1,87 @@
+"""What a job is: something done on the line, one exchange after the other.
+
+A job never touches the line. The schedule calls `ask` when the line could be the job's, and `heard` with the
+outcome of what it asked; between the two and after them others may have had the line. Time is an argument.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol, TypeAlias
+
+if TYPE_CHECKING:
+    from lfs10d.modbus.exchange import Outcome
+    from lfs10d.modbus.frames import Codec, Request
+    from lfs10d.reading import Errand
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """Put this request on the line now.
+
+    `timeout` (s) runs from the request's last bit to the answer's first byte; `patience` is the slave's learned
+    p99 of it, None where it is not known. `baudrate` None means the line's own rate.
+    """
+
+    request: Request
+    codec: Codec
+    timeout: float
+    patience: float | None = None
+    baudrate: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """Nothing to ask before `until` (None: before the schedule is told to `wake` the job)."""
+
+    until: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """The job is over."""
+
+
+@dataclass(frozen=True, slots=True)
+class Later:
+    """More to ask, but not before what was due by `key`."""
+
+    key: float
+
+
+Next: TypeAlias = Later | Done
+
+
+class Job(Protocol):
+    """One thing done on the line.
+
+    `share` is the greatest part of the line's time it may take while others want it, 0 < share <= 1.
+    `excludes` are slave ids that nobody else may ask while it runs.
+    """
+
+    @property
+    def errand(self) -> Errand:
+        """What its exchanges are for."""
+        ...
+
+    @property
+    def share(self) -> float:
+        """The greatest share of the line."""
+        ...
+
+    @property
+    def excludes(self) -> frozenset[int]:
+        """Slave ids that are its own while it runs."""
+        ...
+
+    def ask(self, now: float) -> Ask | Hold | Done:
+        """Decide what to put on the line now."""
+        ...
+
+    def heard(self, outcome: Outcome, now: float) -> Next:
+        """Take the outcome of what was asked."""
+        ...
+
+    def cut_off(self, now: float) -> None:
+        """Learn that the port is lost; the job is over."""
+        ...

@@ -1,0 +1,118 @@
+"""A poll: read a device's values once, with retries as later exchanges; a probe: the same of an offline device.
+
+Rules
+-----
+1. An unsynchronised slave is asked its profile's barrier first; only then a value is asked, by retries too. Probes
+   begin with the barrier always. Where the profile has none the slave is left alone until nothing can be pending.
+2. A fault of the line is tried again, `retries` times, as a later exchange. A right frame is not: an exception or
+   a value out of range would only be said twice.
+3. One poll, one outcome, whatever it took.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from lfs10d.jobs.job import Ask, Done, Hold, Later, Next
+from lfs10d.modbus.frames import ReadRegisters
+from lfs10d.reading import ALIVE_CODES, Errand, Fault, FaultCode, Number
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from lfs10d.modbus.exchange import Outcome
+    from lfs10d.modbus.unanswered import Unanswered
+    from lfs10d.profiles.schema import Block
+    from lfs10d.roster import Device
+
+_NOTHING: frozenset[int] = frozenset()
+
+
+class Poll:
+    """One poll of `device`; `due` orders it among the others.
+
+    When it is over `values` or `fault` is set, `at` says when, `rtt` how long the last exchange took.
+    """
+
+    share = 1.0
+    excludes = _NOTHING
+
+    def __init__(self, device: Device, unanswered: Unanswered, *, due: float, errand: Errand) -> None:
+        self.device = device
+        self.errand = errand
+        self.due = due
+        self.values: dict[str, Number] = {}
+        self.fault: Fault | None = None
+        self.rtt: float | None = None
+        self.at = due
+        self.failed_attempts: list[FaultCode] = []
+        self._unanswered = unanswered
+        self._blocks = device.spec.profile.reads()
+        self._block = 0
+        self._retries = device.retries if errand is not Errand.PROBE else 0
+        self._barrier_due = errand is Errand.PROBE
+        self._barrier_asked = False
+
+    @property
+    def good(self) -> Mapping[str, Number] | None:
+        """The values; None where the poll failed."""
+        return self.values if self.fault is None else None
+
+    def ask(self, now: float) -> Ask | Hold:
+        """Decide what to put on the line now."""
+        device = self.device
+        spec = device.spec
+        timeout = device.probe_timeout if self.errand is Errand.PROBE else device.timeout
+        pending = self._unanswered.unsynchronised(device.slave, now)
+        barrier = spec.profile.barrier
+        if pending:
+            until = self._unanswered.quiet_until(device.slave)
+            if until is None and barrier is None:
+                self._unanswered.leave_alone(device.slave, device.timeout)
+                until = self._unanswered.quiet_until(device.slave)
+            if until is not None:
+                return Hold(until)
+        self._barrier_asked = barrier is not None and (pending or self._barrier_due)
+        if self._barrier_asked and barrier is not None:
+            request = ReadRegisters(device.slave, barrier.register_, barrier.count, barrier.function)
+        else:
+            block = self._blocks[self._block]
+            request = ReadRegisters(device.slave, block.address, block.count, block.function)
+        return Ask(request, spec.codec, timeout, device.turnarounds.p99)
+
+    def heard(self, outcome: Outcome, now: float) -> Next:
+        """Take the outcome of what was asked."""
+        device = self.device
+        self.at = outcome.ended
+        self.failed_attempts += [FaultCode.LATE for late in outcome.late if late.request.slave == device.slave]
+        fault = outcome.fault
+        if self._barrier_asked:
+            alive = fault is None or (fault.code is FaultCode.EXCEPTION and not outcome.ambiguous)
+            if alive:
+                self._barrier_due = False
+                return Later(self.due)
+        elif fault is None and outcome.answer is not None:
+            fault = self._take(self._blocks[self._block], outcome.answer)
+            if fault is None:
+                self.rtt = outcome.rtt
+                return Later(self.due) if self._block < len(self._blocks) else Done()
+        if fault is not None and fault.code not in ALIVE_CODES and self._retries > 0:
+            self._retries -= 1
+            self.failed_attempts.append(fault.code)
+            self.due = now
+            return Later(now)
+        self.fault = fault
+        self.values = {}
+        return Done()
+
+    def _take(self, block: Block, registers: tuple[int, ...]) -> Fault | None:
+        decoded = self.device.spec.profile.decode(block, registers)
+        if isinstance(decoded, Fault):
+            return decoded
+        self.values.update(decoded)
+        self._block += 1
+        return None
+
+    def cut_off(self, now: float) -> None:
+        """Learn that the port is lost."""
+        self.at = now

@@ -1,0 +1,265 @@
+"""The bus: owns the port and obeys one order at a time.
+
+A thin shell around `Exchange`; it decides nothing but when to
+reopen the port.
+
+Every byte on the line passes here, in one thread. `turn` does what can be done now and says when to come back; the
+thread waits in between, in virtual time nobody does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import inf
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+from lfs10d.errors import PortBusyError, PortError
+from lfs10d.modbus.echo import EchoLearner
+from lfs10d.modbus.exchange import Attempt, Echo, Exchange, Listen, Outcome, Quiet, Settled
+from lfs10d.modbus.frames import ReadRegisters
+from lfs10d.modbus.timing import LineTiming
+from lfs10d.reading import Fault, FaultCode, PortChanged
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from lfs10d.modbus.exchange import Pending
+    from lfs10d.modbus.frames import Codec, Request
+    from lfs10d.modbus.port import Port, PortSettings
+    from lfs10d.reading import UartCounters
+
+REOPEN_FIRST = 0.2
+"""How long after the loss of the port it is tried again first, in s; doubled up to the last."""
+REOPEN_LAST = 1.0
+"""The longest pause between two tries to open the port, in s."""
+RATE_SETTLE = 0.005
+"""Silence before and after a change of rate, in s: the divisor can change under bytes still in the adapter."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wait:
+    """Nothing to do before `until`; with `listen` also when bytes come, but not before `not_before`."""
+
+    until: float
+    listen: bool
+    not_before: float = -inf
+
+
+@dataclass(frozen=True, slots=True)
+class LineRules:
+    """How this line is spoken on. Durations in s; `turnaround_delay` is the silence after a broadcast."""
+
+    extra_gap: float = 0.0
+    turnaround_delay: float = 0.1
+    echo: Literal["auto", "on", "off"] = "auto"
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """One request to put on the line; `earlier` are those whose answers may still come. See `lfs10d.jobs.job.Ask`."""
+
+    request: Request
+    codec: Codec
+    timeout: float
+    patience: float | None = None
+    baudrate: int | None = None
+    earlier: tuple[Pending, ...] = ()
+
+
+Step: TypeAlias = Wait | Outcome | PortChanged
+
+
+class Bus:
+    """One line: its port, its silence, its echo. `clock` gives monotonic s, the same as the `now` of every call."""
+
+    def __init__(self, port: Port, rules: LineRules, clock: Callable[[], float]) -> None:
+        self.port = port
+        self.rules = rules
+        self.open = False
+        self.timing = self._timing(port.settings)
+        self.unsolicited = 0
+        self._settings = port.settings
+        self._clock = clock
+        self._echo = EchoLearner(rules.echo)
+        self._order: Order | None = None
+        self._exchange: Exchange | None = None
+        self._quiet_since = -inf
+        self._gap: float | None = None
+        self._reopen_at = -inf
+        self._pause = REOPEN_FIRST
+        self._fault: Fault | None = None
+
+    def _timing(self, settings: PortSettings) -> LineTiming:
+        return LineTiming.of(
+            settings.baudrate,
+            databits=settings.databits,
+            parity=settings.parity,
+            stopbits=settings.stopbits,
+            extra_gap=self.rules.extra_gap,
+        )
+
+    @property
+    def idle(self) -> bool:
+        """Nothing is asked at the moment."""
+        return self._order is None
+
+    @property
+    def echo(self) -> Echo:
+        """What is known of the adapter's echo; no write may be asked while it is unknown."""
+        return self._echo.state
+
+    # -- the port
+
+    def reopen(self, now: float) -> PortChanged | Wait:
+        """Try to open the port, by its path, if the time has come."""
+        if now < self._reopen_at:
+            return Wait(self._reopen_at, listen=False)
+        try:
+            self.port.open()
+        except PortError as error:
+            self._reopen_at = now + self._pause
+            self._pause = min(2 * self._pause, REOPEN_LAST)
+            changed = self._lost(error, now)
+            return changed or Wait(self._reopen_at, listen=False)
+        self.open = True
+        self._fault = None
+        self._pause = REOPEN_FIRST
+        self._echo.reopened()
+        self._quiet_since = self._clock()
+        self._gap = None
+        return PortChanged(now, None)
+
+    def _lost(self, error: PortError, now: float) -> PortChanged | None:
+        """Close the port; tell it once per reason."""
+        self.close()
+        code = FaultCode.PORT_BUSY if isinstance(error, PortBusyError) else FaultCode.PORT_LOST
+        fault = Fault(code, str(error))
+        if fault == self._fault:
+            return None
+        self._fault = fault
+        return PortChanged(now, fault)
+
+    def close(self) -> None:
+        """Give the port back; what was asked is abandoned."""
+        self.open = False
+        self._exchange = self._order = None
+        self.port.close()
+
+    def reconfigure(self, settings: PortSettings, rules: LineRules, now: float) -> None:
+        """Speak by other settings from the next exchange on; what is set at opening has the port reopened."""
+        if rules.echo != self.rules.echo:
+            self._echo = EchoLearner(rules.echo)
+        self.rules = rules
+        before, self._settings = self._settings, settings
+        if self.open and _at_opening(before) != _at_opening(settings):
+            self.close()
+        if not self.open:
+            self.port.reconfigure(settings)
+            self.timing = self._timing(settings)
+            self._reopen_at = now
+
+    @property
+    def line_timing(self) -> LineTiming:
+        """The times at the line's own rate."""
+        return self._timing(self._settings)
+
+    def counters(self) -> UartCounters | None:
+        """Return the driver's counters, None where it has none or the port is lost."""
+        try:
+            return self.port.counters() if self.open else None
+        except PortError:  # the next exchange will tell
+            return None
+
+    # -- one exchange
+
+    def ask(self, order: Order) -> None:
+        """Take what to put on the line next; `step` carries it out."""
+        self._order = order
+
+    def step(self, now: float, *, readable: bool) -> Step:
+        """Do what can be done now; return the outcome when the exchange is over."""
+        try:
+            return self._step(now, readable=readable)
+        except PortError as error:
+            self._reopen_at = now + REOPEN_FIRST
+            return self._lost(error, now) or Wait(self._reopen_at, listen=False)
+
+    def _step(self, now: float, *, readable: bool) -> Step:
+        heard = self.port.read() if readable else b""
+        if self._exchange is None:
+            if heard:  # nobody asked for it: it restarts the silence
+                self.unsolicited += len(heard)
+                self._quiet_since = max(self._quiet_since, now)
+            if self._order is None:
+                return Wait(inf, listen=True)
+            settings = self._settings_for(self._order)
+            if settings != self.port.settings:
+                if now < self._quiet_since + RATE_SETTLE:
+                    return Wait(self._quiet_since + RATE_SETTLE, listen=True)
+                self._change_rate(settings)
+            self._exchange = self._begin(self._order, now)
+        elif heard:
+            self._exchange.received(heard, now)
+        return self._carry_on(self._exchange, now)
+
+    def _settings_for(self, order: Order) -> PortSettings:
+        if order.baudrate is None or order.baudrate == self._settings.baudrate:
+            return self._settings
+        return replace(self._settings, baudrate=order.baudrate)
+
+    def _change_rate(self, settings: PortSettings) -> None:
+        """Speak by other settings: let everything go out, then keep the longer of the two gaps once."""
+        before = self.timing
+        self.port.drain()
+        self.port.reconfigure(settings)
+        self.port.flush()
+        self.timing = self._timing(settings)
+        self._gap = self.timing.slower(before)
+        self._quiet_since = self._clock() + RATE_SETTLE
+
+    def _begin(self, order: Order, now: float) -> Exchange:
+        attempt = Attempt(
+            request=order.request,
+            codec=order.codec,
+            timing=self.timing,
+            timeout=order.timeout,
+            patience=order.patience,
+            echo=self._echo.state,
+            adapter_latency=self.port.adapter_latency,
+            earlier=order.earlier,
+            turn=order.timeout,
+            turnaround_delay=self.rules.turnaround_delay,
+            gap=self._gap,
+        )
+        return Exchange(attempt, asked=now, quiet_since=self._quiet_since)
+
+    def _carry_on(self, exchange: Exchange, now: float) -> Wait | Outcome:
+        while True:
+            action = exchange.step(now)
+            if isinstance(action, Listen):
+                return Wait(action.until, listen=True, not_before=action.not_before)
+            if isinstance(action, Quiet):
+                return Wait(action.until, listen=True)
+            if isinstance(action, Settled):
+                return self._settled(action.outcome)
+            if self.port.waiting():  # the last look before we speak
+                now = self._clock()
+                exchange.received(self.port.read(), now)
+                continue
+            begun = self._clock()
+            self.port.write(action.frame)
+            now = self._clock()
+            exchange.sent(begun, now)
+
+    def _settled(self, outcome: Outcome) -> Outcome:
+        self._exchange = self._order = None
+        self._quiet_since = outcome.quiet_since
+        if outcome.sent_end is not None:
+            self._gap = None
+        if isinstance(outcome.request, ReadRegisters):
+            self._echo.observed(outcome.echoed)
+        return outcome
+
+
+def _at_opening(settings: PortSettings) -> tuple[object, ...]:
+    return settings.path, settings.low_latency, settings.rs485

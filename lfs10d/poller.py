@@ -1,0 +1,177 @@
+"""The body of the line thread: the schedule decides, the bus obeys, what was heard goes out as events.
+
+`Poller.turn` is called with a time and says when to come back: by `LineThread` with the real clock, by tests with a
+virtual one. Other threads only `post`.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING, TypeAlias
+
+from lfs10d.modbus.bus import Order, Wait
+from lfs10d.reading import Errand, Event, Exchanged, PortChanged, UartCounted, UartCounters
+from lfs10d.schedule import Rest, Schedule
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from lfs10d.jobs.job import Ask, Job
+    from lfs10d.modbus.bus import Bus, LineRules
+    from lfs10d.modbus.exchange import Outcome
+    from lfs10d.modbus.port import PortSettings
+    from lfs10d.roster import DeviceSpec, PollRules
+
+COUNTERS_EVERY = 10.0
+"""How often the driver's counters are read, in s."""
+
+Sink: TypeAlias = "Callable[[list[Event]], None]"
+
+
+class Poller:
+    """One line. `sink` takes what was heard, at most once per exchange; `clock` is the bus's.
+
+    `declared` is the time by which the next turn is promised: a watchdog may hold the thread to it.
+    """
+
+    def __init__(self, bus: Bus, schedule: Schedule, sink: Sink, clock: Callable[[], float]) -> None:
+        self.bus = bus
+        self.schedule = schedule
+        self.declared = clock()
+        self._sink = sink
+        self._clock = clock
+        self._posted: deque[Callable[[float], None]] = deque()
+        self._events: list[Event] = []
+        self._errand = Errand.POLL
+        self._known_lost = False
+        self._unsolicited = 0
+        self._count_at = clock()
+        self._first_counters: UartCounters | None = None
+
+    # -- from any thread (the thread must be woken afterwards)
+
+    def post(self, action: Callable[[float], None]) -> None:
+        """Have `action(now)` done between two exchanges."""
+        self._posted.append(action)
+
+    def submit(self, job: Job) -> None:
+        """Have `job` done on the line."""
+        self.post(lambda now: self.schedule.submit(job, now))
+
+    def replace(self, specs: Iterable[DeviceSpec], rules: PollRules) -> None:
+        """Poll these devices from now on."""
+        devices = tuple(specs)
+        self.post(lambda now: self.schedule.replace(devices, rules, now))
+
+    def reconfigure(self, settings: PortSettings, rules: LineRules) -> None:
+        """Speak by other settings from now on; another path closes the port and opens that one."""
+        self.post(lambda now: self._reconfigure(settings, rules, now))
+
+    def _reconfigure(self, settings: PortSettings, rules: LineRules, now: float) -> None:
+        self.bus.reconfigure(settings, rules, now)
+        self.schedule.timing = self.bus.line_timing
+
+    # -- in the line thread
+
+    def turn(self, now: float, *, readable: bool = True) -> Wait:
+        """Do what can be done now and say when to come back."""
+        while True:
+            if self.bus.idle:
+                while self._posted:
+                    self._posted.popleft()(now)
+            wait = self._advance(now, readable=readable)
+            if wait is not None:
+                break
+            readable = False
+            now = self._clock()
+        if self._events:
+            events, self._events = self._events, []
+            self._sink(events)
+        self.declared = wait.until
+        return wait
+
+    def _advance(self, now: float, *, readable: bool) -> Wait | None:
+        """Take one step; None where there may be more to do at once."""
+        if not self.bus.open:
+            opened = self.bus.reopen(now)
+            if isinstance(opened, Wait):
+                return opened
+            self._port_changed(opened)
+            return None
+        resting = None
+        if self.bus.idle:
+            decision = self.schedule.next(now)
+            if isinstance(decision, Rest):
+                resting = decision
+            else:
+                self._ask(decision)
+        step = self.bus.step(now, readable=readable)
+        if isinstance(step, PortChanged):
+            self._port_changed(step)
+            return None
+        if isinstance(step, Wait):
+            if resting is None:
+                return step
+            return Wait(resting.until, listen=True)
+        self._settled(step)
+        self._count(self._clock())
+        return None
+
+    def _ask(self, ask: Ask) -> None:
+        self._errand = self.schedule.errand
+        order = Order(
+            ask.request,
+            ask.codec,
+            ask.timeout,
+            ask.patience,
+            ask.baudrate,
+            self.schedule.unanswered.earlier(),
+        )
+        self.bus.ask(order)
+
+    def _settled(self, outcome: Outcome) -> None:
+        now = self._clock()
+        readings = self.schedule.settled(outcome, now)
+        stray, self.bus.unsolicited = self.bus.unsolicited, 0
+        self._events.append(
+            Exchanged(
+                at=outcome.ended,
+                asked=outcome.asked,
+                began=outcome.began,
+                gap=outcome.gap,
+                slave=outcome.request.slave,
+                errand=self._errand,
+                fault=None if outcome.fault is None else outcome.fault.code,
+                sent=outcome.sent,
+                heard=outcome.heard,
+                unsolicited=outcome.unsolicited + stray,
+                late=len(outcome.late),
+            )
+        )
+        self._events += readings
+
+    def _port_changed(self, changed: PortChanged) -> None:
+        self._events.append(changed)
+        if changed.fault is None:
+            self._known_lost = False
+            self.schedule.port_opened(changed.at)
+        elif not self._known_lost:
+            self._known_lost = True
+            self._events += self.schedule.port_lost(changed.fault, changed.at)
+
+    def _count(self, now: float) -> None:
+        """Read the driver's counters now and then."""
+        if now < self._count_at:
+            return
+        self._count_at = now + COUNTERS_EVERY
+        counters = self.bus.counters()
+        if counters is None:
+            return
+        first = self._first_counters = self._first_counters or counters
+        since = UartCounters(
+            counters.framing - first.framing,
+            counters.parity - first.parity,
+            counters.overrun - first.overrun,
+            counters.breaks - first.breaks,
+        )
+        self._events.append(UartCounted(now, since))

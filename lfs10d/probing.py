@@ -1,0 +1,79 @@
+"""Which offline device is probed next, and when.
+
+An offline device is probed after 1 s, 2 s, 4 s ... up to `probe_interval_max`. All probes together take at most 5 % of
+the line while any device answers. While none does they have the line in turn, each at most once a second; the first
+answer then makes all of them due at once, share or no share: after a power cut everybody is found in seconds.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import TYPE_CHECKING
+
+from lfs10d.roster import Device, Health
+from lfs10d.share import Share
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+PROBE_SHARE = 0.05
+"""The part of the line that all probes together may take while any device answers."""
+PROBE_CREDIT = 1.0
+"""Line time in s that probes may take ahead of their share, so that a single dead device is probed at 1, 2, 4 s."""
+PROBE_SPACING = 1.0
+"""While no device answers each is probed at most so often, in s."""
+
+
+class Probing:
+    """The offline devices of one line; `now` is the line's clock at the beginning."""
+
+    def __init__(self, now: float) -> None:
+        self._share = Share(PROBE_SHARE, credit=PROBE_CREDIT, now=now)
+        self._offline: list[Device] = []
+        self.anyone_online = False
+        self.next_at = inf
+
+    def review(self, devices: Iterable[Device], now: float) -> None:
+        """Look at all devices again, after any change of health or configuration."""
+        polled = [device for device in devices if device.spec.enabled]
+        self._offline = [device for device in polled if device.health is Health.OFFLINE]
+        answering = any(device.online for device in polled)
+        if answering and not self.anyone_online:
+            for device in self._offline:
+                device.next_probe = now
+                device.probe_exempt = True
+        self.anyone_online = answering
+        self.plan(now)
+
+    def plan(self, now: float) -> None:
+        """Find out when a probe may be next: `next_at`."""
+        ready = self._share.ready_at(now) if self.anyone_online else now
+        self.next_at = min((self._wish(device, ready) for device in self._offline), default=inf)
+
+    def stop(self) -> None:
+        """Probe nobody until the next review."""
+        self._offline = []
+        self.anyone_online = False
+        self.next_at = inf
+
+    def choose(self, now: float, excluded: frozenset[int]) -> Device | None:
+        """Return the device to probe now, if any."""
+        if now < self.next_at:
+            return None
+        ready = self._share.ready_at(now) if self.anyone_online else now
+        waiting = [d for d in self._offline if not d.polling and d.slave not in excluded]
+        device = min(waiting, key=lambda d: self._wish(d, ready), default=None)
+        if device is None or self._wish(device, ready) > now:
+            self.next_at = now + PROBE_SPACING if device is None else self._wish(device, ready)
+            return None
+        return device
+
+    def spend(self, device: Device, taken: float, now: float) -> None:
+        """Note that a probe of `device` took `taken` s of the line."""
+        if self.anyone_online and not device.probe_exempt:
+            self._share.spend(taken, now)
+
+    def _wish(self, device: Device, ready: float) -> float:
+        if not self.anyone_online:
+            return max(device.last_asked + PROBE_SPACING, ready)
+        return device.next_probe if device.probe_exempt else max(device.next_probe, ready)
