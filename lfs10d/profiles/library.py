@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from functools import cache
 from importlib import resources
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import yaml
 from pydantic import ValidationError
 
+from lfs10d import document
 from lfs10d.errors import ConfigError, Problem
+from lfs10d.kinds import quoted
 from lfs10d.profiles.schema import Profile
 
 if TYPE_CHECKING:
@@ -17,9 +18,6 @@ if TYPE_CHECKING:
 
 BUILTIN_NAMES = ("lfs10", "ld-e", "fuling-dzb", "eh600")
 """The profiles that come with lfs10d, the first being a slave's default."""
-
-LARGEST_FILE = 256 * 1024
-"""Bytes; a profile has a few thousand."""
 
 
 def builtin_names() -> tuple[str, ...]:
@@ -48,30 +46,23 @@ def _load_builtin(name: str) -> Profile:
 def _read(path: Path, wanted: str) -> str:
     try:
         with path.open("rb") as file:
-            content = file.read(LARGEST_FILE + 1)
-    except OSError as error:
-        reason = error.strerror or str(error)
+            content = file.read(document.LARGEST_FILE + 1)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "is no path"
         known = ", ".join(BUILTIN_NAMES)
-        message = f"profile {wanted!r}: {reason}; a profile is one of {known}, or the path of a YAML file"
-        raise ConfigError((Problem(str(path), 1, 1, "", message),)) from error
-    if len(content) > LARGEST_FILE:
-        raise ConfigError((Problem(str(path), 1, 1, "", "more than 256 KiB: this is no profile"),))
-    try:
-        return content.decode("utf-8")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise ConfigError((Problem(str(path), line, 1, "", "is no UTF-8 text"),)) from error
+        message = f"profile {quoted(wanted)}: {reason}; write {known}, or the path of a profile's YAML file"
+        raise ConfigError((Problem(str(path), 1, 1, "", message),)) from None
+    return document.decode(content, str(path))
 
 
 def parse_profile(text: str, file: str) -> Profile:
     """Return the profile that a YAML text describes; `file` is its name in problems. Raises ConfigError."""
-    data: Any = yaml.safe_load(text)
+    source = document.parse(text, file)
     try:
-        return Profile.model_validate(data)
+        profile = Profile.model_validate(source.data)
     except ValidationError as error:
-        raise ConfigError(
-            tuple(
-                Problem(file, 1, 1, ".".join(map(str, wrong["loc"])), wrong["msg"])
-                for wrong in error.errors()
-            )
-        ) from error
+        problems = source.problems + source.problems_of(error, Profile)
+        raise ConfigError(tuple(sorted(problems))) from None
+    if source.problems:
+        raise ConfigError(source.problems)
+    return profile

@@ -175,9 +175,7 @@ class Cell:
         return Fault(FaultCode.NOT_FINITE, f"{self.name} is {what}: 0x{bits:08X}")
 
     def _subnormal(self, bits: int) -> Fault:
-        message = (
-            f"{self.name} is a subnormal number, 0x{bits:08X}: no measurement, or another type or word order"
-        )
+        message = f"{self.name} is a subnormal number, 0x{bits:08X}: no measurement, or another type or word order"
         return Fault(FaultCode.OUT_OF_RANGE, message)
 
     def _outside(self, number: Number) -> Fault:

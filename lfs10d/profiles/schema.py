@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_validator
 
+from lfs10d.kinds import Duration, Name, Whole
 from lfs10d.profiles.blocks import Block, batch
 from lfs10d.profiles.values import (
     Fact,
     Facts,
     Place,
-    ProfileName,
     ReadFunction,
     Register,
     Registered,
+    Sentence,
     Setting,
-    Text,
     Value,
     refuse,
 )
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 FramingName: TypeAlias = Literal["rtu", "ascii"]
 ChecksumName: TypeAlias = Literal["crc", "sum"]
-SlaveId: TypeAlias = Annotated[int, Field(ge=1, le=255)]
+SlaveId: TypeAlias = Annotated[int, Whole(1, 255)]
 Rate: TypeAlias = Literal[1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200]
 
 MOST_WORDS = 125
@@ -47,27 +47,44 @@ class Barrier(Registered):
     """A read whose answer has another shape than any poll's, so that a late answer cannot pass for it."""
 
     function: ReadFunction = 3
-    count: Annotated[int, Field(ge=1, le=MOST_WORDS)]
+    count: Annotated[int, Whole(1, MOST_WORDS)]
 
 
 class IdRegister(Registered):
     """Where the slave id is set; `locked_by` is what overrules it (`DIP switch`)."""
 
-    locked_by: Text | None = None
+    locked_by: Sentence | None = None
+
+
+class RateCode(Facts):
+    """The content of the rate register that stands for a baud rate."""
+
+    baudrate: Rate
+    code: Register
 
 
 class RateRegister(Registered):
-    """Where the baud rate is set: `codes` gives the register's content for each rate."""
+    """Where the baud rate is set, and the register's content for each rate."""
 
-    codes: dict[Rate, Register]
-    locked_by: Text | None = None
+    rates: Annotated[tuple[RateCode, ...], Field(strict=False, min_length=1)]
+    locked_by: Sentence | None = None
 
-    @field_validator("codes", mode="after")
+    @field_validator("rates", mode="after")
     @classmethod
-    def _distinct(cls, codes: dict[int, int]) -> dict[int, int]:
-        if len(codes) == 0 or len(set(codes.values())) < len(codes):
-            refuse([((), "must give at least one rate a code, and no two rates the same")])
-        return codes
+    def _distinct(cls, rates: tuple[RateCode, ...]) -> tuple[RateCode, ...]:
+        problems: list[tuple[Place, str]] = []
+        for key in ("baudrate", "code"):
+            numbers = [getattr(rate, key) for rate in rates]
+            for index, number in enumerate(numbers):
+                if number in numbers[:index]:
+                    problems.append(((index, key), f"{number} is given twice"))
+        refuse(problems)
+        return rates
+
+    @property
+    def codes(self) -> dict[int, int]:
+        """The code of each baud rate."""
+        return {rate.baudrate: rate.code for rate in self.rates}
 
 
 class Factory(Fact):
@@ -107,25 +124,25 @@ class Profile(Facts):
     `busy_exceptions` are asked again later. `provenance` tells where a plain key's fact comes from.
     """
 
-    name: ProfileName
-    title: Text
-    sources: Annotated[tuple[Text, ...], Field(strict=False)] = ()
+    name: Annotated[str, Name()]
+    title: Sentence
+    sources: Annotated[tuple[Sentence, ...], Field(strict=False)] = ()
     ids: Annotated[tuple[SlaveId, SlaveId], Field(strict=False), AfterValidator(_ids)] = (1, 247)
     broadcast: bool = False
     framings: Annotated[tuple[FramingName, ...], Field(strict=False), AfterValidator(_unique)] = ("rtu",)
     checksums: Annotated[tuple[ChecksumName, ...], Field(strict=False), AfterValidator(_unique)] = ("crc",)
-    max_words: Annotated[int, Field(ge=1, le=MOST_WORDS)] = MOST_WORDS
-    ascii_max_data: Annotated[int, Field(ge=3, le=252)] | None = None
-    min_interval: Annotated[float, Field(ge=0, le=86400)] = 0.0
-    busy_exceptions: Annotated[tuple[Annotated[int, Field(ge=1, le=255)], ...], Field(strict=False)] = (6,)
+    max_words: Annotated[int, Whole(1, MOST_WORDS)] = MOST_WORDS
+    ascii_max_data: Annotated[int, Whole(3, 252)] | None = None
+    min_interval: Annotated[float, Duration(0, 86400)] = 0.0
+    busy_exceptions: Annotated[tuple[Annotated[int, Whole(1, 255)], ...], Field(strict=False)] = (6,)
     factory: Factory | None = None
     slave_id: IdRegister | None = None
     baudrate: RateRegister | None = None
     values: Annotated[tuple[Value, ...], Field(strict=False, min_length=1)]
     settings: Annotated[tuple[Setting, ...], Field(strict=False)] = ()
     barrier: Barrier | None = None
-    provenance: dict[str, Text] = Field(default={})
-    notes: Annotated[tuple[Text, ...], Field(strict=False)] = ()
+    provenance: dict[str, Sentence] = Field(default={})
+    notes: Annotated[tuple[Sentence, ...], Field(strict=False)] = ()
 
     _blocks: tuple[Block, ...] = PrivateAttr(default=())
 
@@ -142,9 +159,7 @@ class Profile(Facts):
 
     @field_validator("baudrate", mode="after")
     @classmethod
-    def _rate_register_is_another(
-        cls, rate: RateRegister | None, info: ValidationInfo
-    ) -> RateRegister | None:
+    def _rate_register_is_another(cls, rate: RateRegister | None, info: ValidationInfo) -> RateRegister | None:
         slave_id = info.data.get("slave_id")
         if rate and slave_id and rate.register == slave_id.register:
             refuse([(("register",), "is the register of the slave id")])
@@ -166,9 +181,7 @@ class Profile(Facts):
     @classmethod
     def _settings_are_apart(cls, settings: tuple[Setting, ...], info: ValidationInfo) -> tuple[Setting, ...]:
         problems = _repeated(settings)
-        taken = {
-            fact.register: key for key in ("slave_id", "baudrate") if (fact := info.data.get(key)) is not None
-        }
+        taken = {fact.register: key for key in ("slave_id", "baudrate") if (fact := info.data.get(key)) is not None}
         for index, setting in enumerate(settings):
             if setting.register in taken:
                 message = f"is set by {taken[setting.register]}; it is no setting"

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Annotated, Literal, Self, TypeAlias
+import warnings
+from dataclasses import dataclass
+from typing import Annotated, Literal, Self, TypeAlias
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
+from lfs10d.kinds import PLAIN_ERROR, Kind, RefusedError, Text, Whole
 from lfs10d.profiles.registers import WORDS, ByteOrder, Cell, Linear, RegisterType, WordOrder, span, spell
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 Place: TypeAlias = tuple[str | int, ...]
 ReadFunction: TypeAlias = Literal[3, 4]
@@ -47,57 +47,61 @@ def refuse(problems: list[tuple[Place, str]]) -> None:
             "profile",
             [
                 InitErrorDetails(
-                    type=PydanticCustomError("profile", "{wrong}", {"wrong": message}), loc=place, input=None
+                    # As a value of the context: braces in the message are no placeholders.
+                    type=PydanticCustomError(PLAIN_ERROR, "{message}", {"message": message}),
+                    loc=place,
+                    input=None,
                 )
                 for place, message in problems
             ],
         )
 
 
-def _worded(pattern: str, wanted: str) -> Callable[[str], str]:
-    expression = re.compile(pattern)
+@dataclass(frozen=True)
+class Word(Kind):
+    """A name in snake_case that is not among the `reserved` ones."""
 
-    def check(text: str) -> str:
-        if not expression.fullmatch(text):
-            refuse([((), f"{text!r} is not {wanted}")])
-        return text
+    reserved: frozenset[str] = frozenset()
+    pattern = re.compile(r"[a-z][a-z0-9_]{0,47}")
 
-    return check
+    @property
+    def words(self) -> str:
+        """Its characters."""
+        return "a name of 1 to 48 of the characters a-z 0-9 _ that begins with a letter"
+
+    def accept(self, value: object) -> str:
+        """Take text that fits."""
+        if not isinstance(value, str) or self.pattern.fullmatch(value) is None:
+            raise self.refusal(value)
+        if value in self.reserved:
+            raise RefusedError(f"is a key of every sample already; choose another, such as raw_{value}")
+        return value
 
 
-def _value_name(text: str) -> str:
-    if text in RESERVED_NAMES:
-        refuse([((), f"{text!r} is a key of every sample; choose another name, such as 'raw_{text}'")])
-    return text
+@dataclass(frozen=True)
+class Factor(Kind):
+    """A scale: not zero, and of a size that keeps every result finite."""
+
+    @property
+    def words(self) -> str:
+        """Its range."""
+        return "a number from 1e-12 to 1e12, or the same negative"
+
+    def accept(self, value: object) -> float:
+        """Take numbers only."""
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self.refusal(value)
+        if not 1 / LARGEST_FACTOR <= abs(value) <= LARGEST_FACTOR:
+            raise self.refusal(value)
+        return float(value)
 
 
-ProfileName: TypeAlias = Annotated[
-    str, AfterValidator(_worded(r"[a-z0-9_-]{1,32}", "a name of 1 to 32 of a-z 0-9 _ -"))
-]
-FactName: TypeAlias = Annotated[
-    str,
-    AfterValidator(
-        _worded(r"[a-z][a-z0-9_]{0,47}", "a name of up to 48 of a-z 0-9 _ that begins with a letter")
-    ),
-]
-ValueName: TypeAlias = Annotated[FactName, AfterValidator(_value_name)]
-Text: TypeAlias = Annotated[
-    str, AfterValidator(_worded(r"[^\x00-\x1f\x7f-\x9f]{1,500}", "one line of 1 to 500 characters"))
-]
-Unit: TypeAlias = Annotated[
-    str,
-    AfterValidator(
-        _worded(r"\S{1,16}", "a unit of 1 to 16 characters without space ('1' for a bare number)")
-    ),
-]
-Register: TypeAlias = Annotated[int, Field(ge=0, le=0xFFFF)]
+Sentence: TypeAlias = Annotated[str, Text(500)]
+UnitText: TypeAlias = Annotated[str, Text(16, what="a unit ('1' for a bare number)")]
+Register: TypeAlias = Annotated[int, Whole(0, 0xFFFF)]
+Scale: TypeAlias = Annotated[float, Factor()]
+Offset: TypeAlias = Annotated[float, Field(ge=-LARGEST_FACTOR, le=LARGEST_FACTOR)]
 Range: TypeAlias = Annotated[tuple[float, float], Field(strict=False)]
-
-
-def _factor(number: float) -> float:
-    if not 1 / LARGEST_FACTOR <= abs(number) <= LARGEST_FACTOR:
-        refuse([((), f"{number!r} is no scale; it is 1e-12 to 1e12, or the same negative")])
-    return number
 
 
 class Facts(BaseModel):
@@ -109,23 +113,19 @@ class Facts(BaseModel):
 class Fact(Facts):
     """Something the maker states: `source` is where, `unverified` that nobody has seen it on hardware."""
 
-    source: Text | None = None
+    source: Sentence | None = None
     unverified: bool = False
-    notes: Text | None = None
+    notes: Sentence | None = None
 
 
-class Registered(Fact):
-    """A fact about one place: key `register`, the address on the wire, 0..0xFFFF.
+with warnings.catch_warnings():
+    # pydantic warns because its metaclass, an ABCMeta, has a method of that name; no instance ever sees it.
+    warnings.filterwarnings("ignore", 'Field name "register"', UserWarning)
 
-    pydantic's metaclass has a method `register`, so the field itself cannot bear that name.
-    """
+    class Registered(Fact):
+        """A fact about one place: `register` is the (first) register's address on the wire."""
 
-    address: Register = Field(alias="register")
-
-    @property
-    def register(self) -> int:
-        """The (first) register's address on the wire."""
-        return self.address
+        register: Register
 
 
 def _ordered(bounds: Range | None) -> list[tuple[Place, str]]:
@@ -141,28 +141,28 @@ class Value(Registered):
     `precision` (decimals) and `device_class` (Home Assistant's word) are for displays and change no value.
     """
 
-    name: ValueName
+    name: Annotated[str, Word(RESERVED_NAMES)]
     function: ReadFunction = 3
     type: RegisterType
     word_order: WordOrder | None = None
     byte_order: ByteOrder = "big"
-    scale: Annotated[float, AfterValidator(_factor)] = 1.0
-    offset: Annotated[float, Field(ge=-LARGEST_FACTOR, le=LARGEST_FACTOR)] = 0.0
-    unit: Unit
+    scale: Scale = 1.0
+    offset: Offset = 0.0
+    unit: UnitText
     range: Range | None = None
-    precision: Annotated[int, Field(ge=0, le=9)] | None = None
-    device_class: FactName | None = None
+    precision: Annotated[int, Whole(0, 9)] | None = None
+    device_class: Annotated[str, Word()] | None = None
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
         problems = _ordered(self.range)
         if self.words == 1 and self.word_order is not None:
-            problems.append((("word_order",), f"an {self.type} fills one register and has no word order"))
+            problems.append((("word_order",), f"{self.type} fills one register; leave the word order out"))
         if self.words > 1 and self.word_order is None:
-            wanted = "which register holds the high half? word_order: high_first or low_first"
-            problems.append((("word_order",), f"missing; {wanted}"))
+            wanted = "high_first or low_first: which of the two registers holds the high half"
+            problems.append((("word_order",), f"is missing; write {wanted}"))
         if self.end > 0x1_0000:  # noqa: PLR2004 - register addresses have 16 bits
-            problems.append((("register",), f"a {self.type} at 0xFFFF would end beyond the last register"))
+            problems.append((("register",), f"{self.type} fills two registers; 0xFFFF is the last"))
         refuse(problems)
         return self
 
@@ -195,15 +195,15 @@ class Value(Registered):
 class Setting(Registered):
     """A register that configures the device; written by request only, and only if marked `writable`.
 
-    `range` is in `unit`, after `scale`; `values` names each register content that is allowed.
+    `range` is in `unit`, after `scale`; `values` gives each register content that is allowed a name.
     """
 
-    name: FactName
+    name: Annotated[str, Word()]
     type: Literal["int16", "uint16"] = "uint16"
-    scale: Annotated[float, AfterValidator(_factor)] = 1.0
-    unit: Unit = "1"
+    scale: Scale = 1.0
+    unit: UnitText = "1"
     range: Range | None = None
-    values: dict[Register, Text] | None = None
+    values: dict[str, Register] | None = None
     writable: bool = False
 
     @model_validator(mode="after")
@@ -222,13 +222,13 @@ class Setting(Registered):
         """Return why the register content `word` (0..65535) must not be written; None if it may be."""
         if not self.writable:
             return f"{self.name} is not marked writable by the profile"
-        if self.values is not None:
-            allowed = ", ".join(f"{code} ({meaning})" for code, meaning in self.values.items())
-            return None if word in self.values else f"{self.name} takes {allowed}, not {word}"
-        signed = word - (word >> 15 << 16) if self.type == "int16" else word
-        low, high = self.range or (0.0, 0.0)
-        number = Linear.of(self.scale, 0).of_integer(signed)
-        if low <= number <= high:
-            return None
-        content = f"register content {word} is {spell(number, self.unit)}"
-        return f"{self.name} takes {span(low, high, self.unit)}; {content}"
+        if self.values is not None and word not in self.values.values():
+            allowed = ", ".join(f"{code} ({meaning})" for meaning, code in self.values.items())
+            return f"{self.name} takes {allowed}, not {word}"
+        if self.range is not None:
+            low, high = self.range
+            number = Linear.of(self.scale, 0).of_integer(word - (word >> 15 << 16) if self.type == "int16" else word)
+            if not low <= number <= high:
+                content = f"register content {word} is {spell(number, self.unit)}"
+                return f"{self.name} takes {span(low, high, self.unit)}; {content}"
+        return None
