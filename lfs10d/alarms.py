@@ -1,0 +1,176 @@
+"""Rise and clear of errors.
+
+Rules
+-----
+1. A device's error rises after `rise_after` failed polls in a row, whatever their codes; `config_conflict`,
+   a fact and no accident of the line, rises at once.
+2. While it is active a failed poll with another code changes it: the newest code is shown, the run's others
+   are listed in `also`.
+3. One good poll ends the run and clears the error. So does what masks it: a lost port, or disabling.
+   Afterwards it rises by rule 1 again.
+4. An error of the line rises at once. Of several the one that explains the others is shown.
+
+Each change says whether the error object must be published. Times are epoch milliseconds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from lfs10d.reading import PORT_CODES, Fault, FaultCode
+from lfs10d.telemetry import VERSION
+
+HEARD_LIMIT = 32
+"""So many of the last bytes heard are shown."""
+
+AT_ONCE = frozenset({FaultCode.CONFIG_CONFLICT})
+
+PRECEDENCE = (
+    FaultCode.PORT_LOST,
+    FaultCode.PORT_BUSY,
+    FaultCode.DUPLICATE_CLIENT,
+    FaultCode.STORAGE_FULL,
+)
+"""Errors of the line; what comes first is shown while several are active."""
+
+
+@dataclass(slots=True)
+class _Run:
+    """Failures in a row: the newest fault, all codes in order of appearance."""
+
+    fault: Fault
+    since: int
+    last: int
+    count: int = 1
+    codes: dict[FaultCode, None] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.codes[self.fault.code] = None
+
+    def again(self, fault: Fault, ts: int) -> None:
+        self.fault = fault
+        self.last = ts
+        self.count += 1
+        self.codes[fault.code] = None
+
+    def payload(self, also: list[str]) -> dict[str, object]:
+        return {
+            "v": VERSION,
+            "active": True,
+            "code": self.fault.code.value,
+            "also": also,
+            "message": self.fault.message,
+            "exception_code": self.fault.exception_code,
+            "heard": self.fault.heard[-HEARD_LIMIT:].hex(" ").upper(),
+            "since": self.since,
+            "last": self.last,
+            "count": self.count,
+        }
+
+
+def _inactive(last_code: FaultCode | None, cleared: int | None) -> dict[str, object]:
+    return {
+        "v": VERSION,
+        "active": False,
+        "code": None,
+        "last_code": None if last_code is None else last_code.value,
+        "cleared": cleared,
+    }
+
+
+class DeviceAlarm:
+    """The error of one device; `rise_after` may be changed at any time and holds from the next failure on."""
+
+    __slots__ = ("_cleared", "_last_code", "_run", "active", "rise_after")
+
+    def __init__(self, rise_after: int) -> None:
+        self.rise_after = rise_after
+        self.active = False
+        self._run: _Run | None = None
+        self._last_code: FaultCode | None = None
+        self._cleared: int | None = None
+
+    def failed(self, fault: Fault, ts: int) -> bool:
+        """Count one failed poll; return whether the error rose or changed its code."""
+        run = self._run
+        if run is None:
+            run = self._run = _Run(fault, ts, ts)
+            changed = False
+        else:
+            changed = fault.code != run.fault.code
+            run.again(fault, ts)
+        if self.active:
+            return changed
+        self.active = run.count >= self.rise_after or fault.code in AT_ONCE
+        return self.active
+
+    def ended(self, ts: int) -> bool:
+        """End the run, for a good poll or a mask; return whether an error was cleared."""
+        run, self._run = self._run, None
+        if run is None or not self.active:
+            return False
+        self.active = False
+        self._last_code = run.fault.code
+        self._cleared = ts
+        return True
+
+    def payload(self) -> dict[str, object]:
+        """Return the error object."""
+        run = self._run
+        if run is None or not self.active:
+            return _inactive(self._last_code, self._cleared)
+        return run.payload([code.value for code in run.codes if code != run.fault.code])
+
+
+class LineAlarm:
+    """The error of the line: the foremost of those that hold now."""
+
+    __slots__ = ("_cleared", "_last_code", "_runs")
+
+    def __init__(self) -> None:
+        self._runs: dict[FaultCode, _Run] = {}
+        self._last_code: FaultCode | None = None
+        self._cleared: int | None = None
+
+    @property
+    def _shown(self) -> _Run | None:
+        return next((self._runs[code] for code in PRECEDENCE if code in self._runs), None)
+
+    def failed(self, fault: Fault, ts: int) -> bool:
+        """Raise an error, or count it once more; return whether what is shown changed.
+
+        `fault.code` is one of PRECEDENCE. The port has one fault at a time.
+        """
+        before = self._face()
+        if fault.code in PORT_CODES:
+            for code in PORT_CODES - {fault.code}:
+                self._runs.pop(code, None)
+        run = self._runs.get(fault.code)
+        if run is None:
+            self._runs[fault.code] = _Run(fault, ts, ts)
+        else:
+            run.again(fault, ts)
+        return self._face() != before
+
+    def ended(self, codes: frozenset[FaultCode], ts: int) -> bool:
+        """Clear those of `codes` that hold; return whether what is shown changed."""
+        shown = self._shown
+        for code in codes:
+            self._runs.pop(code, None)
+        if shown is self._shown or shown is None:
+            return False
+        self._last_code = shown.fault.code
+        self._cleared = ts
+        return True
+
+    def payload(self) -> dict[str, object]:
+        """Return the error object; `also` lists what else holds."""
+        shown = self._shown
+        if shown is None:
+            return _inactive(self._last_code, self._cleared)
+        others = [code.value for code in PRECEDENCE if code in self._runs and code != shown.fault.code]
+        return shown.payload(others)
+
+    def _face(self) -> tuple[FaultCode, str] | None:
+        shown = self._shown
+        return None if shown is None else (shown.fault.code, shown.fault.message)

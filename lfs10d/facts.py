@@ -1,0 +1,124 @@
+"""What the station is told about the daemon, the line and the devices, and one moment on both clocks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from lfs10d.telemetry import VERSION
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from lfs10d.telemetry import Clock
+
+
+@dataclass(frozen=True, slots=True)
+class Instant:
+    """One moment: `mono` in s of the line thread's clock, `wall` in s since the epoch, how far to trust it."""
+
+    mono: float
+    wall: float
+    clock: Clock
+
+    def ts(self, at: float | None = None) -> int:
+        """Return epoch milliseconds of this moment, or of the monotonic time `at` as seen from it."""
+        return round((self.wall if at is None else self.wall - self.mono + at) * 1000)
+
+
+@dataclass(frozen=True, slots=True)
+class DaemonFacts:
+    """What `info` says; `boot` stays the same for one life of the daemon, `mqtt` is any JSON object."""
+
+    version: str
+    host: str
+    boot: str
+    previous_boot: str | None
+    config_hash: str
+    changes: int = 0
+    mqtt: Mapping[str, object] = field(default_factory=dict)
+    features: tuple[str, ...] = ()
+
+    def payload(self, *, started: int, clock: Clock) -> dict[str, object]:
+        """Return the object for `info`; `started` is epoch milliseconds."""
+        return {
+            "v": VERSION,
+            "version": self.version,
+            "host": self.host,
+            "boot": self.boot,
+            "previous_boot": self.previous_boot,
+            "started": started,
+            "config_hash": self.config_hash,
+            "changes": self.changes,
+            "mqtt": dict(self.mqtt),
+            "features": list(self.features),
+            "clock": clock,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class LineFacts:
+    """The line as configured; `gap_required` in s is the silence kept before every request."""
+
+    name: str
+    port: str
+    baudrate: int
+    parity: str
+    databits: int
+    stopbits: int
+    framing: str
+    gap_required: float
+
+    def payload(self, *, is_open: bool, activity: str, requests: str) -> dict[str, object]:
+        """Return the object for `line/state`."""
+        return {
+            "v": VERSION,
+            "port": self.port,
+            "baudrate": self.baudrate,
+            "parity": self.parity,
+            "databits": self.databits,
+            "stopbits": self.stopbits,
+            "framing": self.framing,
+            "open": is_open,
+            "activity": activity,
+            "requests": requests,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceFacts:
+    """A device as configured; `interval` and `response_timeout` in s, the latter None where it is learned."""
+
+    name: str
+    slave: int
+    label: str | None
+    profile: str
+    interval: float
+    enabled: bool
+    response_timeout: float | None
+    value_names: tuple[str, ...]
+    units: Mapping[str, str]
+    offline_after: int
+
+    def entry(self) -> dict[str, object]:
+        """Return the device's place in the array `devices`."""
+        return {
+            "name": self.name,
+            "id": self.slave,
+            "label": self.label,
+            "profile": self.profile,
+            "enabled": self.enabled,
+            "interval": self.interval,
+        }
+
+    def payload(self) -> dict[str, object]:
+        """Return the object for `device/<name>/config`; a learned time-out is `auto`, as in the YAML."""
+        return {
+            "v": VERSION,
+            "slave": self.slave,
+            "label": self.label,
+            "profile": self.profile,
+            "interval": self.interval,
+            "enabled": self.enabled,
+            "response_timeout": "auto" if self.response_timeout is None else self.response_timeout,
+        }

@@ -1,0 +1,223 @@
+"""What is said about one device: its samples, state, availability, error and statistics.
+
+Rules
+-----
+1. Every reading is one sample, numbered from 1 without gaps; `seq` goes on even when the device is removed and
+   added again.
+2. A number is published only with a good reading, and availability is `online` while one is shown: it goes
+   before a good state and after a bad one.
+3. The state shows the newest sample at most once a second, but a change of quality or error at once.
+4. A disabled device has one sample that says so, and then none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Final
+
+from lfs10d.alarms import DeviceAlarm
+from lfs10d.reading import PORT_CODES, FaultCode, Reading
+from lfs10d.tally import DeviceTally
+from lfs10d.telemetry import (
+    AVAILABILITY,
+    CONFIG,
+    ERROR,
+    STATE,
+    STATS,
+    TELEMETRY,
+    WIND,
+    Kind,
+    Publication,
+    Sample,
+    device_topic,
+    retained,
+)
+
+if TYPE_CHECKING:
+    from lfs10d.facts import DeviceFacts, Instant
+
+STATE_EVERY: Final = 1.0
+"""s between two states of the same quality and error."""
+
+STATE_EARLY: Final = 0.02
+"""So many s a state may come before its time (the next one then waits as much longer): a device polled every
+second would else miss its turn by the jitter of its polls and be shown late each time."""
+
+
+class Standing:
+    """One device as the broker knows it; `seq` is its last number used in this boot (0: none)."""
+
+    __slots__ = (
+        "_alarm",
+        "_boot",
+        "_last_good",
+        "_line",
+        "_payload",
+        "_sample",
+        "_state_from",
+        "_telemetry",
+        "_topics",
+        "facts",
+        "online",
+        "seq",
+        "state_due",
+        "tally",
+    )
+
+    def __init__(self, facts: DeviceFacts, *, line: str, boot: str, seq: int, now: Instant) -> None:
+        self.facts = facts
+        self.seq = seq
+        self.online = False
+        self.state_due: float | None = None
+        """Monotonic time at which a newer state than the one shown may be published; None: none waits."""
+        self._line = line
+        self._boot = boot
+        self._topics = {leaf: device_topic(facts.name, leaf) for leaf in (STATE, AVAILABILITY, ERROR, STATS)}
+        self._telemetry = device_topic(facts.name, TELEMETRY)
+        self._alarm = DeviceAlarm(facts.offline_after)
+        self.tally = DeviceTally(facts.response_timeout)
+        self._last_good: float | None = None
+        self._state_from = now.mono
+        self._sample = self._form(0, now.ts(), now)
+        self._payload = self._sample.payload(line)
+
+    def read(self, reading: Reading, now: Instant, *, masked: bool) -> list[Publication]:
+        """Take one reading; return what it makes known. `tally` has counted it already.
+
+        `masked`: the port is lost, so that failures say nothing about the device.
+        """
+        fault = reading.fault
+        ts = now.ts(reading.at)
+        if fault is None:
+            self._last_good = reading.at
+            changed = self._alarm.ended(ts)
+        elif masked or fault.code in PORT_CODES:
+            changed = self._alarm.ended(ts)
+        else:
+            changed = not fault.busy and self._alarm.failed(fault, ts)
+        self.seq += 1
+        sample = self._form(self.seq, ts, now, reading)
+        published = self._show(sample, now, online=reading.online or fault is None)
+        if changed:
+            published.append(self._error())
+        return published
+
+    def disable(self, now: Instant) -> list[Publication]:
+        """Publish the one sample of a device that is no longer polled; its error becomes inactive."""
+        self.seq += 1
+        sample = replace(self._form(self.seq, now.ts(), now), error=FaultCode.DISABLED.value)
+        return self._show(sample, now, online=False) + self.mask(now)
+
+    def mask(self, now: Instant) -> list[Publication]:
+        """Take the device's own error back: what ails it is not the device."""
+        return [self._error()] if self._alarm.ended(now.ts()) else []
+
+    def reconfigure(self, facts: DeviceFacts, now: Instant) -> list[Publication]:
+        """Take new facts about the same device on the same profile; return what changed."""
+        before, self.facts = self.facts, facts
+        self._alarm.rise_after = facts.offline_after
+        published = [self._config()] if facts.payload() != before.payload() else []
+        if before.enabled and not facts.enabled:
+            published += self.disable(now)
+        return published
+
+    def due_state(self, now: Instant) -> Publication | None:
+        """Return the state that waited, if its time has come."""
+        if self.state_due is None or self.state_due > now.mono:
+            return None
+        return self._state(now)
+
+    def burst(self, now: Instant) -> list[Publication]:
+        """Return every retained topic of this device."""
+        return [
+            self._state(now),
+            self._config(),
+            self._availability(),
+            self._error(),
+            self.stats(now),
+        ]
+
+    def stats(self, now: Instant) -> Publication:
+        """Return the statistics."""
+        return retained(self._topics[STATS], self.tally.payload(now.ts()), qos=0)
+
+    def snapshot(self, now: Instant) -> dict[str, object]:
+        """Return what a live view shows of this device; `age_s` is the age of the last good reading."""
+        facts, sample, last_good = self.facts, self._sample, self._last_good
+        return {
+            "name": facts.name,
+            "slave": facts.slave,
+            "label": facts.label,
+            "profile": facts.profile,
+            "enabled": facts.enabled,
+            "interval": facts.interval,
+            "online": self.online,
+            "seq": sample.seq,
+            "ts": sample.ts,
+            "values": dict.fromkeys(sample.names) if sample.values is None else dict(sample.values),
+            "units": dict(sample.units),
+            "quality": sample.quality,
+            "error": sample.error,
+            "rtt_ms": sample.rtt_ms,
+            "age_s": None if last_good is None else round(max(0.0, now.mono - last_good), 1),
+            "alarm": self._alarm.payload(),
+        }
+
+    def _form(self, seq: int, ts: int, now: Instant, reading: Reading | None = None) -> Sample:
+        """Return the sample of a reading, or of none: bad, and nobody's fault."""
+        values = fault = rtt = None
+        if reading is not None:
+            values, fault, rtt = reading.values, reading.fault, reading.rtt
+        return Sample(
+            device=self.facts.name,
+            boot=self._boot,
+            seq=seq,
+            ts=ts,
+            clock=now.clock,
+            values=values,
+            units=self.facts.units,
+            names=self.facts.value_names,
+            quality="bad" if values is None else "good",
+            error=None if fault is None else fault.code.value,
+            rtt_ms=None if values is None or rtt is None else round(rtt * 1000, 1),
+        )
+
+    def _show(self, sample: Sample, now: Instant, *, online: bool) -> list[Publication]:
+        """Publish a sample, and the state and availability as far as they change by it."""
+        shown = self._sample
+        self._sample = sample
+        self._payload = payload = sample.payload(self._line)
+        published = [Publication(self._telemetry, payload, Kind.SAMPLE, retain=False, qos=1, sample=sample)]
+        turned, self.online = online is not self.online, online
+        if turned and online:
+            published.append(self._availability())
+        if sample.error != shown.error or sample.quality != shown.quality or now.mono >= self._state_from - STATE_EARLY:
+            published.append(self._state(now))
+        else:
+            self.state_due = self._state_from
+        if turned and not online:
+            published.append(self._availability())
+        return published
+
+    def _state(self, now: Instant) -> Publication:
+        """Return the newest state, which is then shown."""
+        turn = min(max(self._state_from, now.mono - STATE_EARLY), now.mono + STATE_EARLY)
+        self._state_from = turn + STATE_EVERY
+        self.state_due = None
+        return retained(self._topics[STATE], self._payload)
+
+    def _availability(self) -> Publication:
+        return retained(self._topics[AVAILABILITY], "online" if self.online else "offline")
+
+    def _error(self) -> Publication:
+        return retained(self._topics[ERROR], self._alarm.payload())
+
+    def _config(self) -> Publication:
+        return retained(device_topic(self.facts.name, CONFIG), self.facts.payload())
+
+
+RETAINED_LEAVES: Final = (STATE, CONFIG, AVAILABILITY, ERROR, STATS)
+"""What every device has."""
+
+CLEARED_LEAVES: Final = (*RETAINED_LEAVES, WIND)
+"""What is cleared of a device that is gone."""
