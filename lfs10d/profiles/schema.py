@@ -7,7 +7,7 @@ plausible wrong number.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, get_args
 
 from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_validator
 
@@ -46,52 +46,51 @@ BYTE_COUNT = 1
 class Barrier(Registered):
     """A read whose answer has another shape than any poll's, so that a late answer cannot pass for it."""
 
-    function: ReadFunction = 3
-    count: Annotated[int, Whole(1, MOST_WORDS)]
+    function: ReadFunction = Field(3, description="3 reads holding registers, 4 input registers.")
+    count: Annotated[int, Whole(1, MOST_WORDS)] = Field(description="Registers that it asks for.")
 
 
 class IdRegister(Registered):
     """Where the slave id is set; `locked_by` is what overrules it (`DIP switch`)."""
 
-    locked_by: Sentence | None = None
-
-
-class RateCode(Facts):
-    """The content of the rate register that stands for a baud rate."""
-
-    baudrate: Rate
-    code: Register
+    locked_by: Sentence | None = Field(None, description="What overrules it, such as a DIP switch.")
 
 
 class RateRegister(Registered):
-    """Where the baud rate is set, and the register's content for each rate."""
+    """Where the baud rate is set."""
 
-    rates: Annotated[tuple[RateCode, ...], Field(strict=False, min_length=1)]
-    locked_by: Sentence | None = None
+    codes: dict[int, Register] = Field(description="The register's content for each rate: {9600: 1, 19200: 2}.")
+    locked_by: Sentence | None = Field(None, description="What overrules it, such as a DIP switch.")
 
-    @field_validator("rates", mode="after")
+    @field_validator("codes", mode="before")
     @classmethod
-    def _distinct(cls, rates: tuple[RateCode, ...]) -> tuple[RateCode, ...]:
-        problems: list[tuple[Place, str]] = []
-        for key in ("baudrate", "code"):
-            numbers = [getattr(rate, key) for rate in rates]
-            for index, number in enumerate(numbers):
-                if number in numbers[:index]:
-                    problems.append(((index, key), f"{number} is given twice"))
-        refuse(problems)
-        return rates
+    def _are_of_rates(cls, codes: object) -> object:
+        rates: tuple[int, ...] = get_args(Rate)
+        wanted = " ".join(map(str, rates))
+        keys = codes if isinstance(codes, dict) else {}
+        refuse([((key,), f"is no baud rate; write one of {wanted}") for key in keys if key not in rates])
+        return codes
 
-    @property
-    def codes(self) -> dict[int, int]:
-        """The code of each baud rate."""
-        return {rate.baudrate: rate.code for rate in self.rates}
+    @field_validator("codes", mode="after")
+    @classmethod
+    def _differ(cls, codes: dict[int, int]) -> dict[int, int]:
+        problems: list[tuple[Place, str]] = []
+        if not codes:
+            problems.append(((), "names no rate"))
+        rates: dict[int, int] = {}
+        for rate, code in codes.items():
+            first = rates.setdefault(code, rate)
+            if first != rate:
+                problems.append(((rate,), f"{code} is the code of {first} already"))
+        refuse(problems)
+        return codes
 
 
 class Factory(Fact):
     """How a new device comes: its slave id and baud rate."""
 
-    id: SlaveId
-    baudrate: Rate
+    id: SlaveId = Field(description="Its slave id.")
+    baudrate: Rate = Field(description="Its baud rate.")
 
 
 def _ids(ids: tuple[int, int]) -> tuple[int, int]:
@@ -124,25 +123,41 @@ class Profile(Facts):
     `busy_exceptions` are asked again later. `provenance` tells where a plain key's fact comes from.
     """
 
-    name: Annotated[str, Name()]
-    title: Sentence
-    sources: Annotated[tuple[Sentence, ...], Field(strict=False)] = ()
-    ids: Annotated[tuple[SlaveId, SlaveId], Field(strict=False), AfterValidator(_ids)] = (1, 247)
-    broadcast: bool = False
-    framings: Annotated[tuple[FramingName, ...], Field(strict=False), AfterValidator(_unique)] = ("rtu",)
-    checksums: Annotated[tuple[ChecksumName, ...], Field(strict=False), AfterValidator(_unique)] = ("crc",)
-    max_words: Annotated[int, Whole(1, MOST_WORDS)] = MOST_WORDS
-    ascii_max_data: Annotated[int, Whole(3, 252)] | None = None
-    min_interval: Annotated[float, Duration(0, 86400)] = 0.0
-    busy_exceptions: Annotated[tuple[Annotated[int, Whole(1, 255)], ...], Field(strict=False)] = (6,)
-    factory: Factory | None = None
-    slave_id: IdRegister | None = None
-    baudrate: RateRegister | None = None
-    values: Annotated[tuple[Value, ...], Field(strict=False, min_length=1)]
-    settings: Annotated[tuple[Setting, ...], Field(strict=False)] = ()
-    barrier: Barrier | None = None
-    provenance: dict[str, Sentence] = Field(default={})
-    notes: Annotated[tuple[Sentence, ...], Field(strict=False)] = ()
+    name: Annotated[str, Name()] = Field(description="What to call it, of a-z 0-9 _ -.")
+    title: Sentence = Field(description="What it is, for people.")
+    sources: Annotated[tuple[Sentence, ...], Field(strict=False)] = Field((), description="The maker's documents.")
+    ids: Annotated[tuple[SlaveId, SlaveId], Field(strict=False), AfterValidator(_ids)] = Field(
+        (1, 247), description="First and last slave id it can have."
+    )
+    broadcast: bool = Field(default=False, description="It obeys writes to slave 0; none is ever sent.")
+    framings: Annotated[tuple[FramingName, ...], Field(strict=False), AfterValidator(_unique)] = Field(
+        ("rtu",), description="rtu, ascii or both."
+    )
+    checksums: Annotated[tuple[ChecksumName, ...], Field(strict=False), AfterValidator(_unique)] = Field(
+        ("crc",), description="crc, sum or both; the first unless a slave's `checksum` says otherwise."
+    )
+    max_words: Annotated[int, Whole(1, MOST_WORDS)] = Field(
+        MOST_WORDS, description="Registers that one read may ask for."
+    )
+    ascii_max_data: Annotated[int, Whole(3, 252)] | None = Field(
+        None, description="Data bytes that one ascii answer may have."
+    )
+    min_interval: Annotated[float, Duration(0, 86400)] = Field(0.0, description="Shortest time between two polls.")
+    busy_exceptions: Annotated[tuple[Annotated[int, Whole(1, 255)], ...], Field(strict=False)] = Field(
+        (6,), description="Exception codes that mean: ask again later."
+    )
+    factory: Factory | None = Field(None, description="How a new one comes.")
+    slave_id: IdRegister | None = Field(None, description="Where its slave id is set.")
+    baudrate: RateRegister | None = Field(None, description="Where its baud rate is set.")
+    values: Annotated[tuple[Value, ...], Field(strict=False)] = Field(
+        description="What it measures, the most important first."
+    )
+    settings: Annotated[tuple[Setting, ...], Field(strict=False)] = Field(
+        (), description="Registers that configure it."
+    )
+    barrier: Barrier | None = Field(None, description="A read of another length than any poll's.")
+    provenance: dict[str, Sentence] = Field({}, description="Where a plain key's fact comes from, by key.")
+    notes: Annotated[tuple[Sentence, ...], Field(strict=False)] = Field((), description="What else to know.")
 
     _blocks: tuple[Block, ...] = PrivateAttr(default=())
 
@@ -169,6 +184,8 @@ class Profile(Facts):
     @classmethod
     def _values_can_be_read(cls, values: tuple[Value, ...], info: ValidationInfo) -> tuple[Value, ...]:
         problems = _repeated(values)
+        if not values:
+            problems.append(((), "names no value"))
         most = _words_per_read(info.data)
         for index, value in enumerate(values):
             if value.words > most:

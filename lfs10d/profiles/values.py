@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import re
-import warnings
 from dataclasses import dataclass
-from typing import Annotated, Literal, Self, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from lfs10d.kinds import PLAIN_ERROR, Kind, RefusedError, Text, Whole
@@ -35,6 +34,9 @@ RESERVED_NAMES = frozenset(
     | {"historical"}
 )
 """Keys of a sample; value names stand flat beside them."""
+
+LAST_REGISTER = 0xFFFF
+"""Register addresses have 16 bits (Modbus Application Protocol V1.1b3, section 4.4)."""
 
 LARGEST_FACTOR = 1e12
 """Bound of scale and offset, and of 1 / scale: every result of a 32-bit value stays finite."""
@@ -98,10 +100,18 @@ class Factor(Kind):
 
 Sentence: TypeAlias = Annotated[str, Text(500)]
 UnitText: TypeAlias = Annotated[str, Text(16, what="a unit ('1' for a bare number)")]
-Register: TypeAlias = Annotated[int, Whole(0, 0xFFFF)]
+Register: TypeAlias = Annotated[int, Whole(0, LAST_REGISTER)]
 Scale: TypeAlias = Annotated[float, Factor()]
 Offset: TypeAlias = Annotated[float, Field(ge=-LARGEST_FACTOR, le=LARGEST_FACTOR)]
-Range: TypeAlias = Annotated[tuple[float, float], Field(strict=False)]
+
+
+def _ordered(bounds: tuple[float, float]) -> tuple[float, float]:
+    if not bounds[0] < bounds[1]:
+        refuse([((), "the first number of a range must be less than the second")])
+    return bounds
+
+
+Range: TypeAlias = Annotated[tuple[float, float], Field(strict=False), AfterValidator(_ordered)]
 
 
 class Facts(BaseModel):
@@ -113,25 +123,23 @@ class Facts(BaseModel):
 class Fact(Facts):
     """Something the maker states: `source` is where, `unverified` that nobody has seen it on hardware."""
 
-    source: Sentence | None = None
-    unverified: bool = False
-    notes: Sentence | None = None
+    source: Sentence | None = Field(None, description="Where the maker says so.")
+    unverified: bool = Field(default=False, description="Nobody has seen it on hardware or in the source documents.")
+    notes: Sentence | None = Field(None, description="What else a person should know.")
 
 
-with warnings.catch_warnings():
-    # pydantic warns because its metaclass, an ABCMeta, has a method of that name; no instance ever sees it.
-    warnings.filterwarnings("ignore", 'Field name "register"', UserWarning)
+class Registered(Fact):
+    """A fact about one place; in the file its key is `register`.
 
-    class Registered(Fact):
-        """A fact about one place: `register` is the (first) register's address on the wire."""
+    pydantic's metaclass, an ABCMeta, has a method `register`: a field of that name inherits it as its default.
+    """
 
-        register: Register
+    address: Register = Field(alias="register", description="The (first) register's address on the wire, 0 to 0xFFFF.")
 
-
-def _ordered(bounds: Range | None) -> list[tuple[Place, str]]:
-    if bounds is None or bounds[0] < bounds[1]:
-        return []
-    return [(("range",), "the first number of a range must be less than the second")]
+    @property
+    def register(self) -> int:
+        """The (first) register's address on the wire."""
+        return self.address
 
 
 class Value(Registered):
@@ -141,30 +149,40 @@ class Value(Registered):
     `precision` (decimals) and `device_class` (Home Assistant's word) are for displays and change no value.
     """
 
-    name: Annotated[str, Word(RESERVED_NAMES)]
-    function: ReadFunction = 3
-    type: RegisterType
-    word_order: WordOrder | None = None
-    byte_order: ByteOrder = "big"
-    scale: Scale = 1.0
-    offset: Offset = 0.0
-    unit: UnitText
-    range: Range | None = None
-    precision: Annotated[int, Whole(0, 9)] | None = None
-    device_class: Annotated[str, Word()] | None = None
+    name: Annotated[str, Word(RESERVED_NAMES)] = Field(description="The key under which samples carry it.")
+    function: ReadFunction = Field(3, description="3 reads holding registers, 4 input registers.")
+    type: RegisterType = Field(description="int16, uint16, int32, uint32 or float32.")
+    word_order: WordOrder | None = Field(
+        None,
+        validate_default=True,
+        description="high_first or low_first: which of two registers holds the high half; 32 bits only.",
+    )
+    byte_order: ByteOrder = Field("big", description="big, or little: the bytes within each register swapped.")
+    scale: Scale = Field(1.0, description="What the register's content is multiplied by.")
+    offset: Offset = Field(0.0, description="What is added after the scale.")
+    unit: UnitText = Field(description="The unit of the number; '1' for a bare one.")
+    range: Range | None = Field(None, description="Least and greatest number that is believed.")
+    precision: Annotated[int, Whole(0, 9)] | None = Field(None, description="Decimals on a display.")
+    device_class: Annotated[str, Word()] | None = Field(None, description="Home Assistant's word for its kind.")
 
-    @model_validator(mode="after")
-    def _agrees(self) -> Self:
-        problems = _ordered(self.range)
-        if self.words == 1 and self.word_order is not None:
-            problems.append((("word_order",), f"{self.type} fills one register; leave the word order out"))
-        if self.words > 1 and self.word_order is None:
-            wanted = "high_first or low_first: which of the two registers holds the high half"
-            problems.append((("word_order",), f"is missing; write {wanted}"))
-        if self.end > 0x1_0000:  # noqa: PLR2004 - register addresses have 16 bits
-            problems.append((("register",), f"{self.type} fills two registers; 0xFFFF is the last"))
-        refuse(problems)
-        return self
+    # A field's validator sees those fields above it that have no error, so that each problem is found at once.
+
+    @field_validator("type", mode="after")
+    @classmethod
+    def _ends_within_the_registers(cls, kind: RegisterType, info: ValidationInfo) -> RegisterType:
+        if info.data.get("address", 0) + WORDS[kind] > LAST_REGISTER + 1:
+            refuse([((), f"{kind} fills two registers, and 0xFFFF is the last")])
+        return kind
+
+    @field_validator("word_order", mode="after")
+    @classmethod
+    def _has_a_word_order_if_it_has_words(cls, order: WordOrder | None, info: ValidationInfo) -> WordOrder | None:
+        kind: RegisterType | None = info.data.get("type")
+        if kind and WORDS[kind] == 1 and order is not None:
+            refuse([((), f"{kind} fills one register; leave the word order out")])
+        if kind and WORDS[kind] > 1 and order is None:
+            refuse([((), "is missing; write high_first or low_first: which of two registers holds the high half")])
+        return order
 
     @property
     def words(self) -> int:
@@ -195,35 +213,51 @@ class Value(Registered):
 class Setting(Registered):
     """A register that configures the device; written by request only, and only if marked `writable`.
 
-    `range` is in `unit`, after `scale`; `values` gives each register content that is allowed a name.
+    `range` is in `unit`, after `scale`; `values` tells what each register content that is allowed means.
     """
 
-    name: Annotated[str, Word()]
-    type: Literal["int16", "uint16"] = "uint16"
-    scale: Scale = 1.0
-    unit: UnitText = "1"
-    range: Range | None = None
-    values: dict[str, Register] | None = None
-    writable: bool = False
+    name: Annotated[str, Word()] = Field(description="What to call it.")
+    type: Literal["int16", "uint16"] = Field("uint16", description="int16 or uint16.")
+    scale: Scale = Field(1.0, description="What the register's content is multiplied by.")
+    unit: UnitText = Field("1", description="The unit of the number; '1' for a bare one.")
+    range: Range | None = Field(None, description="Least and greatest number that may be written, in the unit.")
+    values: dict[int, Sentence] | None = Field(
+        None, description="What each register content that may be written means; instead of a range."
+    )
+    writable: bool = Field(default=False, description="A request may write it, within its range or values.")
 
-    @model_validator(mode="after")
-    def _agrees(self) -> Self:
-        problems = _ordered(self.range)
-        if self.range is not None and self.values is not None:
-            problems.append((("values",), "a setting has either a range or values"))
-        if self.values == {}:
-            problems.append((("values",), "names no value"))
-        if self.writable and self.range is None and self.values is None:
-            problems.append((("writable",), "a setting is writable only with a range or values"))
-        refuse(problems)
-        return self
+    @field_validator("values", mode="before")
+    @classmethod
+    def _are_of_contents(cls, values: object) -> object:
+        keys = values if isinstance(values, dict) else {}
+        content = Whole(0, LAST_REGISTER)
+        wrong = [key for key in keys if not isinstance(key, int) or not content.first <= key <= content.last]
+        refuse([((key,), f"is no register content; write {content.words}") for key in wrong])
+        return values
+
+    @field_validator("values", mode="after")
+    @classmethod
+    def _is_an_alternative(cls, values: dict[int, str] | None, info: ValidationInfo) -> dict[int, str] | None:
+        if values == {}:
+            refuse([((), "names no value")])
+        if values is not None and info.data.get("range") is not None:
+            refuse([((), "a setting has either a range or values")])
+        return values
+
+    @field_validator("writable", mode="after")
+    @classmethod
+    def _is_bounded_if_writable(cls, writable: bool, info: ValidationInfo) -> bool:  # noqa: FBT001 - pydantic's call
+        known = "range" in info.data and "values" in info.data
+        if writable and known and info.data["range"] is None and info.data["values"] is None:
+            refuse([((), "a setting is writable only with a range or values")])
+        return writable
 
     def refusal(self, word: int) -> str | None:
         """Return why the register content `word` (0..65535) must not be written; None if it may be."""
         if not self.writable:
             return f"{self.name} is not marked writable by the profile"
-        if self.values is not None and word not in self.values.values():
-            allowed = ", ".join(f"{code} ({meaning})" for meaning, code in self.values.items())
+        if self.values is not None and word not in self.values:
+            allowed = ", ".join(f"{code} ({meaning})" for code, meaning in self.values.items())
             return f"{self.name} takes {allowed}, not {word}"
         if self.range is not None:
             low, high = self.range
