@@ -1,0 +1,158 @@
+"""What can ail a sensor or a line: kinds, how often, and when.
+
+An ailment without times is always there; `first` and `last` bound it, `every` repeats that window. Times are
+integer nanoseconds of the line's clock. Whether it strikes is drawn per request from the sensor's own,
+seeded random source, so a run can be repeated exactly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import TYPE_CHECKING, Literal
+
+from lfs10d.simulator.wire import nanoseconds
+
+if TYPE_CHECKING:
+    from random import Random
+
+
+class Kind(StrEnum):
+    """The faults a sensor can have; the words are those of the faults file."""
+
+    SILENT = "silent"
+    """Hears nothing, answers nothing."""
+    SHY = "shy"
+    """Ignores the request after one to a neighbour that did not answer."""
+    LATE = "late"
+    """Answers `delay` later than it would, also into the next requests."""
+    SLOW_BYTES = "slow_bytes"
+    """Pauses for `delay` between any two bytes."""
+    NOISY = "noisy"
+    """One bit of the answer is flipped, so its check fails."""
+    GARBAGE = "garbage"
+    """Random bytes in place of the answer; `length` of them, or as many as the answer has."""
+    TRUNCATED = "truncated"
+    """Only the first `length` bytes of the answer come, or a random number of them."""
+    LEADING_NOISE = "leading_noise"
+    """`length` (3) random bytes right before the answer."""
+    TRAILING_NOISE = "trailing_noise"
+    """`length` (3) random bytes right after the answer."""
+    WRONG_ID = "wrong_id"
+    """The answer carries id `value` (or the own one + 1), its check is right."""
+    WRONG_FUNCTION = "wrong_function"
+    """The answer carries another function, its check is right."""
+    WRONG_COUNT = "wrong_count"
+    """A read is answered with one register more than asked for, its check is right."""
+    WRONG_ECHO = "wrong_echo"
+    """A write is answered with another value, its check is right."""
+    EXCEPTION = "exception"
+    """Refuses everything with exception `code` (2); 6 is busy."""
+    NAN = "nan"
+    INFINITE = "infinite"
+    OUT_OF_RANGE = "out_of_range"
+    SUBNORMAL = "subnormal"
+    STUCK = "stuck"
+    """The same value for ever."""
+    HANGS = "hangs"
+    """After a frame it could not read, or an exception it sent, silent until the next power cycle."""
+    WILDCARD = "wildcard"
+    """Answers requests to id 255 too."""
+    DIP_LOCKED = "dip_locked"
+    """A write of the id does not take; see `answer`, `reads` and `code`."""
+    STORES_BUT_IGNORES = "stores_but_ignores"
+    """A write of id or rate is echoed and stored in the register, and never obeyed."""
+    POWER_CYCLE = "power_cycle"
+    """A new id or rate is obeyed only after a power cycle."""
+    AT_ONCE = "at_once"
+    """A new id or rate is obeyed before the echo, which comes from the new place."""
+    SLOW_FLASH = "slow_flash"
+    """Silent for `delay` (5 s) after a write that changed something; the echo comes before that."""
+    ECHO_LOSING = "echo_losing"
+    """A write takes effect, its echo never comes."""
+    POWER_CUT = "power_cut"
+    """Without power during the window; when it comes back, what was stored is obeyed."""
+
+
+STRIKES_VALUES = frozenset({Kind.NAN, Kind.INFINITE, Kind.OUT_OF_RANGE, Kind.SUBNORMAL, Kind.STUCK})
+STRIKES_ANSWERS = frozenset({Kind.WRONG_ID, Kind.WRONG_FUNCTION, Kind.WRONG_COUNT, Kind.WRONG_ECHO})
+STRIKES_FRAMES = frozenset(
+    {Kind.NOISY, Kind.GARBAGE, Kind.TRUNCATED, Kind.LEADING_NOISE, Kind.TRAILING_NOISE},
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """When something holds: from `first` to before `last` (None: for ever), again after each `every`."""
+
+    first: int = 0
+    last: int | None = None
+    every: int | None = None
+
+    def covers(self, now: int) -> bool:
+        """Say whether it holds at `now`."""
+        if now < self.first or self.last is None:
+            return now >= self.first
+        if self.every is not None:
+            now = self.first + (now - self.first) % self.every
+        return now < self.last
+
+    def ended(self, now: int) -> int:
+        """Return how often it has ended by `now`."""
+        if self.last is None or now < self.last:
+            return 0
+        return 1 if self.every is None else 1 + (now - self.last) // self.every
+
+
+ALWAYS = Window()
+
+
+@dataclass(frozen=True, slots=True)
+class Ailment:
+    """One fault of one sensor: what, in how many of its answers, when, and its particulars."""
+
+    kind: Kind
+    rate: float = 1.0
+    window: Window = ALWAYS
+    delay: int = 0
+    """Nanoseconds; see the kind."""
+    code: int = 2
+    value: int | None = None
+    length: int | None = None
+    answer: Literal["echo", "exception"] = "echo"
+    """How a DIP-locked sensor answers a write of its id."""
+    reads: Literal["old", "new"] = "old"
+    """What its id register holds afterwards."""
+
+    def strikes(self, now: int, random: Random) -> bool:
+        """Draw whether it shows in the answer to the request heard at `now`."""
+        return self.window.covers(now) and (self.rate >= 1.0 or random.random() < self.rate)
+
+
+DEFAULT_DELAYS = {Kind.LATE: 0.6, Kind.SLOW_BYTES: 0.001, Kind.SLOW_FLASH: 5.0}
+"""Seconds, where none is given."""
+
+
+def ailment(
+    kind: Kind | str,
+    rate: float = 1.0,
+    *,
+    delay: float | None = None,
+    first: float = 0.0,
+    last: float | None = None,
+    every: float | None = None,
+    **particulars: int | str | None,
+) -> Ailment:
+    """Return an ailment told in seconds; `particulars` are code, value, length, answer and reads.
+
+    Raises ValueError for an unknown kind, TypeError for an unknown particular.
+    """
+    kind = Kind(kind)
+    seconds = DEFAULT_DELAYS.get(kind, 0.0) if delay is None else delay
+    window = Window(
+        nanoseconds(first),
+        None if last is None else nanoseconds(last),
+        None if every is None else nanoseconds(every),
+    )
+    plain = Ailment(kind, rate, window, nanoseconds(seconds))
+    return replace(plain, **particulars)  # type: ignore[arg-type]  # replace checks the names, the kinds use them

@@ -1,0 +1,191 @@
+"""The judge of the master: what it sent too early or torn, as a strict slave would see it.
+
+Rules (Modbus over Serial Line V1.02, section 2.5.1.1; LFS10, DZB and EH600 manuals), for RTU:
+
+- A request begins after at least t3.5 of silence since the last byte on the line, whoever sent that, and of the
+  slower rate where the rate changed. Else it is not heard: a gap violation.
+- No pause above t1.5 lies inside a request. Else it is not heard: a t1.5 violation.
+- Nobody writes while another speaks: a collision.
+
+In ASCII only the last holds; a colon begins a frame anew and CR LF ends it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Final
+
+from lfs10d.simulator.wire import SECOND, Format, Framing, unseal
+
+ROUNDING: Final = 2
+"""Nanoseconds by which two times may be off because a master's clock is a float and ours is whole."""
+
+ASCII_PAUSE: Final = SECOND
+"""The longest pause inside an ASCII frame (Modbus over Serial Line V1.02, section 2.5.2.1)."""
+
+EXCESS_EDGES_US: Final = (0, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000, 50000)
+"""Upper edges of the histogram: by how much a gap exceeded what it had to be."""
+
+
+class Verdict(StrEnum):
+    """What became of a request."""
+
+    HEARD = "heard"
+    GAP = "gap"
+    """Begun too early."""
+    TORN = "torn"
+    """A pause above t1.5 inside."""
+    COLLISION = "collision"
+    """Written while another was speaking."""
+    STRUCK = "struck"
+    """Another began to speak into it."""
+    MALFORMED = "malformed"
+    """No frame at all, or its check is wrong."""
+
+
+@dataclass(slots=True)
+class Hearing:
+    """A request as far as it has come."""
+
+    format: Format
+    begun: int
+    ended: int
+    frame: bytes
+    gap: int | None
+    """Silence before it; None if nothing was ever sent before."""
+    verdict: Verdict | None = None
+    """None: nothing against it yet."""
+
+
+@dataclass(slots=True)
+class Judge:
+    """Hears every byte of the master with its time; counts. All gaps are nanoseconds."""
+
+    framing: Framing = "rtu"
+    requests: int = 0
+    heard: int = 0
+    unheard: int = 0
+    gap_violations: int = 0
+    t15_violations: int = 0
+    collisions: int = 0
+    struck: int = 0
+    malformed: int = 0
+    min_gap: int | None = None
+    min_excess: int | None = None
+    """The smallest gap less what it had to be; negative is a violation."""
+    histogram: list[int] = field(default_factory=lambda: [0] * (len(EXCESS_EDGES_US) + 1))
+    _open: Hearing | None = None
+    _torn_off: bytes = b""
+
+    def listen(
+        self, data: bytes, start: int, shape: Format, *, quiet_since: int | None, slower: Format, busy: bool
+    ) -> Hearing:
+        """Hear bytes that begin at `start` and follow each other; return the request they belong to.
+
+        `quiet_since` is the end of the last byte on the line before (None: there was none), `slower` the format
+        whose t3.5 has to pass, `busy` whether another speaks right now. Ask `settle` at the end of the bytes.
+        """
+        ended = start + shape.span(len(data))
+        hearing = self._open
+        if hearing is not None and start - hearing.ended > self._longest_silence(shape):
+            self._close(hearing)
+            hearing = None
+        if hearing is None:
+            gap = None if quiet_since is None else start - quiet_since
+            hearing = self._open = Hearing(shape, start, ended, data, gap)
+            if not busy:
+                self._measure(hearing, slower)
+        else:
+            if self.framing == "rtu" and self._complete(hearing.frame):
+                hearing.verdict = hearing.verdict or Verdict.GAP  # a second request on the heels of the first
+            elif self.framing == "rtu" and start - hearing.ended > shape.t15 + ROUNDING:
+                hearing.verdict = hearing.verdict or Verdict.TORN
+            hearing.frame += data
+            hearing.ended = ended
+        if busy:
+            hearing.verdict = hearing.verdict or Verdict.COLLISION
+        return hearing
+
+    def settle(self, hearing: Hearing, *, struck: bool) -> Verdict | None:
+        """Decide at its end whether a request was heard; None while it is incomplete and may go on.
+
+        `struck`: another's bytes fell into it.
+        """
+        if hearing is not self._open:
+            return None
+        if struck:
+            hearing.verdict = hearing.verdict or Verdict.STRUCK
+        if not self._complete(hearing.frame):
+            return None
+        return self._count(hearing, hearing.verdict or Verdict.HEARD)
+
+    def patience(self, hearing: Hearing) -> int:
+        """Return until when an incomplete request may still go on."""
+        return hearing.ended + self._longest_silence(hearing.format) + 1
+
+    def expire(self, hearing: Hearing, now: int) -> Verdict | None:
+        """End a request that was not completed in time; None if it has ended or went on since."""
+        if hearing is not self._open or now < self.patience(hearing):
+            return None
+        return self._close(hearing)
+
+    def _close(self, hearing: Hearing) -> Verdict:
+        torn = hearing.verdict is None and self._complete(self._torn_off + hearing.frame)
+        return self._count(hearing, hearing.verdict or (Verdict.TORN if torn else Verdict.MALFORMED))
+
+    @property
+    def violations(self) -> int:
+        """How often the master broke a rule."""
+        return self.gap_violations + self.t15_violations + self.collisions
+
+    def summary(self) -> dict[str, object]:
+        """Return every count, ready for JSON; gaps in microseconds."""
+        edges = [*(f"<{edge}" for edge in EXCESS_EDGES_US), f">={EXCESS_EDGES_US[-1]}"]
+        return {
+            "requests": self.requests,
+            "heard": self.heard,
+            "unheard": self.unheard,
+            "gap_violations": self.gap_violations,
+            "t15_violations": self.t15_violations,
+            "collisions": self.collisions,
+            "struck": self.struck,
+            "malformed": self.malformed,
+            "min_gap_us": None if self.min_gap is None else self.min_gap / 1000,
+            "min_excess_us": None if self.min_excess is None else self.min_excess / 1000,
+            "excess_us": dict(zip(edges, self.histogram, strict=True)),
+        }
+
+    def _longest_silence(self, shape: Format) -> int:
+        """Return the pause after which what follows is another request."""
+        return shape.t35 - ROUNDING - 1 if self.framing == "rtu" else ASCII_PAUSE
+
+    def _measure(self, hearing: Hearing, slower: Format) -> None:
+        if hearing.gap is None:
+            return
+        excess = hearing.gap - slower.t35
+        self.min_gap = hearing.gap if self.min_gap is None else min(self.min_gap, hearing.gap)
+        self.min_excess = excess if self.min_excess is None else min(self.min_excess, excess)
+        if -ROUNDING <= excess < 0:
+            excess = 0
+        place = sum(excess >= 1000 * edge for edge in EXCESS_EDGES_US)
+        self.histogram[place] += 1
+        if excess < 0 and self.framing == "rtu":
+            hearing.verdict = Verdict.GAP
+
+    def _complete(self, frame: bytes) -> bool:
+        return any(unseal(frame, self.framing, check) is not None for check in ("crc", "sum"))
+
+    def _count(self, hearing: Hearing, verdict: Verdict) -> Verdict:
+        self._open = None
+        self._torn_off = hearing.frame if verdict is Verdict.MALFORMED else b""
+        hearing.verdict = verdict
+        self.requests += 1
+        self.heard += verdict is Verdict.HEARD
+        self.unheard += verdict is not Verdict.HEARD
+        self.gap_violations += verdict is Verdict.GAP
+        self.t15_violations += verdict is Verdict.TORN
+        self.collisions += verdict is Verdict.COLLISION
+        self.struck += verdict is Verdict.STRUCK
+        self.malformed += verdict is Verdict.MALFORMED
+        return verdict

@@ -1,0 +1,312 @@
+"""One simulated device: hears requests, obeys them, answers; well, or with what ails it.
+
+What a write of id or rate does (the manual leaves it open, so every variant can be played):
+
+==================== ================ =================== =======================
+ailment              register reads   obeyed              echo
+==================== ================ =================== =======================
+none                 new              after the echo      from the old place
+at_once              new              before the echo     from the new place
+power_cycle          new              at power-up         from the old place
+stores_but_ignores   new              never               from the old place
+dip_locked (id only) old or new       never               echo or exception
+slow_flash           new              after the echo      then silent for `delay`
+echo_losing          new              at once             none
+==================== ================ =================== =======================
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from random import Random
+from typing import TYPE_CHECKING, Final
+
+from lfs10d.simulator.faults import (
+    STRIKES_ANSWERS,
+    STRIKES_FRAMES,
+    STRIKES_VALUES,
+    Ailment,
+    Kind,
+    ailment,
+)
+from lfs10d.simulator.registers import LFS10, READ_HOLDING, READ_INPUT, WRITE_SINGLE, Blueprint, Signal
+from lfs10d.simulator.wind import Unique
+from lfs10d.simulator.wire import Format, Framing, nanoseconds, seal
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from lfs10d.simulator.wind import Source
+
+BROADCAST: Final = 0
+WILDCARD_ID: Final = 255
+EXCEPTION_BIT: Final = 0x80
+ILLEGAL_FUNCTION: Final = 1
+ILLEGAL_ADDRESS: Final = 2
+ILLEGAL_VALUE: Final = 3
+REQUEST_BODY: Final = 6
+"""Bytes of the requests 03, 04 and 06 without their check: id, function, two words."""
+_COUNT_AT: Final = 2
+
+_BROKEN_FLOATS: Final[Mapping[Kind, int]] = {
+    Kind.NAN: 0x7FC0_0000,
+    Kind.INFINITE: 0x7F80_0000,
+    Kind.OUT_OF_RANGE: 0x4974_2400,  # 1e6
+    Kind.SUBNORMAL: 0x0000_0001,
+}
+_SPOILS: Final = (STRIKES_ANSWERS | STRIKES_FRAMES) - {Kind.LEADING_NOISE, Kind.TRAILING_NOISE}
+_NOTHING: Final[Mapping[Kind, Ailment]] = {}
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """What a sensor sends: bytes, when, in which format; and what it meant by them."""
+
+    sensor: Sensor
+    start: int
+    data: bytes
+    format: Format
+    pause: int
+    values: tuple[float, ...]
+    """The measured values in it; empty if none, or if they were broken."""
+    whole: bool
+    """A master that hears every byte may believe it."""
+
+
+class Sensor:
+    """A device at a slave id, with its registers, ailments and power. Switch anything at any time in a test."""
+
+    def __init__(
+        self,
+        slave: int,
+        *,
+        blueprint: Blueprint = LFS10,
+        format: Format | None = None,  # noqa: A002  # the word for it
+        framing: Framing = "rtu",
+        turnaround: float = 0.005,
+        jitter: float = 0.0,
+        source: Source | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.slave = slave
+        self.blueprint = blueprint
+        self.format = format or Format()
+        self.framing: Framing = framing
+        self.turnaround = turnaround
+        """Seconds from the request's last bit to the answer's first; up to `jitter` more, drawn each time."""
+        self.jitter = jitter
+        self.source: Source = source or Unique()
+        self.words = dict(blueprint.words)
+        if blueprint.id_register is not None:
+            self.words[blueprint.id_register] = slave
+        if blueprint.rate_register is not None and self.format.baudrate in blueprint.rate_codes:
+            self.words[blueprint.rate_register] = blueprint.rate_codes[self.format.baudrate]
+        for signal in blueprint.signals:
+            for n in range(signal.count):
+                self.words.setdefault(signal.address + n, 0)
+        self.ailments: list[Ailment] = []
+        self.powered = True
+        self.hung = False
+        self.deaf_until = 0
+        self._last: float | None = None
+        self._cuts = 0
+        self.random = Random(f"{seed}/{slave}")  # noqa: S311  # repeatable faults, no secret
+
+    def __repr__(self) -> str:
+        """Return slave id and rate."""
+        return f"<Sensor {self.slave} at {self.format.baudrate}>"
+
+    def ail(self, kind: Kind | str, rate: float = 1.0, **particulars: float | str | None) -> Ailment:
+        """Add an ailment told in seconds (see `faults.ailment`) and return it."""
+        added = ailment(kind, rate, **particulars)  # type: ignore[arg-type]  # passed on as they are
+        self.ailments.append(added)
+        return added
+
+    def heal(self, kind: Kind | str | None = None) -> None:
+        """Remove the ailments of one kind, or all."""
+        self.ailments = [one for one in self.ailments if kind is not None and one.kind != kind]
+
+    def silent_from(self, first: float, last: float | None = None) -> None:
+        """Be dead from that time in seconds on, until `last` if given."""
+        self.ail(Kind.SILENT, first=first, last=last)
+
+    def power_cut(self) -> None:
+        """Lose power; a byte under way is completed (`SimulatedLine.power_cut` cuts that too)."""
+        self.powered = False
+
+    def power_up(self) -> None:
+        """Come back: what the registers say of id and rate is obeyed, unless something overrules it."""
+        self.powered = True
+        self.hung = False
+        self.deaf_until = 0
+        kinds = {one.kind for one in self.ailments}
+        register = self.blueprint.id_register
+        if Kind.DIP_LOCKED in kinds and register is not None:
+            self.words[register] = self.slave
+        if Kind.STORES_BUT_IGNORES not in kinds:
+            self._take_place()
+
+    def power_cycle(self) -> None:
+        """Lose power and come back."""
+        self.power_cut()
+        self.power_up()
+
+    def restore(self, now: int) -> None:
+        """Come back from the scheduled power cuts that are over by `now`."""
+        if self.ailments:
+            cuts = sum(one.window.ended(now) for one in self.ailments if one.kind is Kind.POWER_CUT)
+            if cuts > self._cuts:
+                self.power_up()
+            self._cuts = cuts
+
+    def disturb(self, now: int) -> None:
+        """Hear a frame that is none: one that hangs is hung from now on."""
+        if any(one.kind is Kind.HANGS and one.strikes(now, self.random) for one in self.ailments):
+            self.hung = True
+
+    def hear(self, body: bytes, ended: int, *, after_dead: bool = False) -> Reply | None:
+        """Hear a request (its body) whose last bit came at `ended`; return what is sent in answer, if anything.
+
+        `after_dead`: the request before this one went to another sensor and had no answer.
+        """
+        if body[0] not in (self.slave, BROADCAST) and not self._wild(body[0], ended):
+            return None
+        if not self.powered or self.hung or ended < self.deaf_until or len(body) != REQUEST_BODY:
+            return None
+        struck = self._struck(ended) if self.ailments else _NOTHING
+        if Kind.SILENT in struck or Kind.POWER_CUT in struck or (after_dead and Kind.SHY in struck):
+            return None
+        format_before = self.format
+        answer, values = self._obey(body, ended, struck)
+        if answer[1] & EXCEPTION_BIT and Kind.HANGS in struck:
+            self.hung = True
+        if body[0] == BROADCAST or (Kind.ECHO_LOSING in struck and answer[1] == WRITE_SINGLE):
+            return None
+        shape = self.format if Kind.AT_ONCE in struck else format_before
+        delay = nanoseconds(self.turnaround)
+        if self.jitter:
+            delay += nanoseconds(self.jitter * self.random.random())
+        if not struck:
+            frame = seal(answer, self.framing, self.blueprint.check)
+            return Reply(self, ended + delay, frame, shape, 0, values, whole=True)
+        if Kind.LATE in struck:
+            delay += struck[Kind.LATE].delay
+        frame = seal(self._distort(answer, struck), self.framing, self.blueprint.check)
+        pause = struck[Kind.SLOW_BYTES].delay if Kind.SLOW_BYTES in struck else 0
+        return Reply(
+            self,
+            ended + delay,
+            self._spoil(frame, struck),
+            shape,
+            pause,
+            values,
+            whole=_SPOILS.isdisjoint(struck),
+        )
+
+    def _wild(self, slave: int, now: int) -> bool:
+        return slave == WILDCARD_ID and any(
+            one.kind is Kind.WILDCARD and one.strikes(now, self.random) for one in self.ailments
+        )
+
+    def _struck(self, now: int) -> Mapping[Kind, Ailment]:
+        return {one.kind: one for one in self.ailments if one.strikes(now, self.random)}
+
+    def _obey(self, body: bytes, now: int, struck: Mapping[Kind, Ailment]) -> tuple[bytes, tuple[float, ...]]:
+        function = body[1]
+        if Kind.EXCEPTION in struck:
+            return self._refuse(body, struck[Kind.EXCEPTION].code)
+        if function not in self.blueprint.functions:
+            return self._refuse(body, ILLEGAL_FUNCTION)
+        address, word = int.from_bytes(body[2:4], "big"), int.from_bytes(body[4:6], "big")
+        if function in (READ_HOLDING, READ_INPUT):
+            return self._read(body, address, word, now, struck)
+        return self._write(body, address, word, now, struck), ()
+
+    @staticmethod
+    def _refuse(body: bytes, code: int) -> tuple[bytes, tuple[float, ...]]:
+        return bytes((body[0], body[1] | EXCEPTION_BIT, code)), ()
+
+    def _read(
+        self, body: bytes, address: int, count: int, now: int, struck: Mapping[Kind, Ailment]
+    ) -> tuple[bytes, tuple[float, ...]]:
+        if not 1 <= count <= self.blueprint.max_words:
+            return self._refuse(body, ILLEGAL_VALUE)
+        values: list[float] = []
+        for signal in self.blueprint.signals:
+            if signal.address < address + count and address < signal.address + signal.count:
+                values += self._measure(signal, now, struck)
+        try:
+            words = [self.words[register] for register in range(address, address + count)]
+        except KeyError:
+            return self._refuse(body, ILLEGAL_ADDRESS)
+        data = b"".join([word.to_bytes(2, "big") for word in words])
+        return body[:2] + bytes((len(data),)) + data, tuple(values)
+
+    def _measure(self, signal: Signal, now: int, struck: Mapping[Kind, Ailment]) -> tuple[float, ...]:
+        """Put the signal's value into its registers; return it, or nothing if it is a broken one."""
+        broken = STRIKES_VALUES.intersection(struck)
+        value = self._last if Kind.STUCK in broken and self._last is not None else self.source(now)
+        self._last = value
+        bits = next((_BROKEN_FLOATS[kind] for kind in sorted(broken) if kind in _BROKEN_FLOATS), None)
+        words = signal.words(value) if bits is None else signal.broken(bits)
+        for n, word in enumerate(words):
+            self.words[signal.address + n] = word
+        return (value,) if bits is None else ()
+
+    def _write(self, body: bytes, address: int, value: int, now: int, struck: Mapping[Kind, Ailment]) -> bytes:
+        allowed = self.blueprint.writable.get(address)
+        if allowed is None:
+            return self._refuse(body, ILLEGAL_ADDRESS)[0]
+        if value not in allowed:
+            return self._refuse(body, ILLEGAL_VALUE)[0]
+        if address == self.blueprint.id_register and Kind.DIP_LOCKED in struck:
+            switch = struck[Kind.DIP_LOCKED]
+            if switch.reads == "new":
+                self.words[address] = value
+            return body if switch.answer == "echo" else self._refuse(body, switch.code)[0]
+        if self.words[address] != value and Kind.SLOW_FLASH in struck:
+            self.deaf_until = now + struck[Kind.SLOW_FLASH].delay
+        self.words[address] = value
+        if {Kind.STORES_BUT_IGNORES, Kind.POWER_CYCLE}.isdisjoint(struck):
+            self._take_place(address)
+        return bytes((self.slave,)) + body[1:] if Kind.AT_ONCE in struck and body[0] else body
+
+    def _take_place(self, register: int | None = None) -> None:
+        """Obey what the registers say of id and rate (only the one that was written, if given)."""
+        blueprint = self.blueprint
+        if blueprint.id_register is not None and register in (None, blueprint.id_register):
+            self.slave = self.words[blueprint.id_register]
+        if blueprint.rate_register is not None and register in (None, blueprint.rate_register):
+            code = self.words[blueprint.rate_register]
+            for rate, its_code in blueprint.rate_codes.items():
+                if its_code == code and rate != self.format.baudrate:
+                    self.format = replace(self.format, baudrate=rate)
+
+    def _distort(self, answer: bytes, struck: Mapping[Kind, Ailment]) -> bytes:
+        """Return an answer that is wrong though its check will be right."""
+        if Kind.WRONG_ID in struck:
+            wrong = struck[Kind.WRONG_ID].value
+            answer = bytes(((answer[0] + 1) % 256 if wrong is None else wrong,)) + answer[1:]
+        if Kind.WRONG_COUNT in struck and answer[1] in (READ_HOLDING, READ_INPUT):
+            answer = answer[:2] + bytes((answer[_COUNT_AT] + 2,)) + answer[3:] + answer[-2:]
+        if Kind.WRONG_ECHO in struck and answer[1] == WRITE_SINGLE:
+            answer = answer[:-1] + bytes((answer[-1] ^ 1,))
+        if Kind.WRONG_FUNCTION in struck:
+            answer = answer[:1] + bytes((answer[1] ^ 0x07,)) + answer[2:]
+        return answer
+
+    def _spoil(self, frame: bytes, struck: Mapping[Kind, Ailment]) -> bytes:
+        """Return what of the frame comes onto the line."""
+        if Kind.NOISY in struck:
+            at = self.random.randrange(len(frame))
+            bit = 0x10 if self.framing == "ascii" else 1 << self.random.randrange(8)
+            frame = frame[:at] + bytes((frame[at] ^ bit,)) + frame[at + 1 :]
+        if Kind.GARBAGE in struck:
+            frame = self.random.randbytes(struck[Kind.GARBAGE].length or len(frame))
+        if Kind.TRUNCATED in struck:
+            frame = frame[: struck[Kind.TRUNCATED].length or self.random.randrange(1, len(frame))]
+        if Kind.LEADING_NOISE in struck:
+            frame = self.random.randbytes(struck[Kind.LEADING_NOISE].length or 3) + frame
+        if Kind.TRAILING_NOISE in struck:
+            frame += self.random.randbytes(struck[Kind.TRAILING_NOISE].length or 3)
+        return frame
