@@ -1,1 +1,99 @@
-"""The command line: one file per verb."""
+"""The command line: one file per verb, imported only when the verb is called."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from lfs10d import __version__
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+EXIT_FAILED = 1
+EXIT_USAGE = 2
+EXIT_UNAVAILABLE = 69
+EXIT_CONFIG = 78
+"""sysexits.h: EX_UNAVAILABLE, EX_CONFIG."""
+
+VERBS = {
+    "run": "Run the daemon.",
+    "check": "Validate the configuration; print the line's time budget.",
+    "config": "Print the effective configuration, each value with its origin.",
+    "scan": "Find out who is on a line.",
+    "read": "Read one sensor, now.",
+    "request": "Send a request to the running daemon, print its response.",
+    "watch": "Show a live table of every slave.",
+    "trace": "Show the live frames of the line, decoded.",
+    "profiles": "Show the device profiles.",
+    "simulate": "Run a simulated line on a pseudo terminal.",
+    "demo": "See it all at work: simulated line, broker, daemon, live view.",
+}
+"""Each has a module of its name with `command` in it; the short help stands here so that --help imports none."""
+
+EXAMPLES = """\b
+Examples:
+  lfs10d demo                        see it work, without hardware
+  lfs10d scan /dev/ttyUSB0           who is on the line?
+  lfs10d check -c lfs10d.yaml        is the configuration right? does the line carry it?
+  lfs10d run -c lfs10d.yaml          measure and publish
+"""
+
+
+class Verbs(click.Group):
+    """Looks a verb's module up when it is called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the verbs in the order of a newcomer's day."""
+        del ctx
+        return [verb for verb in VERBS if importlib.util.find_spec(f"{__name__}.{verb}")]
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import the verb's module and return its command."""
+        if cmd_name not in self.list_commands(ctx):
+            return None
+        command = importlib.import_module(f"{__name__}.{cmd_name}").command
+        return command if isinstance(command, click.Command) else None
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the verbs with their short help, importing none of them."""
+        with formatter.section("Verbs"):
+            formatter.write_dl([(verb, VERBS[verb]) for verb in self.list_commands(ctx)])
+
+
+@click.command(
+    cls=Verbs,
+    name="lfs10d",
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog=EXAMPLES,
+)
+@click.version_option(__version__, prog_name="lfs10d", message="%(prog)s %(version)s")
+def lfs10d() -> None:
+    """Poll Modbus wind sensors on one RS485 line and publish them over MQTT.
+
+    Every verb has its own help: lfs10d VERB --help.
+    """
+
+
+def config_option(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add `-c FILE`, passed on as `config: Path`."""
+    return click.option(
+        "-c",
+        "--config",
+        envvar="LFS10D_CONFIG",
+        show_envvar=True,
+        default=Path("/etc/lfs10d/lfs10d.yaml"),
+        show_default=True,
+        metavar="FILE",
+        type=click.Path(path_type=Path),
+        help="The configuration file.",
+    )(function)
+
+
+def json_option(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add `--json`, passed on as `as_json: bool`."""
+    return click.option("--json", "as_json", is_flag=True, help="Print JSON for programs.")(function)

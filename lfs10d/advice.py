@@ -1,0 +1,123 @@
+"""What is allowed but hardly meant: the warnings of `lfs10d check`, each at its place in the file."""
+
+from __future__ import annotations
+
+import ipaddress
+from typing import TYPE_CHECKING
+
+from lfs10d.budget import ASSUMED_TURNAROUND
+from lfs10d.config import LATER_SECTIONS, default_line_name
+from lfs10d.kinds import quoted
+from lfs10d.quantities import duration_text
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from lfs10d.budget import Budget
+    from lfs10d.configfile import Loaded
+    from lfs10d.document import Path
+    from lfs10d.errors import Problem
+
+COMMON_HOST_NAMES = frozenset({"localhost", "raspberrypi", "debian", "raspbian", "ubuntu", "linux", "openwrt"})
+"""Names that systems come with: two gateways soon have the same."""
+
+
+def advice(loaded: Loaded, budget: Budget, host: str) -> tuple[Problem, ...]:
+    """Return the warnings for a valid configuration on the host of this name, in order of place."""
+    warnings = (
+        *_load(loaded, budget),
+        *_login(loaded),
+        *_names(loaded, host),
+        *_unused(loaded),
+    )
+    return tuple(sorted(loaded.document.problem(path, f"warning: {message}") for path, message in warnings))
+
+
+def _load(loaded: Loaded, budget: Budget) -> Iterator[tuple[Path, str]]:
+    path: Path = ("poll", "interval") if loaded.document.holds(("poll", "interval")) else ("slaves",)
+    if budget.load > 1:
+        yield (
+            path,
+            (
+                f"the intervals ask for {budget.load:.0%} of what the line carries: every device will be polled less "
+                "often; use longer intervals, a higher baud rate or a second line"
+            ),
+        )
+    elif budget.load_with_turnaround > 1:
+        yield (
+            path,
+            (
+                f"the intervals ask for {budget.load_with_turnaround:.0%} of what the line carries if the devices take "
+                f"{duration_text(ASSUMED_TURNAROUND)} to answer (and {budget.load:.0%} if they took none)"
+            ),
+        )
+    if not loaded.config.slaves:
+        yield ("slaves",), "there are no slaves: nothing will be polled until one is added"
+    elif not budget.shares:
+        yield ("slaves",), "no slave is enabled: nothing will be polled"
+
+
+def loopback(host: str) -> bool:
+    """Tell whether a broker's host is this machine, judged by its name alone."""
+    if host.lower().rstrip(".") == "localhost" or host.lower().endswith(".localhost"):
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def _login(loaded: Loaded) -> Iterator[tuple[Path, str]]:
+    mqtt = loaded.config.mqtt
+    if loopback(mqtt.host):
+        return
+    certificate = mqtt.tls is not None and mqtt.tls.cert is not None
+    if mqtt.username is None and not certificate:
+        yield (
+            ("mqtt", "host"),
+            (
+                "the broker is remote and needs no login: anyone who reaches it can publish readings and requests; "
+                "set mqtt.username and mqtt.password_file, or mqtt.tls.cert"
+            ),
+        )
+    if mqtt.username is not None and mqtt.tls is None:
+        yield ("mqtt", "username"), "the password crosses the network unencrypted; set mqtt.tls"
+
+
+def _names(loaded: Loaded, host: str) -> Iterator[tuple[Path, str]]:
+    """Two gateways at one broker must not publish under one name; a broker on this host has one gateway."""
+    document, config = loaded.document, loaded.config
+    if not document.holds(("line", "name")):
+        stem = loaded.path.stem
+        if default_line_name(stem) not in {stem, "line0"}:
+            yield (
+                ("line",),
+                f"the file's name {quoted(stem)} is no name for a line, so line.name is {config.line.name}; set it",
+            )
+    if loopback(config.mqtt.host):
+        return
+    if not any(document.holds(path) for path in (("line", "name"), ("mqtt", "base_topic"))):
+        yield (
+            ("mqtt",),
+            (
+                "line.name and mqtt.base_topic are both defaults: a second gateway at this broker would publish under "
+                f"{config.mqtt.base_topic}/{config.line.name} too; set one of them"
+            ),
+        )
+    if config.mqtt.client_id is not None and host.lower() in COMMON_HOST_NAMES:
+        given = loaded.document.data
+        written = given["mqtt"].get("client_id") if isinstance(given, dict) and "mqtt" in given else None
+        if written is None or "%H" in written:
+            yield (
+                ("mqtt", "client_id"),
+                (
+                    f"the client id {config.mqtt.client_id} comes from the host name {host}, which many hosts have; "
+                    "two clients of one id throw each other out: set mqtt.client_id or the host's name"
+                ),
+            )
+
+
+def _unused(loaded: Loaded) -> Iterator[tuple[Path, str]]:
+    for section in LATER_SECTIONS:
+        if loaded.document.holds((section,)):
+            yield (section,), "has no effect yet"

@@ -1,0 +1,130 @@
+"""`lfs10d check`: whether the file is right, and the line carries what it asks for."""
+
+from __future__ import annotations
+
+import json
+import socket
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from lfs10d.advice import advice
+from lfs10d.budget import Budget, budget
+from lfs10d.cli import EXIT_CONFIG, config_option, json_option
+from lfs10d.cli.columns import columns
+from lfs10d.configfile import Loaded, load
+from lfs10d.errors import ConfigError, Problem
+from lfs10d.quantities import duration_text
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+EXAMPLES = """\b
+Examples:
+  lfs10d check                       the file of the service
+  lfs10d check -c site.yaml          another one
+  lfs10d check -c site.yaml --json   for programs
+"""
+
+
+@click.command("check", epilog=EXAMPLES)
+@config_option
+@json_option
+def command(config: Path, *, as_json: bool) -> int:
+    """Validate the configuration; print the line's time budget.
+
+    Every problem is one line FILE:LINE:COLUMN: key: what is wrong, on standard error. Exit code 78 with problems,
+    0 without; warnings change nothing.
+    """
+    try:
+        loaded = load(config)
+    except ConfigError as error:
+        if not as_json:
+            raise
+        click.echo(json.dumps({"valid": False, "problems": [_plain(problem) for problem in error.problems]}, indent=2))
+        click.echo(str(error), err=True)
+        return EXIT_CONFIG
+    found = budget(loaded.config, loaded.profiles)
+    warnings = advice(loaded, found, socket.gethostname())
+    if as_json:
+        click.echo(json.dumps(_report(loaded, found, warnings), indent=2, allow_nan=False))
+    else:
+        for text in _lines(loaded, found):
+            click.echo(text)
+    for warning in warnings:
+        click.echo(str(warning), err=True)
+    return 0
+
+
+def _plain(problem: Problem) -> dict[str, Any]:
+    return {
+        "file": problem.file,
+        "line": problem.line,
+        "column": problem.column,
+        "path": problem.path,
+        "message": problem.message,
+    }
+
+
+def _report(loaded: Loaded, found: Budget, warnings: tuple[Problem, ...]) -> dict[str, Any]:
+    return {
+        "valid": True,
+        "warnings": [_plain(warning) for warning in warnings],
+        "budget": {
+            "gap_us": round(found.gap * 1e6, 1),
+            "load_pct": round(found.load * 100, 2),
+            "load_with_turnaround_pct": round(found.load_with_turnaround * 100, 2),
+            "shortest_cycle_s": round(found.shortest_cycle, 6),
+            "slowest_cycle_s": round(found.slowest_cycle, 6),
+            "slaves": [
+                {
+                    "name": share.device,
+                    "id": share.slave,
+                    "profile": share.profile,
+                    "interval": share.interval,
+                    "exchanges": share.exchanges,
+                    "wire_ms": round(share.wire * 1e3, 3),
+                    "load_pct": None if share.load is None else round(share.load * 100, 3),
+                }
+                for share in found.shares
+            ],
+        },
+        "line": loaded.config.line.name,
+    }
+
+
+def _lines(loaded: Loaded, found: Budget) -> Iterator[str]:
+    line, mqtt = loaded.config.line, loaded.config.mqtt
+    character = f"{line.databits}{line.parity[0].upper()}{line.stopbits}"
+    yield f"{loaded.path}: valid"
+    yield f"line    {line.name}: {line.port}, {line.baudrate} baud {character} {line.framing}"
+    yield f"broker  {mqtt.host}:{mqtt.port}, topics below {mqtt.base_topic}/{line.name}"
+    disabled = sum(not slave.enabled for slave in loaded.config.slaves)
+    yield f"slaves  {len(loaded.config.slaves)}" + (f", {disabled} of them disabled" if disabled else "")
+    yield ""
+    if not found.shares:
+        return
+    yield from columns(
+        ("device", "id", "profile", "interval", "wire time", "load"),
+        [
+            (
+                share.device,
+                str(share.slave),
+                share.profile,
+                duration_text(share.interval) if share.interval else "0",
+                f"{share.wire * 1e3:.1f} ms",
+                "the rest" if share.load is None else f"{share.load:.1%}",
+            )
+            for share in found.shares
+        ],
+        right=(1, 3, 4, 5),
+    )
+    yield ""
+    yield (
+        f"load             {found.load:.1%} of the line without turnaround, "
+        f"{found.load_with_turnaround:.1%} if each answer takes 5 ms to begin"
+    )
+    yield f"fastest cycle    {found.shortest_cycle * 1e3:.1f} ms to poll each once, without turnaround"
+    yield f"slowest cycle    {found.slowest_cycle:.3g} s if every answer begins at the last moment"
+    yield f"silence          {found.gap * 1e6:.0f} us before each request"

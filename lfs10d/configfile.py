@@ -1,0 +1,330 @@
+"""The configuration file: read, validated as a whole, its profiles and secrets found, every value with its origin."""
+
+from __future__ import annotations
+
+import os
+import socket
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import BaseModel, ValidationError
+
+from lfs10d.config import Config, MqttConfig, SlaveConfig, resolved
+from lfs10d.contradictions import contradictions
+from lfs10d.document import Document, decode, parse, path_text
+from lfs10d.errors import ConfigError, Problem
+from lfs10d.kinds import quoted, shown
+from lfs10d.profiles.library import builtin_names, load_profile
+from lfs10d.secret import Secret
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from lfs10d.document import Path as Keys
+    from lfs10d.profiles.schema import Profile
+
+DEFAULT_FILE = Path("/etc/lfs10d/lfs10d.yaml")
+CREDENTIAL = "mqtt-password"
+"""Name of the systemd credential (LoadCredential=) that holds the broker's password."""
+
+LARGEST_PASSWORD = 65_535
+"""Bytes: binary data of MQTT 5.0, section 1.5.6."""
+
+_SECRET_FILES: tuple[Keys, ...] = (
+    ("mqtt", "password_file"),
+    ("mqtt", "tls", "ca"),
+    ("mqtt", "tls", "cert"),
+    ("mqtt", "tls", "key"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where a value comes from: `file` (with its line), `default`, or `credential`."""
+
+    kind: str
+    place: str = ""
+
+    def __str__(self) -> str:
+        return self.place or self.kind
+
+
+DEFAULT = Origin("default")
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """A valid file: `config` without gaps, `profiles` by `SlaveConfig.profile`, `origins` by path in words."""
+
+    path: Path
+    document: Document
+    config: Config
+    profiles: Mapping[str, Profile]
+    origins: Mapping[str, Origin]
+    credential: Path | None
+
+    def profile_of(self, slave: SlaveConfig) -> Profile:
+        """Return the profile of a slave of this configuration."""
+        return self.profiles[slave.profile]
+
+    def password(self) -> Secret | None:
+        """Read the broker's password anew; None if there is none. Raises ConfigError if it cannot be read."""
+        file = self.config.mqtt.password_file
+        if file is not None:
+            try:
+                return _password(Path(file))
+            except _UnreadableError as error:
+                problem = self.document.problem(("mqtt", "password_file"), str(error))
+                raise ConfigError((problem,)) from None
+        if self.credential is None:
+            return None
+        try:
+            return _password(self.credential)
+        except _UnreadableError as error:
+            raise ConfigError((Problem(str(self.credential), 1, 1, "", str(error)),)) from None
+
+
+class _UnreadableError(Exception):
+    """A file beside the configuration cannot be used; the message says why."""
+
+
+def load(
+    path: Path,
+    *,
+    files: bool = True,
+    environment: Mapping[str, str] | None = None,
+    host: str | None = None,
+) -> Loaded:
+    """Return the configuration in a file; raises ConfigError with all its problems, in order of place.
+
+    With `files`, password and certificate files must be readable (a verb that logs in with credentials of its own
+    does without). `environment` and `host` are those of the process unless given.
+    """
+    environment = os.environ if environment is None else environment
+    document = parse(decode(_content(path), str(path)), str(path))
+    if not isinstance(document.data, dict):
+        message = f"must be a mapping with line, slaves and mqtt, not {shown(document.data)}"
+        raise ConfigError((*document.problems, document.problem((), message)))
+    config, problems, wrong = _validated(document)
+    folder = path.parent.absolute()
+    profiles, more = _profiles(document, config, folder, wrong)
+    problems += more
+    problems += (
+        document.problem(found.path, found.message)
+        for found in contradictions(config, profiles)
+        if not any(_concerns(key, wrong) for key in found.on)
+    )
+    config = _anchored(config, folder)
+    if files:
+        problems += _unreadable(document, config, wrong)
+    if problems:
+        # The file itself first, profile files after it.
+        raise ConfigError(tuple(sorted(set(problems), key=lambda found: (found.file != document.file, found))))
+    complete = resolved(config, stem=path.stem, host=socket.gethostname() if host is None else host)
+    folder_of_credentials = environment.get("CREDENTIALS_DIRECTORY")
+    credential = Path(folder_of_credentials, CREDENTIAL) if folder_of_credentials else None
+    if credential is not None and not credential.exists():
+        credential = None
+    loaded = Loaded(path, document, complete, profiles, _origins(document, complete, credential), credential)
+    if files:
+        loaded.password()
+    return loaded
+
+
+def _content(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            return file.read(LARGEST_READ)
+    except FileNotFoundError:
+        message = "there is no such file; name another with -c FILE or $LFS10D_CONFIG"
+    except (OSError, ValueError) as error:
+        message = f"the file cannot be read: {_reason(error)}"
+    raise ConfigError((Problem(str(path), 1, 1, "", message),))
+
+
+LARGEST_READ = 2**20
+"""Bytes: enough for `decode` to see that a file is too large, and no more of /dev/zero."""
+
+
+def _reason(error: OSError | ValueError) -> str:
+    return (getattr(error, "strerror", None) or str(error)).lower()
+
+
+def _validated(document: Document) -> tuple[Config, list[Problem], frozenset[Keys]]:
+    """Return the configuration, its problems, and the paths that are wrong: there defaults stand in."""
+    problems = list(document.problems)
+    try:
+        return Config.model_validate(document.data), problems, frozenset()
+    except ValidationError as error:
+        problems += document.problems_of(error, Config)
+        wrong = frozenset(tuple(detail["loc"]) for detail in error.errors(include_url=False))
+    return Config.model_validate(_mended(document.data, wrong)), problems, wrong
+
+
+def _mended(data: Any, wrong: Iterable[Keys]) -> dict[str, Any]:  # noqa: ANN401  # any YAML
+    """Return data without what is wrong, so that the rest can be checked; what must be there is made up."""
+    bad = frozenset(wrong)
+
+    def keep(value: Any, path: Keys) -> Any:  # noqa: ANN401
+        if isinstance(value, dict):
+            return {key: keep(item, (*path, key)) for key, item in value.items() if not _cut(path, key, bad)}
+        if isinstance(value, list) and path == ("slaves",):
+            return [keep(item, (*path, index)) for index, item in enumerate(value)]
+        if isinstance(value, list) and any(step[: len(path)] == path for step in bad):
+            return []
+        return value
+
+    mended: dict[str, Any] = keep(data, ())
+    mended.setdefault("line", {}).setdefault("port", "/dev/null")
+    mended["slaves"] = [
+        {"id": 1, **item} if isinstance(item, dict) else {"id": 1} if _concerns(("slaves", index), bad) else item
+        for index, item in enumerate(mended.get("slaves", ()))
+    ]
+    return mended
+
+
+def _cut(path: Keys, key: str | int, bad: frozenset[Keys]) -> bool:
+    return not isinstance(key, str) or (*path, key) in bad
+
+
+def _concerns(key: Keys, wrong: frozenset[Keys]) -> bool:
+    """Tell whether a key, what it is part of, or a part of it is wrong."""
+    return any(key[: len(path)] == path[: len(key)] for path in wrong)
+
+
+def _profiles(
+    document: Document, config: Config, folder: Path, wrong: frozenset[Keys]
+) -> tuple[dict[str, Profile], list[Problem]]:
+    profiles: dict[str, Profile] = {}
+    problems: list[Problem] = []
+    failed: set[str] = set()
+    for index, slave in enumerate(config.slaves):
+        name, keys = slave.profile, ("slaves", index, "profile")
+        if name in profiles or name in failed or _concerns(keys, wrong):
+            continue
+        try:
+            if name not in builtin_names():
+                _readable(folder / name)
+            profiles[name] = load_profile(name, relative_to=folder)
+        except _UnreadableError as error:
+            known = ", ".join(builtin_names())
+            message = f"no profile {quoted(name)}: {error}; built in are {known}; else the path of a profile YAML"
+            problems.append(document.problem(keys, message))
+        except ConfigError as error:
+            problems += error.problems
+        if name not in profiles:
+            failed.add(name)
+    return profiles, problems
+
+
+def _anchored(config: Config, folder: Path) -> Config:
+    """Return the configuration with its paths relative to the file made absolute."""
+    mqtt: MqttConfig = config.mqtt
+    line = config.line.model_copy(update={"port": str(folder / config.line.port)})
+    update: dict[str, Any] = {}
+    if mqtt.password_file is not None:
+        update["password_file"] = str(folder / mqtt.password_file)
+    if mqtt.tls is not None:
+        paths = {key: str(folder / value) for key, value in mqtt.tls.model_dump().items() if value is not None}
+        update["tls"] = mqtt.tls.model_copy(update=paths)
+    return config.model_copy(update={"line": line, "mqtt": mqtt.model_copy(update=update)})
+
+
+def _unreadable(document: Document, config: Config, wrong: frozenset[Keys]) -> list[Problem]:
+    """Return what is wrong with the files of the login."""
+    problems: list[Problem] = []
+    for keys in _SECRET_FILES:
+        if _concerns(keys, wrong) or (file := _value(config, keys)) is None:
+            continue
+        try:
+            if keys[-1] == "password_file":
+                _password(Path(file))
+            else:
+                _readable(Path(file))
+        except _UnreadableError as error:
+            problems.append(document.problem(keys, str(error)))
+    if config.mqtt.tls is not None and not problems:
+        problems += _unusable(document, config)
+    return problems
+
+
+def _unusable(document: Document, config: Config) -> list[Problem]:
+    import ssl  # noqa: PLC0415  # a megabyte, and only TLS needs it
+
+    problems: list[Problem] = []
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    tls = config.mqtt.tls
+    if tls is not None and tls.ca is not None:
+        try:
+            context.load_verify_locations(tls.ca)
+        except (OSError, ValueError):
+            message = f"{quoted(tls.ca)} holds no certificate in PEM form"
+            problems.append(document.problem(("mqtt", "tls", "ca"), message))
+    if tls is not None and tls.cert is not None:
+        try:
+            # A key under a passphrase would ask on the terminal; an empty answer makes it an error.
+            context.load_cert_chain(tls.cert, tls.key, password=lambda: "")
+        except (OSError, ValueError):
+            message = f"{quoted(tls.cert)} and its key cannot be used: both in PEM form, matching, no passphrase?"
+            problems.append(document.problem(("mqtt", "tls", "cert"), message))
+    return problems
+
+
+def _value(config: BaseModel, keys: Keys) -> str | None:
+    value: Any = config
+    for key in keys:
+        value = getattr(value, str(key), None)
+    return value if isinstance(value, str) else None
+
+
+def _readable(path: Path) -> None:
+    try:
+        with path.open("rb") as file:
+            file.read(1)
+    except (OSError, ValueError) as error:
+        raise _UnreadableError(f"{quoted(str(path))} cannot be read: {_reason(error)}") from None
+
+
+def _password(path: Path) -> Secret:
+    try:
+        with path.open("rb") as file:
+            content = file.read(LARGEST_PASSWORD + 2)
+        first = content.decode().partition("\n")[0].removesuffix("\r")
+    except UnicodeDecodeError:
+        raise _UnreadableError(f"{quoted(str(path))} is no UTF-8 text") from None
+    except (OSError, ValueError) as error:
+        raise _UnreadableError(f"{quoted(str(path))} cannot be read: {_reason(error)}") from None
+    if not first or len(first.encode()) > LARGEST_PASSWORD:
+        raise _UnreadableError(f"{quoted(str(path))} must hold the password in its first line")
+    return Secret(first)
+
+
+def leaves(model: BaseModel, path: Keys = ()) -> Iterable[tuple[Keys, Any]]:
+    """Yield every value of a configuration with its path; lists of words and null are values, sections are not."""
+    for key in type(model).model_fields:
+        value = getattr(model, key)
+        if isinstance(value, BaseModel):
+            yield from leaves(value, (*path, key))
+        elif isinstance(value, tuple) and value and isinstance(value[0], BaseModel):
+            for index, item in enumerate(value):
+                yield from leaves(item, (*path, key, index))
+        else:
+            yield (*path, key), value
+
+
+def _origins(document: Document, config: Config, credential: Path | None) -> dict[str, Origin]:
+    origins = {path_text(path): _origin(document, path) for path, _ in leaves(config)}
+    if credential is not None and config.mqtt.password_file is None:
+        origins["mqtt.password_file"] = Origin("credential", f"systemd credential {CREDENTIAL}")
+    return origins
+
+
+def _origin(document: Document, path: Keys) -> Origin:
+    inherited: Keys = ("poll", path[-1])
+    short = path[-1] == "id" and document.holds(path[:-1])
+    if document.holds(path) or short:
+        return Origin("file", f"{document.file}:{document.line_of(path)}")
+    if path[0] == "slaves" and path[-1] in {"interval", "response_timeout"} and document.holds(inherited):
+        return Origin("file", f"{document.file}:{document.line_of(inherited)} (poll.{path[-1]})")
+    return DEFAULT
