@@ -1,0 +1,285 @@
+"""One request and its answer as a pure state machine. Time is an argument; the shell around it obeys `step`.
+
+::
+
+    state      what happened                                       next state
+    ---------  --------------------------------------------------  ----------
+    SILENCE    SILENT: the gap has passed without a byte           READY
+    SILENCE    BABBLED: the turn is over, still no silence         SETTLED
+    READY      HEARD: a byte came before the request was written   SILENCE
+    READY      SENT: the request was written                       LISTENING
+    LISTENING  ANSWERED: a right frame is whole                    SETTLED
+    LISTENING  EXPIRED: nothing more is to be expected             SETTLED
+
+Rules
+-----
+1. A request is preceded by `gap` of silence since the last byte heard or sent, wanted or not. If there is none
+   within `turn`, nothing is sent: `collision`.
+2. A right frame (check, slave id, function and count, of a write the whole content) settles the exchange the
+   moment its last byte is there, whatever noise lies before or behind it.
+3. Bytes that equal our request from its first byte on are echo, unless the adapter is known to have none. A write
+   then needs echo and answer, for they look the same; an echo that is expected and changed is `collision`.
+4. What comes on a paced port before our request can have left the wire is noise, unless echo. On a port without
+   pace such a right frame counts if nothing better comes in the usual time.
+5. The answer of an `earlier` request is dropped and told as late, and listening goes on. An answer that could be
+   that of another earlier request is marked as ambiguous: an exception looks the same for every shape.
+6. Silence ends the exchange: before the first byte after `timeout`; in a begun answer after t3.5 and the adapter's
+   latency (ASCII: 1 s); after other bytes likewise, but not before the slave's usual turnaround; after a frame
+   of another slave not before `timeout`. Pauses inside what is received are never judged: adapters make them.
+7. It always ends: a line that never falls silent is given up after the time-out and the longest answer.
+8. The fault names the nearest thing to an answer that came, in this order: a frame with a right check (of the wrong
+   count, function, slave), only a late answer, too few bytes, a wrong check; nothing but echo is `timeout`.
+9. A broadcast is answered by nobody and is over after `turnaround_delay`.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from math import isfinite
+from typing import TYPE_CHECKING
+
+from lfs10d.modbus import verdict
+from lfs10d.modbus.attempt import (
+    Attempt,
+    Decision,
+    Echo,
+    LateAnswer,
+    Listen,
+    Outcome,
+    Pending,
+    Quiet,
+    Send,
+    Settled,
+)
+from lfs10d.modbus.frames import BROADCAST, EXCEPTION_FLAG, Framing
+from lfs10d.modbus.reception import HEARD_KEPT, Reception
+from lfs10d.reading import Fault
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from lfs10d.modbus.hunt import Catch
+    from lfs10d.modbus.verdict import Verdict
+
+__all__ = [
+    "TRANSITIONS",
+    "Attempt",
+    "Decision",
+    "Echo",
+    "Exchange",
+    "Happening",
+    "LateAnswer",
+    "Listen",
+    "MisuseError",
+    "Outcome",
+    "Pending",
+    "Quiet",
+    "Send",
+    "Settled",
+    "State",
+]
+
+ASCII_PAUSE = 1.0
+"""Longest pause between two characters of an ASCII frame, s (Modbus over Serial Line V1.02, section 2.5.2.1)."""
+
+FAULT_HEARD = 32
+"""Bytes of `Fault.heard`: the last ones received."""
+
+
+class State(StrEnum):
+    """Where an exchange stands."""
+
+    SILENCE = "silence"
+    READY = "ready"
+    LISTENING = "listening"
+    SETTLED = "settled"
+
+
+class Happening(StrEnum):
+    """What moves an exchange on."""
+
+    SILENT = "silent"
+    BABBLED = "babbled"
+    HEARD = "heard"
+    SENT = "sent"
+    ANSWERED = "answered"
+    EXPIRED = "expired"
+
+
+TRANSITIONS: Mapping[tuple[State, Happening], State] = {
+    (State.SILENCE, Happening.SILENT): State.READY,
+    (State.SILENCE, Happening.BABBLED): State.SETTLED,
+    (State.READY, Happening.HEARD): State.SILENCE,
+    (State.READY, Happening.SENT): State.LISTENING,
+    (State.LISTENING, Happening.ANSWERED): State.SETTLED,
+    (State.LISTENING, Happening.EXPIRED): State.SETTLED,
+}
+"""The whole machine; the picture in `docs/` is drawn from it."""
+
+
+class MisuseError(RuntimeError):
+    """The caller told what cannot have happened; nothing was changed. A mistake in our own code."""
+
+
+class Exchange:
+    """One request and its answer. Call `step`, obey what it returns, tell what happened, call `step` again.
+
+    `asked` is when the line was given to it, `quiet_since` the last byte heard or sent before, wanted or not.
+    """
+
+    def __init__(self, attempt: Attempt, *, asked: float, quiet_since: float) -> None:
+        timing = attempt.timing
+        self._attempt = attempt
+        self._asked = asked
+        self._quiet_since = quiet_since
+        self._state = State.SILENCE
+        self._frame = attempt.codec.encode(attempt.request)
+        self._reception = Reception(attempt, self._frame)
+        self._gap = timing.gap if attempt.gap is None else max(timing.gap, attempt.gap)
+        # Silence that was still running when the line was given to us is no babble.
+        self._give_up = max(asked + attempt.turn, quiet_since + self._gap)
+        self._hush = ASCII_PAUSE if attempt.codec.framing is Framing.ASCII else timing.t35 + attempt.adapter_latency
+        patience = attempt.timeout if attempt.patience is None else attempt.patience
+        self._patience = min(patience, attempt.timeout)
+        self._began = self._sent_end = self._last = quiet_since
+        self._measured_gap: float | None = None
+        self._outcome: Outcome | None = None
+
+    @property
+    def state(self) -> State:
+        """Where it stands."""
+        return self._state
+
+    @property
+    def quiet_since(self) -> float:
+        """The last byte heard or sent on the line so far."""
+        return self._quiet_since
+
+    def step(self, now: float) -> Decision:
+        """Return what to do now. May be called at any time, any number of times."""
+        if self._outcome is not None:
+            return Settled(self._outcome)
+        if self._state is State.LISTENING:
+            return self._listen(now)
+        silent_at = self._quiet_since + self._gap
+        if now >= silent_at:
+            if self._state is State.SILENCE:
+                self._pass(Happening.SILENT)
+            return Send(self._frame)
+        if now >= self._give_up:
+            self._pass(Happening.BABBLED)
+            return self._settle(now, None, verdict.babble(self._attempt.turn))
+        return Quiet(min(silent_at, self._give_up))
+
+    def sent(self, begun: float, ended: float) -> None:
+        """Tell that the frame was written: the clock just before and just after the one `write`."""
+        if ended < begun:
+            raise MisuseError("a request cannot have been written before it was begun")
+        self._pass(Happening.SENT)
+        gap = begun - self._quiet_since
+        self._measured_gap = gap if isfinite(gap) else None
+        self._began = begun
+        # The latest its last bit can leave an adapter that holds nothing back: counted from after the write.
+        self._sent_end = ended + self._attempt.timing.transmission(len(self._frame))
+        self._quiet_since = self._last = self._sent_end
+        self._reception.sent(begun)
+
+    def received(self, data: bytes, now: float) -> None:
+        """Tell what was read at `now`, in any state, in any pieces."""
+        if not data:
+            return
+        self._quiet_since = max(self._quiet_since, now)
+        if self._state is State.SETTLED:
+            return
+        if self._state is State.READY:
+            self._pass(Happening.HEARD)
+        self._last = max(self._last, now)
+        self._reception.take(data, now)
+
+    def _pass(self, happening: Happening) -> None:
+        following = TRANSITIONS.get((self._state, happening))
+        if following is None:
+            raise MisuseError(f"an exchange in state {self._state} cannot be told {happening}")
+        self._state = following
+
+    # -- listening
+
+    def _listen(self, now: float) -> Decision:
+        reception = self._reception
+        if reception.answer is not None:
+            self._pass(Happening.ANSWERED)
+            return self._settle(reception.answer.last_at, reception.answer, None)
+        first, bound = self._limits()
+        until = min(self._until(first), bound)
+        if until <= now < first and verdict.stranger_interferes(self._attempt, reception):
+            until = min(first, bound)
+        if now >= until:
+            self._pass(Happening.EXPIRED)
+            return self._settle(now, reception.spare, verdict.judge(self._attempt, reception))
+        return Listen(until, min(max(now, reception.whole_at), until))
+
+    def _limits(self) -> tuple[float, float]:
+        """Return until when the first byte of the answer may come, and when even a babbling line is given up.
+
+        A slave answers in order: after its late answer to an earlier request it gets its usual time again.
+        """
+        attempt = self._attempt
+        if attempt.request.slave == BROADCAST:
+            over = self._sent_end + attempt.turnaround_delay
+            return over, over
+        first = max(self._sent_end + attempt.timeout, self._reception.late_at + self._patience)
+        size = attempt.codec.answer_size(attempt.request)
+        if attempt.codec.framing is Framing.ASCII and self._reception.begun:
+            return first, first + size * ASCII_PAUSE
+        return first, first + attempt.timing.transmission(size) + self._hush
+
+    def _until(self, first: float) -> float:
+        """Return when silence ends the exchange (rule 6)."""
+        reception = self._reception
+        if self._attempt.request.slave == BROADCAST:
+            return first
+        hushed = self._last + self._hush
+        if reception.spare is None:
+            if not reception.rest:
+                return first
+            if reception.begun:
+                return hushed
+        return max(hushed, max(self._sent_end, reception.late_at) + self._patience)
+
+    # -- the end
+
+    def _settle(self, ended: float, catch: Catch | None, found: Verdict | None) -> Settled:
+        attempt, reception = self._attempt, self._reception
+        sent = reception.sent_yet
+        answer: tuple[int, ...] | None = ()
+        exception: int | None = None
+        if catch is not None:
+            answer, found = attempt.codec.decode(catch.body), None
+            if catch.body[1] & EXCEPTION_FLAG:
+                (exception,) = answer
+                found = verdict.refusal(exception)
+        fault = None
+        if found is not None:
+            answer = None
+            fault = Fault(found.code, found.message, exception, bytes(reception.heard[-FAULT_HEARD:]))
+        self._outcome = Outcome(
+            request=attempt.request,
+            answer=answer,
+            fault=fault,
+            asked=self._asked,
+            began=self._began if sent else None,
+            sent_end=self._sent_end if sent else None,
+            gap=self._measured_gap,
+            ended=ended,
+            turnaround=max(0.0, catch.first_at - self._sent_end) if catch else None,
+            rtt=max(0.0, catch.last_at - self._began) if catch else None,
+            answered=sent and reception.begun,
+            late=tuple(reception.late),
+            echoed=reception.echoed if sent else None,
+            sent=self._frame if sent else b"",
+            heard=bytes(reception.heard[-HEARD_KEPT:]),
+            unsolicited=reception.unsolicited,
+            quiet_since=self._quiet_since,
+            ambiguous=reception.ambiguous,
+        )
+        return Settled(self._outcome)

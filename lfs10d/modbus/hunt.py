@@ -1,0 +1,151 @@
+"""Finding frames in what the line gave, through noise, at every offset.
+
+A `Quarry` is one right answer looked for. Its head (slave id, function, count) is found by a plain search, its
+length is known from its shape, so each byte is looked at a fixed number of times however long the garbage is.
+Positions count characters from the beginning of the exchange.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from lfs10d.modbus.frames import Codec, Shape
+
+KEPT = 1024
+"""Characters kept while the line babbles: more than twice the longest frame (513, ASCII)."""
+
+
+@dataclass(slots=True)
+class Quarry:
+    """One answer looked for, from position `start` on; `begun` once its whole head was seen."""
+
+    codec: Codec
+    shape: Shape
+    start: int = 0
+    begun: bool = False
+    partial: bool = False
+    """At `start` lies the head of a frame whose rest has not come yet."""
+
+    def skip(self, position: int) -> None:
+        """Look for it at `position` and later only."""
+        if position > self.start:
+            self.start, self.partial = position, False
+
+
+@dataclass(frozen=True, slots=True)
+class Catch:
+    """A frame found right: its body without check, its place, and when its first and last byte were heard."""
+
+    body: bytes
+    begin: int
+    end: int
+    first_at: float
+    last_at: float
+
+
+class Hunt:
+    """The stream of one exchange."""
+
+    __slots__ = ("_base", "_claims", "_mark_ends", "_mark_times", "_stream")
+
+    def __init__(self) -> None:
+        self._stream = bytearray()
+        self._base = 0
+        self._mark_ends: list[int] = []
+        self._mark_times: list[float] = []
+        self._claims: list[tuple[int, int]] = []
+
+    @property
+    def end(self) -> int:
+        """The position behind the last character heard."""
+        return self._base + len(self._stream)
+
+    def feed(self, data: bytes, now: float) -> None:
+        """Add what was heard at `now`; call `seek` for every quarry before the next."""
+        if len(self._stream) > 2 * KEPT:
+            self._forget(len(self._stream) - KEPT)
+        self._stream += data
+        self._mark_ends.append(self.end)
+        self._mark_times.append(now)
+
+    def _forget(self, count: int) -> None:
+        del self._stream[:count]
+        self._base += count
+        gone = bisect_right(self._mark_ends, self._base)
+        del self._mark_ends[:gone], self._mark_times[:gone]
+
+    def seek(self, quarry: Quarry) -> Catch | None:
+        """Return the next right frame of this shape, or None; goes on behind it at the next call."""
+        head, size = quarry.shape.head, quarry.shape.size
+        quarry.partial = False
+        while True:
+            at = self._stream.find(head, max(0, quarry.start - self._base))
+            if at < 0:
+                quarry.start = max(quarry.start, self.end - len(head) + 1)
+                return None
+            quarry.begun = True
+            begin = quarry.start = self._base + at
+            if begin + size > self.end:
+                quarry.partial = True
+                return None
+            body = quarry.codec.unwrap(bytes(self._stream[at : at + size]))
+            if body is not None:
+                quarry.start = end = begin + size
+                return Catch(body, begin, end, self._heard_at(begin), self._heard_at(end - 1))
+            quarry.start = begin + 1
+
+    def _heard_at(self, position: int) -> float:
+        return self._mark_times[bisect_right(self._mark_ends, position)]
+
+    def claim(self, catch: Catch) -> None:
+        """Take a frame out of what is left to explain."""
+        self._claims.append((catch.begin, catch.end))
+
+    def unclaimed(self, start: int) -> bytes:
+        """Return what was heard from `start` on and belongs to no claimed frame (of the last `KEPT`)."""
+        rest = bytearray()
+        at = max(start, self._base, self.end - KEPT)
+        for begin, end in sorted(self._claims):
+            rest += self._stream[at - self._base : max(0, begin - self._base)]
+            at = max(at, end)
+        return bytes(rest + self._stream[at - self._base :])
+
+    def unclaimed_count(self, start: int) -> int:
+        """Return how many characters from `start` on belong to no claimed frame."""
+        claimed = sum(max(0, end - max(begin, start)) for begin, end in self._claims)
+        return self.end - start - claimed
+
+    def begins(self, quarry: Quarry) -> bool:
+        """Whether bytes came that begin as this answer: its head, or enough of it at the very end."""
+        return quarry.begun or self._tail(quarry) >= quarry.shape.sign
+
+    def _tail(self, quarry: Quarry) -> int:
+        """Return how many characters at the very end are the beginning of this answer's head."""
+        head = quarry.shape.head
+        for length in range(min(len(head), self.end - max(quarry.start, self._base)), 0, -1):
+            if self._stream.endswith(head[:length]):
+                return length
+        return 0
+
+    def missing(self, quarries: Iterable[Quarry]) -> int:
+        """Return how many characters must still come before any of these can be whole; 0 if none has begun.
+
+        Where one character fits several, the first of them is taken: an answer is likelier than a refusal, and
+        a refusal noticed a few characters late costs less than a wake-up in every exchange.
+        """
+        fewest = 0
+        for quarry in quarries:
+            if quarry.partial:
+                lacking, length = quarry.start + quarry.shape.size - self.end, len(quarry.shape.head)
+            elif length := self._tail(quarry):
+                lacking = quarry.shape.size - length
+            else:
+                continue
+            if not fewest or (length > 1 and lacking < fewest):
+                fewest = lacking
+        return fewest

@@ -1,0 +1,243 @@
+"""What was heard during one exchange, sorted: echo, what came too early, late answers, the answer, the rest."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import TYPE_CHECKING
+
+from lfs10d.modbus.attempt import Attempt, Echo, LateAnswer, Pending
+from lfs10d.modbus.frames import BROADCAST, EXCEPTION_FLAG, WriteRegister
+from lfs10d.modbus.hunt import Catch, Hunt, Quarry
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+HEARD_KEPT = 1024
+"""Bytes remembered as heard, the last ones; the longest frame has 513 (ASCII)."""
+
+EARLY_TOLERANCE = 1
+"""Characters by which an answer may seem to come before our request has left: clocks and rates differ a little."""
+
+RATE_TOLERANCE = 0.9
+"""A character takes at least this share of its time: rates differ by a few percent, and stop bits are cut."""
+
+
+class Reception:
+    """The ear of one exchange, which sent `frame`.
+
+    `answer` is the right frame, once it is whole; `spare` a right frame that came too early to be believed at
+    once, on a port without pace. `late_at` is when the asked slave's last late answer was whole, `whole_at` when
+    the frame in progress can be whole.
+    """
+
+    def __init__(self, attempt: Attempt, frame: bytes) -> None:
+        normal, exception = attempt.codec.shapes(attempt.request)
+        self._attempt = attempt
+        self._frame = frame
+        self._hunt = Hunt()
+        self._normal = Quarry(attempt.codec, normal)
+        self._exception = Quarry(attempt.codec, exception)
+        self._older = [older for pending in attempt.earlier for older in self._quarries_of(pending)]
+        self._pending = list(attempt.earlier)
+        self._held: list[tuple[bytes, float]] = []
+        self._matched = self._missing = self._from = self._early_end = 0
+        self._earliest = -inf
+        self._undecided = self._echo_whole = False
+        # Echo and answer of a write look the same.
+        self._expects_echo = attempt.echo is Echo.ON or (
+            attempt.echo is Echo.UNKNOWN and isinstance(attempt.request, WriteRegister)
+        )
+        self.sent_yet = False
+        self.heard = bytearray()
+        self.answer: Catch | None = None
+        self.spare: Catch | None = None
+        self.late: list[LateAnswer] = []
+        self.late_at = self.whole_at = -inf
+
+    def _quarries_of(self, pending: Pending) -> Iterator[tuple[Pending, Quarry]]:
+        """Yield the answers to an earlier request that cannot be taken for ours."""
+        ours = {self._normal.shape, self._exception.shape}
+        for shape in pending.codec.shapes(pending.request):
+            if shape not in ours:
+                yield pending, Quarry(pending.codec, shape)
+
+    def sent(self, begun: float) -> None:
+        """Tell when the request was begun: from now on its echo and its answer may come."""
+        timing = self._attempt.timing
+        self._earliest = begun + timing.transmission(len(self._frame) - EARLY_TOLERANCE)
+        self._undecided = self._attempt.echo is not Echo.OFF
+        self._early_end = self._hunt.end
+        self._begin_at(self._hunt.end)
+        self.heard.clear()
+        self.sent_yet = True
+
+    def take(self, data: bytes, now: float) -> None:
+        """Sort what was read at `now`."""
+        self.heard += data
+        if len(self.heard) > 2 * HEARD_KEPT:
+            del self.heard[:-HEARD_KEPT]
+        data = self._attempt.codec.fold(data)
+        if self._undecided:
+            data = self._compare(data, now)
+        if data:
+            self._sort(data, now)
+        self._foresee(now)
+
+    def _compare(self, data: bytes, now: float) -> bytes:
+        """Hold back what may be echo; return what is none."""
+        part = data[: len(self._frame) - self._matched]
+        if not self._frame.startswith(part, self._matched):
+            self._undecided = False
+            for held, at in self._held:
+                self._sort(held, at)
+            self._held.clear()
+            return data
+        self._matched += len(part)
+        if self._matched < len(self._frame):
+            self._held.append((part, now))
+            return b""
+        self._undecided, self._echo_whole = False, True
+        self._held.clear()
+        return data[len(part) :]
+
+    def _sort(self, data: bytes, now: float) -> None:
+        early = self._too_early(len(data), now) if self.sent_yet else 0
+        if early:
+            self._early_end = self._hunt.end + early
+            if self._attempt.paced:
+                self._begin_at(self._early_end)
+        self._hunt.feed(data, now)
+        self._seek_older(now)
+        if self.sent_yet and self._attempt.request.slave != BROADCAST:
+            self._seek_ours()
+
+    def _begin_at(self, position: int) -> None:
+        self._from = position
+        self._normal.skip(position)
+        self._exception.skip(position)
+
+    def _too_early(self, count: int, now: float) -> int:
+        """Return how many of `count` characters read at `now` came before our request can have left the wire.
+
+        On a wire the last but n cannot have come later than n characters ago, however long the adapter kept it.
+        """
+        if now < self._earliest:
+            return count
+        if not self._attempt.paced:
+            return 0
+        room = (now - self._earliest) / (RATE_TOLERANCE * self._attempt.timing.character)
+        return max(0, count - 1 - int(room))
+
+    def _seek_older(self, now: float) -> None:
+        """Drop the answers of earlier requests; since a slave answers in order, none older can follow them."""
+        for pending, quarry in tuple(self._older):
+            if pending not in self._pending or (catch := self._hunt.seek(quarry)) is None:
+                continue
+            self._hunt.claim(catch)
+            for other in (self._normal, self._exception, *(other for _, other in self._older)):
+                other.skip(catch.end)
+            slave = pending.request.slave
+            count = self._pending.index(pending) + 1
+            before, after = self._pending[:count], self._pending[count:]
+            self._pending = [each for each in before if each.request.slave != slave] + after
+            self._older = [older for older in self._older if older[0] in self._pending]
+            self.late.append(LateAnswer(pending.request, max(0.0, catch.first_at - pending.sent_end)))
+            if slave == self._attempt.request.slave:
+                self.late_at = now
+
+    def _seek_ours(self) -> None:
+        quarries = [self._normal, self._exception]
+        if self._expects_echo and not self._echo_whole and isinstance(self._attempt.request, WriteRegister):
+            del quarries[0]
+        for quarry in quarries:
+            while self.answer is None and (catch := self._hunt.seek(quarry)) is not None:
+                self._hunt.claim(catch)
+                if catch.begin < self._early_end:
+                    self.spare = self.spare or catch
+                else:
+                    self.answer = catch
+
+    def _foresee(self, now: float) -> None:
+        """Reckon when the frame in progress can be whole: the soonest that any of its pieces lets expect."""
+        if self._held:
+            missing = len(self._frame) - self._matched if self._attempt.echo is Echo.ON else 0
+        else:
+            older = [quarry for _, quarry in self._older]
+            missing = self._hunt.missing([self._normal, self._exception, *older])
+        expected = now + missing * self._attempt.timing.character
+        self.whole_at = min(self.whole_at, expected) if 0 < missing < self._missing else expected
+        self._missing = missing
+
+    # -- what it amounts to
+
+    @property
+    def rest(self) -> int:
+        """How many characters came in the place of an answer and are neither echo nor an earlier answer."""
+        return self._hunt.unclaimed_count(self._from) + sum(len(held) for held, _ in self._held)
+
+    def leftover(self) -> bytes:
+        """Return these characters (the last of them where there were very many)."""
+        return self._hunt.unclaimed(self._from) + b"".join(held for held, _ in self._held)
+
+    @property
+    def begun(self) -> bool:
+        """Whether bytes came that begin as the answer."""
+        if self.answer is not None or self.spare is not None:
+            return True
+        if self._hunt.begins(self._normal) or self._hunt.begins(self._exception):
+            return True
+        return not self._expects_echo and self._matched >= self._normal.shape.sign and bool(self._held)
+
+    @property
+    def expected(self) -> int:
+        """How many characters the answer has that came, as far as can be told."""
+        only_exception = self._hunt.begins(self._exception) and not self._hunt.begins(self._normal)
+        return (self._exception if only_exception else self._normal).shape.size
+
+    @property
+    def only_request(self) -> bool:
+        """Whether nothing came but our own bytes, from an adapter that is known to have no echo."""
+        return self.leftover() == self._frame
+
+    @property
+    def echo_changed(self) -> bool:
+        """Whether an echo was expected and did not come back whole."""
+        return self._expects_echo and not self._echo_whole
+
+    @property
+    def echoed(self) -> bool | None:
+        """Whether our own bytes came back; None without evidence, for only an answer proves that they did not."""
+        caught = self.answer or self.spare
+        writes = isinstance(self._attempt.request, WriteRegister)
+        if self._echo_whole:
+            return None if writes and self._attempt.echo is Echo.UNKNOWN and caught is None else True
+        if caught is None or writes:
+            return None
+        heard = self._attempt.codec.fold(bytes(self.heard))
+        if self._frame in heard:
+            return True if heard.startswith(self._frame) else None
+        return False
+
+    @property
+    def ambiguous(self) -> bool:
+        """Whether the answer may be that of another earlier request.
+
+        An exception tells nothing but the function. Where the same was asked before, either answer will do.
+        """
+        caught = self.answer or self.spare
+        if caught is None:
+            return False
+        request = self._attempt.request
+        rivals = [each.request for each in self._pending if each.request.slave == request.slave]
+        if caught.body[1] & EXCEPTION_FLAG:
+            return any(rival.function == request.function for rival in rivals)
+        shapes = self._attempt.codec.shapes
+        return any(rival != request and shapes(rival)[0] == self._normal.shape for rival in rivals)
+
+    @property
+    def unsolicited(self) -> int:
+        """How many bytes are no echo and belong to no answer, of this or of an earlier request."""
+        count = self._hunt.unclaimed_count(0) + sum(len(held) for held, _ in self._held)
+        if self.answer is None and self.spare is None and self.begun:
+            count -= min(self.rest, self.expected)
+        return count

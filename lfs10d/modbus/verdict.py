@@ -1,0 +1,138 @@
+"""What went wrong in an exchange without an answer: the fault's code and words for the person on the roof."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from lfs10d.modbus.frames import BROADCAST, EXCEPTION_FLAG, EXCEPTION_NAMES, Codec, ReadRegisters, Request
+from lfs10d.reading import FaultCode
+
+if TYPE_CHECKING:
+    from lfs10d.modbus.attempt import Attempt
+    from lfs10d.modbus.reception import Reception
+
+_REQUEST_BODY = 6
+"""Slave, function, address and count: what a master sends, and no answer of a read can be."""
+
+
+class Verdict(NamedTuple):
+    """A fault's code and message."""
+
+    code: FaultCode
+    message: str
+
+
+def milliseconds(seconds: float) -> str:
+    """Return a duration for people, to a tenth of a millisecond: `200 ms`, `3.6 ms`."""
+    return f"{seconds * 1000:.1f}".removesuffix(".0") + " ms"
+
+
+def judge(attempt: Attempt, reception: Reception) -> Verdict | None:
+    """Name what went wrong when nothing more is to be expected; None where nothing did: a broadcast.
+
+    The nearest thing to an answer counts: a frame with a right check, then a late answer, then broken bytes.
+    """
+    heard = reception.leftover()
+    if heard and reception.echo_changed:
+        return changed_echo()
+    if attempt.request.slave == BROADCAST:
+        return None
+    if heard and not reception.only_request:
+        found = stranger(attempt.request, attempt.codec, heard)
+        if found is not None:
+            return found
+        if reception.begun or not reception.late:
+            return broken(heard, reception.expected, begun=reception.begun)
+    if reception.late:
+        return late(reception.late[-1].latency)
+    return silent(attempt.timeout, own=bool(heard))
+
+
+def stranger_interferes(attempt: Attempt, reception: Reception) -> bool:
+    """Whether what came is a frame of another slave: ours may still answer."""
+    found = stranger(attempt.request, attempt.codec, reception.leftover())
+    return found is not None and found.code is FaultCode.WRONG_SLAVE
+
+
+def silent(timeout: float, *, own: bool = False) -> Verdict:
+    """Judge that nobody answered; `own`: our request came back though no echo was expected."""
+    hint = " but our own request came back: does the adapter echo?" if own else ""
+    return Verdict(FaultCode.TIMEOUT, f"no answer in {milliseconds(timeout)}{hint}")
+
+
+def late(latency: float) -> Verdict:
+    """Judge that only the answer to an earlier request came, `latency` s after that."""
+    since = milliseconds(latency)
+    return Verdict(FaultCode.LATE, f"only the answer to an earlier request came, {since} after it was asked")
+
+
+def babble(turn: float) -> Verdict:
+    """Judge that the line never fell silent for us."""
+    waited = milliseconds(turn)
+    return Verdict(
+        FaultCode.COLLISION,
+        f"the line did not fall silent in {waited}, nothing was sent: a second master, a babbling device or noise",
+    )
+
+
+def changed_echo() -> Verdict:
+    """Judge that our own bytes came back otherwise than we sent them."""
+    message = "our own request came back changed: another device sent at the same time, or noise"
+    return Verdict(FaultCode.COLLISION, message)
+
+
+def refusal(code: int) -> Verdict:
+    """Judge an exception answer."""
+    name = EXCEPTION_NAMES.get(code, "of the device's own")
+    return Verdict(FaultCode.EXCEPTION, f"exception {code:02X} {name}")
+
+
+def stranger(request: Request, codec: Codec, heard: bytes) -> Verdict | None:
+    """Judge the nearest frame in `heard` that has a right check and is no answer to `request`; None without one."""
+    size = codec.answer_size(request)
+    verdicts = [_judge(request, body) for _, _, body in codec.frames(heard, request.slave, size)]
+    return max(verdicts, key=_closeness, default=None)
+
+
+def broken(heard: bytes, size: int, *, begun: bool) -> Verdict:
+    """Judge bytes that hold no right frame at all in place of an answer of `size`; `begun`: they begin as one.
+
+    `heard` is what is left when echo, earlier answers and what came too early are taken out, at least one byte.
+    """
+    count = len(heard)
+    if count >= size:
+        return Verdict(
+            FaultCode.CRC, f"check failed ({count} bytes): noise, two devices with one id, or a wrong baud rate"
+        )
+    if begun:
+        return Verdict(FaultCode.MALFORMED, f"answer cut short: {count} of {size} bytes")
+    plural = "s" * (count > 1)
+    return Verdict(FaultCode.MALFORMED, f"{count} byte{plural} in place of an answer of {size}: noise")
+
+
+_CLOSENESS = {FaultCode.MALFORMED: 3, FaultCode.WRONG_FUNCTION: 2, FaultCode.WRONG_SLAVE: 1}
+"""Which of several frames tells most: the asked slave's own, nearest to what was asked."""
+
+
+def _closeness(verdict: Verdict) -> int:
+    return _CLOSENESS[verdict.code]
+
+
+def _judge(request: Request, body: bytes) -> Verdict:
+    """Judge a frame with a right check that is no answer to `request`."""
+    slave, function, data = body[0], body[1] & ~EXCEPTION_FLAG, body[2:]
+    asked = len(body) == _REQUEST_BODY and function in (3, 4)
+    if slave != request.slave:
+        if asked:
+            return Verdict(FaultCode.WRONG_SLAVE, f"a request to slave {slave} was heard: is there a second master?")
+        return Verdict(FaultCode.WRONG_SLAVE, f"slave {slave} answered in place of slave {request.slave}")
+    if function != request.function:
+        wrong = f"slave {slave} answered function {function:02X} in place of {request.function:02X}"
+        return Verdict(FaultCode.WRONG_FUNCTION, wrong)
+    if not isinstance(request, ReadRegisters):
+        told = f"slave {slave} confirmed another write: {data.hex(' ').upper()}"
+    elif asked:
+        told = f"a request to slave {slave} was heard in place of its answer: an echo, or a second master"
+    else:
+        told = f"slave {slave} sent {max(0, len(data) - 1)} data bytes in place of {2 * request.count}"
+    return Verdict(FaultCode.MALFORMED, told)
