@@ -96,12 +96,8 @@ def shortest(bits: int) -> float:
     return float(f"{exact:.{_MOST_FLOAT32_DIGITS}g}")
 
 
-def _float32_bits(number: float) -> int | None:
-    try:
-        packed = _FLOAT32.pack(number)
-    except OverflowError:  # rounded up beyond the largest float32
-        return None
-    bits: int = _WORD.unpack(packed)[0]
+def _float32_bits(number: float) -> int:
+    bits: int = _WORD.unpack(_FLOAT32.pack(number))[0]
     return bits
 
 

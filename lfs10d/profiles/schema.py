@@ -201,7 +201,7 @@ class Profile(Facts):
         taken = {fact.register: key for key in ("slave_id", "baudrate") if (fact := info.data.get(key)) is not None}
         for index, setting in enumerate(settings):
             if setting.register in taken:
-                message = f"is set by {taken[setting.register]}; it is no setting"
+                message = f"is set by {taken[setting.register]}; it is no setting of its own"
                 problems.append(((index, "register"), message))
             taken.setdefault(setting.register, f"settings[{index}]")
         refuse(problems)

@@ -1,0 +1,109 @@
+"""Which registers are read together, and what comes of them."""
+
+from __future__ import annotations
+
+import struct
+from itertools import pairwise
+
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from lfs10d.profiles.blocks import Block, batch
+from lfs10d.profiles.values import Value
+from lfs10d.reading import Fault, FaultCode
+
+FORMATS = {"int16": "h", "uint16": "H", "int32": "i", "uint32": "I"}
+
+
+def value(name: str, register: int, kind: str = "uint16", **more: object) -> Value:
+    words = {} if kind.endswith("16") else {"word_order": "high_first"}
+    return Value.model_validate({"name": name, "register": register, "type": kind, "unit": "1", **words, **more})
+
+
+@st.composite
+def some_values(draw: st.DrawFn) -> tuple[Value, ...]:
+    places = draw(
+        st.lists(
+            st.tuples(st.sampled_from(sorted(FORMATS)), st.integers(0, 20), st.sampled_from([3, 4])),
+            min_size=1,
+            max_size=12,
+        )
+    )
+    return tuple(
+        value(f"v{index}", register, kind, function=function) for index, (kind, register, function) in enumerate(places)
+    )
+
+
+def summary(blocks: tuple[Block, ...]) -> list[tuple[int, int, int]]:
+    return [(block.function, block.address, block.count) for block in blocks]
+
+
+def test_neighbours_come_in_one_read() -> None:
+    values = [value("b", 2), value("a", 1), value("c", 3, "int32")]
+    assert summary(batch(values, 5)) == [(3, 1, 4)]
+
+
+def test_a_gap_of_one_register_is_never_read_across() -> None:
+    assert summary(batch([value("a", 1), value("b", 3)], 5)) == [(3, 1, 1), (3, 3, 1)]
+
+
+def test_values_of_two_functions_are_never_read_together() -> None:
+    assert summary(batch([value("a", 1), value("b", 2, function=4)], 5)) == [(3, 1, 1), (4, 2, 1)]
+
+
+def test_neighbours_beyond_the_limit_are_split_between_values() -> None:
+    values = [value("a", 0, "int32"), value("b", 2, "int32"), value("c", 4)]
+    assert summary(batch(values, 3)) == [(3, 0, 2), (3, 2, 3)]
+
+
+def test_overlapping_values_share_their_registers() -> None:
+    assert summary(batch([value("a", 0, "int32"), value("low", 1), value("high", 0)], 5)) == [(3, 0, 2)]
+
+
+def test_no_values_need_no_read() -> None:
+    assert batch([], 5) == ()
+
+
+@given(values=some_values(), most=st.integers(2, 6))
+@example(values=(value("a", 0, "int32"), value("b", 0), value("c", 1, "int32")), most=2)
+def test_batching_loses_nothing_reads_nothing_unlisted_and_keeps_the_limit(
+    values: tuple[Value, ...], most: int
+) -> None:
+    blocks = batch(values, most)
+    listed = {(v.function, v.register + word) for v in values for word in range(v.words)}
+    asked = [(b.function, b.address + word) for b in blocks for word in range(b.count)]
+    assert set(asked) == listed
+    assert sorted(v.name for b in blocks for v in b.values) == sorted(v.name for v in values)
+    assert all(b.count <= most for b in blocks)
+    for b in blocks:
+        assert all(b.address <= v.register and v.end <= b.address + b.count for v in b.values)
+    for first, second in pairwise(blocks):
+        touch = first.function == second.function and second.address <= first.address + first.count
+        assert not touch or second.values[0].end - first.address > most
+
+
+@given(values=some_values(), most=st.integers(2, 6), data=st.data())
+def test_a_block_decodes_what_each_value_alone_would_be(
+    values: tuple[Value, ...], most: int, data: st.DataObject
+) -> None:
+    memory = {function: data.draw(st.binary(min_size=46, max_size=46)) for function in (3, 4)}
+    numbers: dict[str, int | float] = {}
+    for block in batch(values, most):
+        words = struct.unpack_from(f">{block.count}H", memory[block.function], 2 * block.address)
+        decoded = block.decode(words)
+        assert not isinstance(decoded, Fault)
+        numbers |= decoded
+    assert numbers == {
+        v.name: struct.unpack_from(">" + FORMATS[v.type], memory[v.function], 2 * v.register)[0] for v in values
+    }
+
+
+def test_one_bad_value_makes_the_whole_block_a_fault() -> None:
+    (block,) = batch([value("a", 1), value("b", 2, range=[0, 10])], 5)
+    assert block.decode((7, 10)) == {"a": 7, "b": 10}
+    assert block.decode((7, 11)) == Fault(FaultCode.OUT_OF_RANGE, "b 11 is outside 0..10")
+
+
+def test_another_number_of_registers_than_asked_is_malformed() -> None:
+    (block,) = batch([value("a", 1)], 5)
+    assert block.decode((1, 2)) == Fault(FaultCode.MALFORMED, "2 registers came, 1 were asked")

@@ -1,0 +1,181 @@
+"""Values and settings: what is accepted, and what may be written."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from lfs10d.profiles.values import RESERVED_NAMES, Setting, Value
+from lfs10d.telemetry import Sample
+
+VALUE = {"name": "level", "register": 1, "type": "uint16", "unit": "m"}
+SETTING = {"name": "average", "register": 16}
+
+
+def problems(model: type[Value | Setting], data: dict[str, Any]) -> list[tuple[tuple[int | str, ...], str]]:
+    with pytest.raises(ValidationError) as caught:
+        model.model_validate(data)
+    return [(wrong["loc"], wrong["msg"]) for wrong in caught.value.errors()]
+
+
+@pytest.mark.parametrize("name", ["level", "l", "wind_speed_2m", "x" * 48])
+def test_a_value_is_named_in_snake_case(name: str) -> None:
+    assert Value.model_validate(VALUE | {"name": name}).name == name
+
+
+@pytest.mark.parametrize("name", ["", "Level", "wind-speed", "2m", "_x", "x" * 49, "level ", "pegel_ü", 7, None])
+def test_another_name_is_refused(name: object) -> None:
+    ((place, message),) = problems(Value, VALUE | {"name": name})
+    assert place == ("name",)
+    assert message.startswith("must be a name of 1 to 48 of the characters a-z 0-9 _ that begins with a letter")
+
+
+@pytest.mark.parametrize("name", sorted(RESERVED_NAMES))
+def test_a_value_cannot_hide_a_key_of_the_sample(name: str) -> None:
+    wanted = f"is a key of every sample already; choose another, such as raw_{name}"
+    assert problems(Value, VALUE | {"name": name}) == [(("name",), wanted)]
+
+
+@pytest.mark.parametrize("units", [{"level": "m"}, {"level": "m", "depth": "m"}])
+def test_the_reserved_names_are_the_keys_of_every_sample(units: dict[str, str]) -> None:
+    sample = Sample(
+        device="mast",
+        boot="k3f9a2c7",
+        seq=1,
+        ts=0,
+        clock="synced",
+        values=dict.fromkeys(units, 1.0),
+        units=units,
+        names=tuple(units),
+        quality="good",
+        error=None,
+        rtt_ms=1.0,
+    )
+    assert set(sample.payload("line0", historical=True)) - set(units) <= RESERVED_NAMES
+
+
+@pytest.mark.parametrize("scale", [0, -0.0, 1e-13, -1e13, True, "0.1", None])
+def test_a_scale_that_leads_nowhere_is_refused(scale: object) -> None:
+    ((place, message),) = problems(Value, VALUE | {"scale": scale})
+    assert place == ("scale",)
+    assert message.startswith("must be a number from 1e-12 to 1e12, or the same negative, not ")
+
+
+@given(
+    scale=st.floats(1e-12, 1e12) | st.floats(-1e12, -1e-12),
+    offset=st.floats(-1e12, 1e12),
+    word=st.integers(0, 0xFFFF),
+)
+def test_every_accepted_scale_and_offset_give_a_number(scale: float, offset: float, word: int) -> None:
+    value = Value.model_validate(VALUE | {"scale": scale, "offset": offset})
+    assert isinstance(value.cell(1).decode((word,)), int | float)
+
+
+@pytest.mark.parametrize("bounds", [[2, 1], [1, 1]])
+def test_a_range_is_ordered(bounds: list[int]) -> None:
+    wanted = "the first number of a range must be less than the second"
+    assert problems(Value, VALUE | {"range": bounds}) == [(("range",), wanted)]
+    assert problems(Setting, SETTING | {"range": bounds}) == [(("range",), wanted)]
+
+
+def test_two_registers_need_a_word_order_for_a_guess_would_give_a_wrong_number() -> None:
+    wanted = "is missing; write high_first or low_first: which of two registers holds the high half"
+    assert problems(Value, VALUE | {"type": "float32"}) == [(("word_order",), wanted)]
+
+
+def test_one_register_has_no_word_order() -> None:
+    wanted = "uint16 fills one register; leave the word order out"
+    assert problems(Value, VALUE | {"word_order": "high_first"}) == [(("word_order",), wanted)]
+
+
+def test_a_wrong_type_is_the_only_problem_of_its_word_order() -> None:
+    (wrong,) = problems(Value, VALUE | {"type": "double", "word_order": "high_first"})
+    assert wrong[0] == ("type",)
+
+
+def test_a_value_ends_within_the_registers() -> None:
+    assert Value.model_validate(VALUE | {"register": 0xFFFF}).end == 0x10000
+    wide = VALUE | {"register": 0xFFFF, "type": "int32", "word_order": "low_first"}
+    assert problems(Value, wide) == [(("type",), "int32 fills two registers, and 0xFFFF is the last")]
+
+
+@pytest.mark.parametrize("register", [-1, 0x10000, "1", 1.0, True, None])
+def test_a_register_is_an_address_of_16_bits(register: object) -> None:
+    assert ("register",) in [place for place, _ in problems(Value, VALUE | {"register": register})]
+
+
+def test_a_setting_not_marked_writable_is_never_written() -> None:
+    setting = Setting.model_validate(SETTING | {"range": [0, 10]})
+    assert setting.refusal(5) == "average is not marked writable by the profile"
+
+
+def test_a_writable_setting_is_bounded() -> None:
+    wanted = "a setting is writable only with a range or values"
+    assert problems(Setting, SETTING | {"writable": True}) == [(("writable",), wanted)]
+
+
+def test_a_range_with_a_problem_is_the_only_problem_of_a_writable_setting() -> None:
+    wrong = problems(Setting, SETTING | {"writable": True, "range": [2, 1]})
+    assert [place for place, _ in wrong] == [("range",)]
+
+
+@given(word=st.integers(0, 0xFFFF))
+def test_a_setting_takes_what_lies_in_its_range_in_its_unit(word: int) -> None:
+    more = {"type": "int16", "scale": 0.1, "unit": "s", "range": [-10, 60], "writable": True}
+    setting = Setting.model_validate(SETTING | more)
+    signed = int.from_bytes(word.to_bytes(2, "big"), "big", signed=True)
+    assert (setting.refusal(word) is None) is (-100 <= signed <= 600)
+
+
+@pytest.mark.parametrize(
+    ("kind", "word", "refusal"),
+    [
+        ("uint16", 601, "average takes -10..60 s; register content 601 is 60.1 s"),
+        ("uint16", 0xFFFF, "average takes -10..60 s; register content 65535 is 6553.5 s"),
+        ("int16", 0xFF00, "average takes -10..60 s; register content 65280 is -25.6 s"),
+    ],
+)
+def test_a_refused_content_is_told_in_the_unit(kind: str, word: int, refusal: str) -> None:
+    more = {"type": kind, "scale": 0.1, "unit": "s", "range": [-10, 60], "writable": True}
+    assert Setting.model_validate(SETTING | more).refusal(word) == refusal
+
+
+def test_a_setting_with_values_takes_only_those() -> None:
+    setting = Setting.model_validate(SETTING | {"values": {0: "off", 7: "on"}, "writable": True})
+    assert setting.refusal(7) is None
+    assert setting.refusal(1) == "average takes 0 (off), 7 (on), not 1"
+
+
+@pytest.mark.parametrize(
+    ("more", "wrong"),
+    [
+        ({"values": {}}, [(("values",), "names no value")]),
+        (
+            {"values": {1: "on"}, "range": [0, 1]},
+            [(("values",), "a setting has either a range or values")],
+        ),
+        (
+            {"values": {70000: "on", "off": "off", -1: "x"}},
+            [
+                (("values", key), "is no register content; write a whole number from 0 to 65535")
+                for key in (70000, "off", -1)
+            ],
+        ),
+    ],
+)
+def test_the_values_of_a_setting_are_register_contents(more: dict[str, Any], wrong: list[Any]) -> None:
+    assert problems(Setting, SETTING | more) == wrong
+
+
+def test_values_that_are_no_mapping_are_refused() -> None:
+    assert [place for place, _ in problems(Setting, SETTING | {"values": [1]})] == [("values",)]
+
+
+def test_facts_do_not_change_after_loading() -> None:
+    value = Value.model_validate(VALUE)
+    with pytest.raises(ValidationError):
+        value.unit = "ft"  # type: ignore[misc]  # that it is frozen is the claim
