@@ -1,0 +1,62 @@
+"""Is the wall clock synchronised? Asked of systemd, for the daemon's sandbox forbids adjtimex.
+
+systemd-timesyncd leaves a mark in /run once it has set the clock. Any other (chrony, ntpd) is known to timedate1,
+which reads the kernel's flag. Without both nobody knows.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+ClockState: TypeAlias = Literal["synced", "unsynced", "unknown"]
+
+MARK = Path("/run/systemd/timesync/synchronized")
+"""Touched by systemd-timesyncd at each synchronisation (systemd-timesyncd.service(8)); /run is empty after a boot."""
+
+QUESTION = ("timedatectl", "show", "--property=NTPSynchronized", "--value")
+"""org.freedesktop.timedate1 in words; prints yes or no."""
+
+PATIENCE = 2.0
+"""How long timedate1 may take, s: it is started by the question."""
+
+LOOK_AGAIN: dict[ClockState, float] = {"synced": 600.0, "unsynced": 15.0, "unknown": 600.0}
+"""How long an answer is good for, s. A clock is usually synchronised within a minute of the network."""
+
+
+def look(*, mark: Path = MARK, question: Sequence[str] = QUESTION, patience: float = PATIENCE) -> ClockState:
+    """Tell the state of the wall clock. Blocks up to `patience` seconds, so never call it on loop or line thread."""
+    if os.path.lexists(mark):
+        return "synced"
+    return judge(_ask(question, patience))
+
+
+def judge(answer: str | None) -> ClockState:
+    """Take timedate1's answer, None if there was none."""
+    match answer:
+        case "yes":
+            return "synced"
+        case "no":
+            return "unsynced"
+        case _:
+            return "unknown"
+
+
+def _ask(question: Sequence[str], patience: float) -> str | None:
+    try:
+        answer = subprocess.run(  # noqa: S603 - a constant command, no shell
+            question,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            timeout=patience,
+            check=True,
+        )
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return answer.stdout.decode("ascii", "replace").strip()

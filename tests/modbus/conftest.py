@@ -1,0 +1,38 @@
+"""A real pseudo terminal: the test holds the far end, the code under test opens the near end by its path."""
+
+from __future__ import annotations
+
+import os
+import tty
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+
+@dataclass
+class FarEnd:
+    """The master of a pty; `path` is where its slave is opened."""
+
+    fd: int
+    path: str
+
+    def close(self) -> None:
+        """Pull the plug."""
+        if self.fd >= 0:
+            os.close(self.fd)
+            self.fd = -1
+
+
+@pytest.fixture
+def far_end() -> Iterator[FarEnd]:
+    """Give a pty in raw mode whose slave nobody has open."""
+    master, slave = os.openpty()
+    tty.setraw(slave)
+    end = FarEnd(master, os.ttyname(slave))
+    os.close(slave)
+    yield end
+    end.close()
