@@ -102,10 +102,14 @@ class PollQueue:
 
     def _first(self, now: float) -> Device | Poll | None:
         due = self._due[0][0] if self._due else inf
-        flat = self._flat[0].last_asked + FLAT_OUT_PATIENCE if self._flat else inf
+        flat = self._flat_due() if self._flat else inf
         if due <= min(now, flat):
             return heappop(self._due)[2]
         return self._flat.popleft() if self._flat else None
+
+    def _flat_due(self) -> float:
+        device = self._flat[0]
+        return max(device.last_asked, device.due) + FLAT_OUT_PATIENCE
 
     def _begin(self, device: Device, now: float) -> Poll:
         interval = device.spec.interval

@@ -47,8 +47,8 @@ class Probing:
 
     def plan(self, now: float) -> None:
         """Find out when a probe may be next: `next_at`."""
-        ready = self._share.ready_at(now) if self.anyone_online else now
-        self.next_at = min((self._wish(device, ready) for device in self._offline), default=inf)
+        ready = self._share.ready_at(now)
+        self.next_at = min((self._allowed_at(device, ready) for device in self._offline), default=inf)
 
     def stop(self) -> None:
         """Probe nobody until the next review."""
@@ -60,20 +60,23 @@ class Probing:
         """Return the device to probe now, if any."""
         if now < self.next_at:
             return None
-        ready = self._share.ready_at(now) if self.anyone_online else now
+        ready = self._share.ready_at(now)
         waiting = [d for d in self._offline if not d.polling and d.slave not in excluded]
-        device = min(waiting, key=lambda d: self._wish(d, ready), default=None)
-        if device is None or self._wish(device, ready) > now:
-            self.next_at = now + PROBE_SPACING if device is None else self._wish(device, ready)
+        device = min(waiting, key=lambda d: (not d.probe_exempt, self._wished_at(d)), default=None)
+        if device is None:
+            self.next_at = now + PROBE_SPACING
             return None
-        return device
+        self.next_at = self._allowed_at(device, ready)
+        return device if self.next_at <= now else None
 
     def spend(self, device: Device, taken: float, now: float) -> None:
         """Note that a probe of `device` took `taken` s of the line."""
         if self.anyone_online and not device.probe_exempt:
             self._share.spend(taken, now)
 
-    def _wish(self, device: Device, ready: float) -> float:
-        if not self.anyone_online:
-            return max(device.last_asked + PROBE_SPACING, ready)
-        return device.next_probe if device.probe_exempt else max(device.next_probe, ready)
+    def _wished_at(self, device: Device) -> float:
+        return device.next_probe if self.anyone_online else device.last_asked + PROBE_SPACING
+
+    def _allowed_at(self, device: Device, ready: float) -> float:
+        wished = self._wished_at(device)
+        return max(wished, ready) if self.anyone_online and not device.probe_exempt else wished

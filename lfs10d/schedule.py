@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from lfs10d.jobs.job import Ask, Hold, Job, Later
 from lfs10d.jobs.poll import Poll
+from lfs10d.modbus.frames import ReadRegisters
 from lfs10d.modbus.unanswered import Unanswered
 from lfs10d.pollqueue import PollQueue, back_on_grid, spread
 from lfs10d.probing import Probing
@@ -276,7 +277,8 @@ def _another(old: DeviceSpec, new: DeviceSpec) -> bool:
 
 
 def _wire_time(device: Device, timing: LineTiming) -> float:
-    request = device.spec.profile.reads()[0].request(device.slave)
+    block = device.spec.profile.reads()[0]
+    request = ReadRegisters(device.slave, block.address, block.count, block.function)
     codec = device.spec.codec
     return timing.exchange(len(codec.encode(request)), codec.answer_size(request))
 

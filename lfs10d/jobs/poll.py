@@ -74,7 +74,7 @@ class Poll:
                 return Hold(until)
         self._barrier_asked = barrier is not None and (pending or self._barrier_due)
         if self._barrier_asked and barrier is not None:
-            request = ReadRegisters(device.slave, barrier.register_, barrier.count, barrier.function)
+            request = ReadRegisters(device.slave, barrier.register, barrier.count, barrier.function)
         else:
             block = self._blocks[self._block]
             request = ReadRegisters(device.slave, block.address, block.count, block.function)

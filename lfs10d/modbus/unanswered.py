@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
 QUIET_LEAST = 1.0
 """How long a slave is left alone where no barrier can tell, at least; in s."""
-REMEMBERED = 8
-"""Unanswered requests remembered per slave id; older ones of the same shape add nothing."""
 
 
 class Unanswered:
@@ -93,6 +91,6 @@ class Unanswered:
             self.forget(request.slave)
 
     def _remember(self, request: Request, codec: Codec, sent_end: float) -> None:
-        pending = self._pending.setdefault(request.slave, [])
-        pending.append(Pending(request, codec, sent_end))
-        del pending[:-REMEMBERED]
+        """Keep the newest of equal requests: a slave that answers it has answered those before."""
+        pending = [each for each in self._pending.get(request.slave, []) if each.request != request]
+        self._pending[request.slave] = [*pending, Pending(request, codec, sent_end)]

@@ -1,0 +1,110 @@
+"""From the configuration to what each part is built from: the one place where their words meet."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from typing import TYPE_CHECKING
+
+from lfs10d.facts import DeviceFacts, LineFacts
+from lfs10d.modbus.bus import LineRules
+from lfs10d.modbus.frames import Checksum, Codec, Framing
+from lfs10d.modbus.settings import PortSettings, Rs485
+from lfs10d.modbus.timing import LineTiming
+from lfs10d.roster import DeviceSpec, PollRules
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from lfs10d.config import Config, LineConfig, PollConfig, SlaveConfig
+    from lfs10d.profiles.schema import Profile
+
+
+def port_settings(line: LineConfig) -> PortSettings:
+    """Return how the port is to be opened."""
+    return PortSettings(
+        path=line.port,
+        baudrate=line.baudrate,
+        parity=line.parity,
+        databits=line.databits,
+        stopbits=line.stopbits,
+        low_latency=line.low_latency,
+        rs485=None if line.rs485 is None else Rs485(**line.rs485.model_dump()),
+    )
+
+
+def line_rules(line: LineConfig) -> LineRules:
+    """Return how the line is spoken on."""
+    return LineRules(extra_gap=line.extra_gap, turnaround_delay=line.turnaround_delay, echo=line.echo)
+
+
+def line_timing(line: LineConfig) -> LineTiming:
+    """Return the times at the line's rate."""
+    return LineTiming.of(
+        line.baudrate,
+        databits=line.databits,
+        parity=line.parity,
+        stopbits=line.stopbits,
+        extra_gap=line.extra_gap,
+    )
+
+
+def poll_rules(poll: PollConfig) -> PollRules:
+    """Return what holds for the polls of every device."""
+    return PollRules(retries=poll.retries, offline_after=poll.offline_after, probe_interval_max=poll.probe_interval_max)
+
+
+def device_specs(config: Config, profiles: Mapping[str, Profile]) -> tuple[DeviceSpec, ...]:
+    """Return the devices for the schedule; `profiles` by the configuration's word for each."""
+    return tuple(_device_spec(slave, config.line, profiles[slave.profile]) for slave in config.slaves)
+
+
+def _device_spec(slave: SlaveConfig, line: LineConfig, profile: Profile) -> DeviceSpec:
+    return DeviceSpec(
+        name=slave.name,
+        slave=slave.id,
+        profile=profile,
+        codec=Codec(Framing(line.framing), Checksum(slave.checksum or profile.checksum)),
+        interval=slave.interval,
+        enabled=slave.enabled,
+        response_timeout=slave.response_timeout,
+    )
+
+
+def line_facts(line: LineConfig) -> LineFacts:
+    """Return what the broker is told about the line."""
+    return LineFacts(
+        name=line.name,
+        port=line.port,
+        baudrate=line.baudrate,
+        parity=line.parity,
+        databits=line.databits,
+        stopbits=line.stopbits,
+        framing=line.framing,
+        gap_required=line_timing(line).gap,
+    )
+
+
+def device_facts(config: Config, profiles: Mapping[str, Profile]) -> tuple[DeviceFacts, ...]:
+    """Return what the broker is told about each device."""
+    return tuple(
+        DeviceFacts(
+            name=slave.name,
+            slave=slave.id,
+            label=slave.label,
+            profile=profiles[slave.profile].name,
+            interval=slave.interval,
+            enabled=slave.enabled,
+            response_timeout=slave.response_timeout,
+            value_names=profiles[slave.profile].value_names,
+            units=profiles[slave.profile].units,
+            offline_after=config.poll.offline_after,
+        )
+        for slave in config.slaves
+    )
+
+
+def config_hash(config: Config) -> str:
+    """Return 12 hex digits that differ where the effective configuration differs."""
+    text = json.dumps(config.model_dump(mode="json"), sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:12]

@@ -1,0 +1,142 @@
+"""Health and time-outs of a device follow the rules at the top of `lfs10d.roster`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from lfs10d.modbus.frames import Codec, Framing
+from lfs10d.profiles.library import load_profile
+from lfs10d.reading import Fault, FaultCode
+from lfs10d.roster import Device, DeviceSpec, Health, PollRules, Turnarounds
+
+SILENCE = Fault(FaultCode.TIMEOUT, "no answer in 200 ms")
+REFUSAL = Fault(FaultCode.EXCEPTION, "exception 02", exception_code=2)
+
+
+def a_device(response_timeout: float | None = None, rules: PollRules | None = None) -> Device:
+    profile = load_profile("lfs10", relative_to=Path())
+    spec = DeviceSpec("mast", 3, profile, Codec(Framing.RTU), 1.0, response_timeout=response_timeout)
+    return Device(spec, rules or PollRules(), spec.slave)
+
+
+def test_a_device_never_heard_gets_200_then_400_then_1000_ms() -> None:
+    device = a_device(rules=PollRules(offline_after=9))
+    timeouts = []
+    for _ in range(5):
+        timeouts.append(device.timeout)
+        device.failed(SILENCE, 0.0)
+    assert timeouts == [0.2, 0.4, 1.0, 1.0, 1.0]
+    assert device.health is Health.UNHEARD
+
+
+@pytest.mark.parametrize(
+    ("turnaround", "answers", "timeout"),
+    [
+        pytest.param(0.030, 100, 0.080, id="twice the p99 and 20 ms"),
+        pytest.param(0.005, 100, 0.050, id="never below 50 ms"),
+        pytest.param(0.700, 100, 1.000, id="never above 1 s"),
+        pytest.param(0.005, 9, 0.200, id="with few answers no less than the first time-out"),
+        pytest.param(0.150, 9, 0.320, id="with few answers more where they take longer"),
+    ],
+)
+def test_the_learned_time_out(turnaround: float, answers: int, timeout: float) -> None:
+    device = a_device()
+    for _ in range(answers):
+        device.turnarounds.learn(turnaround)
+    assert device.timeout == pytest.approx(timeout)
+
+
+def test_the_p99_of_100_answers_leaves_one_out() -> None:
+    turnarounds = Turnarounds()
+    for _ in range(99):
+        turnarounds.learn(0.01)
+    turnarounds.learn(0.5)
+    assert turnarounds.p99 == 0.01
+    turnarounds.learn(0.4)
+    assert turnarounds.p99 == 0.4
+    for _ in range(100):
+        turnarounds.learn(0.02)
+    assert turnarounds.p99 == 0.02
+
+
+def test_after_a_change_of_rate_learning_begins_anew() -> None:
+    device = a_device()
+    device.turnarounds.learn(0.01)
+    device.turnarounds.forget()
+    assert device.turnarounds.p99 is None
+    assert device.timeout == 0.2
+
+
+def test_a_fixed_time_out_holds_for_polls_and_probes() -> None:
+    device = a_device(response_timeout=0.5)
+    device.turnarounds.learn(0.01)
+    assert device.timeout == 0.5
+    assert device.probe_timeout == 0.5
+
+
+def test_every_fourth_probe_waits_a_second() -> None:
+    device = a_device()
+    for _ in range(3):
+        device.failed(SILENCE, 0.0)
+    waits = []
+    for _ in range(8):
+        waits.append(device.probe_timeout)
+        device.failed(SILENCE, 0.0)
+    assert waits == [0.2, 0.2, 0.2, 1.0] * 2
+
+
+def test_probes_come_after_1_2_4_s_up_to_the_longest_interval() -> None:
+    device = a_device(rules=PollRules(offline_after=1, probe_interval_max=5.0))
+    now = 100.0
+    waits = []
+    for _ in range(5):
+        device.failed(SILENCE, now)
+        waits.append(device.next_probe - now)
+        now = device.next_probe
+    assert waits == [1.0, 2.0, 4.0, 5.0, 5.0]
+
+
+def test_offline_comes_with_the_nth_failure_in_a_row_only() -> None:
+    device = a_device()
+    device.answered()
+    for _ in range(2):
+        device.failed(SILENCE, 0.0)
+    assert device.online
+    device.answered()
+    for _ in range(3):
+        assert device.online
+        device.failed(SILENCE, 0.0)
+    assert device.health is Health.OFFLINE
+
+
+@pytest.mark.parametrize("code", [FaultCode.EXCEPTION, FaultCode.OUT_OF_RANGE, FaultCode.NOT_FINITE])
+def test_a_refusal_or_a_bad_value_proves_it_alive(code: FaultCode) -> None:
+    device = a_device(rules=PollRules(offline_after=1))
+    device.failed(SILENCE, 0.0)
+    assert not device.online
+    device.failed(Fault(code, "alive"), 1.0)
+    assert device.online
+    assert device.failures == 0
+
+
+def test_only_one_that_answers_is_tried_again() -> None:
+    device = a_device(rules=PollRules(retries=2, offline_after=1))
+    assert device.retries == 0
+    device.answered()
+    assert device.retries == 2
+    device.failed(SILENCE, 0.0)
+    assert device.retries == 0
+
+
+def test_when_the_port_comes_back_nothing_is_known_of_it() -> None:
+    device = a_device()
+    device.answered()
+    device.polling = True
+    device.cut_off()
+    assert device.health is Health.OFFLINE
+    assert not device.polling
+    device.reconnected()
+    assert device.health is Health.UNHEARD
+    assert device.name == "mast"
