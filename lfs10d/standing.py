@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 STATE_EVERY: Final = 1.0
 """s between two states of the same quality and error."""
 
-STATE_EARLY: Final = 0.02
+STATE_EARLY: Final = 0.01
 """So many s a state may come before its time (the next one then waits as much longer): a device polled every
 second would else miss its turn by the jitter of its polls and be shown late each time."""
 
@@ -201,8 +201,8 @@ class Standing:
 
     def _state(self, now: Instant) -> Publication:
         """Return the newest state, which is then shown."""
-        turn = min(max(self._state_from, now.mono - STATE_EARLY), now.mono + STATE_EARLY)
-        self._state_from = turn + STATE_EVERY
+        on_time = abs(now.mono - self._state_from) <= STATE_EARLY
+        self._state_from = (self._state_from if on_time else now.mono) + STATE_EVERY
         self.state_due = None
         return retained(self._topics[STATE], self._payload)
 

@@ -1,0 +1,297 @@
+"""What is said about one device."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, cast
+
+import pytest
+
+from lfs10d.facts import DeviceFacts, Instant
+from lfs10d.reading import Fault, FaultCode, Reading
+from lfs10d.standing import STATE_EARLY, Standing
+from lfs10d.telemetry import Kind
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from lfs10d.telemetry import Publication
+
+FACTS = DeviceFacts(
+    name="a",
+    slave=3,
+    label="Mast",
+    profile="lfs10",
+    interval=0.25,
+    enabled=True,
+    response_timeout=None,
+    value_names=("wind_speed",),
+    units={"wind_speed": "m/s"},
+    offline_after=2,
+)
+TIMEOUT = Fault(FaultCode.TIMEOUT, "no answer in 200 ms")
+CRC = Fault(FaultCode.CRC, "check wrong")
+BUSY = Fault(FaultCode.EXCEPTION, "busy", exception_code=6)
+REFUSED = Fault(FaultCode.EXCEPTION, "illegal data", exception_code=3)
+LOST = Fault(FaultCode.PORT_LOST, "absent")
+
+
+def instant(mono: float) -> Instant:
+    return Instant(mono, 1_795_298_000 + mono, "synced")
+
+
+class Watched:
+    """A standing with a hand on its clock: `poll` reads at a time in s and returns the leaves published."""
+
+    def __init__(self, *, seq: int = 0) -> None:
+        self.standing = Standing(FACTS, line="line0", boot="k3f9a2c7", seq=seq, now=instant(0))
+
+    def publish(
+        self, at: float, outcome: float | Fault, *, online: bool | None = None, masked: bool = False
+    ) -> list[Publication]:
+        fault = outcome if isinstance(outcome, Fault) else None
+        reading = Reading(
+            device="a",
+            at=at,
+            values=None if isinstance(outcome, Fault) else {"wind_speed": outcome},
+            fault=fault,
+            rtt=0.01823 if fault is None else None,
+            online=fault is None if online is None else online,
+            response_timeout=0.2,
+        )
+        return self.standing.read(reading, instant(at), masked=masked)
+
+    def poll(self, at: float, outcome: float | Fault, *, online: bool | None = None, masked: bool = False) -> list[str]:
+        return leaves(self.publish(at, outcome, online=online, masked=masked))
+
+    @property
+    def shown(self) -> dict[str, object]:
+        """Every retained payload now, by leaf."""
+        return {each.topic.split("/")[-1]: each.payload for each in self.standing.burst(instant(1e6))}
+
+
+def leaves(published: Iterable[Publication]) -> list[str]:
+    return [each.topic.removeprefix("device/a/") for each in published]
+
+
+def fields(payload: object, *keys: str) -> tuple[object, ...]:
+    return tuple(cast("Mapping[str, object]", payload)[key] for key in keys)
+
+
+def test_a_device_is_offline_and_without_a_value_until_its_first_answer() -> None:
+    shown = Watched().shown
+    assert shown["availability"] == "offline"
+    assert fields(shown["state"], "wind_speed", "quality", "error", "seq") == (None, "bad", None, 0)
+    assert fields(shown["error"], "active", "last_code") == (False, None)
+
+
+def test_the_first_answer_is_available_first_and_shown_at_once() -> None:
+    watched = Watched()
+    published = watched.publish(0.5, 12.34)
+    assert leaves(published) == ["telemetry", "availability", "state"]
+    sample, available, state = published
+    assert sample.sample is not None
+    assert (sample.kind, sample.retain, sample.qos) == (Kind.SAMPLE, False, 1)
+    assert sample.sample.payload("line0") == sample.payload
+    assert available.payload == "online"
+    assert state.payload == sample.payload
+    assert fields(state.payload, "seq", "ts", "wind_speed", "rtt_ms") == (1, 1_795_298_000_500, 12.34, 18.2)
+
+
+def test_a_device_that_goes_shows_no_value_before_it_is_unavailable() -> None:
+    watched = Watched()
+    watched.poll(0, 1.0)
+    assert watched.poll(0.25, TIMEOUT, online=False) == ["telemetry", "state", "availability"]
+    assert fields(watched.shown["state"], "wind_speed", "rtt_ms") == (None, None)
+
+
+def test_the_state_shows_the_newest_sample_once_a_second() -> None:
+    watched = Watched()
+    watched.poll(0, 1.0)
+    assert watched.poll(0.25, 2.0) == ["telemetry"]
+    assert watched.poll(0.5, 3.0) == ["telemetry"]
+    due = watched.standing.state_due
+    assert due is not None
+    assert watched.standing.due_state(instant(due - 0.001)) is None
+    state = watched.standing.due_state(instant(due))
+    assert state is not None
+    assert fields(state.payload, "wind_speed", "seq") == (3.0, 3)
+    assert watched.standing.state_due is None
+    assert watched.standing.due_state(instant(10)) is None
+
+
+@pytest.mark.parametrize("jitter", [0.005, -0.005])
+def test_a_device_polled_every_second_is_shown_at_every_poll(jitter: float) -> None:
+    watched = Watched()
+    polls = [watched.poll(second + (second % 2) * jitter, 1.0) for second in range(60)]
+    assert all("state" in published for published in polls)
+
+
+def test_states_do_not_exceed_one_a_second_in_the_long_run() -> None:
+    watched = Watched()
+    shown = sum("state" in watched.poll(number * 0.9975, 1.0) for number in range(1000))
+    assert shown <= 998
+
+
+def test_a_change_of_quality_or_error_is_shown_at_once() -> None:
+    watched = Watched()
+    outcomes: list[float | Fault] = [1.0, TIMEOUT, TIMEOUT, CRC, REFUSED, 2.0, 3.0]
+    shown = ["state" in watched.poll(number / 100, outcome) for number, outcome in enumerate(outcomes)]
+    assert shown == [True, True, False, True, True, True, False]
+
+
+def test_many_changes_do_not_silence_the_state_afterwards() -> None:
+    watched = Watched()
+    for number in range(100):
+        watched.poll(number / 100, 1.0 if number % 2 else TIMEOUT)
+    watched.poll(1.0, 1.0)
+    assert watched.poll(2.1, 1.0) == ["telemetry", "state"]
+
+
+def test_a_state_shown_because_of_a_change_waits_no_longer() -> None:
+    watched = Watched()
+    watched.poll(0, 1.0)
+    watched.poll(0.2, 2.0)
+    watched.poll(0.4, TIMEOUT)
+    assert watched.standing.state_due is None
+
+
+def test_an_error_rises_after_as_many_failures_as_make_it_offline_and_clears_with_one_value() -> None:
+    watched = Watched()
+    watched.poll(0, 1.0)
+    assert watched.poll(1, TIMEOUT, online=True) == ["telemetry", "state"]
+    assert watched.poll(2, TIMEOUT) == ["telemetry", "state", "availability", "error"]
+    assert fields(watched.shown["error"], "active", "code", "count") == (True, "timeout", 2)
+    assert watched.poll(3, 1.0) == ["telemetry", "availability", "state", "error"]
+    assert fields(watched.shown["error"], "active", "last_code") == (False, "timeout")
+
+
+def test_a_refusal_proves_the_device_alive() -> None:
+    watched = Watched()
+    assert watched.poll(0, REFUSED, online=True) == ["telemetry", "availability", "state"]
+    assert watched.shown["availability"] == "online"
+    assert fields(watched.shown["state"], "error", "wind_speed") == ("exception", None)
+
+
+def test_a_busy_device_is_a_bad_sample_but_no_error() -> None:
+    watched = Watched()
+    for second in range(5):
+        assert "error" not in watched.poll(second, BUSY, online=True)
+    assert fields(watched.shown["state"], "error", "quality") == ("exception", "bad")
+    assert fields(watched.shown["error"], "active") == (False,)
+
+
+def test_a_busy_answer_neither_ends_nor_lengthens_a_run_of_failures() -> None:
+    watched = Watched()
+    watched.poll(0, TIMEOUT)
+    watched.poll(1, BUSY, online=True)
+    assert "error" in watched.poll(2, TIMEOUT)
+
+
+def test_a_lost_port_takes_the_device_s_own_error_back() -> None:
+    watched = Watched()
+    watched.poll(0, TIMEOUT)
+    watched.poll(1, TIMEOUT)
+    assert watched.poll(2, LOST) == ["telemetry", "state", "error"]
+    assert fields(watched.shown["state"], "error") == ("port_lost",)
+    assert fields(watched.shown["error"], "active", "last_code") == (False, "timeout")
+    assert "error" not in watched.poll(3, TIMEOUT)
+    assert "error" in watched.poll(4, TIMEOUT)
+
+
+def test_while_masked_failures_are_not_held_against_the_device() -> None:
+    watched = Watched()
+    assert all("error" not in watched.poll(second, TIMEOUT, masked=True) for second in range(5))
+
+
+def test_a_mask_is_published_only_where_there_was_an_error() -> None:
+    watched = Watched()
+    assert watched.standing.mask(instant(0)) == []
+    watched.poll(0, TIMEOUT)
+    watched.poll(1, TIMEOUT)
+    assert leaves(watched.standing.mask(instant(2))) == ["error"]
+
+
+def test_disabling_is_one_sample_without_an_error() -> None:
+    watched = Watched()
+    watched.poll(0, 1.0)
+    published = watched.standing.reconfigure(replace(FACTS, enabled=False), instant(0.1))
+    assert leaves(published) == ["config", "telemetry", "state", "availability"]
+    assert fields(published[1].payload, "seq", "error", "quality", "wind_speed", "rtt_ms") == (
+        2,
+        "disabled",
+        "bad",
+        None,
+        None,
+    )
+    assert fields(watched.shown["error"], "active") == (False,)
+    assert watched.shown["availability"] == "offline"
+
+
+def test_disabling_an_ailing_device_clears_its_error() -> None:
+    watched = Watched()
+    watched.poll(0, TIMEOUT)
+    watched.poll(1, TIMEOUT)
+    published = watched.standing.reconfigure(replace(FACTS, enabled=False), instant(2))
+    assert leaves(published) == ["config", "telemetry", "state", "error"]
+
+
+def test_enabling_publishes_the_configuration_alone() -> None:
+    watched = Watched()
+    watched.standing.reconfigure(replace(FACTS, enabled=False), instant(1))
+    assert leaves(watched.standing.reconfigure(FACTS, instant(2))) == ["config"]
+
+
+def test_what_is_not_shown_is_not_published() -> None:
+    watched = Watched()
+    assert watched.standing.reconfigure(replace(FACTS, offline_after=1), instant(1)) == []
+    assert "error" in watched.poll(2, TIMEOUT)
+
+
+def test_numbers_go_on_after_a_removal() -> None:
+    watched = Watched(seq=41)
+    assert fields(watched.shown["state"], "seq") == (0,)
+    assert fields(watched.publish(0, 1.0)[0].payload, "seq") == (42,)
+
+
+def test_statistics_count_what_the_tally_was_told() -> None:
+    watched = Watched()
+    reading = Reading("a", 1.0, {"wind_speed": 1.0}, None, 0.02, online=True, response_timeout=0.2)
+    watched.standing.tally.polled(reading, 77)
+    stats = watched.standing.stats(instant(2))
+    assert (stats.topic, stats.qos, stats.retain) == ("device/a/stats", 0, True)
+    assert fields(stats.payload, "polls", "last_good_ts") == (1, 77)
+
+
+def test_a_snapshot_tells_how_old_the_last_good_value_is() -> None:
+    watched = Watched()
+    assert watched.standing.snapshot(instant(1))["age_s"] is None
+    watched.poll(1, 12.34)
+    watched.poll(2, TIMEOUT, online=True)
+    snapshot = watched.standing.snapshot(instant(4.04))
+    assert fields(snapshot, "name", "slave", "label", "online") == ("a", 3, "Mast", True)
+    assert fields(snapshot, "values", "quality", "error", "age_s") == (
+        {"wind_speed": None},
+        "bad",
+        "timeout",
+        3.0,
+    )
+    watched.poll(5, 9.5)
+    assert fields(watched.standing.snapshot(instant(5)), "values", "rtt_ms", "age_s") == (
+        {"wind_speed": 9.5},
+        18.2,
+        0.0,
+    )
+
+
+def test_a_value_is_never_shown_as_unavailable_even_if_the_line_says_so() -> None:
+    watched = Watched()
+    assert watched.poll(0, 1.0, online=False) == ["telemetry", "availability", "state"]
+    assert watched.shown["availability"] == "online"
+
+
+def test_a_state_may_come_a_little_early_and_no_earlier() -> None:
+    watched = Watched()
+    watched.poll(10, 1.0)
+    assert "state" not in watched.poll(11 - 2 * STATE_EARLY, 1.0)
+    assert "state" in watched.poll(11 - STATE_EARLY / 2, 1.0)
