@@ -1,0 +1,93 @@
+"""The samples that wait for their turn on `history`. Pure.
+
+One shelf per device and boot, in order of seq. The next to be taken is the shelf that holds the oldest sample.
+A sample that the broker has acknowledged before may stand here once more (`repeated`): where there is no room,
+these go first, and their going is no loss.
+"""
+
+from __future__ import annotations
+
+from bisect import insort
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, TypeAlias
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from lfs10d.telemetry import Sample
+
+Key: TypeAlias = tuple[str, str]
+"""Device and boot: one history array holds samples of one key."""
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """One sample that waits since `since` (monotonic s); `repeated`: the broker acknowledged it before."""
+
+    sample: Sample
+    since: float
+    repeated: bool = False
+
+    @property
+    def key(self) -> Key:
+        """Device and boot."""
+        return self.sample.device, self.sample.boot
+
+
+def _seq(kept: Kept) -> int:
+    return kept.sample.seq
+
+
+@dataclass(slots=True)
+class History:
+    """What waits; `len()` counts the samples. No sample is put here while it stands here already."""
+
+    _shelves: dict[Key, list[Kept]] = field(default_factory=dict)
+    _count: int = 0
+    _repeated: int = 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    def add(self, kept: Kept) -> None:
+        """Put one sample in its place."""
+        shelf = self._shelves.setdefault(kept.key, [])
+        if shelf and _seq(shelf[-1]) > _seq(kept):
+            insort(shelf, kept, key=_seq)
+        else:
+            shelf.append(kept)
+        self._count += 1
+        self._repeated += kept.repeated
+
+    def extend(self, many: Iterable[Kept]) -> None:
+        """Put several in their places."""
+        for kept in many:
+            self.add(kept)
+
+    def take(self, most: int) -> tuple[Kept, ...]:
+        """Take up to `most` samples of the key that holds the oldest, in order of seq; () where none waits."""
+        if not self._shelves:
+            return ()
+        key = min(self._shelves, key=lambda each: self._shelves[each][0].since)
+        shelf = self._shelves[key]
+        taken = tuple(shelf[:most])
+        del shelf[:most]
+        if not shelf:
+            del self._shelves[key]
+        self._count -= len(taken)
+        self._repeated -= sum(kept.repeated for kept in taken)
+        return taken
+
+    def evict(self) -> Kept | None:
+        """Make room: drop all that were acknowledged before (None), else take the oldest (None: none waits)."""
+        if not self._repeated:
+            return next(iter(self.take(1)), None)
+        shelves = {key: [kept for kept in shelf if not kept.repeated] for key, shelf in self._shelves.items()}
+        self._shelves = {key: shelf for key, shelf in shelves.items() if shelf}
+        self._count -= self._repeated
+        self._repeated = 0
+        return None
+
+    def oldest(self) -> Kept | None:
+        """Return the one that waits longest, None where none waits."""
+        return min((shelf[0] for shelf in self._shelves.values()), key=lambda kept: kept.since, default=None)

@@ -1,0 +1,49 @@
+"""Retained topics that a daemon left behind and nobody stands behind any more. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Set as AbstractSet
+
+    from lfs10d.mqtt.topics import Topics
+
+QUIET = 0.5
+"""Seconds without a retained message after which the broker has sent them all."""
+
+LONGEST = 5.0
+"""Seconds after which a sweep ends in any case."""
+
+
+@dataclass(slots=True)
+class Sweep:
+    """Collects what is retained under the devices' topics from `begun` on (monotonic seconds)."""
+
+    topics: Topics
+    begun: float
+    _found: set[str] = field(default_factory=set)
+    _heard: float = 0.0
+
+    def __post_init__(self) -> None:
+        self._heard = self.begun
+
+    def heard(self, topic: str, payload: bytes, now: float) -> bool:
+        """Take one retained message; return False if it is not one of a device's topics."""
+        relative = self.topics.relative(topic)
+        if relative is None or not self.topics.is_owned(relative):
+            return False
+        self._heard = now
+        if payload:
+            self._found.add(relative)
+        return True
+
+    @property
+    def due(self) -> float:
+        """When it is over."""
+        return min(self._heard + QUIET, self.begun + LONGEST)
+
+    def orphans(self, stands_behind: AbstractSet[str]) -> tuple[str, ...]:
+        """Return the topics under `B` to be cleared, in order."""
+        return tuple(sorted(self._found - stands_behind))

@@ -1,0 +1,106 @@
+"""When the next connection is tried, and in which version. Pure: time and chance are arguments.
+
+- A connection that held is renewed at once; then after 1, 2, 4 ... 30 s, each shortened by chance by up to a
+  quarter, so that a hundred gateways do not come back in step.
+- Each round begins with the configured version. A broker that refuses 5, or closes the connection in place of
+  an answer, is asked in 3.1.1 at once: some old brokers say nothing. Nothing is remembered, because a broker
+  may be replaced by a better one.
+- Taken over by a client with our id, we wait 60 s, doubling to 1 h, until a connection has held for 2 h. In
+  3.1.1, where the broker does not say so, three short connections in a row without a failed attempt between
+  them are taken for that.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from lfs10d.mqtt.endings import Ending
+from lfs10d.mqtt.settings import Version
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from lfs10d.mqtt.endings import Ended
+
+FIRST_DELAY = 1.0
+LONGEST_DELAY = 30.0
+"""Seconds between two attempts."""
+
+JITTER = 0.25
+"""The part of a delay that chance may take away."""
+
+HELD = 10.0
+"""Seconds after which a connection counts as one that held."""
+
+TAKEN_OVER_FIRST = 60.0
+TAKEN_OVER_LONGEST = 3600.0
+TAKEN_OVER_FORGOTTEN = 7200.0
+"""Seconds (contract, section 3); the last is longer than the other side can be waiting."""
+
+SHORT = 30.0
+SHORT_MOST = 3
+"""This many connections in a row of less than that many seconds are, in 3.1.1, another client with our id."""
+
+
+@dataclass(slots=True)
+class Reconnect:
+    """The policy; `chance()` is uniform in 0..1."""
+
+    configured: Version
+    chance: Callable[[], float]
+    version: Version = Version.V5
+    """What is tried next."""
+    due: float = float("-inf")
+    """When it is tried, monotonic seconds."""
+    duplicate: bool = False
+    """Another client uses our id."""
+    _delay: float = FIRST_DELAY
+    _takeover: float = TAKEN_OVER_FIRST
+    _since: float | None = None
+    _short: int = 0
+
+    def __post_init__(self) -> None:
+        self.version = self.configured
+
+    def accepted(self, now: float) -> None:
+        """Note that the connection stands."""
+        self._since = now
+
+    def held(self, now: float) -> None:
+        """Forget a duplicate once the connection has held for as long as the other side may be waiting."""
+        if self._since is not None and now - self._since >= self._takeover:
+            self.duplicate = False
+
+    def ended(self, ended: Ended, now: float) -> None:
+        """Note how the connection or the attempt ended, and decide on the next."""
+        version, self.version = self.version, self.configured
+        since, self._since = self._since, None
+        if since is not None:
+            self._lost(ended, version, now - since, now)
+        elif ended.ending is Ending.WRONG_VERSION and version is Version.V5:
+            self.version = Version.V311
+            self.due = now
+        else:
+            self._short = 0
+            self._later(now)
+
+    def _lost(self, ended: Ended, version: Version, life: float, now: float) -> None:
+        if life >= TAKEN_OVER_FORGOTTEN:
+            self._takeover = TAKEN_OVER_FIRST
+        self._short = self._short + 1 if life < SHORT else 0
+        suspect = version is Version.V311 and self._short >= SHORT_MOST
+        if ended.ending is Ending.TAKEN_OVER or suspect:
+            self.duplicate = True
+            self._short = 0
+            self.due = now + self._takeover
+            self._takeover = min(2 * self._takeover, TAKEN_OVER_LONGEST)
+        elif life >= HELD:
+            self._delay = FIRST_DELAY
+            self.due = now
+        else:
+            self._later(now)
+
+    def _later(self, now: float) -> None:
+        self.due = now + self._delay * (1 - JITTER * self.chance())
+        self._delay = min(2 * self._delay, LONGEST_DELAY)

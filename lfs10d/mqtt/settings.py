@@ -1,0 +1,72 @@
+"""Which broker is spoken to, and how. Plain values."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from lfs10d.config import MqttConfig
+    from lfs10d.secret import Secret
+
+
+class Version(StrEnum):
+    """The version of the protocol."""
+
+    V5 = "5"
+    V311 = "3.1.1"
+
+
+@dataclass(frozen=True, slots=True)
+class Tls:
+    """Paths; None: the system's authorities, no certificate of our own, a key that is in `cert`."""
+
+    ca: str | None = None
+    cert: str | None = None
+    key: str | None = None
+
+
+def no_password() -> Secret | None:
+    """Return that there is none."""
+    return None
+
+
+@dataclass(frozen=True, slots=True)
+class BrokerSettings:
+    """`password` is asked at each connect, in a thread that may block; its errors are the connect's.
+
+    `keepalive` is in whole seconds (MQTT 5.0, section 3.1.2.10).
+    """
+
+    host: str
+    port: int
+    client_id: str
+    version: Version = Version.V5
+    username: str | None = None
+    password: Callable[[], Secret | None] = field(default=no_password, repr=False)
+    tls: Tls | None = None
+    keepalive: int = 20
+
+    @classmethod
+    def of(cls, config: MqttConfig, *, client_id: str, password: Callable[[], Secret | None]) -> BrokerSettings:
+        """Return the settings of section `mqtt`; a verb that is no daemon gives a client id of its own."""
+        tls = config.tls
+        return cls(
+            host=config.host,
+            port=config.port,
+            client_id=client_id,
+            version=Version(config.version),
+            username=config.username,
+            password=password,
+            tls=None if tls is None else Tls(tls.ca, tls.cert, tls.key),
+            keepalive=math.ceil(config.keepalive),
+        )
+
+    @property
+    def place(self) -> str:
+        """The broker as messages name it: `broker localhost:1883`."""
+        return f"broker {self.host}:{self.port}"

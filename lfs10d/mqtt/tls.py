@@ -1,0 +1,35 @@
+"""The TLS context of a connection to the broker."""
+
+from __future__ import annotations
+
+import ssl
+from typing import TYPE_CHECKING
+
+from lfs10d.errors import BrokerError
+
+if TYPE_CHECKING:
+    from lfs10d.mqtt.settings import Tls
+
+
+def tls_context(tls: Tls) -> ssl.SSLContext:
+    """Return a context for TLS 1.2 or newer that checks certificate and name; raise BrokerError. Reads files."""
+    try:
+        context = ssl.create_default_context(cafile=tls.ca)
+    except OSError as error:
+        raise BrokerError(f"mqtt.tls.ca: {tls.ca}: {_words(error)}") from error
+    context.minimum_version = ssl.TLSVersion.TLSv1_2
+    if tls.cert is not None:
+        try:
+            # A key under a passphrase would be asked for on the terminal, where nobody sits.
+            context.load_cert_chain(tls.cert, tls.key, password=lambda: "")
+        except OSError as error:
+            files = tls.cert if tls.key is None else f"{tls.cert}, mqtt.tls.key: {tls.key}"
+            raise BrokerError(f"mqtt.tls.cert: {files}: {_words(error)}") from error
+    return context
+
+
+def _words(error: OSError) -> str:
+    if isinstance(error, ssl.SSLError):
+        reason = (error.reason or "not understood").replace("_", " ").lower()
+        return f"not a usable PEM file without passphrase ({reason})"
+    return (error.strerror or str(error)).lower()

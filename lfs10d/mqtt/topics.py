@@ -1,0 +1,103 @@
+"""Where full topics are spelled: `B` = `<base topic>/<line name>`, and what lies under it.
+
+What a daemon publishes is named under `B` in `lfs10d.telemetry`; here are `B` itself, the requests, the
+responses and the filters. Pure.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from lfs10d import telemetry
+
+ONLINE = "online"
+OFFLINE = "offline"
+
+REQUEST = "request"
+RESPONSE = "response"
+
+OWNED_LEAVES = (
+    telemetry.STATE,
+    telemetry.CONFIG,
+    telemetry.AVAILABILITY,
+    telemetry.ERROR,
+    telemetry.STATS,
+    telemetry.WIND,
+)
+"""The last levels of the retained topics of a device; nobody but this daemon publishes them under its `B`."""
+
+LONGEST_TOPIC = 65_535
+"""Bytes of UTF-8 (MQTT 5.0, section 1.5.4)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Topics:
+    """The topics of one line under `base`, which is `B`: `lfs10d/line0`."""
+
+    base: str
+
+    @classmethod
+    def of(cls, base_topic: str, line: str) -> Topics:
+        """Return the topics of `line` below the configured base topic."""
+        return cls(f"{base_topic}/{line}")
+
+    @property
+    def availability(self) -> str:
+        """`online` or `offline`, retained; the last will goes here."""
+        return self.full(telemetry.AVAILABILITY)
+
+    @property
+    def requests(self) -> str:
+        """The filter of all requests."""
+        return self.full(f"{REQUEST}/#")
+
+    @property
+    def retained_of_devices(self) -> tuple[str, ...]:
+        """The filters under which a daemon that ran before may have left retained topics."""
+        return tuple(self.full(telemetry.device_topic("+", leaf)) for leaf in OWNED_LEAVES)
+
+    def full(self, relative: str) -> str:
+        """Return the topic as the broker knows it: `state` under `lfs10d/line0` is `lfs10d/line0/state`."""
+        return f"{self.base}/{relative}"
+
+    def relative(self, topic: str) -> str | None:
+        """Return what follows `B/`, None for a topic that is not under `B`."""
+        prefix = f"{self.base}/"
+        return topic.removeprefix(prefix) if topic.startswith(prefix) else None
+
+    def is_owned(self, relative: str) -> bool:
+        """Tell whether a topic under `B` is a retained topic of a device, as `retained_of_devices` has them."""
+        match relative.split("/"):
+            case ["device", _, leaf]:
+                return leaf in OWNED_LEAVES
+            case _:
+                return False
+
+    def request_levels(self, topic: str) -> tuple[str, ...] | None:
+        """Return the levels under `B/request/`, None for a topic that is no request.
+
+        `B/request/device/read` is `("device", "read")`. The filter `B/request/#` also matches `B/request`
+        itself, which has no level: `()`.
+        """
+        relative = self.relative(topic)
+        if relative is None:
+            return None
+        first, *levels = relative.split("/")
+        return tuple(levels) if first == REQUEST else None
+
+    def response(self, *levels: str) -> str:
+        """Return the topic under `B` that answers the request of these levels: `response/device/read`."""
+        return "/".join((RESPONSE, *levels))
+
+    def response_topic(self, asked: str | None) -> str | None:
+        """Return a request's Response Topic under `B`, None where it is absent, not ours or no topic name.
+
+        It is ours if it lies under `B/response/`; a topic name has no wildcard and no NUL
+        (MQTT 5.0, sections 4.7.1 and 4.7.3).
+        """
+        relative = None if asked is None else self.relative(asked)
+        if asked is None or relative is None or not relative.startswith(f"{RESPONSE}/"):
+            return None
+        if any(each in relative for each in "+#\0") or len(asked.encode()) > LONGEST_TOPIC:
+            return None
+        return relative

@@ -1,0 +1,256 @@
+"""The daemon at the broker: its will, its bursts, its requests, and what is left over from before.
+
+After a connect: subscribe to requests and to our own availability; every retained topic; when the broker has
+them all, availability `online`; then live samples; then clear the retained topics that nobody stands behind any
+more; 10 s later the past. Nothing here blocks. Decisions are made in `Outbox`, `Reconnect` and `Sweep`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from typing import TYPE_CHECKING
+
+from lfs10d import telemetry
+from lfs10d.mqtt.dispatch import Dispatch
+from lfs10d.mqtt.endings import REFUSED_FROM, reason_in_words
+from lfs10d.mqtt.inbound import inbound
+from lfs10d.mqtt.link import Link
+from lfs10d.mqtt.messages import Filter, Will
+from lfs10d.mqtt.orphans import Sweep
+from lfs10d.mqtt.outbox import Outbox
+from lfs10d.mqtt.topics import OFFLINE, ONLINE, Topics
+from lfs10d.telemetry import Kind, Publication
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+    from collections.abc import Set as AbstractSet
+
+    from lfs10d.mqtt.endings import Ended
+    from lfs10d.mqtt.inbound import InboundRequest
+    from lfs10d.mqtt.messages import Accepted, Incoming
+    from lfs10d.mqtt.settings import BrokerSettings, Version
+
+log = logging.getLogger(__name__)
+
+DRAIN_WITHIN = 0.4
+FAREWELL_WITHIN = 0.6
+LEAVE_WITHIN = 0.3
+"""Seconds of a clean exit: for what still waits, for `offline` to be acknowledged, for the connection to close."""
+
+_ONLINE = telemetry.retained(telemetry.AVAILABILITY, ONLINE)
+
+
+class Uplink:
+    """Built and called in the thread of the asyncio loop, while it runs.
+
+    `base` is `B`. `burst()` returns every retained topic but `availability`; `stands_behind()` the retained
+    topics under `B` that are ours; `requested` takes each request; `changed` is told of every connect, loss and
+    takeover, whose state is then in the properties; `epoch_ms()` is the wall clock.
+    """
+
+    def __init__(
+        self,
+        settings: BrokerSettings,
+        *,
+        base: str,
+        line: str,
+        burst: Callable[[], Iterable[Publication]],
+        stands_behind: Callable[[], AbstractSet[str]],
+        requested: Callable[[InboundRequest], None],
+        epoch_ms: Callable[[], int],
+        changed: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._topics = Topics(base)
+        self._burst = burst
+        self._stands_behind = stands_behind
+        self._requested = requested
+        self._changed = changed
+        self._link = Link(settings, self, will=Will(self._topics.availability, OFFLINE.encode()))
+        self._outbox = Outbox(detection=2.0 * settings.keepalive)
+        self._dispatch = Dispatch(self._outbox, self._topics, line, epoch_ms=epoch_ms, stuck=self._acknowledges_nothing)
+        self._sweep: Sweep | None = None
+        self._sweep_wanted = False
+        self._subscription: int | None = None
+        self._farewell: int | None = None
+        self._leaving = False
+        self._progress = asyncio.Event()
+        self._drop_told = False
+
+    @property
+    def connected(self) -> bool:
+        """The broker has accepted us."""
+        return self._link.standing is not None
+
+    @property
+    def version(self) -> Version | None:
+        """The version of MQTT that is spoken; None while not connected."""
+        return self._link.version
+
+    @property
+    def duplicate(self) -> bool:
+        """Another client takes our id away: `duplicate_client`."""
+        return self._link.duplicate
+
+    @property
+    def backlog(self) -> telemetry.Backlog:
+        """What waits, for `line/stats`."""
+        return self._outbox.backlog
+
+    async def start(self) -> None:
+        """Begin to connect; what is published before waits."""
+        self._link.start()
+
+    async def stop(self) -> None:
+        """Send what waits, say `offline`, disconnect; at most 1.5 s, whatever the broker does."""
+        await self._part()
+
+    async def reload(self, settings: BrokerSettings | None = None) -> None:
+        """Try again what the broker refused, clear what nobody stands behind; connect anew if given settings."""
+        refused = self._outbox.reload()
+        if settings is not None:
+            await self._part()
+            self._leaving = False
+            self._link.renew(settings)
+            return
+        self._sweep_wanted = True
+        if refused:
+            self.republish()
+        elif self._outbox.announced:
+            self._begin_sweep()
+
+    def republish(self) -> None:
+        """Send every retained topic once more."""
+        if self.connected:
+            self._outbox.burst(self._burst(), _ONLINE)
+            self._dispatch.wake()
+
+    def publish(self, publications: Iterable[Publication]) -> None:
+        """Send these, or keep them while the broker is away."""
+        now = asyncio.get_running_loop().time()
+        dropped = self._outbox.dropped
+        for publication in publications:
+            self._outbox.add(publication, now)
+        if self._outbox.dropped > dropped and not self._drop_told:
+            self._drop_told = True
+            log.warning("more samples wait for the broker than there is room for: the oldest are dropped")
+        self._dispatch.wake()
+
+    def respond(self, topic: str, payload: telemetry.Payload, correlation: bytes | None = None) -> None:
+        """Answer a request on `topic` (under `B`), by MQTT 5 with its Correlation Data."""
+        response = Publication(topic, payload, Kind.RESPONSE, retain=False, qos=1)
+        self._outbox.add(response, asyncio.get_running_loop().time(), correlation=correlation)
+        self._dispatch.wake()
+
+    def clear_retained(self, topic: str) -> None:
+        """Clear a retained topic under `B`, a retained request for example."""
+        self.publish([telemetry.retained(topic, None)])
+
+    # The end
+
+    async def _part(self) -> None:
+        loop = asyncio.get_running_loop()
+        self._leaving = True
+        await self._until(lambda: self._outbox.idle, loop.time() + DRAIN_WITHIN)
+        standing = self._link.standing
+        if standing is not None:
+            self._farewell = standing.publish(self._topics.availability, OFFLINE.encode(), retain=True)
+            await self._until(lambda: self._farewell is None, loop.time() + FAREWELL_WITHIN)
+        await self._link.leave(LEAVE_WITHIN)
+
+    async def _until(self, reached: Callable[[], bool], deadline: float) -> None:
+        try:
+            async with asyncio.timeout_at(deadline):
+                while self.connected and not reached():
+                    self._progress.clear()
+                    await self._progress.wait()
+        except TimeoutError:
+            log.debug("the broker does not answer in time")
+
+    # Events of the link
+
+    def accepted(self, accepted: Accepted) -> None:
+        """Subscribe, and send the burst."""
+        standing = self._link.standing
+        if standing is None:
+            return
+        self._dispatch.connected(standing, accepted)
+        self._subscription = standing.subscribe([Filter(self._topics.requests), Filter(self._topics.availability)])
+        self._outbox.burst(self._burst(), _ONLINE)
+        self._sweep_wanted = True
+        self._dispatch.wake()
+        self._changed()
+
+    def ended(self, ended: Ended) -> None:
+        """Keep what is not acknowledged."""
+        log.debug("%s", ended.message)
+        self._dispatch.lost()
+        self._sweep = self._farewell = None
+        self._drop_told = False
+        self._progress.set()
+        self._changed()
+
+    def acknowledged(self, mid: int, reason: int) -> None:
+        """Send on."""
+        if mid == self._farewell:
+            self._farewell = None
+        self._dispatch.acknowledged(mid, reason)
+        if self._sweep_wanted and self._outbox.announced:
+            self._begin_sweep()
+        self._progress.set()
+
+    def subscribed(self, mid: int, reasons: tuple[int, ...]) -> None:
+        """Complain once about requests that will never come."""
+        if mid == self._subscription:
+            for topic, reason in zip((self._topics.requests, self._topics.availability), reasons, strict=False):
+                if reason >= REFUSED_FROM:
+                    log.warning("the broker refuses to let us subscribe to %s: %s", topic, reason_in_words(reason))
+
+    def arrived(self, message: Incoming) -> None:
+        """Take a request, or somebody's word that we are offline, or what is retained."""
+        if message.topic == self._topics.availability:
+            if message.payload == OFFLINE.encode() and self._outbox.announced and not self._leaving:
+                # The will of our connection before, or somebody's mistake.
+                self.publish([_ONLINE])
+            return
+        now = asyncio.get_running_loop().time()
+        if message.retained and self._sweep is not None and self._sweep.heard(message.topic, message.payload, now):
+            return
+        request = inbound(message, self._topics)
+        if request is not None:
+            self._requested(request)
+
+    def _acknowledges_nothing(self) -> None:
+        self._link.drop("acknowledges nothing any more")
+
+    # What is left over
+
+    def _begin_sweep(self) -> None:
+        self._sweep_wanted = False
+        standing = self._link.standing
+        if standing is None or self._sweep is not None:
+            return
+        loop = asyncio.get_running_loop()
+        self._sweep = Sweep(self._topics, loop.time())
+        standing.subscribe(
+            [
+                Filter(topic, qos=0, retain_as_published=False, no_local=True)
+                for topic in self._topics.retained_of_devices
+            ]
+        )
+        loop.call_at(self._sweep.due, self._end_sweep, self._sweep)
+
+    def _end_sweep(self, sweep: Sweep) -> None:
+        standing = self._link.standing
+        if standing is None or sweep is not self._sweep:
+            return
+        loop = asyncio.get_running_loop()
+        if loop.time() < sweep.due:
+            loop.call_at(sweep.due, self._end_sweep, sweep)
+            return
+        self._sweep = None
+        standing.unsubscribe(self._topics.retained_of_devices)
+        orphans = sweep.orphans(self._stands_behind())
+        if orphans:
+            log.info("clearing %d retained topics of devices that are no longer configured", len(orphans))
+            self.publish(telemetry.retained(topic, None) for topic in orphans)

@@ -1,0 +1,65 @@
+"""Why there is no connection is said in words, with the broker's place and what to do."""
+
+from __future__ import annotations
+
+import errno
+import socket
+import ssl
+
+import pytest
+
+from lfs10d.errors import BrokerError
+from lfs10d.mqtt.endings import Ending, failed, reason_in_words
+from lfs10d.mqtt.settings import BrokerSettings, Tls
+
+SETTINGS = BrokerSettings("gate.example", 8883, "me", tls=Tls())
+
+
+def certificate_error() -> ssl.SSLCertVerificationError:
+    error = ssl.SSLCertVerificationError(1, "x")
+    error.verify_message = "certificate has expired."
+    return error
+
+
+def tls_error(reason: str | None) -> ssl.SSLError:
+    error = ssl.SSLError(1, "x")
+    error.reason = reason  # type: ignore[assignment]  # None where OpenSSL gives none
+    return error
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (BrokerError("mqtt.tls.ca: /x: no such file"), "mqtt.tls.ca: /x: no such file"),
+        (socket.gaierror(-2, "Name or service not known"), "the name gate.example cannot be resolved: check"),
+        (certificate_error(), "the certificate is not accepted: certificate has expired: check mqtt.host"),
+        (tls_error("WRONG_VERSION_NUMBER"), "no TLS: it does not speak TLS on this port: check mqtt.port"),
+        (tls_error("TLSV1_ALERT_UNKNOWN_CA"), "no TLS: tlsv1 alert unknown ca: check"),
+        (tls_error(None), "no TLS: tls error: check"),
+        (ConnectionRefusedError(errno.ECONNREFUSED, "Connection refused"), "connection refused: is the broker"),
+        (TimeoutError("timed out"), "no answer: check mqtt.host, the network and the firewall"),
+        (ConnectionResetError(errno.ECONNRESET, "reset"), "closed the connection during TLS: check mqtt.port"),
+        (OSError(errno.EHOSTUNREACH, "No route to host"), "no route to host"),
+        (PermissionError(errno.EACCES, "Permission denied", "/etc/pw"), "/etc/pw: permission denied"),
+        (UnicodeError("label too long"), "UnicodeError: label too long"),
+        (OSError("bare"), "OSError: bare"),
+    ],
+)
+def test_a_failed_attempt_names_the_broker_and_the_cause(error: Exception, words: str) -> None:
+    ended = failed(error, SETTINGS)
+    assert ended.ending is Ending.UNREACHABLE
+    assert ended.message.startswith(f"broker gate.example:8883: {words}")
+
+
+def test_a_reset_without_tls_is_just_that() -> None:
+    plain = BrokerSettings("gate.example", 1883, "me")
+    ended = failed(ConnectionResetError(errno.ECONNRESET, "Connection reset by peer"), plain)
+    assert ended.message == "broker gate.example:1883: connection reset by peer"
+
+
+def test_a_reason_code_says_what_to_do() -> None:
+    assert reason_in_words(0x86) == "wrong user name or password: check mqtt.username and mqtt.password_file"
+
+
+def test_an_unknown_reason_code_is_shown_as_the_number_it_is() -> None:
+    assert reason_in_words(0xA2) == "reason code 0xA2"

@@ -1,0 +1,76 @@
+"""What waits for history is kept in order, per device and boot."""
+
+from __future__ import annotations
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lfs10d.mqtt.history import History, Kept
+from lfs10d.telemetry import Sample
+
+
+def kept(device: str, seq: int, since: float | None = None, *, repeated: bool = False) -> Kept:
+    sample = Sample(device, "k", seq, 0, "synced", None, {}, (), "bad", "timeout", None)
+    return Kept(sample, float(seq) if since is None else since, repeated)
+
+
+def seqs(taken: tuple[Kept, ...]) -> list[tuple[str, int]]:
+    return [(each.sample.device, each.sample.seq) for each in taken]
+
+
+def test_nothing_waits_at_first() -> None:
+    history = History()
+    assert (len(history), history.take(100), history.oldest(), history.evict()) == (0, (), None, None)
+
+
+def test_the_device_with_the_oldest_sample_is_taken_first() -> None:
+    history = History()
+    history.extend([kept("a", 1, 5.0), kept("b", 1, 4.0), kept("b", 2, 6.0)])
+    assert history.oldest() == kept("b", 1, 4.0)
+    assert [seqs(history.take(100)) for _ in range(2)] == [[("b", 1), ("b", 2)], [("a", 1)]]
+
+
+def test_no_more_are_taken_than_asked_for() -> None:
+    history = History()
+    history.extend(kept("a", seq) for seq in range(1, 6))
+    assert seqs(history.take(2)) == [("a", 1), ("a", 2)]
+    assert len(history) == 3
+
+
+def test_one_array_never_mixes_boots() -> None:
+    history = History()
+    other = Sample("a", "j", 9, 0, "synced", None, {}, (), "bad", "timeout", None)
+    history.extend([kept("a", 1), Kept(other, 0.0)])
+    assert [each.sample.boot for each in history.take(100)] == ["j"]
+
+
+def test_evicting_takes_the_oldest() -> None:
+    history = History()
+    history.extend([kept("a", 1, 5.0), kept("b", 1, 4.0)])
+    assert history.evict() == kept("b", 1, 4.0)
+    assert len(history) == 1
+
+
+def test_what_was_acknowledged_before_goes_first_and_all_at_once() -> None:
+    history = History()
+    history.extend([kept("a", 1), kept("a", 2, repeated=True), kept("b", 3, repeated=True)])
+    assert history.evict() is None
+    assert len(history) == 1
+    assert seqs(history.take(100)) == [("a", 1)]
+    assert history.take(100) == ()
+
+
+@given(st.lists(st.tuples(st.sampled_from("ab"), st.integers(1, 50)), unique=True), st.integers(1, 10))
+def test_whatever_the_order_of_arrival_each_device_leaves_in_order_of_seq(
+    arrivals: list[tuple[str, int]], most: int
+) -> None:
+    history = History()
+    history.extend(kept(device, seq, repeated=seq % 3 == 0) for device, seq in arrivals)
+    left: list[tuple[str, int]] = []
+    while taken := history.take(most):
+        assert len(taken) <= most
+        assert len({each.key for each in taken}) == 1
+        left += seqs(taken)
+    assert len(history) == 0
+    for device in "ab":
+        assert [each for each in left if each[0] == device] == sorted(each for each in arrivals if each[0] == device)

@@ -1,0 +1,145 @@
+"""When the next connection is tried, and in which version, in virtual time."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lfs10d.mqtt.endings import Ended, Ending
+from lfs10d.mqtt.reconnect import HELD, SHORT_MOST, TAKEN_OVER_FIRST, TAKEN_OVER_FORGOTTEN, Reconnect
+from lfs10d.mqtt.settings import Version
+
+UNREACHABLE = Ended(Ending.UNREACHABLE, "")
+WRONG_VERSION = Ended(Ending.WRONG_VERSION, "")
+LOST = Ended(Ending.LOST, "")
+TAKEN_OVER = Ended(Ending.TAKEN_OVER, "")
+
+
+def fresh(version: Version = Version.V5) -> Reconnect:
+    return Reconnect(version, lambda: 0.0)
+
+
+def live(policy: Reconnect, start: float, seconds: float, ended: Ended = LOST) -> None:
+    policy.accepted(start)
+    policy.ended(ended, start + seconds)
+
+
+def test_the_first_attempt_is_at_once() -> None:
+    assert fresh().due < 0.0
+
+
+def test_attempts_that_fail_are_1_2_4_up_to_30_s_apart() -> None:
+    policy = fresh()
+    delays = []
+    for _ in range(7):
+        policy.ended(UNREACHABLE, 100.0)
+        delays.append(policy.due - 100.0)
+    assert delays == [1.0, 2.0, 4.0, 8.0, 16.0, 30.0, 30.0]
+
+
+@given(st.floats(0, 1))
+def test_chance_shortens_a_delay_by_at_most_a_quarter(chance: float) -> None:
+    policy = Reconnect(Version.V5, lambda: chance)
+    policy.ended(UNREACHABLE, 0.0)
+    assert 0.75 <= policy.due <= 1.0
+
+
+def test_a_connection_that_held_is_renewed_at_once_and_starts_from_1_s_again() -> None:
+    policy = fresh()
+    for _ in range(5):
+        policy.ended(UNREACHABLE, 0.0)
+    live(policy, 100.0, HELD)
+    assert policy.due == 100.0 + HELD
+    policy.ended(UNREACHABLE, 111.0)
+    assert policy.due == 112.0
+
+
+def test_a_connection_that_does_not_hold_is_not_renewed_at_once() -> None:
+    policy = fresh()
+    live(policy, 100.0, 0.5)
+    assert policy.due == 101.5
+    live(policy, 101.5, 0.5)
+    assert policy.due == 104.0
+
+
+def test_a_broker_that_refuses_5_is_asked_in_3_1_1_at_once() -> None:
+    policy = fresh()
+    policy.ended(WRONG_VERSION, 7.0)
+    assert (policy.version, policy.due) == (Version.V311, 7.0)
+
+
+def test_each_round_begins_with_5_again() -> None:
+    policy = fresh()
+    policy.ended(WRONG_VERSION, 0.0)
+    live(policy, 0.0, 100.0)
+    assert policy.version is Version.V5
+    policy.ended(WRONG_VERSION, 100.0)
+    policy.ended(WRONG_VERSION, 100.0)
+    assert (policy.version, policy.due) == (Version.V5, 101.0)
+
+
+def test_3_1_1_where_configured_is_the_only_one_tried() -> None:
+    policy = fresh(Version.V311)
+    assert policy.version is Version.V311
+    policy.ended(WRONG_VERSION, 0.0)
+    assert (policy.version, policy.due) == (Version.V311, 1.0)
+
+
+def test_taken_over_it_waits_60_s_doubling_to_1_h() -> None:
+    policy = fresh()
+    now = 0.0
+    waits = []
+    for _ in range(8):
+        live(policy, now, 500.0, TAKEN_OVER)
+        waits.append(policy.due - now - 500.0)
+        now = policy.due
+    assert waits == [60.0, 120.0, 240.0, 480.0, 960.0, 1920.0, 3600.0, 3600.0]
+    assert policy.duplicate
+
+
+def test_a_duplicate_is_forgotten_when_the_connection_holds_longer_than_the_other_may_wait() -> None:
+    policy = fresh()
+    policy.held(0.0)
+    live(policy, 0.0, 10.0, TAKEN_OVER)
+    policy.held(1e9)
+    assert policy.duplicate
+    policy.accepted(70.0)
+    policy.held(70.0 + 2 * TAKEN_OVER_FIRST - 1)
+    assert policy.duplicate
+    policy.held(70.0 + 2 * TAKEN_OVER_FIRST)
+    assert not policy.duplicate
+
+
+def test_after_two_hours_in_peace_the_wait_is_60_s_again() -> None:
+    policy = fresh()
+    live(policy, 0.0, 10.0, TAKEN_OVER)
+    live(policy, 100.0, TAKEN_OVER_FORGOTTEN, TAKEN_OVER)
+    assert policy.due == 100.0 + TAKEN_OVER_FORGOTTEN + TAKEN_OVER_FIRST
+
+
+def test_in_3_1_1_three_short_connections_in_a_row_are_a_duplicate() -> None:
+    policy = fresh(Version.V311)
+    for count in range(1, SHORT_MOST + 1):
+        live(policy, 100.0 * count, 5.0)
+        assert policy.duplicate == (count == SHORT_MOST)
+    assert policy.due == 100.0 * SHORT_MOST + 5.0 + TAKEN_OVER_FIRST
+
+
+@pytest.mark.parametrize("between", ["failure", "long life"])
+def test_in_3_1_1_a_broker_that_comes_and_goes_is_no_duplicate(between: str) -> None:
+    policy = fresh(Version.V311)
+    for count in range(10):
+        live(policy, 1000.0 * count, 5.0)
+        if between == "failure":
+            policy.ended(UNREACHABLE, 1000.0 * count + 6.0)
+        else:
+            live(policy, 1000.0 * count + 10.0, 600.0)
+    assert not policy.duplicate
+
+
+def test_in_5_short_connections_alone_are_no_duplicate() -> None:
+    policy = fresh()
+    for count in range(10):
+        live(policy, 100.0 * count, 5.0)
+    assert not policy.duplicate

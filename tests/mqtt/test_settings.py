@@ -1,0 +1,35 @@
+"""Settings come from section `mqtt` of the configuration and never show a password."""
+
+from __future__ import annotations
+
+from lfs10d.config import MqttConfig
+from lfs10d.mqtt.settings import BrokerSettings, Tls, Version, no_password
+from lfs10d.secret import Secret
+
+
+def test_the_section_is_taken_over_key_by_key() -> None:
+    config = MqttConfig.model_validate(
+        {
+            "host": "gate",
+            "port": 8883,
+            "version": "3.1.1",
+            "username": "u",
+            "tls": {"ca": "/ca", "cert": "/c", "key": "/k"},
+            "keepalive": "1.5s",
+        }
+    )
+    settings = BrokerSettings.of(config, client_id="me", password=no_password)
+    assert settings == BrokerSettings("gate", 8883, "me", Version.V311, "u", no_password, Tls("/ca", "/c", "/k"), 2)
+
+
+def test_without_tls_there_is_none() -> None:
+    settings = BrokerSettings.of(MqttConfig(), client_id="me", password=no_password)
+    assert settings.tls is None
+    assert settings.version is Version.V5
+    assert settings.place == "broker localhost:1883"
+
+
+def test_a_password_is_not_shown() -> None:
+    settings = BrokerSettings("gate", 1883, "me", password=lambda: Secret("hunter2"))
+    assert "password" not in repr(settings)
+    assert no_password() is None
