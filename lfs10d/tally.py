@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 WINDOW = 30
 """Rates are of the last so many s."""
 
+LEAST_SPAN = 1.0
+"""A rate over fewer s than this is chance and not told."""
+
 RECENT_GAPS = 1000
 RECENT_RTTS = 100
 
@@ -117,13 +120,13 @@ class LineTally:
         self._least_gap = None
 
     def rates(self, now: float) -> Rates:
-        """Return the figures of the last half minute, or of the time since the start where that is less."""
+        """Return the figures of the last half minute, or since the start where that is less: at least 1 s."""
         oldest = floor(now) - WINDOW + 1
         span = min(now - oldest, now - self._started)
         seconds = [second for second in self._seconds if second.number >= oldest]
         longest = max((second.longest for second in seconds), default=0.0)
         cycle = round(longest, 3) if longest > 0 else None
-        if span <= 0:
+        if span < LEAST_SPAN:
             return Rates(None, None, cycle)
         load = min(100.0, 100 * sum(second.busy for second in seconds) / span)
         return Rates(round(load, 1), round(sum(second.polls for second in seconds) / span, 2), cycle)

@@ -6,7 +6,7 @@ import json
 from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lfs10d.outbound import check
@@ -126,6 +126,7 @@ def take(running: Station, step: object, now: Instant) -> list[Publication]:
             return running.configure(LINE, cast("tuple[DeviceFacts, ...]", step), now)
 
 
+@settings(deadline=None)  # the claim is about truth, not about speed
 @given(st.lists(st.tuples(steps, st.floats(0, 20), st.sampled_from(["synced", "unsynced"])), max_size=60))
 def test_whatever_happens_the_broker_is_told_the_truth(history: list[tuple[object, float, Clock]]) -> None:
     """Numbers have no gaps; no value is shown as bad or offline; what is retained is what the daemon stands behind.

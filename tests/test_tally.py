@@ -124,7 +124,7 @@ def test_the_load_is_the_share_of_the_time_the_line_was_given_away() -> None:
 def test_the_load_never_exceeds_the_line() -> None:
     tally = LineTally(START)
     tally.exchanged(exchange(START + 0.1, took=5.0))
-    assert figures(tally, START + 0.2)["load_pct"] == 100.0
+    assert figures(tally, START + 1.5)["load_pct"] == 100.0
 
 
 def test_rates_are_of_the_last_half_minute_alone() -> None:
@@ -138,9 +138,18 @@ def test_rates_are_of_the_last_half_minute_alone() -> None:
 
 def test_shortly_after_the_start_rates_are_of_the_time_since() -> None:
     tally = LineTally(START)
-    for number in range(4):
+    for number in range(20):
         tally.polled(reading(START + 0.1 * number), None)
-    assert figures(tally, START + 0.4)["polls_per_s"] == 10.0
+    assert figures(tally, START + 2)["polls_per_s"] == 10.0
+
+
+@pytest.mark.parametrize("since", [0.0, 5e-324, 0.9])
+def test_within_the_first_second_no_rate_is_known(since: float) -> None:
+    tally = LineTally(0.0)
+    tally.exchanged(exchange(0.0))
+    tally.polled(reading(0.0), None)
+    payload = figures(tally, since)
+    assert (payload["load_pct"], payload["polls_per_s"]) == (None, None)
 
 
 def test_the_cycle_is_the_longest_time_between_two_polls_of_one_device() -> None:
