@@ -106,7 +106,9 @@ def explain(profile: Profile) -> list[Table]:
                 tuple(_setting(setting) for setting in profile.settings),
             )
         )
-    tables.append(Table("Where this is from, and what to know", (), tuple(_remarks(profile))))
+    remarks = tuple(_remarks(profile))
+    if remarks:
+        tables.append(Table("Where this is from, and what to know", (), remarks))
     return tables
 
 

@@ -79,7 +79,7 @@ def shortest(bits: int) -> float:
     """Return the shortest decimal that reads back as the normal or zero float32 `bits`, as a float.
 
     12.99 for 0x414FD70A, where `struct` alone gives 12.989999771118164. Of several equally short ones the
-    nearest. Minus zero stays minus zero: its bits are what the sensor sent.
+    nearest, of two as near the even one. Minus zero stays minus zero: its bits are what the sensor sent.
     """
     (exact,) = _FLOAT32.unpack(_WORD.pack(bits))
     number: float = exact
