@@ -107,6 +107,15 @@ class Window:
 ALWAYS = Window()
 
 
+def window(first: float = 0.0, last: float | None = None, every: float | None = None) -> Window:
+    """Return a window told in seconds."""
+    return Window(
+        nanoseconds(first),
+        None if last is None else nanoseconds(last),
+        None if every is None else nanoseconds(every),
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class Ailment:
     """One fault of one sensor: what, in how many of its answers, when, and its particulars."""
@@ -149,10 +158,5 @@ def ailment(
     """
     kind = Kind(kind)
     seconds = DEFAULT_DELAYS.get(kind, 0.0) if delay is None else delay
-    window = Window(
-        nanoseconds(first),
-        None if last is None else nanoseconds(last),
-        None if every is None else nanoseconds(every),
-    )
-    plain = Ailment(kind, rate, window, nanoseconds(seconds))
+    plain = Ailment(kind, rate, window(first, last, every), nanoseconds(seconds))
     return replace(plain, **particulars)  # type: ignore[arg-type]  # replace checks the names, the kinds use them

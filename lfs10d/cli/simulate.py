@@ -1,0 +1,192 @@
+"""`lfs10d simulate`: a simulated line on a pseudo terminal, for any master; its judge's figures at the end."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import signal
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from lfs10d.cli import json_option
+from lfs10d.profiles.library import load_profile
+from lfs10d.quantities import seconds
+from lfs10d.simulator.build import Plan, build, slave_ids
+from lfs10d.simulator.faultfile import BAUDRATES, FaultFile, load_faults
+from lfs10d.simulator.pty import PtyLine
+from lfs10d.simulator.registers import LFS10, blueprint_of
+from lfs10d.simulator.wire import SECOND, Format, Framing, Parity
+
+if TYPE_CHECKING:
+    from lfs10d.simulator.line import SimulatedLine
+
+EXAMPLES = """\b
+Examples:
+  lfs10d simulate --link /tmp/line0                       eight sensors in moving wind
+  lfs10d simulate --link /tmp/line0 --slaves 1-4,255      these ids
+  lfs10d simulate --link /tmp/line0 --faults faults.yaml  some of them ill
+  lfs10d read /tmp/line0 3                                in another terminal
+
+\b
+A faults file:
+  slaves:
+    3: silent
+    4: [{fault: noisy, rate: 0.1}]
+    5: [{fault: silent, after: 10s, for: 5s}]
+SIGUSR1 takes the power from all sensors for a moment.
+"""
+
+
+def _ids(context: click.Context, parameter: click.Parameter, value: str) -> tuple[int, ...]:
+    """Return the ids of text such as 1-8,12."""
+    try:
+        return slave_ids(value)
+    except ValueError as error:
+        raise click.BadParameter(str(error), context, parameter) from error
+
+
+def _time(context: click.Context, parameter: click.Parameter, value: str | None) -> float | None:
+    """Return the seconds of text such as 5ms."""
+    try:
+        duration = None if value is None else seconds(value)
+    except ValueError as error:
+        raise click.BadParameter(f"{value!r} is no duration; write 5ms, 1s or 2m", context, parameter) from error
+    return duration
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """The options as given; times in seconds."""
+
+    link: Path | None
+    slaves: tuple[int, ...]
+    baudrate: str
+    parity: Parity
+    stopbits: str
+    framing: Framing
+    faults: Path | None
+    profile: str | None
+    turnaround: float
+    jitter: float
+    latency: float | None
+    echo: bool
+    values: str
+    seed: int
+    interval: float | None
+    as_json: bool
+
+    @property
+    def plan(self) -> Plan:
+        """The line as asked for; raises ConfigError for a profile that cannot be read."""
+        profile = None if self.profile is None else load_profile(self.profile, relative_to=Path())
+        return Plan(
+            self.slaves,
+            Format(int(self.baudrate), 7 if self.framing == "ascii" else 8, self.parity, int(self.stopbits)),
+            self.framing,
+            LFS10 if profile is None else blueprint_of(profile),
+            turnaround=self.turnaround,
+            jitter=self.jitter,
+            seed=self.seed,
+            unique=self.values == "unique",
+        )
+
+
+@click.command("simulate", epilog=EXAMPLES)
+@click.option("--link", type=click.Path(path_type=Path), metavar="PATH", help="A lasting name for the terminal.")
+@click.option("--slaves", callback=_ids, default="1-8", show_default=True, metavar="IDS", help="Which ids.")
+@click.option("--baudrate", type=click.Choice([str(rate) for rate in BAUDRATES]), default="9600", show_default=True)
+@click.option("--parity", type=click.Choice(["none", "even", "odd"]), default="none", show_default=True)
+@click.option("--stopbits", type=click.Choice(["1", "2"]), default="1", show_default=True)
+@click.option("--framing", type=click.Choice(["rtu", "ascii"]), default="rtu", show_default=True)
+@click.option("--faults", type=click.Path(path_type=Path), metavar="FILE", help="What ails whom (YAML).")
+@click.option("--profile", metavar="NAME", help="Another device than lfs10: a profile's name or file.")
+@click.option(
+    "--turnaround",
+    callback=_time,
+    metavar="DURATION",
+    default="5ms",
+    show_default=True,
+    help="Before an answer begins.",
+)
+@click.option(
+    "--jitter", callback=_time, metavar="DURATION", default="0ms", show_default=True, help="Up to so much more."
+)
+@click.option(
+    "--latency", callback=_time, metavar="DURATION", default=None, help="The adapter delivers in pieces so far apart."
+)
+@click.option("--echo", is_flag=True, help="The adapter returns the master's own bytes.")
+@click.option("--values", type=click.Choice(["wind", "unique"]), default="wind", show_default=True)
+@click.option("--seed", type=int, default=1, show_default=True, help="Of wind and faults.")
+@click.option("--interval", callback=_time, metavar="DURATION", default=None, help="Print the figures so often.")
+@json_option
+def command(**options: Any) -> None:  # noqa: ANN401  # sixteen options; `Wanted` names and types them
+    """Run a line full of simulated sensors on a pseudo terminal, and judge who polls it.
+
+    A request that begins before 3.5 characters of silence, or pauses for more than 1.5 inside, is not heard, and
+    counted. Ends with Ctrl-C.
+    """
+    wanted = Wanted(**options)
+    plan = wanted.plan
+    faults = FaultFile() if wanted.faults is None else load_faults(wanted.faults, plan.slaves)
+    latency = faults.line.latency if wanted.latency is None else wanted.latency
+    port = PtyLine(
+        build(plan, faults),
+        link=wanted.link,
+        echo=wanted.echo or faults.line.echo,
+        latency=latency,
+        realtime=True,
+    )
+    with contextlib.suppress(KeyboardInterrupt), port:
+        signal.signal(signal.SIGUSR1, lambda *_: port.tell(_power_cycle))
+        _tell_ready(wanted, port)
+        while True:
+            threading.Event().wait(wanted.interval)
+            _tell_figures(wanted, port, "figures")
+    _tell_figures(wanted, port, "end")
+
+
+simulate = command
+
+
+def _power_cycle(line: SimulatedLine) -> None:
+    line.power_cut(line.now / SECOND)
+    line.power_up()
+
+
+def _tell_ready(wanted: Wanted, port: PtyLine) -> None:
+    if wanted.as_json:
+        _print({"event": "ready", "path": port.path, "terminal": port.terminal, "slaves": wanted.slaves})
+        return
+    shape = f"{wanted.baudrate} baud, {wanted.framing}"
+    count = f"{len(wanted.slaves)} sensor{'s' if len(wanted.slaves) > 1 else ''}"
+    click.echo(f"simulated line at {port.path}: {count}, {shape}; Ctrl-C ends it")
+
+
+def _tell_figures(wanted: Wanted, port: PtyLine, event: str) -> None:
+    figures = port.summary()
+    if wanted.as_json:
+        _print({"event": event, **figures})
+        return
+    gap = figures["min_gap_us"]
+    words = ", ".join(
+        f"{figures[key]} {text}"
+        for key, text in (
+            ("requests", "requests"),
+            ("heard", "heard"),
+            ("answers", "answers"),
+            ("gap_violations", "begun too early"),
+            ("t15_violations", "torn"),
+            ("collisions", "collisions"),
+            ("malformed", "malformed"),
+        )
+    )
+    shortest = "" if gap is None else f", shortest gap {float(gap) / 1000:.3f} ms"
+    click.echo(f"{float(figures['seconds']):.0f} s: {words}{shortest}")
+
+
+def _print(data: dict[str, Any]) -> None:
+    click.echo(json.dumps(data, allow_nan=False))
