@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import signal
 import sys
@@ -26,7 +27,7 @@ TRACEBACK = "LFS10D_TRACEBACK"
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the verb that the arguments name and exit with its code."""
     for stream in (sys.stdout, sys.stderr):
-        if stream is not None and hasattr(stream, "reconfigure"):
+        if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     signal.signal(signal.SIGTERM, _terminated)
     code = _run(arguments)
@@ -89,7 +90,8 @@ def _tell(message: str) -> None:
 def _flushed(code: int) -> int:
     """Return the exit code, 1 if what was printed could not be written (a full disk, a closed pipe)."""
     try:
-        sys.stdout.flush()
+        if sys.stdout is not None:  # None: closed by whoever started us
+            sys.stdout.flush()
     except BrokenPipeError:
         pass
     except (OSError, ValueError) as error:

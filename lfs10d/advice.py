@@ -39,7 +39,7 @@ def _load(loaded: Loaded, budget: Budget) -> Iterator[tuple[Path, str]]:
         yield (
             path,
             (
-                f"the intervals ask for {budget.load:.0%} of what the line carries: every device will be polled less "
+                f"the intervals ask for {budget.load:.1%} of what the line carries: every device will be polled less "
                 "often; use longer intervals, a higher baud rate or a second line"
             ),
         )
@@ -47,8 +47,8 @@ def _load(loaded: Loaded, budget: Budget) -> Iterator[tuple[Path, str]]:
         yield (
             path,
             (
-                f"the intervals ask for {budget.load_with_turnaround:.0%} of what the line carries if the devices take "
-                f"{duration_text(ASSUMED_TURNAROUND)} to answer (and {budget.load:.0%} if they took none)"
+                f"the intervals ask for {budget.load_with_turnaround:.1%} of what the line carries if the devices take "
+                f"{duration_text(ASSUMED_TURNAROUND)} to answer (and {budget.load:.1%} if they took none)"
             ),
         )
     if not loaded.config.slaves:

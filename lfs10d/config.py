@@ -150,7 +150,7 @@ class SlaveConfig(Section):
     interval: Annotated[float, Duration(0.02, DAY, zero="as fast as the line allows")] = Field(
         1.0, description="Time between two polls. Default: poll.interval."
     )
-    enabled: Annotated[bool, Flag()] = Field(default=True, description="Is it polled?")
+    enabled: Annotated[bool, Flag()] = Field(default=True, description="Whether it is polled.")
     response_timeout: Annotated[float | None, Duration(0.01, 10, auto="learned")] = Field(
         None, description="Time to its answer's first byte. Default: poll.response_timeout."
     )

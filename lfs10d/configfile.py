@@ -31,6 +31,9 @@ CREDENTIAL = "mqtt-password"
 LARGEST_PASSWORD = 65_535
 """Bytes: binary data of MQTT 5.0, section 1.5.6."""
 
+LONGEST_PATH = 4096
+"""Characters of a path that are shown: whole, for only whole it helps (PATH_MAX of Linux)."""
+
 _SECRET_FILES: tuple[Keys, ...] = (
     ("mqtt", "password_file"),
     ("mqtt", "tls", "ca"),
@@ -105,7 +108,7 @@ def load(
     document = parse(decode(_content(path), str(path)), str(path))
     if not isinstance(document.data, dict):
         message = f"must be a mapping with line, slaves and mqtt, not {shown(document.data)}"
-        raise ConfigError((*document.problems, document.problem((), message)))
+        raise ConfigError(tuple(sorted((*document.problems, document.problem((), message)))))
     config, problems, wrong = _validated(document)
     folder = path.parent.absolute()
     profiles, more = _profiles(document, config, folder, wrong)
@@ -259,14 +262,14 @@ def _unusable(document: Document, config: Config) -> list[Problem]:
         try:
             context.load_verify_locations(tls.ca)
         except (OSError, ValueError):
-            message = f"{quoted(tls.ca)} holds no certificate in PEM form"
+            message = f"{_named(tls.ca)} holds no certificate in PEM form"
             problems.append(document.problem(("mqtt", "tls", "ca"), message))
     if tls is not None and tls.cert is not None:
         try:
             # A key under a passphrase would ask on the terminal; an empty answer makes it an error.
             context.load_cert_chain(tls.cert, tls.key, password=lambda: "")
         except (OSError, ValueError):
-            message = f"{quoted(tls.cert)} and its key cannot be used: both in PEM form, matching, no passphrase?"
+            message = f"{_named(tls.cert)} and its key cannot be used: both in PEM form, matching, no passphrase?"
             problems.append(document.problem(("mqtt", "tls", "cert"), message))
     return problems
 
@@ -278,12 +281,16 @@ def _value(config: BaseModel, keys: Keys) -> str | None:
     return value if isinstance(value, str) else None
 
 
+def _named(path: Path | str) -> str:
+    return quoted(str(path), LONGEST_PATH)
+
+
 def _readable(path: Path) -> None:
     try:
         with path.open("rb") as file:
             file.read(1)
     except (OSError, ValueError) as error:
-        raise _UnreadableError(f"{quoted(str(path))} cannot be read: {_reason(error)}") from None
+        raise _UnreadableError(f"{_named(path)} cannot be read: {_reason(error)}") from None
 
 
 def _password(path: Path) -> Secret:
@@ -292,11 +299,11 @@ def _password(path: Path) -> Secret:
             content = file.read(LARGEST_PASSWORD + 2)
         first = content.decode().partition("\n")[0].removesuffix("\r")
     except UnicodeDecodeError:
-        raise _UnreadableError(f"{quoted(str(path))} is no UTF-8 text") from None
+        raise _UnreadableError(f"{_named(path)} is no UTF-8 text") from None
     except (OSError, ValueError) as error:
-        raise _UnreadableError(f"{quoted(str(path))} cannot be read: {_reason(error)}") from None
+        raise _UnreadableError(f"{_named(path)} cannot be read: {_reason(error)}") from None
     if not first or len(first.encode()) > LARGEST_PASSWORD:
-        raise _UnreadableError(f"{quoted(str(path))} must hold the password in its first line")
+        raise _UnreadableError(f"{_named(path)} must hold the password in its first line")
     return Secret(first)
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from lfs10d.config import device_name
+from lfs10d.quantities import duration_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -97,5 +98,5 @@ def _against_profile(config: Config, index: int, slave: SlaveConfig, profile: Pr
     path = ("slaves", index, "interval")
     given = slave.interval if "interval" in slave.model_fields_set else config.poll.interval
     if 0 < given < profile.min_interval:
-        message = f"must be at least {profile.min_interval:g}s for profile {profile.name}, or 0"
+        message = f"must be at least {duration_text(profile.min_interval)} for profile {profile.name}, or 0"
         yield Contradiction(path, message, (path, of, ("poll", "interval")))

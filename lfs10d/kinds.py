@@ -45,9 +45,9 @@ def shown(value: object) -> str:
             return "a list"
 
 
-def quoted(text: str) -> str:
+def quoted(text: str, longest: int = _SHOWN_CHARACTERS) -> str:
     """Return text in double quotes on one line, shortened, with every character that does not print escaped."""
-    cut = text if len(text) <= _SHOWN_CHARACTERS else text[: _SHOWN_CHARACTERS - 3] + "..."
+    cut = text if len(text) <= longest else text[: longest - 3] + "..."
     return "".join(
         character if character.isprintable() else json.dumps(character)[1:-1]
         for character in json.dumps(cut, ensure_ascii=False)
@@ -127,7 +127,7 @@ class Choice(Kind):
 
     values: tuple[int | str, ...]
     null: bool = False
-    meaning: Mapping[int | str, int | str] = field(default_factory=dict)
+    meaning: Mapping[int | str, int | str] = field(default_factory=dict, hash=False)
 
     @property
     def words(self) -> str:
@@ -140,10 +140,10 @@ class Choice(Kind):
         if value is None and self.null:
             return None
         if type(value) is int or type(value) is str:
-            if value in self.values:
-                return value
             if value in self.meaning:
                 return self.meaning[value]
+            if value in self.values:
+                return value
         raise self.refusal(value)
 
 

@@ -1,0 +1,109 @@
+"""`lfs10d check` as a person calls it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+from click.testing import CliRunner
+
+from lfs10d.cli.check import command
+
+if TYPE_CHECKING:
+    from tests.cli.conftest import Lfs10d
+
+
+@pytest.fixture(autouse=True)
+def in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def check(text: str, *arguments: str) -> tuple[int, str, str]:
+    Path("lfs10d.yaml").write_text(text)
+    result = CliRunner().invoke(command, ["-c", "lfs10d.yaml", *arguments], standalone_mode=False)
+    if result.exception is not None:
+        raise result.exception
+    assert isinstance(result.return_value, int)
+    return result.return_value, result.stdout, result.stderr
+
+
+GOOD = "line: {port: /dev/x}\nslaves: [2, {id: 3, interval: 0}, {id: 4, enabled: false}]\n"
+
+
+def test_a_valid_file_is_answered_with_the_time_budget_as_a_table() -> None:
+    code, out, err = check(GOOD)
+    assert (code, err) == (0, "")
+    assert out.splitlines()[:9] == [
+        "lfs10d.yaml: valid",
+        "line    line0: /dev/x, 9600 baud 8N1 rtu",
+        "broker  localhost:1883, topics below lfs10d/line0",
+        "slaves  3, 1 of them disabled",
+        "",
+        "device   id  profile  interval  wire time      load",
+        "slave-2   2  lfs10          1s    25.0 ms      2.5%",
+        "slave-3   3  lfs10           0    25.0 ms  the rest",
+        "",
+    ]
+    assert "fastest cycle    50.0 ms" in out
+    assert "slowest cycle    2.05 s" in out
+
+
+def test_without_slaves_there_is_no_table_but_a_warning_and_exit_code_0() -> None:
+    code, out, err = check("line: {port: /dev/x}\nslaves: []\n")
+    assert code == 0
+    assert "device" not in out
+    assert err == "lfs10d.yaml:2:9: slaves: warning: there are no slaves: nothing will be polled until one is added\n"
+
+
+def test_a_program_gets_the_same_as_json() -> None:
+    code, out, err = check(GOOD + "wind: {}\n", "--json")
+    found = json.loads(out)
+    assert code == 0
+    assert found["valid"] is True
+    assert found["budget"]["load_pct"] == 2.5
+    assert [slave["load_pct"] for slave in found["budget"]["slaves"]] == [2.5, None]
+    assert [warning["path"] for warning in found["warnings"]] == ["wind"]
+    assert err.startswith("lfs10d.yaml:3:7: wind: warning: ")
+
+
+def test_a_program_gets_the_problems_as_json_and_a_person_as_lines() -> None:
+    code, out, err = check("line: {port: 5}\nx: 1\n", "--json")
+    assert code == 78
+    found = json.loads(out)
+    assert found["valid"] is False
+    assert [(problem["line"], problem["column"], problem["path"]) for problem in found["problems"]] == [
+        (1, 14, "line.port"),
+        (2, 1, "x"),
+    ]
+    assert len(err.splitlines()) == 2
+
+
+def test_every_problem_is_a_line_on_standard_error_and_the_exit_code_78(lfs10d: Lfs10d, small: Path) -> None:
+    small.write_text("line: {port: 5}\nx: 1\n")
+    result = lfs10d("check", "-c", small.name)
+    assert result.returncode == 78
+    assert result.stdout == ""
+    assert result.stderr.splitlines() == [
+        (
+            "lfs10d.yaml:1:14: line.port: must be a path of 1 to 4096 characters on one line, without control characters, "
+            "not 5"
+        ),
+        (
+            "lfs10d.yaml:2:1: x: is not a known key; known here: line, poll, slaves, mqtt, commands, homeassistant, wind, "
+            "store, log"
+        ),
+    ]
+
+
+def test_a_missing_file_is_one_line_and_the_exit_code_78(lfs10d: Lfs10d) -> None:
+    result = lfs10d("check", "-c", "none.yaml")
+    assert result.returncode == 78
+    assert result.stderr == "none.yaml:1:1: there is no such file; name another with -c FILE or $LFS10D_CONFIG\n"
+
+
+def test_the_environment_names_the_file_and_the_option_comes_before_it(lfs10d: Lfs10d, small: Path) -> None:
+    assert lfs10d("check", LFS10D_CONFIG=small.name).returncode == 0
+    assert lfs10d("check", "-c", small.name, LFS10D_CONFIG="none.yaml").returncode == 0
+    assert lfs10d("check", LFS10D_CONFIG="").stderr.startswith("/etc/lfs10d/lfs10d.yaml:1:1: ")

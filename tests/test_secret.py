@@ -1,0 +1,31 @@
+"""A password that never prints itself."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import pytest
+
+from lfs10d.secret import Secret
+
+
+def test_only_reveal_shows_the_text() -> None:
+    secret = Secret("hunter2")
+    assert secret.reveal() == "hunter2"
+    assert "hunter2" not in f"{secret} {secret!r} {secret!s} {secret:>20} {[secret]} {vars(type(secret))}"
+    assert f"{secret:>5}" == "  ***"
+
+
+def test_secrets_compare_by_their_text_so_that_a_reload_sees_a_change() -> None:
+    assert Secret("ä") == Secret("ä")
+    assert Secret("a") != Secret("b")
+    assert Secret("a") != "a"
+    assert len({Secret("a"), Secret("a")}) == 1
+
+
+def test_a_secret_is_not_written_down() -> None:
+    with pytest.raises(TypeError, match="not written down"):
+        pickle.dumps(Secret("a"))
+    with pytest.raises(TypeError, match="not written down"):
+        copy.deepcopy(Secret("a"))
