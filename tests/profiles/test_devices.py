@@ -1,0 +1,130 @@
+"""The data files on the wire: printed frames of the makers' documents, and simulated devices that play them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from lfs10d.modbus.frames import Checksum, Codec, Framing
+from lfs10d.modbus.request import ReadRegisters, WriteRegister
+from lfs10d.profiles.library import builtin_names, load_profile
+from lfs10d.reading import Fault
+from lfs10d.simulator.registers import blueprint_of
+from lfs10d.simulator.sensor import Sensor
+from lfs10d.simulator.wire import unseal
+
+if TYPE_CHECKING:
+    from lfs10d.profiles.schema import ChecksumName, FramingName, Profile
+    from lfs10d.reading import Number
+
+RTU = Codec(Framing.RTU)
+SUM = Codec(Framing.RTU, Checksum.SUM)
+ASCII = Codec(Framing.ASCII)
+
+ROOT = Path(__file__).parents[2]
+DEVICES = [*builtin_names(), "config/profiles/wind-vane.yaml"]
+
+
+def load(name: str) -> Profile:
+    return load_profile(name, relative_to=ROOT)
+
+
+SPOKEN = [
+    (name, framing, checksum)
+    for name in DEVICES
+    for framing, checksum in product(load(name).framings, load(name).checksums)
+]
+
+
+def polled(profile: Profile, codec: Codec, answers: list[bytes]) -> dict[str, Number]:
+    """Return the values of one poll from the frames that answered it."""
+    numbers: dict[str, Number] = {}
+    for block, answer in zip(profile.reads(), answers, strict=True):
+        body = codec.unwrap(answer)
+        assert body is not None
+        values = profile.decode(block, codec.decode(body))
+        assert not isinstance(values, Fault)
+        numbers |= values
+    return numbers
+
+
+@pytest.mark.parametrize(
+    ("name", "codec", "request_frame", "answer", "values"),
+    [
+        ("lfs10", RTU, "010300010002 95CB", "010304414FD70A 002F", {"wind_speed": 12.99}),
+        ("ld-e", RTU, "010310040002 810A", "010304D0F50000 D2C1", {"displacement": 53493}),
+    ],
+)
+def test_a_poll_is_the_frame_that_the_document_prints(
+    name: str, codec: Codec, request_frame: str, answer: str, values: dict[str, Number]
+) -> None:
+    profile = load(name)
+    (block,) = profile.reads()
+    request = ReadRegisters(1, block.address, block.count, block.function)
+    assert codec.encode(request) == bytes.fromhex(request_frame)
+    assert polled(profile, codec, [bytes.fromhex(answer)]) == values
+
+
+def test_the_laser_is_polled_in_ascii_as_its_manual_prints() -> None:
+    profile = load("ld-e")
+    (block,) = profile.reads()
+    assert ASCII.encode(ReadRegisters(1, block.address, block.count, block.function)) == b":010310040002E6\r\n"
+    assert polled(profile, ASCII, [b":010304D0F5000033\r\n"]) == {"displacement": 53493}
+
+
+def test_the_laser_is_written_as_its_manual_prints_but_with_the_right_check() -> None:
+    (setting,) = load("ld-e").settings
+    assert setting.refusal(1) is None
+    request = WriteRegister(1, setting.register, 1)
+    assert RTU.encode(request) == bytes.fromhex("010610000001 4CCA")
+    assert ASCII.encode(request) == b":010610000001E8\r\n"
+
+
+def test_the_barrier_of_the_eh600_is_the_read_that_its_manual_prints() -> None:
+    barrier = load("eh600").barrier
+    assert barrier is not None
+    request = ReadRegisters(1, barrier.register, barrier.count, barrier.function)
+    assert RTU.encode(request) == bytes.fromhex("0103F0020002 56CB")
+
+
+def test_the_eh600_with_the_other_check_is_asked_with_the_sum_of_the_bytes() -> None:
+    profile = load("eh600")
+    block = profile.reads()[0]
+    request = ReadRegisters(1, block.address, block.count, block.function)
+    assert SUM.encode(request) == bytes.fromhex("010310010001 0016")
+
+
+@pytest.mark.parametrize(("name", "framing", "check"), SPOKEN)
+def test_a_simulated_device_is_polled_to_the_values_it_means(
+    name: str, framing: FramingName, check: ChecksumName
+) -> None:
+    profile = load(name)
+    codec = Codec(Framing(framing), Checksum(check))
+    blueprint = replace(blueprint_of(profile), check=check)
+    sensor = Sensor(7, blueprint=blueprint, framing=framing, source=lambda _now: 10.0)
+    answers = []
+    for block in profile.reads():
+        request = ReadRegisters(7, block.address, block.count, block.function)
+        asked = unseal(codec.encode(request), framing, check)
+        assert asked is not None
+        reply = sensor.hear(asked, 0)
+        assert reply is not None
+        assert len(reply.data) == codec.answer_size(request)
+        answers.append(reply.data)
+    assert polled(profile, codec, answers) == dict.fromkeys(profile.value_names, 10.0)
+
+
+@pytest.mark.parametrize(("name", "framing", "check"), SPOKEN)
+def test_the_answer_to_a_barrier_has_a_length_that_no_poll_has(
+    name: str, framing: FramingName, check: ChecksumName
+) -> None:
+    profile = load(name)
+    codec = Codec(Framing(framing), Checksum(check))
+    assert profile.barrier is not None
+    sizes = {codec.answer_size(ReadRegisters(1, b.address, b.count, b.function)) for b in profile.reads()}
+    barrier = ReadRegisters(1, profile.barrier.register, profile.barrier.count, profile.barrier.function)
+    assert codec.answer_size(barrier) not in sizes
