@@ -1,0 +1,76 @@
+"""`python -m bench`: run the rows, print the table, write bench/RESULTS.md."""
+
+from __future__ import annotations
+
+import argparse
+import datetime as dt
+import shlex
+import sys
+import tempfile
+from pathlib import Path
+
+from bench.broker import Broker
+from bench.masters import DAEMON
+from bench.measure import measure
+from bench.programs import HERE
+from bench.report import Runs, markdown, results, table
+from bench.rows import FIRST_ROWS, ROWS, Row, engine_rows
+
+
+def chosen(options: argparse.Namespace) -> tuple[Row, ...]:
+    """Return the rows asked for; rows that others are measured against come first, as listed."""
+    rows = engine_rows() if options.engine else ROWS
+    known = {row.name: row for row in rows}
+    if options.rows:
+        names = options.rows.split(",")
+        unknown = [name for name in names if name not in known]
+        if unknown:
+            sys.exit(f"no row named {', '.join(unknown)}; there are: {', '.join(known)}")
+        names += [known[name].against for name in names if known[name].against in known]
+        return tuple(row for row in rows if row.name in names)
+    if options.quick and not options.engine:
+        return tuple(row for row in rows if row.name in FIRST_ROWS)
+    return rows
+
+
+def run_rows(rows: tuple[Row, ...], options: argparse.Namespace) -> Runs:
+    """Measure each row by each master in turn, the whole again for each run."""
+    runs: Runs = {}
+    daemon = tuple(shlex.split(options.daemon)) if options.daemon else DAEMON
+    with tempfile.TemporaryDirectory(prefix="lfs10d-bench-") as folder, Broker(Path(folder)) as broker:
+        for number in range(1, options.runs + 1):
+            for row in rows:
+                for master in row.masters:
+                    run = measure(row, master, broker.port, daemon)
+                    runs.setdefault((row.name, master), []).append(run)
+                    print(
+                        f"run {number}: {row.title}, {master}: {run.rate:.2f}/s, {run.share:.4f} of the wire,"
+                        f" {run.violations} violations",
+                        file=sys.stderr,
+                    )
+    return runs
+
+
+def main() -> None:
+    """Measure and tell."""
+    parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
+    parser.add_argument("--rows", help="names, like 9600,noise (default: all)")
+    parser.add_argument("--quick", action="store_true", help=f"only {', '.join(FIRST_ROWS)}")
+    parser.add_argument("--engine", action="store_true", help="ways to wait, without the daemon (decision 0001)")
+    parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--seconds", type=float, help="length of a run, instead of the row's own")
+    parser.add_argument("--daemon", help="command of the daemon (default: lfs10d beside this Python)")
+    parser.add_argument("--no-write", action="store_true", help="print only; leave bench/RESULTS.md alone")
+    options = parser.parse_args()
+    rows = chosen(options)
+    if options.seconds:
+        rows = tuple(row.lasting(options.seconds) for row in rows)
+    runs = run_rows(rows, options)
+    print(markdown(table(rows, runs)))
+    if not (options.no_write or options.engine):
+        when = dt.datetime.now(dt.UTC).date().isoformat()
+        (HERE / "RESULTS.md").write_text(results(rows, runs, when))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,56 @@
+"""Those who poll: the C reference, the engine probe and the daemon, each as a process with one command."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bench.programs import HERE, MOSQUITTO_HEADER, build_reference
+
+if TYPE_CHECKING:
+    from bench.rows import Master, Row
+
+BASE = "bench"
+DAEMON = (str(Path(sys.executable).with_name("lfs10d")),)
+
+
+def daemon_configuration(row: Row, port: Path, broker: int) -> dict[str, object]:
+    """Return the daemon's configuration of a row; JSON is YAML."""
+    profile = row.profile if row.profile == "lfs10" else str(HERE / f"{row.profile}.yaml")
+    return {
+        "line": {"name": "line0", "port": str(port), "baudrate": row.baudrate, "realtime": row.realtime},
+        "poll": {"interval": row.interval},
+        "slaves": [{"id": slave, "profile": profile} for slave in row.ids],
+        "mqtt": {"host": "127.0.0.1", "port": broker, "base_topic": BASE},
+        "log": {"level": "warning"},
+    }
+
+
+def command(master: Master, row: Row, folder: Path, port: Path, broker: int, daemon: tuple[str, ...]) -> list[str]:
+    """Return the command line that polls the row's line."""
+    if master == "daemon":
+        configuration = folder / "line0.yaml"
+        configuration.write_text(json.dumps(daemon_configuration(row, port, broker), indent=2) + "\n")
+        return [*daemon, "run", "-c", str(configuration), "--state-dir", str(folder / "state")]
+    rate = ["--baudrate", str(row.baudrate)]
+    if master == "reference":
+        publish = ["--mqtt", f"127.0.0.1:{broker}"] if MOSQUITTO_HEADER.exists() else []
+        return [str(build_reference()), *rate, "--ids", f"1-{row.sensors}", *publish, str(port)]
+    priority = ["--fifo"] if row.realtime else []
+    probe = [sys.executable, "-m", "bench.engine", master, str(port), *rate]
+    return [*probe, "--slaves", str(row.sensors), "--burst", *priority]
+
+
+def start(words: list[str], errors: Path) -> subprocess.Popen[str]:
+    """Start a master; what it complains of goes to a file."""
+    with errors.open("w") as complaints:
+        return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=complaints, text=True, cwd=HERE.parent)
+
+
+def scratch() -> tempfile.TemporaryDirectory[str]:
+    """Return a folder for one run."""
+    return tempfile.TemporaryDirectory(prefix="lfs10d-bench-")
