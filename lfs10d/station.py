@@ -244,6 +244,14 @@ class Station:
             "devices": [standing.snapshot(now) for standing in self._standings.values()],
         }
 
+    def summary(self, now: Instant) -> str:
+        """Return one line for a person: `7 of 8 slaves online, line 78 % busy`."""
+        polled = [standing for standing in self._standings.values() if standing.facts.enabled]
+        online = sum(standing.online for standing in polled)
+        load = self._tally.rates(now.mono).load_pct
+        busy = "" if load is None else f", line {load:.0f} % busy"
+        return f"{online} of {len(polled)} slaves online{busy}"
+
     @property
     def _masked(self) -> bool:
         """Failures say nothing about the devices now."""

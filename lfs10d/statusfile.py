@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 from typing import TYPE_CHECKING
@@ -17,22 +18,23 @@ class StatusFile:
     """The file at `path`; its folder is made if it can be. A place that cannot be written is no error."""
 
     def __init__(self, path: Path) -> None:
-        self._path = path
+        self.path = path
         self._draft = path.with_suffix(".tmp")
 
     def show(self, status: Mapping[str, object]) -> bool:
         """Replace the content; returns whether it could be written. Nothing is synced: it is of the moment."""
         text = json.dumps(status, allow_nan=False, separators=(",", ":"))
         try:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
+            self.path.parent.mkdir(parents=True, exist_ok=True)
             self._draft.write_text(text, encoding="utf-8")
             os.chmod(self._draft, WORLD_READABLE)  # noqa: PTH101 - whatever the umask says
-            self._draft.replace(self._path)
+            self._draft.replace(self.path)
         except OSError:
             return False
         return True
 
     def remove(self) -> None:
         """Take the file away: nobody stands behind it any more."""
-        for path in (self._path, self._draft):
-            path.unlink(missing_ok=True)
+        for path in (self.path, self._draft):
+            with contextlib.suppress(OSError):
+                path.unlink(missing_ok=True)

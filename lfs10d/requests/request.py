@@ -1,0 +1,46 @@
+"""What a request is made of, and what it may use of the daemon."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable
+
+    from lfs10d.admission import Form
+    from lfs10d.commands import Answer
+
+
+class Powers(Protocol):
+    """What the daemon lets requests do. Called in the thread of the asyncio loop."""
+
+    def health(self) -> dict[str, object]:
+        """Return how the daemon, the line and the devices are, as in `status.json`."""
+        ...
+
+    def republish(self) -> int:
+        """Send every retained topic once more; return how many."""
+        ...
+
+    def configuration(self) -> dict[str, object]:
+        """Return the effective configuration, secrets left out, and where its values come from."""
+        ...
+
+    async def reload(self) -> dict[str, list[str]]:
+        """Read the files again and apply what changed; return `applied` and `restart_required`.
+
+        Raises ConfigError where a file is wrong; the running configuration stays.
+        """
+        ...
+
+
+Perform: TypeAlias = "Callable[[Any, Powers], Awaitable[Answer]]"
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """A request: what admission must know, and what it does with its parameters and the daemon's powers."""
+
+    form: Form
+    perform: Perform

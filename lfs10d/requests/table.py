@@ -1,0 +1,14 @@
+"""Every request by its name: `config/reload` is `B/request/config/reload`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from lfs10d.requests import config, general
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from lfs10d.requests.request import Request
+
+REQUESTS: Mapping[str, Request] = {**general.REQUESTS, **config.REQUESTS}
