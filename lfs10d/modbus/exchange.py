@@ -24,8 +24,9 @@ Rules
 5. The answer of an `earlier` request is dropped and told as late, and listening goes on. An answer that could be
    that of another earlier request is marked as ambiguous: an exception looks the same for every shape.
 6. Silence ends the exchange: before the first byte after `timeout`; in a begun answer after t3.5 and the adapter's
-   latency (ASCII: 1 s); after other bytes likewise, but not before the slave's usual turnaround; after a frame
-   of another slave not before `timeout`. Pauses inside what is received are never judged: adapters make them.
+   latency (ASCII: 1 s); after other bytes likewise, but not before the slave's usual turnaround; after a right
+   frame that is no answer to us not before `timeout`. Pauses in what is received are never judged: adapters make
+   them.
 7. It always ends: a line that never falls silent is given up after the time-out and the longest answer.
 8. The fault names the nearest thing to an answer that came, in this order: a frame with a right check (of the wrong
    count, function, slave), only a late answer, too few bytes, a wrong check; nothing but echo is `timeout`.
@@ -211,7 +212,7 @@ class Exchange:
             return self._settle(reception.answer.last_at, reception.answer, None)
         first, bound = self._limits()
         until = min(self._until(first), bound)
-        if until <= now < first and verdict.stranger_interferes(self._attempt, reception):
+        if until <= now < first and verdict.stranger_spoke(self._attempt, reception):
             until = min(first, bound)
         if now >= until:
             self._pass(Happening.EXPIRED)

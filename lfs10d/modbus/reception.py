@@ -40,7 +40,7 @@ class Reception:
         self._older = [older for pending in attempt.earlier for older in self._quarries_of(pending)]
         self._pending = list(attempt.earlier)
         self._held: list[tuple[bytes, float]] = []
-        self._matched = self._missing = self._from = self._early_end = 0
+        self._matched = self._missing = self._from = self._sent_at = self._early_end = 0
         self._earliest = -inf
         self._undecided = self._echo_whole = False
         # Echo and answer of a write look the same.
@@ -66,8 +66,8 @@ class Reception:
         timing = self._attempt.timing
         self._earliest = begun + timing.transmission(len(self._frame) - EARLY_TOLERANCE)
         self._undecided = self._attempt.echo is not Echo.OFF
-        self._early_end = self._hunt.end
-        self._begin_at(self._hunt.end)
+        self._sent_at = self._early_end = self._hunt.end
+        self._begin_at(self._sent_at)
         self.heard.clear()
         self.sent_yet = True
 
@@ -196,13 +196,15 @@ class Reception:
 
     @property
     def only_request(self) -> bool:
-        """Whether nothing came but our own bytes, from an adapter that is known to have no echo."""
-        return self.leftover() == self._frame
+        """Whether nothing came but our own bytes."""
+        return self._attempt.codec.fold(bytes(self.heard)) == self._frame
 
     @property
     def echo_changed(self) -> bool:
-        """Whether an echo was expected and did not come back whole."""
-        return self._expects_echo and not self._echo_whole
+        """Whether an echo was expected, and something came in its place."""
+        if not self._expects_echo or self._echo_whole:
+            return False
+        return bool(self._held) or self._hunt.unclaimed_count(self._sent_at) > 0
 
     @property
     def echoed(self) -> bool | None:

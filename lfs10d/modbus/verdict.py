@@ -32,11 +32,11 @@ def judge(attempt: Attempt, reception: Reception) -> Verdict | None:
 
     The nearest thing to an answer counts: a frame with a right check, then a late answer, then broken bytes.
     """
-    heard = reception.leftover()
-    if heard and reception.echo_changed:
+    if reception.echo_changed:
         return changed_echo()
     if attempt.request.slave == BROADCAST:
         return None
+    heard = reception.leftover()
     if heard and not reception.only_request:
         found = stranger(attempt.request, attempt.codec, heard)
         if found is not None:
@@ -48,10 +48,9 @@ def judge(attempt: Attempt, reception: Reception) -> Verdict | None:
     return silent(attempt.timeout, own=bool(heard))
 
 
-def stranger_interferes(attempt: Attempt, reception: Reception) -> bool:
-    """Whether what came is a frame of another slave: ours may still answer."""
-    found = stranger(attempt.request, attempt.codec, reception.leftover())
-    return found is not None and found.code is FaultCode.WRONG_SLAVE
+def stranger_spoke(attempt: Attempt, reception: Reception) -> bool:
+    """Whether what came is a right frame that is no answer to us: ours may still follow."""
+    return stranger(attempt.request, attempt.codec, reception.leftover()) is not None
 
 
 def silent(timeout: float, *, own: bool = False) -> Verdict:
@@ -134,5 +133,6 @@ def _judge(request: Request, body: bytes) -> Verdict:
     elif asked:
         told = f"a request to slave {slave} was heard in place of its answer: an echo, or a second master"
     else:
-        told = f"slave {slave} sent {max(0, len(data) - 1)} data bytes in place of {2 * request.count}"
+        came, announced = max(0, len(data) - 1), sum(data[:1])
+        told = f"slave {slave} sent {came} data bytes, announced as {announced}, in place of {2 * request.count}"
     return Verdict(FaultCode.MALFORMED, told)

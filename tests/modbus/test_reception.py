@@ -1,0 +1,237 @@
+"""What was heard is sorted: echo, what came too early, late answers, the answer, the rest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from lfs10d.modbus.attempt import Attempt, Echo, Pending
+from lfs10d.modbus.frames import Checksum, Codec, Framing, ReadRegisters, Request, WriteRegister
+from lfs10d.modbus.reception import HEARD_KEPT, Reception
+from lfs10d.modbus.timing import LineTiming
+
+RTU, ASCII = Codec(Framing.RTU), Codec(Framing.ASCII)
+WIND, WHO, MOVE = ReadRegisters(1, 0x0001, 2), ReadRegisters(1, 0x0005, 1), WriteRegister(1, 0x0005, 7)
+ANSWER, REFUSED = bytes.fromhex("010304414FD70A002F"), bytes.fromhex("018302C0F1")
+LATE = RTU.wrap(bytes.fromhex("0103020007"))
+CONFIRMED = RTU.encode(MOVE)
+REQUEST = RTU.encode(WIND)
+TIMING = LineTiming.of(9600)
+
+
+def reception(
+    request: Request = WIND,
+    *,
+    echo: Echo = Echo.OFF,
+    earlier: tuple[Request, ...] = (),
+    codec: Codec = RTU,
+    paced: bool = True,
+    sent: bool = True,
+) -> Reception:
+    """Return the ear of an exchange whose request was begun at 0."""
+    attempt = Attempt(
+        request=request,
+        codec=codec,
+        timing=TIMING,
+        timeout=0.2,
+        patience=None,
+        echo=echo,
+        adapter_latency=0.02,
+        earlier=tuple(Pending(each, codec, -0.5) for each in earlier),
+        turn=0.2,
+        paced=paced,
+    )
+    ear = Reception(attempt, codec.encode(request))
+    if sent:
+        ear.sent(0.0)
+    return ear
+
+
+def test_nothing_amounts_to_nothing() -> None:
+    ear = reception()
+    assert (ear.answer, ear.spare, ear.late, ear.rest, ear.leftover()) == (None, None, [], 0, b"")
+    assert (ear.begun, ear.echoed, ear.echo_changed, ear.ambiguous, ear.unsolicited) == (False, None, False, False, 0)
+
+
+def test_an_answer_in_two_pieces_is_an_answer() -> None:
+    ear = reception()
+    ear.take(ANSWER[:4], 0.02)
+    assert ear.begun
+    assert ear.whole_at == pytest.approx(0.02 + 5 * TIMING.character)
+    ear.take(ANSWER[4:], 0.03)
+    assert ear.answer is not None
+    assert (ear.answer.first_at, ear.answer.last_at) == (0.02, 0.03)
+    assert (ear.rest, ear.unsolicited, ear.echoed) == (0, 0, False)
+
+
+def test_a_later_piece_never_postpones_the_end_of_its_frame() -> None:
+    ear = reception()
+    ear.take(ANSWER[:4], 0.02)
+    ear.take(ANSWER[4:5], 0.024)
+    assert ear.whole_at == pytest.approx(0.02 + 5 * TIMING.character)
+
+
+def test_ascii_is_heard_in_either_case() -> None:
+    ear = reception(codec=ASCII)
+    ear.take(b":010304d0f5000033\r\n", 0.1)
+    assert ear.answer is not None
+
+
+def test_bytes_before_the_request_are_only_searched_for_late_answers() -> None:
+    ear = reception(earlier=(WHO,), sent=False)
+    ear.take(b"\xff" + LATE + ANSWER, -0.1)
+    ear.sent(0.0)
+    assert [late.request for late in ear.late] == [WHO]
+    assert (ear.answer, ear.rest, ear.unsolicited) == (None, 0, 10)
+    assert ear.late_at == -0.1
+    assert ear.heard == b""
+
+
+def test_a_late_answer_is_claimed_wherever_it_lies() -> None:
+    ear = reception(earlier=(WHO, MOVE))
+    ear.take(b"\xff" + LATE + CONFIRMED + ANSWER, 0.05)
+    assert [late.request for late in ear.late] == [WHO, MOVE]
+    assert ear.answer is not None
+    assert ear.leftover() == b"\xff"
+
+
+def test_a_late_answer_of_another_slave_is_not_the_slaves_own() -> None:
+    ear = reception(earlier=(ReadRegisters(4, 1, 2),))
+    ear.take(RTU.wrap(bytes.fromhex("040304414FD70A")), 0.05)
+    assert len(ear.late) == 1
+    assert ear.late_at < 0
+
+
+def test_what_comes_too_early_on_a_wire_is_no_answer() -> None:
+    ear = reception()
+    ear.take(ANSWER, 0.001)
+    assert (ear.answer, ear.spare, ear.rest, ear.unsolicited) == (None, None, 0, 9)
+
+
+def test_what_comes_too_early_without_a_pace_is_a_spare() -> None:
+    ear = reception(paced=False)
+    ear.take(ANSWER, 0.001)
+    assert ear.answer is None
+    assert ear.spare is not None
+    assert (ear.begun, ear.echoed, ear.ambiguous) == (True, False, False)
+    ear.take(ANSWER, 0.02)
+    assert ear.answer is not None
+
+
+def test_an_echo_is_taken_out() -> None:
+    ear = reception(echo=Echo.UNKNOWN)
+    ear.take(REQUEST[:3], 0.003)
+    assert (ear.rest, ear.begun, ear.leftover()) == (3, True, REQUEST[:3])
+    ear.take(REQUEST[3:], 0.009)
+    assert (ear.rest, ear.begun, ear.echoed, ear.only_request) == (0, False, True, True)
+    ear.take(ANSWER, 0.03)
+    assert ear.answer is not None
+    assert not ear.only_request
+
+
+def test_what_seemed_echo_and_is_none_is_given_back() -> None:
+    ear = reception(echo=Echo.UNKNOWN)
+    ear.take(ANSWER[:2], 0.02)
+    ear.take(ANSWER[2:], 0.03)
+    assert ear.answer is not None
+    assert ear.answer.first_at == 0.02
+    assert ear.echoed is False
+
+
+def test_an_echo_behind_noise_proves_nothing() -> None:
+    ear = reception()
+    ear.take(b"\x00" + REQUEST + ANSWER, 0.03)
+    assert ear.answer is not None
+    assert ear.echoed is None
+
+
+def test_an_echo_that_nobody_expects_is_noticed() -> None:
+    ear = reception()
+    ear.take(REQUEST + ANSWER, 0.03)
+    assert ear.echoed is True
+
+
+def test_an_expected_echo_that_came_back_otherwise_has_changed() -> None:
+    ear = reception(echo=Echo.ON)
+    ear.take(REQUEST[:3], 0.003)
+    assert ear.echo_changed
+    assert ear.whole_at == pytest.approx(0.003 + 5 * TIMING.character)
+    ear.take(b"\xff" * 5, 0.009)
+    assert ear.echo_changed
+    assert not ear.begun
+    whole = reception(echo=Echo.ON)
+    whole.take(REQUEST, 0.009)
+    assert not whole.echo_changed
+
+
+@pytest.mark.parametrize(("echo", "echoed"), [(Echo.ON, True), (Echo.UNKNOWN, None), (Echo.OFF, None)])
+def test_one_frame_confirms_a_write_only_where_there_is_no_echo(echo: Echo, *, echoed: bool | None) -> None:
+    ear = reception(MOVE, echo=echo)
+    ear.take(CONFIRMED, 0.03)
+    assert (ear.answer is not None) is (echo is Echo.OFF)
+    assert ear.echoed is echoed
+
+
+def test_two_frames_confirm_a_write_behind_an_echo() -> None:
+    ear = reception(MOVE, echo=Echo.UNKNOWN)
+    ear.take(CONFIRMED + CONFIRMED, 0.03)
+    assert ear.answer is not None
+    assert ear.echoed is True
+    changed = reception(MOVE, echo=Echo.ON)
+    changed.take(b"\x00" + CONFIRMED, 0.03)
+    assert changed.answer is None
+
+
+def test_a_broadcast_has_no_answer() -> None:
+    ear = reception(WriteRegister(0, 5, 7))
+    ear.take(RTU.encode(WriteRegister(0, 5, 7)), 0.03)
+    assert ear.answer is None
+
+
+def test_how_long_the_answer_should_be_depends_on_what_it_begins_as() -> None:
+    ear = reception()
+    ear.take(REFUSED[:4], 0.02)
+    assert (ear.expected, ear.unsolicited) == (5, 0)
+    both = reception()
+    both.take(REFUSED[:4] + ANSWER[:4], 0.02)
+    assert (both.expected, both.unsolicited) == (9, 0)
+
+
+@pytest.mark.parametrize(
+    ("request_", "earlier", "heard", "ambiguous"),
+    [
+        (WIND, (WHO,), REFUSED, True),
+        (WIND, (MOVE,), REFUSED, False),
+        (WIND, (ReadRegisters(2, 1, 2),), REFUSED, False),
+        (WIND, (WHO,), LATE + REFUSED, False),
+        (WHO, (WHO,), LATE, False),
+        (WHO, (ReadRegisters(1, 4, 1),), LATE, True),
+        (WHO, (WIND,), LATE, False),
+    ],
+)
+def test_what_another_request_could_have_asked_for_is_ambiguous(
+    request_: Request, earlier: tuple[Request, ...], heard: bytes, *, ambiguous: bool
+) -> None:
+    ear = reception(request_, earlier=earlier)
+    ear.take(heard, 0.03)
+    assert ear.answer is not None
+    assert ear.ambiguous is ambiguous
+
+
+def test_only_the_last_of_very_much_is_remembered() -> None:
+    ear = reception()
+    for step in range(10):
+        ear.take(b"\x55" * 500, 1.0 + step)
+    assert HEARD_KEPT <= len(ear.heard) <= 2 * HEARD_KEPT
+    assert ear.rest == ear.unsolicited == 5000
+
+
+def test_a_slave_with_another_check_field_is_heard_late_too() -> None:
+    summed = Codec(Framing.RTU, Checksum.SUM)
+    pending = Pending(WHO, summed, -1.0)
+    ear = Reception(replace(reception()._attempt, earlier=(pending,)), REQUEST)
+    ear.take(LATE, 0.4)
+    assert not ear.late
+    ear.take(summed.wrap(bytes.fromhex("0103020007")), 0.5)
+    assert ear.late[0].latency == 1.5
