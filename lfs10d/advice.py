@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
     from lfs10d.budget import Budget
     from lfs10d.configfile import Loaded
-    from lfs10d.document import Path
     from lfs10d.errors import Problem
+    from lfs10d.wording import KeyPath
 
 COMMON_HOST_NAMES = frozenset({"localhost", "raspberrypi", "debian", "raspbian", "ubuntu", "linux", "openwrt"})
 """Names that systems come with: two gateways soon have the same."""
@@ -33,8 +33,8 @@ def advice(loaded: Loaded, budget: Budget, host: str) -> tuple[Problem, ...]:
     return tuple(sorted(loaded.document.problem(path, f"warning: {message}") for path, message in warnings))
 
 
-def _load(loaded: Loaded, budget: Budget) -> Iterator[tuple[Path, str]]:
-    path: Path = ("poll", "interval") if loaded.document.holds(("poll", "interval")) else ("slaves",)
+def _load(loaded: Loaded, budget: Budget) -> Iterator[tuple[KeyPath, str]]:
+    path: KeyPath = ("poll", "interval") if loaded.document.holds(("poll", "interval")) else ("slaves",)
     if budget.load > 1:
         yield (
             path,
@@ -67,7 +67,7 @@ def loopback(host: str) -> bool:
         return False
 
 
-def _login(loaded: Loaded) -> Iterator[tuple[Path, str]]:
+def _login(loaded: Loaded) -> Iterator[tuple[KeyPath, str]]:
     mqtt = loaded.config.mqtt
     if loopback(mqtt.host):
         return
@@ -84,7 +84,7 @@ def _login(loaded: Loaded) -> Iterator[tuple[Path, str]]:
         yield ("mqtt", "username"), "the password crosses the network unencrypted; set mqtt.tls"
 
 
-def _names(loaded: Loaded, host: str) -> Iterator[tuple[Path, str]]:
+def _names(loaded: Loaded, host: str) -> Iterator[tuple[KeyPath, str]]:
     """Two gateways at one broker must not publish under one name; a broker on this host has one gateway."""
     document, config = loaded.document, loaded.config
     if not document.holds(("line", "name")):
@@ -117,7 +117,7 @@ def _names(loaded: Loaded, host: str) -> Iterator[tuple[Path, str]]:
             )
 
 
-def _unused(loaded: Loaded) -> Iterator[tuple[Path, str]]:
+def _unused(loaded: Loaded) -> Iterator[tuple[KeyPath, str]]:
     for section in LATER_SECTIONS:
         if loaded.document.holds((section,)):
             yield (section,), "has no effect yet"

@@ -12,34 +12,20 @@ from pydantic import BaseModel, ValidationError
 
 from lfs10d.config import Config, MqttConfig, SlaveConfig, resolved
 from lfs10d.contradictions import contradictions
+from lfs10d.credentials import CREDENTIAL, UnreadableError, credential_file, password_in, readable, reason, unreadable
 from lfs10d.document import Document, decode, parse, path_text
 from lfs10d.errors import ConfigError, Problem
 from lfs10d.kinds import quoted, shown
 from lfs10d.profiles.library import builtin_names, load_profile
-from lfs10d.secret import Secret
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from lfs10d.document import Path as Keys
     from lfs10d.profiles.schema import Profile
+    from lfs10d.secret import Secret
+    from lfs10d.wording import KeyPath
 
 DEFAULT_FILE = Path("/etc/lfs10d/lfs10d.yaml")
-CREDENTIAL = "mqtt-password"
-"""Name of the systemd credential (LoadCredential=) that holds the broker's password."""
-
-LARGEST_PASSWORD = 65_535
-"""Bytes: binary data of MQTT 5.0, section 1.5.6."""
-
-LONGEST_PATH = 4096
-"""Characters of a path that are shown: whole, for only whole it helps (PATH_MAX of Linux)."""
-
-_SECRET_FILES: tuple[Keys, ...] = (
-    ("mqtt", "password_file"),
-    ("mqtt", "tls", "ca"),
-    ("mqtt", "tls", "cert"),
-    ("mqtt", "tls", "key"),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,20 +62,16 @@ class Loaded:
         file = self.config.mqtt.password_file
         if file is not None:
             try:
-                return _password(Path(file))
-            except _UnreadableError as error:
+                return password_in(Path(file))
+            except UnreadableError as error:
                 problem = self.document.problem(("mqtt", "password_file"), str(error))
                 raise ConfigError((problem,)) from None
         if self.credential is None:
             return None
         try:
-            return _password(self.credential)
-        except _UnreadableError as error:
+            return password_in(self.credential)
+        except UnreadableError as error:
             raise ConfigError((Problem(str(self.credential), 1, 1, "", str(error)),)) from None
-
-
-class _UnreadableError(Exception):
-    """A file beside the configuration cannot be used; the message says why."""
 
 
 def load(
@@ -120,15 +102,13 @@ def load(
     )
     config = _anchored(config, folder)
     if files:
-        problems += _unreadable(document, config, wrong)
+        found = ((keys, message) for keys, message in unreadable(config.mqtt) if not _concerns(keys, wrong))
+        problems += (document.problem(keys, message) for keys, message in found)
     if problems:
         # The file itself first, profile files after it.
         raise ConfigError(tuple(sorted(set(problems), key=lambda found: (found.file != document.file, found))))
     complete = resolved(config, stem=path.stem, host=socket.gethostname() if host is None else host)
-    folder_of_credentials = environment.get("CREDENTIALS_DIRECTORY")
-    credential = Path(folder_of_credentials, CREDENTIAL) if folder_of_credentials else None
-    if credential is not None and not credential.exists():
-        credential = None
+    credential = credential_file(environment)
     loaded = Loaded(path, document, complete, profiles, _origins(document, complete, credential), credential)
     if files:
         loaded.password()
@@ -142,7 +122,7 @@ def _content(path: Path) -> bytes:
     except FileNotFoundError:
         message = "there is no such file; name another with -c FILE or $LFS10D_CONFIG"
     except (OSError, ValueError) as error:
-        message = f"the file cannot be read: {_reason(error)}"
+        message = f"the file cannot be read: {reason(error)}"
     raise ConfigError((Problem(str(path), 1, 1, "", message),))
 
 
@@ -150,11 +130,7 @@ LARGEST_READ = 2**20
 """Bytes: enough for `decode` to see that a file is too large, and no more of /dev/zero."""
 
 
-def _reason(error: OSError | ValueError) -> str:
-    return (getattr(error, "strerror", None) or str(error)).lower()
-
-
-def _validated(document: Document) -> tuple[Config, list[Problem], frozenset[Keys]]:
+def _validated(document: Document) -> tuple[Config, list[Problem], frozenset[KeyPath]]:
     """Return the configuration, its problems, and the paths that are wrong: there defaults stand in."""
     problems = list(document.problems)
     try:
@@ -165,11 +141,11 @@ def _validated(document: Document) -> tuple[Config, list[Problem], frozenset[Key
     return Config.model_validate(_mended(document.data, wrong)), problems, wrong
 
 
-def _mended(data: Any, wrong: Iterable[Keys]) -> dict[str, Any]:  # noqa: ANN401  # any YAML
+def _mended(data: Any, wrong: Iterable[KeyPath]) -> dict[str, Any]:  # noqa: ANN401  # any YAML
     """Return data without what is wrong, so that the rest can be checked; what must be there is made up."""
     bad = frozenset(wrong)
 
-    def keep(value: Any, path: Keys) -> Any:  # noqa: ANN401
+    def keep(value: Any, path: KeyPath) -> Any:  # noqa: ANN401
         if isinstance(value, dict):
             return {key: keep(item, (*path, key)) for key, item in value.items() if not _cut(path, key, bad)}
         if isinstance(value, list) and path == ("slaves",):
@@ -187,17 +163,17 @@ def _mended(data: Any, wrong: Iterable[Keys]) -> dict[str, Any]:  # noqa: ANN401
     return mended
 
 
-def _cut(path: Keys, key: str | int, bad: frozenset[Keys]) -> bool:
+def _cut(path: KeyPath, key: str | int, bad: frozenset[KeyPath]) -> bool:
     return not isinstance(key, str) or (*path, key) in bad
 
 
-def _concerns(key: Keys, wrong: frozenset[Keys]) -> bool:
+def _concerns(key: KeyPath, wrong: frozenset[KeyPath]) -> bool:
     """Tell whether a key, what it is part of, or a part of it is wrong."""
     return any(key[: len(path)] == path[: len(key)] for path in wrong)
 
 
 def _profiles(
-    document: Document, config: Config, folder: Path, wrong: frozenset[Keys]
+    document: Document, config: Config, folder: Path, wrong: frozenset[KeyPath]
 ) -> tuple[dict[str, Profile], list[Problem]]:
     profiles: dict[str, Profile] = {}
     problems: list[Problem] = []
@@ -208,9 +184,9 @@ def _profiles(
             continue
         try:
             if name not in builtin_names():
-                _readable(folder / name)
+                readable(folder / name)
             profiles[name] = load_profile(name, relative_to=folder)
-        except _UnreadableError as error:
+        except UnreadableError as error:
             known = ", ".join(builtin_names())
             message = f"no profile {quoted(name)}: {error}; built in are {known}; else the path of a profile YAML"
             problems.append(document.problem(keys, message))
@@ -234,80 +210,7 @@ def _anchored(config: Config, folder: Path) -> Config:
     return config.model_copy(update={"line": line, "mqtt": mqtt.model_copy(update=update)})
 
 
-def _unreadable(document: Document, config: Config, wrong: frozenset[Keys]) -> list[Problem]:
-    """Return what is wrong with the files of the login."""
-    problems: list[Problem] = []
-    for keys in _SECRET_FILES:
-        if _concerns(keys, wrong) or (file := _value(config, keys)) is None:
-            continue
-        try:
-            if keys[-1] == "password_file":
-                _password(Path(file))
-            else:
-                _readable(Path(file))
-        except _UnreadableError as error:
-            problems.append(document.problem(keys, str(error)))
-    if config.mqtt.tls is not None and not problems:
-        problems += _unusable(document, config)
-    return problems
-
-
-def _unusable(document: Document, config: Config) -> list[Problem]:
-    import ssl  # noqa: PLC0415  # a megabyte, and only TLS needs it
-
-    problems: list[Problem] = []
-    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-    tls = config.mqtt.tls
-    if tls is not None and tls.ca is not None:
-        try:
-            context.load_verify_locations(tls.ca)
-        except (OSError, ValueError):
-            message = f"{_named(tls.ca)} holds no certificate in PEM form"
-            problems.append(document.problem(("mqtt", "tls", "ca"), message))
-    if tls is not None and tls.cert is not None:
-        try:
-            # A key under a passphrase would ask on the terminal; an empty answer makes it an error.
-            context.load_cert_chain(tls.cert, tls.key, password=lambda: "")
-        except (OSError, ValueError):
-            message = f"{_named(tls.cert)} and its key cannot be used: both in PEM form, matching, no passphrase?"
-            problems.append(document.problem(("mqtt", "tls", "cert"), message))
-    return problems
-
-
-def _value(config: BaseModel, keys: Keys) -> str | None:
-    value: Any = config
-    for key in keys:
-        value = getattr(value, str(key), None)
-    return value if isinstance(value, str) else None
-
-
-def _named(path: Path | str) -> str:
-    return quoted(str(path), LONGEST_PATH)
-
-
-def _readable(path: Path) -> None:
-    try:
-        with path.open("rb") as file:
-            file.read(1)
-    except (OSError, ValueError) as error:
-        raise _UnreadableError(f"{_named(path)} cannot be read: {_reason(error)}") from None
-
-
-def _password(path: Path) -> Secret:
-    try:
-        with path.open("rb") as file:
-            content = file.read(LARGEST_PASSWORD + 2)
-        first = content.decode().partition("\n")[0].removesuffix("\r")
-    except UnicodeDecodeError:
-        raise _UnreadableError(f"{_named(path)} is no UTF-8 text") from None
-    except (OSError, ValueError) as error:
-        raise _UnreadableError(f"{_named(path)} cannot be read: {_reason(error)}") from None
-    if not first or len(first.encode()) > LARGEST_PASSWORD:
-        raise _UnreadableError(f"{_named(path)} must hold the password in its first line")
-    return Secret(first)
-
-
-def leaves(model: BaseModel, path: Keys = ()) -> Iterable[tuple[Keys, Any]]:
+def leaves(model: BaseModel, path: KeyPath = ()) -> Iterable[tuple[KeyPath, Any]]:
     """Yield every value of a configuration with its path; lists of words and null are values, sections are not."""
     for key in type(model).model_fields:
         value = getattr(model, key)
@@ -327,8 +230,8 @@ def _origins(document: Document, config: Config, credential: Path | None) -> dic
     return origins
 
 
-def _origin(document: Document, path: Keys) -> Origin:
-    inherited: Keys = ("poll", path[-1])
+def _origin(document: Document, path: KeyPath) -> Origin:
+    inherited: KeyPath = ("poll", path[-1])
     short = path[-1] == "id" and document.holds(path[:-1])
     if document.holds(path) or short:
         return Origin("file", f"{document.file}:{document.line_of(path)}")

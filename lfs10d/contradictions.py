@@ -13,17 +13,16 @@ if TYPE_CHECKING:
 
     from lfs10d.config import Config, SlaveConfig
     from lfs10d.profiles.schema import Profile
-
-Path = tuple[str | int, ...]
+    from lfs10d.wording import KeyPath
 
 
 @dataclass(frozen=True, slots=True)
 class Contradiction:
     """A problem at `path`; it rests on the keys `on`, and means nothing where one of them is wrong itself."""
 
-    path: Path
+    path: KeyPath
     message: str
-    on: tuple[Path, ...]
+    on: tuple[KeyPath, ...]
 
 
 def contradictions(config: Config, profiles: Mapping[str, Profile]) -> Iterator[Contradiction]:
@@ -38,12 +37,12 @@ def contradictions(config: Config, profiles: Mapping[str, Profile]) -> Iterator[
 
 
 def _line(config: Config) -> Iterator[Contradiction]:
-    paths: tuple[Path, ...] = (("line", "databits"), ("line", "framing"))
+    paths: tuple[KeyPath, ...] = (("line", "databits"), ("line", "framing"))
     if config.line.databits != 8 and config.line.framing == "rtu":  # noqa: PLR2004  # RTU sends whole bytes
         yield Contradiction(paths[0], "must be 8 with framing rtu; 7 goes with ascii only", paths)
     for index, slave in enumerate(config.slaves):
         if config.line.framing == "ascii" and slave.checksum is not None:
-            path: Path = ("slaves", index, "checksum")
+            path: KeyPath = ("slaves", index, "checksum")
             message = "must be left out on an ascii line: its frames always carry an LRC"
             yield Contradiction(path, message, (path, paths[1]))
 
@@ -51,7 +50,7 @@ def _line(config: Config) -> Iterator[Contradiction]:
 def _broker(config: Config) -> Iterator[Contradiction]:
     mqtt = config.mqtt
     if mqtt.version == "3.1.1" and mqtt.password_file is not None and mqtt.username is None:
-        path: Path = ("mqtt", "password_file")
+        path: KeyPath = ("mqtt", "password_file")
         message = "needs mqtt.username: MQTT 3.1.1 has no password without one"
         yield Contradiction(path, message, (path, ("mqtt", "version"), ("mqtt", "username")))
     if mqtt.tls is not None and mqtt.tls.key is not None and mqtt.tls.cert is None:
@@ -63,10 +62,10 @@ def _taken(config: Config) -> Iterator[Contradiction]:
     ids: dict[int, int] = {}
     names: dict[str, int] = {}
     for index, slave in enumerate(config.slaves):
-        place: Path = ("slaves", index)
+        place: KeyPath = ("slaves", index)
         first = ids.setdefault(slave.id, index)
         if first != index:
-            on: tuple[Path, ...] = ((*place, "id"), ("slaves", first, "id"))
+            on: tuple[KeyPath, ...] = ((*place, "id"), ("slaves", first, "id"))
             yield Contradiction(on[0], f"id {slave.id} is taken by slaves[{first}]; every slave needs its own", on)
         other = names.setdefault(device_name(slave), index)
         if other == index or (first != index and not slave.name and not config.slaves[other].name):
@@ -81,8 +80,8 @@ def _taken(config: Config) -> Iterator[Contradiction]:
 
 
 def _against_profile(config: Config, index: int, slave: SlaveConfig, profile: Profile) -> Iterator[Contradiction]:
-    of: Path = ("slaves", index, "profile")
-    path: Path = ("slaves", index, "id")
+    of: KeyPath = ("slaves", index, "profile")
+    path: KeyPath = ("slaves", index, "id")
     first, last = profile.ids
     if not first <= slave.id <= last:
         yield Contradiction(path, f"must be from {first} to {last} for profile {profile.name}", (path, of))
@@ -90,7 +89,7 @@ def _against_profile(config: Config, index: int, slave: SlaveConfig, profile: Pr
     if slave.checksum is not None and slave.checksum not in profile.checksums:
         allowed = " or ".join(profile.checksums)
         yield Contradiction(path, f"must be {allowed} for profile {profile.name}", (path, of))
-    framing: Path = ("line", "framing")
+    framing: KeyPath = ("line", "framing")
     if config.line.framing not in profile.framings:
         allowed = " or ".join(profile.framings)
         message = f"profile {profile.name} speaks {allowed} only, and line.framing is {config.line.framing}"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
@@ -261,27 +260,6 @@ def test_certificates_that_cannot_be_used_are_errors_at_their_keys() -> None:
     assert [line.partition(": ")[0] for line in found] == ["3:35", "3:49"]
     assert found[0].endswith('ca.pem" holds no certificate in PEM form')
     assert "both in PEM form, matching, no passphrase?" in found[1]
-
-
-@pytest.mark.needs("openssl")
-def test_certificates_that_can_be_used_are_taken_but_a_key_with_a_passphrase_never_asks() -> None:
-    subject = ["-subj", "/CN=gateway", "-days", "2", "-newkey", "rsa:2048"]
-    subprocess.run(
-        ["openssl", "req", "-x509", "-noenc", *subject, "-keyout", "key.pem", "-out", "cert.pem"],
-        check=True,
-        capture_output=True,
-    )
-    text = SMALL.replace("localhost", "localhost, tls: {ca: cert.pem, cert: cert.pem, key: key.pem}")
-    mqtt = loaded(text).config.mqtt
-    assert mqtt.tls is not None
-    assert mqtt.tls.key == str(Path("key.pem").absolute())
-    subprocess.run(
-        ["openssl", "rsa", "-aes128", "-passout", "pass:hunter2", "-in", "key.pem", "-out", "locked.pem"],
-        check=True,
-        capture_output=True,
-    )
-    (found,) = problems(text.replace("key.pem", "locked.pem"))
-    assert "mqtt.tls.cert" in found
 
 
 def test_tls_without_files_trusts_the_system() -> None:

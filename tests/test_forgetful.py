@@ -84,6 +84,14 @@ def test_the_power_fails_before_the_step_has_an_effect_and_no_exception_handler_
     assert not issubclass(PowerCutError, Exception)
 
 
+def test_a_full_disk_takes_what_still_fits_and_fails() -> None:
+    files = ForgetfulFiles(full=3)
+    files.write(A, b"xy", mode=0o600)
+    with pytest.raises(OSError, match="No space left"):
+        files.append(A, b"zz", mode=0o600)
+    assert files.read(A) == b"xyz"
+
+
 def test_a_file_that_is_not_there_cannot_be_read() -> None:
     with pytest.raises(FileNotFoundError, match="No such file"):
         ForgetfulFiles().read(A)

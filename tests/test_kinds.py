@@ -68,6 +68,7 @@ KINDS: tuple[Kind, ...] = (
         (Host(), "broker.local", "broker.local"),
         (Host(), "192.0.2.7", "192.0.2.7"),
         (Host(), "fe80::1%eth0", "fe80::1%eth0"),
+        (BaseTopic(), "site/%H/wind", "site/%H/wind"),
     ],
 )
 def test_what_is_of_the_kind_is_taken(kind: Kind, value: object, meant: object) -> None:

@@ -11,7 +11,8 @@ from lfs10d.cli import config_option, json_option
 from lfs10d.cli.columns import columns
 from lfs10d.config import Config, Section
 from lfs10d.configfile import Loaded, leaves, load
-from lfs10d.document import path_text, render
+from lfs10d.coreschema import render
+from lfs10d.document import path_text
 from lfs10d.kinds import Duration, Size
 from lfs10d.quantities import duration_text, size_text
 

@@ -87,12 +87,12 @@ def test_every_problem_is_a_line_on_standard_error_and_the_exit_code_78(lfs10d: 
     assert result.stdout == ""
     assert result.stderr.splitlines() == [
         (
-            "lfs10d.yaml:1:14: line.port: must be a path of 1 to 4096 characters on one line, without control characters, "
-            "not 5"
+            "lfs10d.yaml:1:14: line.port: must be a path of 1 to 4096 characters on one line, "
+            "without control characters, not 5"
         ),
         (
-            "lfs10d.yaml:2:1: x: is not a known key; known here: line, poll, slaves, mqtt, commands, homeassistant, wind, "
-            "store, log"
+            "lfs10d.yaml:2:1: x: is not a known key; known here: line, poll, slaves, mqtt, commands, "
+            "homeassistant, wind, store, log"
         ),
     ]
 

@@ -1,0 +1,107 @@
+"""The files of the login: the password and the certificates, as they are found and read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from lfs10d.kinds import quoted
+from lfs10d.secret import Secret
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from lfs10d.config import MqttConfig, TlsConfig
+    from lfs10d.wording import KeyPath
+
+CREDENTIAL = "mqtt-password"
+"""Name of the systemd credential (LoadCredential=) that holds the broker's password."""
+
+LARGEST_PASSWORD = 65_535
+"""Bytes: binary data of MQTT 5.0, section 1.5.6."""
+
+LONGEST_PATH = 4096
+"""Characters of a path that are shown: whole, for only whole it helps (PATH_MAX of Linux)."""
+
+
+class UnreadableError(Exception):
+    """A file beside the configuration cannot be used; the message says why."""
+
+
+def reason(error: OSError | ValueError) -> str:
+    """Return why a file cannot be read, in the system's words."""
+    return (getattr(error, "strerror", None) or str(error)).lower()
+
+
+def readable(path: Path) -> None:
+    """Raise UnreadableError if a file cannot be read."""
+    try:
+        with path.open("rb") as file:
+            file.read(1)
+    except (OSError, ValueError) as error:
+        raise UnreadableError(f"{_named(path)} cannot be read: {reason(error)}") from None
+
+
+def password_in(path: Path) -> Secret:
+    """Return the first line of a file; raises UnreadableError if there is none."""
+    try:
+        with path.open("rb") as file:
+            content = file.read(LARGEST_PASSWORD + 2)
+        first = content.decode().partition("\n")[0].removesuffix("\r")
+    except UnicodeDecodeError:
+        raise UnreadableError(f"{_named(path)} is no UTF-8 text") from None
+    except (OSError, ValueError) as error:
+        raise UnreadableError(f"{_named(path)} cannot be read: {reason(error)}") from None
+    if not first or len(first.encode()) > LARGEST_PASSWORD:
+        raise UnreadableError(f"{_named(path)} must hold the password in its first line")
+    return Secret(first)
+
+
+def credential_file(environment: Mapping[str, str]) -> Path | None:
+    """Return the file of the systemd credential, if this service has one."""
+    folder = environment.get("CREDENTIALS_DIRECTORY")
+    path = Path(folder, CREDENTIAL) if folder else None
+    return path if path is not None and path.exists() else None
+
+
+def unreadable(mqtt: MqttConfig) -> Iterator[tuple[KeyPath, str]]:
+    """Yield what is wrong with the files that a broker's section names (absolute paths), with their keys."""
+    if mqtt.password_file is not None:
+        try:
+            password_in(Path(mqtt.password_file))
+        except UnreadableError as error:
+            yield ("mqtt", "password_file"), str(error)
+    if mqtt.tls is None:
+        return
+    missing = False
+    for key, file in (("ca", mqtt.tls.ca), ("cert", mqtt.tls.cert), ("key", mqtt.tls.key)):
+        try:
+            if file is not None:
+                readable(Path(file))
+        except UnreadableError as error:
+            missing = True
+            yield ("mqtt", "tls", key), str(error)
+    if not missing:
+        yield from _unusable(mqtt.tls)
+
+
+def _unusable(tls: TlsConfig) -> Iterator[tuple[KeyPath, str]]:
+    import ssl  # noqa: PLC0415  # a megabyte, and only TLS needs it
+
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    if tls.ca is not None:
+        try:
+            context.load_verify_locations(tls.ca)
+        except (OSError, ValueError):
+            yield ("mqtt", "tls", "ca"), f"{_named(tls.ca)} holds no certificate in PEM form"
+    if tls.cert is not None:
+        try:
+            # A key under a passphrase would ask on the terminal; an empty answer makes it an error.
+            context.load_cert_chain(tls.cert, tls.key, password=lambda: "")
+        except (OSError, ValueError):
+            message = f"{_named(tls.cert)} and its key cannot be used: both in PEM form, matching, no passphrase?"
+            yield ("mqtt", "tls", "cert"), message
+
+
+def _named(path: Path | str) -> str:
+    return quoted(str(path), LONGEST_PATH)
