@@ -195,7 +195,16 @@ class _NodeReader:
         self.values += 1
         place = _place(node)
         if self.values > MOST_VALUES or len(path) > DEEPEST_NESTING:
-            raise ConfigError((Problem(self.file, *place, path_text(path), "aliases make this too large to read"),))
+            raise ConfigError(
+                (
+                    Problem(
+                        self.file,
+                        *place,
+                        path_text(path),
+                        "is too large or too deep to read (an alias counts as what it stands for)",
+                    ),
+                )
+            )
         self.places[path] = Place(place, key)
         match node:
             case ScalarNode():
