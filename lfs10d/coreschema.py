@@ -92,6 +92,15 @@ class Dumper(Emitter, Serializer, SafeRepresenter, CoreSchema):
         return True
 
 
+def _text(dumper: Dumper, text: str) -> Node:
+    # PyYAML leaves what YAML 1.1 calls line breaks as they are, but for double quotes; `parse` refuses them bare.
+    style = '"' if any(character in text for character in "\x85\u2028\u2029") else None
+    return dumper.represent_scalar(f"{TAG}str", text, style=style)
+
+
+Dumper.add_representer(str, _text)
+
+
 def render(data: object) -> str:
     """Return data as YAML that `parse` reads back as the same data (`document.parse`)."""
     return str(yaml.dump_all([data], Dumper=lambda stream, **_: Dumper(stream)))

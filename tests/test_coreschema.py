@@ -56,6 +56,7 @@ CORE = st.recursive(
 
 @given(CORE)
 @example(["on", "0o17", "010", "0x1F", "1:30", "~", "", "true", "1e3", ".5", "null", "<<", "="])
+@example({"\x85": "\u2028", "\ufeff": "a\u2029"})
 def test_what_is_rendered_reads_back_as_the_same_data(content: object) -> None:
     assert parse(render(content), "f").data == content
 
