@@ -33,22 +33,27 @@ def chosen(options: argparse.Namespace) -> tuple[Row, ...]:
     return rows
 
 
-def run_rows(rows: tuple[Row, ...], options: argparse.Namespace) -> Runs:
-    """Measure each row by each master in turn, the whole again for each run."""
+def run_rows(rows: tuple[Row, ...], options: argparse.Namespace) -> tuple[Runs, list[str]]:
+    """Measure each row by each master in turn, the whole again for each run; return what failed, too."""
     runs: Runs = {}
+    failures = []
     daemon = tuple(shlex.split(options.daemon)) if options.daemon else DAEMON
     with tempfile.TemporaryDirectory(prefix="lfs10d-bench-") as folder, Broker(Path(folder)) as broker:
         for number in range(1, options.runs + 1):
-            for row in rows:
-                for master in row.masters:
+            for row, master in [(row, master) for row in rows for master in row.masters]:
+                told = f"run {number}: {row.title}, {master}"
+                try:
                     run = measure(row, master, broker.port, daemon)
-                    runs.setdefault((row.name, master), []).append(run)
-                    print(
-                        f"run {number}: {row.title}, {master}: {run.rate:.2f}/s, {run.share:.4f} of the wire,"
-                        f" {run.violations} violations",
-                        file=sys.stderr,
-                    )
-    return runs
+                except RuntimeError as error:
+                    failures.append(f"{told}: {error}")
+                    print(failures[-1], file=sys.stderr)
+                    continue
+                runs.setdefault((row.name, master), []).append(run)
+                print(
+                    f"{told}: {run.rate:.2f}/s, {run.share:.4f} of the wire, {run.violations} violations",
+                    file=sys.stderr,
+                )
+    return runs, failures
 
 
 def main() -> None:
@@ -65,8 +70,10 @@ def main() -> None:
     rows = chosen(options)
     if options.seconds:
         rows = tuple(row.lasting(options.seconds) for row in rows)
-    runs = run_rows(rows, options)
+    runs, failures = run_rows(rows, options)
     print(markdown(table(rows, runs)))
+    if failures:
+        sys.exit(f"{len(failures)} runs failed; bench/RESULTS.md is left as it was")
     if not (options.no_write or options.engine):
         when = dt.datetime.now(dt.UTC).date().isoformat()
         (HERE / "RESULTS.md").write_text(results(rows, runs, when))

@@ -31,6 +31,11 @@ class Sent:
         """The answer went over the wire unspoilt and in time."""
         return self.kind == "ok"
 
+    @property
+    def believable(self) -> bool:
+        """The answer was whole and belonged to the request the master had sent last."""
+        return self.kind in ("ok", "late")
+
 
 def read_log(path: Path) -> list[Sent]:
     """Read what the line sent, in the order in which it ended."""

@@ -79,7 +79,7 @@ def judge_samples(sent: list[Sent], samples: list[Heard], begun: float, ended: f
         if heard.value is None:
             continue
         origin = by_value.get(float32(heard.value))
-        if origin is None or not origin.whole or origin.slave != heard.slave or origin.order <= last[heard.slave]:
+        if origin is None or not origin.believable or origin.slave != heard.slave or origin.order <= last[heard.slave]:
             wrong += 1
             continue
         last[heard.slave] = origin.order
@@ -112,8 +112,12 @@ def jitter(sent: list[Sent], interval: float) -> float | None:
     return percentile(off, 0.99) if off and interval else None
 
 
-def rates(sent: list[Sent], healthy: tuple[int, ...], seconds: float) -> tuple[float, float]:
-    """Return whole answers a second of the healthy sensors, and that of the slowest times their number."""
+def rates(sent: list[Sent], healthy: tuple[int, ...], seconds: float, interval: float = 0.0) -> tuple[float, float]:
+    """Return whole answers a second of the healthy sensors, and that of the slowest times their number.
+
+    Flat out the time is taken from the first to the last answer, for a window's ends fall between two; polls at
+    an interval come in groups, and are counted in the whole window.
+    """
     counts = dict.fromkeys(healthy, 0)
     ends = []
     for each in sent:
@@ -122,7 +126,8 @@ def rates(sent: list[Sent], healthy: tuple[int, ...], seconds: float) -> tuple[f
             ends.append(each.ended)
     if len(ends) < 2:  # noqa: PLR2004
         return 0.0, 0.0
-    return (len(ends) - 1) / (ends[-1] - ends[0]), min(counts.values()) / seconds * len(healthy)
+    rate = len(ends) / seconds if interval else (len(ends) - 1) / (ends[-1] - ends[0])
+    return rate, min(counts.values()) / seconds * len(healthy)
 
 
 def measure(row: Row, master: Master, broker: int, daemon: tuple[str, ...]) -> Run:
@@ -152,7 +157,7 @@ def measure(row: Row, master: Master, broker: int, daemon: tuple[str, ...]) -> R
         samples = subscriber.samples()
     ends = [each.ended for each in log]
     within = log[bisect.bisect_left(ends, begun) : bisect.bisect_left(ends, ended)]
-    rate, slowest = rates(within, row.healthy, ended - begun)
+    rate, slowest = rates(within, row.healthy, ended - begun, interval_seconds(row))
     run = Run(
         row=row.name,
         master=master,

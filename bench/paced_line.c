@@ -175,6 +175,7 @@ static void begin_frame(struct line *line, int64_t now) {
         else judge->too_early++;
     }
     if (talking) wire_trample(wire, now);
+    wire_overtake(wire);
 }
 
 static void hear_bytes(struct line *line, const uint8_t *bytes, int n, int64_t now) {

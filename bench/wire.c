@@ -3,7 +3,7 @@
 #include <string.h>
 #include <unistd.h>
 
-const char *const KIND_NAMES[] = {"ok", "crc", "truncated", "garbage", "late", "garbled", "echo"};
+const char *const KIND_NAMES[] = {"ok", "crc", "truncated", "garbage", "late", "stale", "garbled", "echo"};
 
 void wire_say(struct wire *wire, const struct talk *talk) {
     if (wire->n_talks == MAX_TALKS) {
@@ -36,6 +36,11 @@ void wire_trample(struct wire *wire, int64_t now) {
         struct talk *talk = &wire->talks[i];
         if (talk->kind != KIND_ECHO && talk->start <= now) talk->kind = KIND_GARBLED;
     }
+}
+
+void wire_overtake(struct wire *wire) {
+    for (int i = 0; i < wire->n_talks; i++)
+        if (wire->talks[i].kind == KIND_LATE) wire->talks[i].kind = KIND_STALE;
 }
 
 static int earliest(const struct wire *wire) {
@@ -79,7 +84,7 @@ static void end_talk(struct wire *wire, int index) {
     struct judge *judge = wire->judge;
     if (talk->kind != KIND_ECHO) {
         judge->garbled += talk->kind == KIND_GARBLED;
-        if (talk->kind == KIND_OK || talk->kind == KIND_LATE) {
+        if (talk->kind == KIND_OK || talk->kind == KIND_LATE || talk->kind == KIND_STALE) {
             if (judge->answered++ == 0) judge->first_answer = wire->quiet_since;
             judge->last_answer = wire->quiet_since;
         }

@@ -4,7 +4,9 @@
 
 #include "judge.h"
 
-enum kind { KIND_OK, KIND_CRC, KIND_TRUNCATED, KIND_GARBAGE, KIND_LATE, KIND_GARBLED, KIND_ECHO };
+enum kind { KIND_OK, KIND_CRC, KIND_TRUNCATED, KIND_GARBAGE, KIND_LATE, KIND_STALE, KIND_GARBLED, KIND_ECHO };
+/* LATE was delayed on purpose; STALE too, and the master began something else in the meantime: it may believe
+ * the first, never the second. */
 extern const char *const KIND_NAMES[];
 
 /* Bytes that one sender puts on the line, one after the other, from `start` on. */
@@ -46,6 +48,8 @@ bool wire_talking(const struct wire *wire, int64_t now);
 bool wire_surprising(const struct wire *wire, int64_t now);
 /* The master began to send over whatever is in the air: what is left of it is destroyed. */
 void wire_trample(struct wire *wire, int64_t now);
+/* The master began to send: answers it no longer waits for are stale. */
+void wire_overtake(struct wire *wire);
 int64_t wire_due(const struct wire *wire); /* when the next byte or piece is due; INT64_MAX: nothing is */
 void wire_deliver(struct wire *wire);      /* hand over everything due by now */
 

@@ -44,16 +44,22 @@ def test_what_was_sent_and_heard_in_order_is_right() -> None:
         [heard(0, 1), heard(0, 1)],
         [heard(2, 1)],
     ],
-    ids=["of another sensor", "never sent", "out of order", "twice", "from a late answer"],
+    ids=["of another sensor", "never sent", "out of order", "twice", "from an answer given up"],
 )
 def test_a_value_is_wrong(samples: list[Heard]) -> None:
-    log = [sent(0, 1), sent(1, 1), sent(2, 1, "late")]
+    log = [sent(0, 1), sent(1, 1), sent(2, 1, "stale")]
     assert judge_samples(log, samples, 0.0, 10.0).wrong == 1
 
 
 def test_a_whole_answer_that_nobody_published_is_lost_and_a_spoilt_one_is_not() -> None:
     log = [sent(0, 1), sent(1, 1, "crc"), sent(2, 1), sent(20, 1)]
     assert judge_samples(log, [heard(0, 1)], 0.0, 10.0).lost == 1
+
+
+def test_a_late_answer_that_was_waited_for_is_right_and_need_not_be_published() -> None:
+    log = [sent(0, 1, "late"), sent(1, 1, "late")]
+    judgement = judge_samples(log, [heard(0, 1)], 0.0, 10.0)
+    assert (judgement.wrong, judgement.lost) == (0, 0)
 
 
 def test_failed_polls_are_no_values() -> None:
@@ -70,6 +76,7 @@ def test_the_rate_counts_whole_answers_of_the_healthy_only() -> None:
     rate, slowest = rates(log, (1, 2), 8.5)
     assert rate == pytest.approx(4 / 7)
     assert slowest == pytest.approx(2 / 8.5 * 2)
+    assert rates(log, (1, 2), 8.5, interval=1.0)[0] == pytest.approx(5 / 8.5)
 
 
 def test_nobody_answering_is_a_rate_of_nothing() -> None:

@@ -153,6 +153,14 @@ def test_a_late_answer_comes_before_the_answer_to_a_later_request(paced: Starter
         heard = b"".join(terminal.hear(16))
     assert (heard[2], heard[9 + 2]) == (4, 2)
     line.close()
+    assert [each.kind for each in read_log(line.log)] == ["stale"]
+
+
+def test_a_late_answer_that_is_waited_for_is_no_stale_one(paced: Starter) -> None:
+    line = paced("--late", "100", "--late-by", "400")
+    with Terminal(line) as terminal:
+        assert terminal.ask(request(1))[:3] == bytes((1, 3, 4))
+    line.close()
     assert [each.kind for each in read_log(line.log)] == ["late"]
 
 
