@@ -6,6 +6,7 @@ set) and is skipped elsewhere, with one line that says what to install.
 
 from __future__ import annotations
 
+import getpass
 import os
 import shutil
 import socket
@@ -33,14 +34,12 @@ SEARCH_PATH = os.pathsep.join((os.environ.get("PATH", os.defpath), "/usr/sbin", 
 """Debian keeps daemons in /usr/sbin, which is not on a user's PATH."""
 
 
-def program(name: str) -> str:
+def path_of(name: str) -> str:
     """Return the path of a program; without it fail in CI and skip elsewhere."""
     path = shutil.which(name, path=SEARCH_PATH)
     if path is not None:
         return path
-    message = (
-        f"needs {name}: install it (Debian: apt install mosquitto mosquitto-clients openssl socat mbpoll gcc)"
-    )
+    message = f"needs {name}: install it (Debian: apt install mosquitto mosquitto-clients openssl socat mbpoll gcc)"
     if os.environ.get("CI"):
         pytest.fail(message, pytrace=False)
     pytest.skip(message)
@@ -49,7 +48,13 @@ def program(name: str) -> str:
 def pytest_runtest_setup(item: pytest.Item) -> None:
     for mark in item.iter_markers("needs"):
         for name in mark.args:
-            program(name)
+            path_of(name)
+
+
+@pytest.fixture(name="program", scope="session")
+def _program() -> Callable[[str], str]:
+    """Give the function that finds a program, or fails in CI and skips elsewhere."""
+    return path_of
 
 
 def free_port() -> int:
@@ -57,6 +62,12 @@ def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
+
+
+@pytest.fixture
+def unused_port() -> int:
+    """Give a TCP port of the loopback that nobody uses now."""
+    return free_port()
 
 
 def eventually(claim: Callable[[], bool], what: str, *, within: float = PATIENCE) -> None:
@@ -103,8 +114,8 @@ class Listener:
         self._client.on_connect = lambda *_: self._subscribe()
         self._client.on_subscribe = lambda *_: self._subscribed.set()
         self._client.on_message = lambda _client, _userdata, message: self._note(message)
-        self._client.on_publish = lambda _client, _userdata, mid, reason, _properties: (
-            self.acknowledged.__setitem__(mid, reason.value)
+        self._client.on_publish = lambda _client, _userdata, mid, reason, _properties: self.acknowledged.__setitem__(
+            mid, reason.value
         )
         self._client.connect_async("127.0.0.1", port)
         self._client.loop_start()
@@ -188,6 +199,7 @@ class Mosquitto:
             "persistence false",
             "max_queued_messages 0",
             "log_type all",
+            f"user {getpass.getuser()}",  # started by root it would change to a user that cannot read our files
             f"listener {self.port} 127.0.0.1",
             *self.listener,
             *self.configuration,
@@ -195,19 +207,16 @@ class Mosquitto:
         path = self.folder / "mosquitto.conf"
         path.write_text("\n".join(lines) + "\n")
         with (self.folder / "mosquitto.log").open("ab") as log:
+            before = log.tell()
             self.process = subprocess.Popen(
                 [self.executable, "-c", str(path)], stdin=subprocess.DEVNULL, stdout=log, stderr=log
             )
-        eventually(self._listens, "mosquitto listens")
+        eventually(lambda: self._runs(before), "mosquitto runs")
 
-    def _listens(self) -> bool:
+    def _runs(self, since: int) -> bool:
         assert self.process is not None
         assert self.process.poll() is None, f"mosquitto ended: {self.log}"
-        try:
-            socket.create_connection(("127.0.0.1", self.port), timeout=1).close()
-        except ConnectionRefusedError:
-            return False
-        return True
+        return " running" in self.log[since:]
 
     def stop(self) -> None:
         """End it in order (SIGTERM)."""
@@ -271,7 +280,7 @@ def mosquitto(tmp_path: Path) -> Iterator[Mosquitto]:
     """Give a running mosquitto of this test's own."""
     folder = tmp_path / "mosquitto"
     folder.mkdir()
-    broker = Mosquitto(program("mosquitto"), folder)
+    broker = Mosquitto(path_of("mosquitto"), folder)
     broker.start()
     yield broker
     broker.close()

@@ -24,7 +24,7 @@ _REASONS = {
     UNSUPPORTED_VERSION: "the broker does not speak this version of MQTT: set mqtt.version",
     0x85: "the broker refuses our client id: set mqtt.client_id",
     0x86: "wrong user name or password: check mqtt.username and mqtt.password_file",
-    0x87: "not authorized: check mqtt.username, and that the broker's ACL lets it publish the base topic",
+    0x87: "not authorized: check mqtt.username and mqtt.password_file, and the ACL of the broker",
     0x88: "the broker is not available",
     0x89: "the broker is busy",
     0x8A: "the broker has banned this client",

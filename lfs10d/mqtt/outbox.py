@@ -155,8 +155,8 @@ class Outbox:
                 self._live.appendleft(letter)
             case Array(samples=samples):
                 self._history.extend(samples)
-            case Declaration(loss=loss):
-                self._losses.restore(loss)
+            case _:
+                self._losses.restore(letter.loss)
 
     # What goes out
 

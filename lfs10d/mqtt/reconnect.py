@@ -5,9 +5,9 @@
 - Each round begins with the configured version. A broker that refuses 5, or closes the connection in place of
   an answer, is asked in 3.1.1 at once: some old brokers say nothing. Nothing is remembered, because a broker
   may be replaced by a better one.
-- Taken over by a client with our id, we wait 60 s, doubling to 1 h, until a connection has held for 2 h. In
-  3.1.1, where the broker does not say so, three short connections in a row without a failed attempt between
-  them are taken for that.
+- Taken over by a client with our id, we wait 60 s, doubling to 1 h, until a connection has held for 2 h. Not
+  every broker says so (by 3.1.1 none can, mosquitto 2.0.11 does not): three connections in a row that do not
+  hold, without a failed attempt between them, are taken for that, and afterwards each one that does not hold.
 """
 
 from __future__ import annotations
@@ -38,9 +38,8 @@ TAKEN_OVER_LONGEST = 3600.0
 TAKEN_OVER_FORGOTTEN = 7200.0
 """Seconds (contract, section 3); the last is longer than the other side can be waiting."""
 
-SHORT = 30.0
 SHORT_MOST = 3
-"""This many connections in a row of less than that many seconds are, in 3.1.1, another client with our id."""
+"""This many connections in a row that do not hold are another client with our id."""
 
 
 @dataclass(slots=True)
@@ -75,9 +74,10 @@ class Reconnect:
     def ended(self, ended: Ended, now: float) -> None:
         """Note how the connection or the attempt ended, and decide on the next."""
         version, self.version = self.version, self.configured
+        self.held(now)
         since, self._since = self._since, None
         if since is not None:
-            self._lost(ended, version, now - since, now)
+            self._lost(ended, now - since, now)
         elif ended.ending is Ending.WRONG_VERSION and version is Version.V5:
             self.version = Version.V311
             self.due = now
@@ -85,14 +85,13 @@ class Reconnect:
             self._short = 0
             self._later(now)
 
-    def _lost(self, ended: Ended, version: Version, life: float, now: float) -> None:
+    def _lost(self, ended: Ended, life: float, now: float) -> None:
         if life >= TAKEN_OVER_FORGOTTEN:
             self._takeover = TAKEN_OVER_FIRST
-        self._short = self._short + 1 if life < SHORT else 0
-        suspect = version is Version.V311 and self._short >= SHORT_MOST
+        self._short = self._short + 1 if life < HELD else 0
+        suspect = self._short >= (1 if self.duplicate else SHORT_MOST)
         if ended.ending is Ending.TAKEN_OVER or suspect:
             self.duplicate = True
-            self._short = 0
             self.due = now + self._takeover
             self._takeover = min(2 * self._takeover, TAKEN_OVER_LONGEST)
         elif life >= HELD:

@@ -275,6 +275,29 @@ def test_what_is_under_way_when_the_connection_is_lost_waits_again_in_order() ->
     assert [seqs(outbox.next(0.2)) for _ in range(3)] == [[1], [2], [3]]
 
 
+def test_an_array_under_way_when_the_connection_is_lost_waits_again() -> None:
+    outbox = Outbox()
+    outbox.add(sample(1), 0.0)
+    connect(outbox, 10.0)
+    take(outbox, 20.0, Array)
+    outbox.lost(21.0)
+    connect(outbox, 22.0)
+    assert seqs(outbox.next(32.0)) == [1]
+
+
+def test_a_refused_array_is_declared_but_for_what_was_acknowledged_before() -> None:
+    outbox = connected(now=-100.0)
+    outbox.add(sample(1), 0.0)
+    outbox.settled(take(outbox, 0.0, Live), 0.0)
+    outbox.lost(1.0)
+    outbox.add(sample(2), 1.0)
+    connect(outbox, 10.0)
+    array = take(outbox, 20.0, Array)
+    assert seqs(array) == [1, 2]
+    outbox.refused(array, NOT_AUTHORIZED)
+    assert take(outbox, 20.0, Declaration).loss == Loss("a", "k", 2, 2, 1)
+
+
 def test_messages_under_way_wait_again_in_order_and_traces_do_not() -> None:
     outbox = connected()
     for number in range(3):

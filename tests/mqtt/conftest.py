@@ -1,0 +1,160 @@
+"""Brokers that are not mosquitto, and a certificate authority, for the tests of the connection."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import subprocess
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, TypeAlias
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import AsyncIterator, Awaitable, Callable
+    from contextlib import AbstractAsyncContextManager
+    from pathlib import Path
+
+Answer: TypeAlias = "Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]"
+
+CONNECT, PUBLISH, SUBSCRIBE, PINGREQ, DISCONNECT = 0x10, 0x30, 0x82, 0xC0, 0xE0
+
+
+@contextlib.asynccontextmanager
+async def serving(answer: Answer, port: int = 0) -> AsyncIterator[int]:
+    """Serve each client with `answer` on a port of the loopback; at the end all clients are thrown out."""
+    served: set[asyncio.Task[None]] = set()
+
+    async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        task = asyncio.current_task()
+        assert task is not None
+        served.add(task)
+        try:
+            with contextlib.suppress(asyncio.IncompleteReadError, ConnectionError, asyncio.CancelledError):
+                await answer(reader, writer)
+        finally:
+            writer.close()
+            with contextlib.suppress(ConnectionError, asyncio.CancelledError):
+                await writer.wait_closed()
+            served.discard(task)
+
+    server = await asyncio.start_server(serve, "127.0.0.1", port)
+    try:
+        yield server.sockets[0].getsockname()[1]
+    finally:
+        server.close()
+        for task in list(served):
+            task.cancel()
+        await asyncio.gather(*served)
+
+
+@pytest.fixture(name="serving", scope="session")
+def _serving() -> Callable[[Answer], AbstractAsyncContextManager[int]]:
+    """Give the function that serves whatever is asked for."""
+    return serving
+
+
+@dataclass
+class OldBroker:
+    """A broker of 2014: MQTT 3.1.1 (level 4) and nothing else. It keeps what is published to it.
+
+    `refusal` is what a client of MQTT 5 is told: the CONNACK of section 3.2.2.3 of 3.1.1, or nothing.
+    """
+
+    refusal: bytes = b"\x20\x02\x00\x01"
+    levels: list[int] = field(default_factory=list)
+    """The protocol level of each CONNECT."""
+    published: list[tuple[str, bytes]] = field(default_factory=list)
+    granted: bytes = b"\x01\x01"
+    """What each filter of a SUBSCRIBE is told."""
+    kick_after: float | None = None
+    """Seconds after which an accepted client is thrown out without a word."""
+
+    @contextlib.asynccontextmanager
+    async def running(self) -> AsyncIterator[int]:
+        """Listen on a free port of the loopback."""
+        async with serving(self._serve) as port:
+            yield port
+
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(self.kick_after):
+                while await self._answer(reader, writer):
+                    await writer.drain()
+
+    async def _answer(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> bool:
+        head = (await reader.readexactly(1))[0]
+        length = shift = 0
+        while True:
+            byte = (await reader.readexactly(1))[0]
+            length |= (byte & 0x7F) << shift
+            shift += 7
+            if not byte & 0x80:
+                break
+        body = await reader.readexactly(length)
+        if head == CONNECT:
+            self.levels.append(body[6])
+            writer.write(b"\x20\x02\x00\x00" if body[6] == 4 else self.refusal)
+            return body[6] == 4
+        if head & 0xF0 == PUBLISH:
+            end = 2 + int.from_bytes(body[:2], "big")
+            mid = body[end : end + 2] if head & 0x06 else b""
+            self.published.append((body[2:end].decode(), body[end + len(mid) :]))
+            if mid:
+                writer.write(b"\x40\x02" + mid)
+        elif head == SUBSCRIBE:
+            writer.write(bytes((0x90, 2 + len(self.granted))) + body[:2] + self.granted)
+        elif head == PINGREQ:
+            writer.write(b"\xd0\x00")
+        return head != DISCONNECT
+
+
+@dataclass(frozen=True)
+class Authority:
+    """A certificate authority of this test run's own, made by the openssl command."""
+
+    folder: Path
+    openssl: str
+
+    @property
+    def ca(self) -> str:
+        """The certificate of the authority."""
+        return str(self.folder / "ca.pem")
+
+    def found(self) -> None:
+        """Make the authority itself."""
+        self._run("req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes",
+                  "-days", "2", "-subj", "/CN=lfs10d test authority",
+                  "-addext", "keyUsage=critical,keyCertSign,cRLSign",
+                  "-keyout", "ca.key", "-out", "ca.pem")  # fmt: skip
+
+    def issue(self, name: str, *names: str) -> tuple[str, str]:
+        """Return the files of a certificate for `names` (as openssl writes them: `DNS:localhost`) and its key."""
+        (self.folder / f"{name}.ext").write_text(
+            f"subjectAltName={','.join(names) or 'DNS:' + name}\n"
+            "authorityKeyIdentifier=keyid\nsubjectKeyIdentifier=hash\n"
+        )
+        self._run("req", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes",
+                  "-subj", f"/CN={name}", "-keyout", f"{name}.key", "-out", f"{name}.csr")  # fmt: skip
+        self._run("x509", "-req", "-in", f"{name}.csr", "-CA", "ca.pem", "-CAkey", "ca.key", "-CAcreateserial",
+                  "-days", "2", "-extfile", f"{name}.ext", "-out", f"{name}.pem")  # fmt: skip
+        return str(self.folder / f"{name}.pem"), str(self.folder / f"{name}.key")
+
+    def _run(self, *arguments: str) -> None:
+        subprocess.run([self.openssl, *arguments], cwd=self.folder, check=True, capture_output=True, timeout=60)
+
+
+@pytest.fixture
+def authority(tmp_path: Path, program: Callable[[str], str]) -> Authority:
+    """Give an authority that has issued nothing yet."""
+    folder = tmp_path / "authority"
+    folder.mkdir()
+    made = Authority(folder, program("openssl"))
+    made.found()
+    return made
+
+
+@pytest.fixture
+def old_broker() -> OldBroker:
+    """Give a broker of 3.1.1 only; it listens while it is `running()`."""
+    return OldBroker()
