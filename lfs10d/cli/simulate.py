@@ -144,7 +144,7 @@ def command(**options: Any) -> None:  # noqa: ANN401  # sixteen options; `Wanted
         signal.signal(signal.SIGUSR1, lambda *_: port.tell(_power_cycle))
         _tell_ready(wanted, port)
         while True:
-            threading.Event().wait(wanted.interval)
+            threading.Event().wait(wanted.interval or None)
             _tell_figures(wanted, port, "figures")
     _tell_figures(wanted, port, "end")
 

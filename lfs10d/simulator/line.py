@@ -140,11 +140,10 @@ class SimulatedLine:
         start = now
         busy = False
         for burst in self._bursts:
-            if burst.start < now < burst.ends[-1]:
-                if burst.speaker is MASTER:
-                    start = burst.ends[-1]
-                else:
-                    busy = True
+            if burst.speaker is MASTER and now < burst.ends[-1]:
+                start = burst.ends[-1]
+            elif burst.speaker is not MASTER and burst.ends[0] <= now < burst.ends[-1]:
+                busy = True  # of a byte that is not over nobody can know: that request is struck
         self._retire(start)
         quiet_since, slower = None, shape
         if self._quiet_since is not None:

@@ -113,6 +113,7 @@ class PtyLine:
             raise FailedError(f"{self.link}: the link cannot be made: {error.strerror}") from error
         self._wake = os.pipe()
         self._stopping = False
+        self.present = False
         if self._origin is None:
             self._origin = time.monotonic_ns()
         self._thread = threading.Thread(target=self._serve, name="simulated-line", daemon=True)
@@ -223,9 +224,9 @@ class PtyLine:
         except BlockingIOError:
             return
         except OSError:
-            self.present = False
             with suppress(termios.error):
                 termios.tcflush(self._master, termios.TCIOFLUSH)
+            self.present = False
             return
         self._look_at_rate()
         self.line.transmit(data, self._time(), self.adapter.format)

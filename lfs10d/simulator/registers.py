@@ -48,13 +48,18 @@ class Signal:
 
     def words(self, value: float) -> tuple[int, ...]:
         """Return the registers that hold this value; what does not fit is bent to the nearest that does."""
-        content = (value - self.offset) / self.scale
         if self.type == "float32":
-            return self._ordered(struct.pack(">f", content))
+            return self._ordered(struct.pack(">f", (value - self.offset) / self.scale))
+        return self._ordered(struct.pack(_CODES[self.type], self._content(value)))
+
+    def settled(self, value: float) -> float:
+        """Return the value as its registers tell it; of a float32 the decimal itself."""
+        return value if self.type == "float32" else round(self._content(value) * self.scale + self.offset, 9)
+
+    def _content(self, value: float) -> int:
         bits = 8 * _WORD * self.count
         low = 0 if self.type.startswith("u") else -(1 << bits - 1)
-        high = low + (1 << bits) - 1
-        return self._ordered(struct.pack(_CODES[self.type], min(max(round(content), low), high)))
+        return min(max(round((value - self.offset) / self.scale), low), low + (1 << bits) - 1)
 
     def broken(self, float_bits: int) -> tuple[int, ...]:
         """Return these bits of a float32, or all ones in a register that holds whole numbers."""

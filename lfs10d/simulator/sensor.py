@@ -251,7 +251,7 @@ class Sensor:
         words = signal.words(value) if bits is None else signal.broken(bits)
         for n, word in enumerate(words):
             self.words[signal.address + n] = word
-        return (value,) if bits is None else ()
+        return (signal.settled(value),) if bits is None else ()
 
     def _write(self, body: bytes, address: int, value: int, now: int, struck: Mapping[Kind, Ailment]) -> bytes:
         allowed = self.blueprint.writable.get(address)

@@ -1,0 +1,409 @@
+"""A simulated sensor, well and ill, as a master meets it."""
+
+from __future__ import annotations
+
+import math
+import struct
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import pytest
+
+from lfs10d.simulator.faults import Kind
+from lfs10d.simulator.registers import Blueprint, Signal
+from lfs10d.simulator.sensor import Sensor
+from lfs10d.simulator.wire import Format, unseal
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from tests.simulator.conftest import Bench
+
+    Maker = Callable[..., Bench]
+
+WIND, RATE, ID = 1, 4, 5
+
+
+def wind_in(body: bytes | None) -> float:
+    assert body is not None
+    (speed,) = struct.unpack(">f", body[3:])
+    return float(speed)
+
+
+def test_a_well_sensor_sends_the_value_that_the_log_tells(bench: Maker) -> None:
+    line = bench(Sensor(1), Sensor(2))
+    for slave in (1, 2, 1):
+        body = line.read(slave)
+        assert line.answer.believable
+        assert line.answer.sensor.slave == slave
+        assert wind_in(body) == pytest.approx(line.answer.values[0], rel=1e-6)
+    assert len({request.answers[0].values for request in line.line.log}) == 3
+
+
+def test_ids_above_247_answer(bench: Maker) -> None:
+    assert bench(Sensor(255), Sensor(248)).id_of(248) == 248
+
+
+def test_an_answer_begins_after_the_turnaround(bench: Maker) -> None:
+    line = bench(Sensor(1, turnaround=0.007))
+    line.read(1)
+    request = line.line.log[0]
+    assert request.answers[0].burst.start - request.ended == 7_000_000
+
+
+def test_jitter_adds_up_to_so_much_and_differs(bench: Maker) -> None:
+    line = bench(Sensor(1, turnaround=0.005, jitter=0.01))
+    for _ in range(20):
+        line.read(1)
+    delays = {request.answers[0].burst.start - request.ended for request in line.line.log}
+    assert len(delays) > 10
+    assert 5_000_000 <= min(delays) <= max(delays) <= 15_000_000
+
+
+@pytest.mark.parametrize(
+    ("body", "code"),
+    [
+        ("01 04 00 01 00 02", 1),
+        ("01 08 00 01 00 02", 1),
+        ("01 03 00 01 00 03", 2),
+        ("01 03 00 00 00 01", 2),
+        ("01 03 00 01 00 00", 3),
+        ("01 03 00 01 00 7E", 3),
+        ("01 06 00 03 00 01", 2),
+        ("01 06 00 05 01 00", 3),
+        ("01 06 00 05 00 00", 3),
+        ("01 06 00 04 00 03", 3),
+    ],
+)
+def test_what_the_device_does_not_have_is_refused(bench: Maker, body: str, code: int) -> None:
+    request = bytes.fromhex(body)
+    assert bench(Sensor(1)).exchange(request) == bytes((1, request[1] | 0x80, code))
+
+
+def test_a_request_of_another_length_is_ignored(bench: Maker) -> None:
+    assert bench(Sensor(1)).exchange(bytes.fromhex("01 03 00 01 00 02 00")) is None
+
+
+def test_a_new_id_is_obeyed_after_an_echo_from_the_old_place(bench: Maker) -> None:
+    line = bench(Sensor(1))
+    assert line.write(1, ID, 9) == bytes.fromhex("01 06 00 05 00 09")
+    assert line.id_of(1) is None
+    assert line.id_of(9) == 9
+
+
+def test_a_new_rate_is_obeyed_after_an_echo_at_the_old_one(bench: Maker) -> None:
+    line = bench(Sensor(1))
+    assert line.write(1, RATE, 2) is not None
+    assert line.read(1) is None
+    assert line.line.sensor(1).format == Format(19200)
+
+
+def test_a_rate_written_anew_changes_nothing(bench: Maker) -> None:
+    line = bench(Sensor(1))
+    line.write(1, RATE, 1)
+    assert line.id_of(1) == 1
+
+
+def test_one_that_obeys_at_once_echoes_from_the_new_place(bench: Maker) -> None:
+    line = bench(Sensor(1))
+    line.line.sensor(1).ail("at_once")
+    assert line.write(1, ID, 9) == bytes.fromhex("09 06 00 05 00 09")
+    assert line.write(9, RATE, 2) is None
+    assert line.heard  # the echo, at 19200: noise
+
+
+def test_power_cycle_needing_ones_read_new_and_answer_at_the_old_place(bench: Maker) -> None:
+    line = bench(Sensor(1))
+    sensor = line.line.sensor(1)
+    sensor.ail("power_cycle")
+    line.write(1, ID, 9)
+    assert line.id_of(1) == 9
+    assert line.id_of(9) is None
+    sensor.power_cycle()
+    assert line.id_of(9) == 9
+
+
+def test_one_that_stores_but_ignores_never_obeys(bench: Maker) -> None:
+    line = bench(Sensor(1))
+    sensor = line.line.sensor(1)
+    sensor.ail("stores_but_ignores")
+    line.write(1, ID, 9)
+    sensor.power_cycle()
+    assert line.id_of(1) == 9
+    assert line.id_of(9) is None
+
+
+@pytest.mark.parametrize("reads", ["old", "new"])
+@pytest.mark.parametrize("answer", ["echo", "exception"])
+def test_the_dip_switch_wins_in_every_variant(bench: Maker, reads: str, answer: str) -> None:
+    line = bench(Sensor(1))
+    sensor = line.line.sensor(1)
+    sensor.ail("dip_locked", answer=answer, reads=reads, code=3)
+    echo = bytes.fromhex("01 06 00 05 00 09")
+    assert line.write(1, ID, 9) == (echo if answer == "echo" else bytes.fromhex("01 86 03"))
+    assert line.id_of(1) == (9 if reads == "new" else 1)
+    sensor.power_cycle()
+    assert line.id_of(1) == 1
+    line.write(1, RATE, 2)
+    assert sensor.format.baudrate == 19200  # the switch sets the id only
+
+
+def test_a_lost_echo_does_not_undo_the_write(bench: Maker) -> None:
+    line = bench(Sensor(1))
+    line.line.sensor(1).ail("echo_losing")
+    assert line.write(1, ID, 9) is None
+    assert line.id_of(9) == 9
+    assert line.exchange(bytes.fromhex("09 06 00 03 00 01")) == bytes.fromhex("09 86 02")
+
+
+def test_slow_flash_is_silent_after_the_echo_of_a_change_only(bench: Maker) -> None:
+    line = bench(Sensor(1))
+    line.line.sensor(1).ail("slow_flash", delay=3.0)
+    assert line.write(1, ID, 1) is not None
+    assert line.id_of(1) == 1
+    assert line.write(1, ID, 9) is not None
+    assert line.id_of(9) is None
+    line.listen(3.0)
+    assert line.id_of(9) == 9
+
+
+def test_silence_begins_and_ends_when_told(bench: Maker) -> None:
+    line = bench(Sensor(1))
+    line.line.sensor(1).silent_from(2.0, 3.0)
+    heard = []
+    for seconds in (1.0, 2.0, 2.5, 3.0):
+        line.reach(seconds)
+        heard.append(line.id_of(1) is not None)
+    assert heard == [True, False, False, True]
+
+
+def test_a_healed_sensor_keeps_its_other_ailments() -> None:
+    sensor = Sensor(1)
+    sensor.ail("silent")
+    kept = sensor.ail("noisy", 0.5)
+    sensor.heal("silent")
+    assert sensor.ailments == [kept]
+    sensor.heal()
+    assert sensor.ailments == []
+
+
+def test_without_power_nothing_answers(bench: Maker) -> None:
+    line = bench(Sensor(1))
+    sensor = line.line.sensor(1)
+    sensor.power_cut()
+    assert line.id_of(1) is None
+    sensor.power_up()
+    assert line.id_of(1) == 1
+
+
+def test_a_scheduled_power_cut_makes_it_obey_what_was_stored(bench: Maker) -> None:
+    line = bench(Sensor(1))
+    sensor = line.line.sensor(1)
+    sensor.ail("power_cycle")
+    sensor.ail("power_cut", first=5.0, last=6.0)
+    line.write(1, ID, 9)
+    line.reach(5.0)
+    assert line.id_of(1) is None
+    line.reach(6.0)
+    assert line.id_of(9) == 9
+
+
+def test_one_that_hangs_is_silent_after_an_exception_until_the_next_power_cycle(bench: Maker) -> None:
+    line = bench(Sensor(1))
+    sensor = line.line.sensor(1)
+    sensor.ail("hangs")
+    assert line.id_of(1) == 1
+    assert line.read(1, 3, 1) == bytes.fromhex("01 83 02")
+    assert line.id_of(1) is None
+    sensor.power_cycle()
+    assert line.id_of(1) == 1
+
+
+def test_one_that_hangs_is_silent_after_a_frame_it_could_not_read(bench: Maker) -> None:
+    line = bench(Sensor(1), Sensor(2))
+    line.line.sensor(1).ail("hangs")
+    line.port.write(b"\x01\x03\x00\x01")
+    line.listen(0.1)
+    assert line.id_of(1) is None
+    assert line.id_of(2) == 2
+
+
+def test_a_shy_sensor_ignores_the_request_after_one_to_the_dead(bench: Maker) -> None:
+    line = bench(Sensor(1), Sensor(2))
+    line.line.sensor(1).ail("shy")
+    line.read(77)
+    assert line.id_of(1) is None
+    assert line.id_of(1) == 1
+    line.read(2)
+    assert line.id_of(1) == 1
+
+
+def test_a_broadcast_is_obeyed_by_all_and_answered_by_nobody(bench: Maker) -> None:
+    line = bench(Sensor(1), Sensor(2))
+    assert line.write(0, RATE, 2) is None
+    assert line.heard == b""
+    assert {sensor.format.baudrate for sensor in line.line.sensors} == {19200}
+
+
+def test_an_echo_at_once_of_a_broadcast_is_none(bench: Maker) -> None:
+    line = bench(Sensor(1))
+    line.line.sensor(1).ail("at_once")
+    line.write(0, ID, 4)
+    assert line.heard == b""
+    assert line.id_of(4) == 4
+
+
+def test_a_wildcard_answers_255_too(bench: Maker) -> None:
+    line = bench(Sensor(1))
+    assert line.id_of(255) is None
+    line.line.sensor(1).ail("wildcard")
+    assert line.id_of(255) == 1
+    assert line.id_of(254) is None
+
+
+@pytest.mark.parametrize(
+    ("kind", "holds"),
+    [
+        ("nan", math.isnan),
+        ("infinite", math.isinf),
+        ("out_of_range", lambda speed: speed == 1e6),
+        ("subnormal", lambda speed: 0 < speed < 1e-40),
+    ],
+)
+def test_a_broken_value_is_sent_as_such(bench: Maker, kind: str, holds: Callable[[float], bool]) -> None:
+    line = bench(Sensor(1))
+    line.line.sensor(1).ail(kind)
+    assert holds(wind_in(line.read(1)))
+    assert line.answer.values == ()
+
+
+def test_a_stuck_sensor_repeats_its_value(bench: Maker) -> None:
+    line = bench(Sensor(1))
+    line.line.sensor(1).ail("stuck")
+    assert wind_in(line.read(1)) == wind_in(line.read(1))
+
+
+def test_a_refusal_has_the_code_it_was_given(bench: Maker) -> None:
+    line = bench(Sensor(1))
+    line.line.sensor(1).ail("exception", code=6)
+    assert line.read(1) == bytes.fromhex("01 83 06")
+
+
+@pytest.mark.parametrize(
+    ("kind", "particulars", "first"),
+    [
+        ("wrong_id", {}, "02 03 04"),
+        ("wrong_id", {"value": 77}, "4D 03 04"),
+        ("wrong_function", {}, "01 04 04"),
+        ("wrong_count", {}, "01 03 06"),
+        ("wrong_echo", {}, "01 03 04"),
+    ],
+)
+def test_a_wrong_answer_has_a_right_check(bench: Maker, kind: str, particulars: dict[str, int], first: str) -> None:
+    line = bench(Sensor(1))
+    line.line.sensor(1).ail(kind, **particulars)
+    body = line.read(1)
+    assert body is not None
+    assert body[:3] == bytes.fromhex(first)
+    assert len(body) == 3 + body[2]
+    assert not line.answer.believable
+
+
+def test_a_wrong_echo_carries_another_value(bench: Maker) -> None:
+    line = bench(Sensor(1))
+    line.line.sensor(1).ail("wrong_echo")
+    line.line.sensor(1).ail("wrong_count")
+    assert line.write(1, ID, 1) == bytes.fromhex("01 06 00 05 00 00")
+
+
+@pytest.mark.parametrize("framing", ["rtu", "ascii"])
+def test_a_noisy_answer_never_passes_its_check(bench: Maker, framing: str) -> None:
+    line = bench(Sensor(1, framing=framing), framing=framing)  # type: ignore[arg-type]  # a literal
+    line.line.sensor(1).ail("noisy")
+    for _ in range(200):
+        assert line.read(1) is None
+        assert line.heard
+    assert not line.answer.believable
+
+
+@pytest.mark.parametrize(
+    ("kind", "particulars", "lengths"),
+    [
+        ("garbage", {}, {9}),
+        ("garbage", {"length": 30}, {30}),
+        ("truncated", {"length": 4}, {4}),
+        ("truncated", {}, set(range(1, 9))),
+    ],
+)
+def test_a_spoilt_answer_has_the_length_it_was_given(
+    bench: Maker, kind: str, particulars: dict[str, int], lengths: set[int]
+) -> None:
+    line = bench(Sensor(1))
+    line.line.sensor(1).ail(kind, **particulars)
+    seen = set()
+    for _ in range(100):
+        assert line.read(1) is None
+        seen.add(len(line.heard))
+    assert seen == lengths
+
+
+@pytest.mark.parametrize(("kind", "part"), [("leading_noise", slice(5, None)), ("trailing_noise", slice(9))])
+def test_noise_around_an_answer_leaves_it_whole(bench: Maker, kind: str, part: slice) -> None:
+    line = bench(Sensor(1))
+    line.line.sensor(1).ail(kind, length=5)
+    line.read(1)
+    assert len(line.heard) == 14
+    assert unseal(line.heard[part]) is not None
+    assert line.answer.believable
+
+
+def test_a_late_answer_comes_into_the_next_request(bench: Maker) -> None:
+    line = bench(Sensor(1), Sensor(2))
+    line.line.sensor(1).ail("late", delay=0.2)
+    assert line.read(1, wait=0.1) is None
+    assert line.read(2, wait=0.05) is not None
+    line.listen(0.1)
+    assert unseal(line.heard) is not None
+    assert line.line.log[0].answers[0].believable
+
+
+def test_bytes_can_come_with_pauses(bench: Maker) -> None:
+    line = bench(Sensor(1))
+    line.line.sensor(1).ail("slow_bytes", delay=0.002)
+    line.read(1)
+    ends = line.answer.burst.ends
+    assert {after - before for before, after in pairwise(ends)} <= {3_041_666, 3_041_667}
+
+
+def test_an_ailment_shows_at_its_rate(bench: Maker) -> None:
+    line = bench(Sensor(1))
+    line.line.sensor(1).ail("silent", 0.3)
+    answers = sum(line.id_of(1) is not None for _ in range(300))
+    assert 170 < answers < 250
+
+
+def test_other_devices_are_just_data(bench: Maker) -> None:
+    meter = Blueprint(
+        "meter",
+        (Signal(10, "uint16", scale=0.1), Signal(20, "int32")),
+        words={30: 7},
+        writable={30: range(10)},
+        functions=frozenset({3, 4, 6}),
+        max_words=2,
+        check="sum",
+    )
+    sensor = Sensor(5, blueprint=meter, source=lambda now: 12.34 if now else 0.0, framing="ascii")
+    line = bench(sensor, framing="ascii")
+    assert line.read(5, 10, 1) == bytes.fromhex("05 03 02 00 7B")
+    assert line.exchange(bytes.fromhex("05 04 00 14 00 02")) == bytes.fromhex("05 04 04 00 00 00 0C")
+    assert line.write(5, 30, 8) == bytes.fromhex("05 06 00 1E 00 08")
+    assert line.read(5, 30, 1) == bytes.fromhex("05 03 02 00 08")
+    sensor.power_cycle()
+    assert repr(sensor) == "<Sensor 5 at 9600>"
+    sensor.ail(Kind.NAN)
+    assert line.read(5, 10, 1) == bytes.fromhex("05 03 02 FF FF")
+
+
+def test_a_sensor_at_an_odd_rate_keeps_its_register_as_it_was() -> None:
+    assert Sensor(1, format=Format(38400)).words[RATE] == 1
+    assert Sensor(1, format=Format(19200)).words[RATE] == 2
