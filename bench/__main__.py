@@ -38,9 +38,10 @@ def run_rows(rows: tuple[Row, ...], options: argparse.Namespace) -> tuple[Runs, 
     runs: Runs = {}
     failures = []
     daemon = tuple(shlex.split(options.daemon)) if options.daemon else DAEMON
+    turns = [(row, master) for row in rows for master in row.masters]
     with tempfile.TemporaryDirectory(prefix="lfs10d-bench-") as folder, Broker(Path(folder)) as broker:
         for number in range(1, options.runs + 1):
-            for row, master in [(row, master) for row in rows for master in row.masters]:
+            for row, master in turns:
                 told = f"run {number}: {row.title}, {master}"
                 try:
                     run = measure(row, master, broker.port, daemon)

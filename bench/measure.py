@@ -143,7 +143,7 @@ def measure(row: Row, master: Master, broker: int, daemon: tuple[str, ...]) -> R
             try:
                 time.sleep(row.warm)
                 if process.poll() is not None:
-                    raise RuntimeError(f"{words[0]} ended: {(folder / 'errors').read_text()}")
+                    raise RuntimeError(f"{words[0]} ended: {(folder / 'errors').read_text().strip()}")
                 line.window()
                 begun, before = time.monotonic(), weigh(process.pid)
                 time.sleep(row.seconds)

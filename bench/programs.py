@@ -11,9 +11,9 @@ from pathlib import Path
 HERE = Path(__file__).parent
 BUILD = HERE / "build"
 FLAGS = ("-std=c11", "-O2", "-Wall", "-Wextra", "-Werror", "-D_GNU_SOURCE")
-LINE_SOURCES = ("paced_line.c", "wire.c", "judge.c")
+LINE_SOURCES = ("paced_line.c", "options.c", "wire.c", "judge.c")
 MASTER_SOURCES = ("reference_master.c",)
-HEADERS = ("rtu.h", "wire.h", "judge.h")
+HEADERS = ("rtu.h", "options.h", "wire.h", "judge.h")
 MOSQUITTO_HEADER = Path("/usr/include/mosquitto.h")
 PATIENCE = 5.0
 """Seconds given to a program to end by itself."""
