@@ -180,6 +180,12 @@ def test_an_answer_is_given_at_its_last_byte(codec: Codec, slave: int) -> None:
     assert outcome.heard == frame
 
 
+def test_the_round_trip_runs_from_the_first_bit_of_the_request() -> None:
+    outcome = carry_out(PLAIN, byte_by_byte(ANSWER, 0.02), quiet_since=0.0)
+    assert outcome.began == T9600.gap
+    assert outcome.rtt == pytest.approx(0.02 + 9 * CHARACTER - T9600.gap)
+
+
 def test_lower_case_ascii_is_understood() -> None:
     frame = b":010304d0f5000033\r\n"
     assert carry_out(attempt(WIND, ASCII), [(0.05, frame)]).answer == (0xD0F5, 0)
@@ -326,6 +332,17 @@ def test_a_babbling_line_is_given_up_after_the_time_out_and_the_longest_answer()
     assert outcome.quiet_since == pytest.approx(outcome.ended, abs=0.002)
 
 
+def test_a_line_that_begins_answers_for_ever_is_given_up_then_too() -> None:
+    outcome = carry_out(PLAIN, [(0.01 + i * 0.001, b"\x01\x03\x04") for i in range(5000)])
+    assert code(outcome) is FaultCode.CRC
+    assert outcome.ended == pytest.approx(SENT_END + 0.2 + 9 * CHARACTER + HUSH, abs=0.01)
+
+
+def test_a_babbling_ascii_line_is_given_up_after_one_pause() -> None:
+    outcome = carry_out(attempt(WIND, ASCII), [(0.02 + i * 0.001, b"\x55") for i in range(5000)])
+    assert outcome.ended == pytest.approx(17 * CHARACTER + 0.2 + 19 * CHARACTER + 1.0, abs=0.002)
+
+
 def test_an_ascii_line_that_begins_for_ever_is_given_up_too() -> None:
     outcome = carry_out(attempt(WIND, ASCII), [(0.05 + i * 0.1, b":0103") for i in range(1000)])
     assert code(outcome) is FaultCode.CRC
@@ -450,6 +467,11 @@ def test_an_echo_hides_no_answer(each: Attempt, *, piecewise: bool) -> None:
 def test_echo_and_answer_in_one_piece_are_taken_apart(each: Attempt) -> None:
     outcome = carry_out(each, [(0.03, REQUEST + ANSWER)])
     assert (outcome.answer, outcome.echoed, outcome.unsolicited) == (VALUES, True, 0)
+
+
+@pytest.mark.parametrize("each", [ECHOING, UNKNOWN])
+def test_nothing_at_all_is_a_timeout_on_an_echoing_adapter_too(each: Attempt) -> None:
+    assert code(carry_out(each, [])) is FaultCode.TIMEOUT
 
 
 @pytest.mark.parametrize("each", [ECHOING, UNKNOWN])

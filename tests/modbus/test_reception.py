@@ -109,6 +109,14 @@ def test_what_comes_too_early_on_a_wire_is_no_answer() -> None:
     assert (ear.answer, ear.spare, ear.rest, ear.unsolicited) == (None, None, 0, 9)
 
 
+@pytest.mark.parametrize(("later", "rest"), [(-0.01, 0), (0.01, 1), (1.01, 2), (9.0, 9)])
+def test_of_one_piece_only_the_last_bytes_can_have_come_after_the_request(later: float, rest: int) -> None:
+    """Counted in characters, at the fastest, from when seven of the request's eight had left."""
+    ear = reception()
+    ear.take(b"\xff" * 9, (7 + 0.9 * later) * TIMING.character)
+    assert ear.rest == rest
+
+
 def test_what_comes_too_early_without_a_pace_is_a_spare() -> None:
     ear = reception(paced=False)
     ear.take(ANSWER, 0.001)
@@ -122,12 +130,31 @@ def test_what_comes_too_early_without_a_pace_is_a_spare() -> None:
 def test_an_echo_is_taken_out() -> None:
     ear = reception(echo=Echo.UNKNOWN)
     ear.take(REQUEST[:3], 0.003)
-    assert (ear.rest, ear.begun, ear.leftover()) == (3, True, REQUEST[:3])
+    assert (ear.rest, ear.begun, ear.leftover(), ear.unsolicited) == (3, True, REQUEST[:3], 0)
+    assert ear.whole_at == 0.003
     ear.take(REQUEST[3:], 0.009)
     assert (ear.rest, ear.begun, ear.echoed, ear.only_request) == (0, False, True, True)
     ear.take(ANSWER, 0.03)
     assert ear.answer is not None
     assert not ear.only_request
+
+
+def test_the_end_of_an_echo_and_the_answer_may_come_in_one_piece() -> None:
+    ear = reception(echo=Echo.ON)
+    ear.take(REQUEST[:3], 0.003)
+    ear.take(REQUEST[3:] + ANSWER, 0.03)
+    assert ear.answer is not None
+    assert (ear.echoed, ear.unsolicited) == (True, 0)
+
+
+def test_half_an_echo_belongs_to_no_answer() -> None:
+    ear = reception(echo=Echo.ON)
+    ear.take(REQUEST[:3], 0.003)
+    assert ear.unsolicited == 3
+
+
+def test_an_expected_echo_of_which_nothing_came_has_not_changed() -> None:
+    assert not reception(echo=Echo.ON).echo_changed
 
 
 def test_what_seemed_echo_and_is_none_is_given_back() -> None:
