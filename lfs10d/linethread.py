@@ -7,7 +7,6 @@ import os
 import select
 import threading
 import time
-from math import inf
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -20,14 +19,19 @@ IDLE_MOST = 5.0
 """The thread passes a turn at least so often, in s, so that a watchdog can tell idle from wedged."""
 WORTH_SLEEPING = 0.0002
 """A wait shorter than this (s) is not split in two."""
+REFUSED_PAUSE = 0.01
+"""How long to wait where the system refuses to watch the port, in s: the next read tells why."""
 
 
 class LineThread(threading.Thread):
-    """Runs `poller` until `stop`; `prepare` is called first, in the thread; `failed` with what ended it by mistake."""
+    """Runs `poller` until `stop`; `prepare` is called first, in the thread; `failed` with what ended it by mistake.
+
+    `declared` is the monotonic time by which the next turn is promised: a watchdog may hold the thread to it.
+    """
 
     def __init__(self, poller: Poller, *, prepare: Callable[[], None], failed: Callable[[BaseException], None]) -> None:
         super().__init__(name="line", daemon=True)
-        self.declared = inf
+        self.declared = time.monotonic() + IDLE_MOST
         self._poller = poller
         self._prepare = prepare
         self._failed = failed
@@ -46,34 +50,41 @@ class LineThread(threading.Thread):
 
     def run(self) -> None:
         """Take turns until `stop`."""
+        self.declared = time.monotonic() + IDLE_MOST
         try:
             self._prepare()
             readable = True
             while not self._stopping:
                 wait = self._poller.turn(time.monotonic(), readable=readable)
-                readable = self._wait(wait)
+                self._wait(wait)
+                # What came while nobody looked must be read before time is called.
+                readable = wait.listen
         except BaseException as error:  # noqa: BLE001 - the daemon must learn of whatever ended its line
             self._failed(error)
         finally:
             self._poller.bus.close()
 
-    def _wait(self, wait: Wait) -> bool:
-        """Wait as told; return whether the port has something to read."""
+    def _wait(self, wait: Wait) -> None:
+        """Wait as told, or until woken."""
         now = time.monotonic()
         self.declared = now + min(max(wait.until - now, 0.0), IDLE_MOST)
         if wait.not_before - now > WORTH_SLEEPING:
-            if self._select([self._woken], wait.not_before - now):
-                return True
+            if self._select([self._woken], min(wait.not_before - now, IDLE_MOST)):
+                return
             now = time.monotonic()
-        fds = [self._woken]
+        watched = [self._woken]
         if wait.listen:
-            fds.append(self._poller.bus.port.fileno())
-        ready = self._select(fds, min(max(wait.until - now, 0.0), IDLE_MOST))
-        return any(fd != self._woken for fd in ready)
+            watched.append(self._poller.bus.port.fileno())
+        self._select(watched, min(max(wait.until - now, 0.0), IDLE_MOST))
 
-    def _select(self, fds: list[int], timeout: float) -> list[int]:
-        ready, _, _ = select.select(fds, [], [], timeout)
+    def _select(self, watched: list[int], timeout: float) -> bool:
+        """Wait until one of `watched` can be read, at most `timeout` s; whether one can."""
+        try:
+            ready, _, _ = select.select(watched, [], [], timeout)
+        except (OSError, ValueError):  # the descriptor is gone or cannot be watched
+            time.sleep(min(timeout, REFUSED_PAUSE))
+            return True
         if self._woken in ready:
             with contextlib.suppress(BlockingIOError):
                 os.read(self._woken, 4096)
-        return ready
+        return bool(ready)

@@ -43,8 +43,6 @@ class Poller:
         self._posted: deque[Callable[[float], None]] = deque()
         self._events: list[Event] = []
         self._errand = Errand.POLL
-        self._known_lost = False
-        self._unsolicited = 0
         self._count_at = clock()
         self._first_counters: UartCounters | None = None
 
@@ -56,7 +54,7 @@ class Poller:
 
     def submit(self, job: Job) -> None:
         """Have `job` done on the line."""
-        self.post(lambda now: self.schedule.submit(job, now))
+        self.post(lambda now: self._events.extend(self.schedule.submit(job, now)))
 
     def replace(self, specs: Iterable[DeviceSpec], rules: PollRules) -> None:
         """Poll these devices from now on."""
@@ -69,7 +67,7 @@ class Poller:
 
     def _reconfigure(self, settings: PortSettings, rules: LineRules, now: float) -> None:
         self.bus.reconfigure(settings, rules, now)
-        self.schedule.timing = self.bus.line_timing
+        self.schedule.retime(self.bus.line_timing)
 
     # -- in the line thread
 
@@ -125,7 +123,7 @@ class Poller:
             ask.timeout,
             ask.patience,
             ask.baudrate,
-            self.schedule.unanswered.earlier(),
+            self.schedule.unanswered.earlier(ask.request.slave),
         )
         self.bus.ask(order)
 
@@ -153,10 +151,8 @@ class Poller:
     def _port_changed(self, changed: PortChanged) -> None:
         self._events.append(changed)
         if changed.fault is None:
-            self._known_lost = False
             self.schedule.port_opened(changed.at)
-        elif not self._known_lost:
-            self._known_lost = True
+        else:
             self._events += self.schedule.port_lost(changed.fault, changed.at)
 
     def _count(self, now: float) -> None:

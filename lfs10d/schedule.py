@@ -4,27 +4,26 @@ Rules
 -----
 1. In this order: jobs without a share (requests); jobs within their share of the line (scans, changes) and probes
    (`lfs10d.probing`); polls (`lfs10d.pollqueue`). While no device answers, polls go before probes.
-2. A slave id that a job excludes is asked by nobody else while the job runs.
+2. A slave id that a job excludes is polled by nobody while the job runs.
 3. When the port is lost every device is offline and gets one reading; nothing is due until it is back, then every
    device is due at once.
+4. One poll, one reading; none if its device is no longer configured, or no longer enabled and nobody requested it.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass
-from math import inf
 from typing import TYPE_CHECKING, TypeAlias
 
-from lfs10d.jobs.job import Ask, Hold, Job, Later
+from lfs10d.jobs.job import Again, Ask, Hold, Job, Later
 from lfs10d.jobs.poll import Poll
+from lfs10d.jobs.queue import JobQueue
 from lfs10d.modbus.frames import ReadRegisters
 from lfs10d.modbus.unanswered import Unanswered
 from lfs10d.pollqueue import PollQueue, back_on_grid, spread
 from lfs10d.probing import Probing
 from lfs10d.reading import Errand, Fault, Reading
-from lfs10d.roster import Device, DeviceSpec, Health, PollRules
-from lfs10d.share import Share
+from lfs10d.roster import LEARNED_MOST, Device, DeviceSpec, Health, PollRules
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -44,7 +43,10 @@ Decision: TypeAlias = Ask | Rest
 
 
 class Schedule:
-    """The devices of one line and the jobs on it; `now` is the line's clock at the beginning."""
+    """The devices of one line and the jobs on it; `now` is the line's clock at the beginning.
+
+    `timing` is that of the line's own rate. The port counts as open until `port_lost`.
+    """
 
     def __init__(self, timing: LineTiming, now: float) -> None:
         self.timing = timing
@@ -53,12 +55,9 @@ class Schedule:
         self._by_slave: dict[int, Device] = {}
         self._polls = PollQueue(self.unanswered)
         self._probing = Probing(now)
-        self._jobs: deque[Job] = deque()
-        self._held: list[tuple[float, Job]] = []
-        self._shares: dict[Job, Share] = {}
-        self._excluded: frozenset[int] = frozenset()
+        self._jobs = JobQueue()
         self._current: tuple[Job, Ask] | None = None
-        self._open = True
+        self._lost: Fault | None = None
 
     # -- what is to be polled
 
@@ -73,7 +72,7 @@ class Schedule:
             device = before.get(spec.name)
             if device is None or _another(device.spec, spec):
                 device = Device(spec, rules, spec.slave)
-                if not self._open:
+                if self._lost:
                     device.cut_off()
                 fresh.append(device)
             elif device.spec.interval != spec.interval:
@@ -81,10 +80,12 @@ class Schedule:
             device.spec, device.rules = spec, rules
             self.devices[spec.name] = device
         self._by_slave = {device.slave: device for device in self.devices.values()}
+        for job in self._jobs.drop(lambda job: isinstance(job, Poll) and not self._wanted(job)):
+            job.cut_off(now)
         self._requeue(fresh, now)
 
     def _requeue(self, fresh: list[Device], now: float) -> None:
-        """Make the queue anew; polls in progress of devices that are gone are dropped."""
+        """Make the queue of polls anew, with new grids for `fresh`."""
         polled = [device for device in self.devices.values() if device.spec.enabled]
         if polled:
             wire_time = _wire_time(polled[0], self.timing)
@@ -94,102 +95,102 @@ class Schedule:
         self._polls.clear()
         for poll in kept:
             self._polls.resume(poll, poll.due)
-        self._jobs = deque(job for job in self._jobs if not isinstance(job, Poll) or self._wanted(job))
-        self._held = [(until, job) for until, job in self._held if not isinstance(job, Poll) or self._wanted(job)]
-        for device in self.devices.values():
+        for device in polled:
             if not device.polling:
                 self._polls.enqueue(device)
-        self._probing.review(self.devices.values(), now)
+        self._probing.review(polled, now)
 
     def _wanted(self, poll: Poll) -> bool:
-        """Whether somebody still waits for this poll: a request, or its device is still polled."""
-        stands = self.devices.get(poll.device.name) is poll.device and poll.device.spec.enabled
-        return stands or poll.errand is Errand.REQUEST
+        """Whether the reading of this poll is of any use (rule 4)."""
+        device = poll.device
+        useful = device.spec.enabled or poll.errand is Errand.REQUEST
+        return useful and self.devices.get(device.name) is device
 
     # -- jobs
 
-    def submit(self, job: Job, now: float) -> None:
-        """Take a job; it is asked as soon as its class and its share allow."""
-        if job.share < 1:
-            self._shares[job] = Share(job.share, credit=0.0, now=now)
-        self._jobs.append(job)
-        self._excluded |= job.excludes
+    def submit(self, job: Job, now: float) -> list[Reading]:
+        """Take a job; it is asked as soon as its class and its share allow. While the port is lost it is cut off."""
+        wanted = not isinstance(job, Poll) or self._wanted(job)
+        if wanted and self._lost is None:
+            self._jobs.submit(job, now)
+            return []
+        job.cut_off(now)
+        return [_reading(job.device, now, self._lost)] if wanted and isinstance(job, Poll) else []
 
     def wake(self, job: Job, now: float) -> None:
         """End the `Hold` of `job`."""
-        for entry in self._held:
-            if entry[1] is job:
-                self._held.remove(entry)
-                self._resume(job, now)
-                return
-
-    def _over(self, job: Job) -> None:
-        self._shares.pop(job, None)
-        if job.excludes:
-            running = [*self._jobs, *(held for _, held in self._held)]
-            self._excluded = frozenset().union(*(other.excludes for other in running))
+        if self._jobs.wake(job):
+            self._resume(job, now)
 
     # -- the port
 
     def port_lost(self, fault: Fault, now: float) -> list[Reading]:
-        """Note that the port is lost: one reading per polled device; every job is over."""
-        jobs = [*self._jobs, *(job for _, job in self._held)]
+        """Note that the port is lost: one reading per device that is or was asked to be polled; every job is over.
+
+        While it is lost already only the reason is noted.
+        """
+        if self._lost is not None:
+            self._lost = fault
+            return []
+        jobs = [*self._jobs.drop(lambda _: True), *self._polls.polls()]
         if self._current is not None:
-            jobs.append(self._current[0])
+            job, ask = self._current
+            self._jobs.over(job)
+            jobs.append(job)
+            self.unanswered.abandoned(ask.request, ask.codec, ask.timeout, now)
         for job in jobs:
             job.cut_off(now)
-        self._jobs.clear()
-        self._held.clear()
-        self._shares.clear()
-        self._excluded = frozenset()
         self._current = None
-        self._open = False
+        self._lost = fault
         self._polls.clear()
         self._probing.stop()
         for device in self.devices.values():
             device.cut_off()
-        return [_reading(device, now, fault) for device in self.devices.values() if device.spec.enabled]
+        requested = [job.device.name for job in jobs if isinstance(job, Poll) and self._wanted(job)]
+        told = [device for device in self.devices.values() if device.spec.enabled or device.name in requested]
+        return [_reading(device, now, fault) for device in told]
+
+    def retime(self, timing: LineTiming) -> None:
+        """Take the times of the line's new rate; what was learned at another rate is forgotten."""
+        if timing.baudrate != self.timing.baudrate:
+            for device in self.devices.values():
+                device.turnarounds.forget()
+        self.timing = timing
 
     def port_opened(self, now: float) -> None:
         """Note that the port is open: every device is due at once."""
-        self._open = True
+        self._lost = None
         for device in self.devices.values():
             device.reconnected()
-            self.unanswered.forget(device.slave)
         self._requeue(list(self.devices.values()), now)
 
     # -- who speaks next
 
     def next(self, now: float) -> Decision:
         """Decide who speaks next; the outcome of an `Ask` must come back through `settled`."""
-        for entry in [entry for entry in self._held if entry[0] <= now]:
-            self._held.remove(entry)
-            self._resume(entry[1], now)
-        while True:
-            job = self._choose(now)
-            if job is None:
-                return Rest(self._next_wish(now))
-            decision = job.ask(now)
+        for job in self._jobs.released(now):
+            self._resume(job, now)
+        while (chosen := self._choose(now)) is not None:
+            decision = chosen.ask(now)
             if isinstance(decision, Ask):
-                self._current = job, decision
+                self._current = chosen, decision
                 return decision
             if isinstance(decision, Hold):
-                self._held.append((inf if decision.until is None else decision.until, job))
+                self._jobs.hold(chosen, decision)
             else:
-                self._over(job)
+                self._jobs.over(chosen)
+        return Rest(min(self._probing.next_at, self._polls.next_due(), self._jobs.next_at(now)))
 
     def _choose(self, now: float) -> Job | None:
-        for _ in range(len(self._jobs)):
-            job = self._jobs.popleft()
-            if job not in self._shares or self._shares[job].allows(now):
-                return job
-            self._jobs.append(job)
+        job = self._jobs.choose(now)
+        if job is not None:
+            return job
         if self._probing.anyone_online:
-            return self._choose_probe(now) or self._polls.choose(now, self._excluded)
-        return self._polls.choose(now, self._excluded) or self._choose_probe(now)
+            return self._choose_probe(now) or self._polls.choose(now, self._jobs.excluded)
+        return self._polls.choose(now, self._jobs.excluded) or self._choose_probe(now)
 
     def _choose_probe(self, now: float) -> Poll | None:
-        device = self._probing.choose(now, self._excluded)
+        device = self._probing.choose(now, self._jobs.excluded)
         if device is None:
             return None
         device.polling = True
@@ -199,16 +200,8 @@ class Schedule:
     def _resume(self, job: Job, key: float) -> None:
         if isinstance(job, Poll) and job.errand is Errand.POLL:
             self._polls.resume(job, key)
-        elif isinstance(job, Poll):
-            self._jobs.appendleft(job)
         else:
-            self._jobs.append(job)
-
-    def _next_wish(self, now: float) -> float:
-        wishes = [self._probing.next_at, self._polls.next_due()]
-        wishes += [until for until, _ in self._held]
-        wishes += [self._shares[job].ready_at(now) for job in self._jobs]
-        return min(wishes)
+            self._jobs.resume(job)
 
     @property
     def errand(self) -> Errand:
@@ -222,23 +215,29 @@ class Schedule:
         if self._current is None:
             raise RuntimeError("an outcome without an Ask")
         (job, ask), self._current = self._current, None
-        self.unanswered.settled(outcome, ask.codec, ask.timeout)
+        self.unanswered.settled(outcome, ask.codec, ask.timeout, now)
         self._learn(outcome)
         self._spend(job, outcome, now)
         following = job.heard(outcome, now)
         if isinstance(job, Poll) and not self._wanted(job):
+            job.cut_off(now)
             return []
         if isinstance(following, Later):
             self._resume(job, following.key)
             return []
-        self._over(job)
+        if isinstance(following, Again):
+            self._jobs.go_on(job)
+            return []
+        self._jobs.over(job)
         return [self._finish(job, now)] if isinstance(job, Poll) else []
 
     def _learn(self, outcome: Outcome) -> None:
         """Learn how long answers take, late ones included, whoever asked."""
         for late in outcome.late:
-            if late.request.slave in self._by_slave:
-                self._by_slave[late.request.slave].turnarounds.learn(late.latency)
+            device = self._by_slave.get(late.request.slave)
+            # What is later than any time-out says nothing of the usual time, and may be an older answer's.
+            if device is not None and late.latency <= LEARNED_MOST:
+                device.turnarounds.learn(late.latency)
         if outcome.turnaround is not None and outcome.answer is not None:
             device = self._by_slave.get(outcome.request.slave)
             if device is not None:
@@ -246,10 +245,10 @@ class Schedule:
 
     def _spend(self, job: Job, outcome: Outcome, now: float) -> None:
         taken = outcome.ended - outcome.asked + self.timing.gap
-        if job in self._shares:
-            self._shares[job].spend(taken, now)
-        elif isinstance(job, Poll) and job.errand is Errand.PROBE:
+        if isinstance(job, Poll) and job.errand is Errand.PROBE:
             self._probing.spend(job.device, taken, now)
+        else:
+            self._jobs.spend(job, taken, now)
 
     def _finish(self, poll: Poll, now: float) -> Reading:
         device = poll.device

@@ -49,13 +49,21 @@ class Later:
     key: float
 
 
-Next: TypeAlias = Later | Done
+@dataclass(frozen=True, slots=True)
+class Again:
+    """More to ask at once, whatever the share says: the slice at another rate goes on.
+
+    A job says so for a quarter of a second at most; the rate is changed per slice, never per exchange.
+    """
+
+
+Next: TypeAlias = Later | Again | Done
 
 
 class Job(Protocol):
     """One thing done on the line.
 
-    `share` is the greatest part of the line's time it may take while others want it, 0 < share <= 1.
+    `share` is the greatest part of the line's time it may take, 0 < share <= 1; with 1 it goes before everybody.
     `excludes` are slave ids that nobody else may ask while it runs.
     """
 
@@ -83,5 +91,5 @@ class Job(Protocol):
         ...
 
     def cut_off(self, now: float) -> None:
-        """Learn that the port is lost; the job is over."""
+        """Learn that the job is over before its time: the port is lost, or its device is no longer configured."""
         ...

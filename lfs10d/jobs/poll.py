@@ -2,8 +2,9 @@
 
 Rules
 -----
-1. An unsynchronised slave is asked its profile's barrier first; only then a value is asked, by retries too. Probes
-   begin with the barrier always. Where the profile has none the slave is left alone until nothing can be pending.
+1. While a late answer could pass for a value's, the slave is asked its profile's barrier first, by retries too; see
+   `lfs10d.modbus.unanswered`. Probes begin with the barrier always. Where the profile has none the slave is left
+   alone until nothing can be pending.
 2. A fault of the line is tried again, `retries` times, as a later exchange. A right frame is not: an exception or
    a value out of range would only be said twice.
 3. One poll, one outcome, whatever it took.
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
     from lfs10d.modbus.exchange import Outcome
     from lfs10d.modbus.unanswered import Unanswered
-    from lfs10d.profiles.schema import Block
+    from lfs10d.profiles.blocks import Block
     from lfs10d.roster import Device
 
 _NOTHING: frozenset[int] = frozenset()
@@ -62,30 +63,30 @@ class Poll:
         """Decide what to put on the line now."""
         device = self.device
         spec = device.spec
-        timeout = device.probe_timeout if self.errand is Errand.PROBE else device.timeout
-        pending = self._unanswered.unsynchronised(device.slave, now)
+        block = self._blocks[self._block]
+        request = ReadRegisters(device.slave, block.address, block.count, block.function)
         barrier = spec.profile.barrier
-        if pending:
-            until = self._unanswered.quiet_until(device.slave)
-            if until is None and barrier is None:
-                self._unanswered.leave_alone(device.slave, device.timeout)
-                until = self._unanswered.quiet_until(device.slave)
-            if until is not None:
-                return Hold(until)
-        self._barrier_asked = barrier is not None and (pending or self._barrier_due)
-        if self._barrier_asked and barrier is not None:
+        if barrier is None and self._unanswered.confusable(request, spec.codec):
+            self._unanswered.leave_alone(device.slave, device.timeout)
+        until = self._unanswered.left_alone_until(device.slave, now)
+        if until is not None:
+            return Hold(until)
+        self._barrier_asked = False
+        if barrier is not None and (self._barrier_due or self._unanswered.confusable(request, spec.codec)):
             request = ReadRegisters(device.slave, barrier.register, barrier.count, barrier.function)
-        else:
-            block = self._blocks[self._block]
-            request = ReadRegisters(device.slave, block.address, block.count, block.function)
+            self._barrier_asked = True
+        elif (until := self._unanswered.lingering_until(request, spec.codec, now)) is not None:
+            return Hold(until)
+        timeout = device.probe_timeout if self.errand is Errand.PROBE else device.timeout
         return Ask(request, spec.codec, timeout, device.turnarounds.p99)
 
     def heard(self, outcome: Outcome, now: float) -> Next:
         """Take the outcome of what was asked."""
         device = self.device
         self.at = outcome.ended
-        self.failed_attempts += [FaultCode.LATE for late in outcome.late if late.request.slave == device.slave]
         fault = outcome.fault
+        if fault is None or fault.code is not FaultCode.LATE:  # else the attempt itself is counted as late
+            self.failed_attempts += [FaultCode.LATE for late in outcome.late if late.request.slave == device.slave]
         if self._barrier_asked:
             alive = fault is None or (fault.code is FaultCode.EXCEPTION and not outcome.ambiguous)
             if alive:

@@ -1,10 +1,8 @@
 """The bus: owns the port and obeys one order at a time.
 
-A thin shell around `Exchange`; it decides nothing but when to
-reopen the port.
-
-Every byte on the line passes here, in one thread. `turn` does what can be done now and says when to come back; the
-thread waits in between, in virtual time nobody does.
+A thin shell around `Exchange`; it decides nothing but when to reopen the port. Every byte on the line passes here,
+in one thread. `step` does what can be done now and says when to come back; the thread waits in between, in virtual
+time nobody does.
 """
 
 from __future__ import annotations
@@ -114,6 +112,7 @@ class Bus:
         """Try to open the port, by its path, if the time has come."""
         if now < self._reopen_at:
             return Wait(self._reopen_at, listen=False)
+        self.port.settings = self._settings
         try:
             self.port.open()
         except PortError as error:
@@ -122,6 +121,7 @@ class Bus:
             changed = self._lost(error, now)
             return changed or Wait(self._reopen_at, listen=False)
         self.open = True
+        self.timing = self.line_timing
         self._fault = None
         self._pause = REOPEN_FIRST
         self._echo.reopened()
@@ -153,9 +153,9 @@ class Bus:
         before, self._settings = self._settings, settings
         if self.open and _at_opening(before) != _at_opening(settings):
             self.close()
-        if not self.open:
-            self.port.reconfigure(settings)
-            self.timing = self._timing(settings)
+        if self.open:
+            self.timing = self._timing(self.port.settings)
+        else:
             self._reopen_at = now
 
     @property

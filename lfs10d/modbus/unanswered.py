@@ -5,12 +5,18 @@ no answer stays here until its slave has answered something that can only be new
 
 Rules
 -----
-1. No answer, or bytes that do not begin as one: the slave is unsynchronised; its next exchange must be a *barrier*,
-   a read of another shape than the one unanswered.
-2. Any answer to the barrier, whole or begun as one, ends that: nothing older is pending.
-3. An exception looks the same for every shape. While something older was pending it may be the older one's: then
-   the slave stays unsynchronised and is left alone for twice its time-out, at least 1 s, after which it counts as
-   synchronised. So does a slave whose profile has no second shape.
+1. No answer, or bytes that do not begin as one: the request stays pending. While a pending request has the *shape*
+   (function and length of the answer) of another, that other must not be asked for its value: either answer would
+   do. A read of another shape goes first, the *barrier*.
+2. An answer belongs to the oldest pending request of its shape, if there is one, else to the request just asked.
+   What is older is over; what is newer stays pending, the request just asked included. So an answer of a shape that
+   nobody was waiting for proves that nothing is pending.
+3. Bytes that only begin as an answer end the oldest pending request, whatever its shape.
+4. An exception looks the same for every shape. While a request of its function is pending it may be that one's: then
+   the slave is left alone for twice its time-out, at least 1 s, after which nothing counts as pending. So is a slave
+   whose profile has no second shape.
+5. A request met by silence *lingers* for as long, though what was asked later is answered: a bridge or a buffer on
+   the way may bring answers out of turn. Until then its shape is not asked for a value.
 """
 
 from __future__ import annotations
@@ -18,79 +24,146 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from lfs10d.modbus.exchange import Pending
+from lfs10d.reading import FaultCode
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
     from lfs10d.modbus.exchange import Outcome
     from lfs10d.modbus.frames import Codec, Request
 
 QUIET_LEAST = 1.0
 """How long a slave is left alone where no barrier can tell, at least; in s."""
+_SILENT = frozenset({FaultCode.TIMEOUT, FaultCode.LATE, FaultCode.WRONG_SLAVE})
+"""With these faults the asked slave itself said nothing."""
+EQUALS_KEPT = 4
+"""Of equal pending requests so many are remembered, the newest: no sensor keeps more of them in mind."""
 
 
 class Unanswered:
     """The unanswered requests of one line, by slave id."""
 
     def __init__(self) -> None:
-        self._pending: dict[int, list[Pending]] = {}
+        self._pending: dict[int, tuple[Pending, ...]] = {}
+        self._lingers: dict[Pending, float] = {}
+        self._over: set[Pending] = set()
         self._quiet_until: dict[int, float] = {}
 
-    def earlier(self) -> tuple[Pending, ...]:
-        """Return every request whose answer may still come, each slave's oldest first."""
-        if not self._pending:
-            return ()
-        return tuple(pending for each in self._pending.values() for pending in each)
+    @property
+    def everybodys(self) -> Mapping[int, tuple[Pending, ...]]:
+        """The requests of every slave id whose answers may still come, each slave's oldest first; a view."""
+        return self._pending
 
-    def unsynchronised(self, slave: int, now: float) -> bool:
-        """Whether an answer to an older request of `slave` may still come."""
-        if slave not in self._pending:
-            return False
-        if now >= self._quiet_until.get(slave, now + 1):
-            self.forget(slave)
-            return False
-        return True
+    def earlier(self, slave: int) -> tuple[Pending, ...]:
+        """Return the requests to `slave` whose answers may still come, the oldest first."""
+        return self._pending.get(slave, ())
 
-    def quiet_until(self, slave: int) -> float | None:
-        """Until when `slave` must be left alone (rule 3); None: a barrier may be asked now."""
-        return self._quiet_until.get(slave)
+    def confusable(self, request: Request, codec: Codec) -> bool:
+        """Whether an answer to an older request could pass for that to `request`, unless a barrier goes first."""
+        pending = self._pending.get(request.slave)
+        return pending is not None and any(each not in self._over and _alike(request, codec, each) for each in pending)
+
+    def lingering_until(self, request: Request, codec: Codec, now: float) -> float | None:
+        """Return until when `request` must not be asked though a barrier was answered (rule 5), None if it may be."""
+        pending = self._pending.get(request.slave)
+        if pending is None:
+            return None
+        self._drop(request.slave, [each for each in pending if each in self._over], now)
+        alike = [each for each in self.earlier(request.slave) if _alike(request, codec, each)]
+        return max((self._lingers[each] for each in alike if each in self._over), default=None)
 
     def leave_alone(self, slave: int, timeout: float) -> None:
-        """Decide that no barrier helps for `slave`, whose time-out is `timeout` s: rule 3."""
+        """Decide that no barrier helps for `slave`, whose time-out is `timeout` s: rule 4."""
         sent = max(pending.sent_end for pending in self._pending[slave])
         self._quiet_until[slave] = sent + max(2 * timeout, QUIET_LEAST)
 
-    def forget(self, slave: int) -> None:
-        """Count `slave` as synchronised."""
-        self._pending.pop(slave, None)
-        self._quiet_until.pop(slave, None)
+    def left_alone_until(self, slave: int, now: float) -> float | None:
+        """Return until when `slave` must be left alone, None if it may be asked now."""
+        until = self._quiet_until.get(slave)
+        if until is not None and now >= until:
+            for each in self._pending.pop(slave, ()):
+                self._forget(each)
+            del self._quiet_until[slave]
+            return None
+        return until
 
-    def settled(self, outcome: Outcome, codec: Codec, timeout: float) -> None:
-        """Learn from an exchange that is over; `timeout` in s is the one it had."""
+    def abandoned(self, request: Request, codec: Codec, timeout: float, now: float) -> None:
+        """Note that the exchange of `request` was cut off at `now`: it may have been sent."""
+        if request.slave:
+            self._remember(Pending(request, codec, now), lingers=now + max(2 * timeout, QUIET_LEAST))
+
+    def settled(self, outcome: Outcome, codec: Codec, timeout: float, now: float) -> None:
+        """Learn from an exchange that is over at `now`; `timeout` in s is the one it had."""
         slave = outcome.request.slave
         for late in outcome.late:
-            self._answered(late.request)
+            self._came_late(late.request, now)
         if outcome.sent_end is None or slave == 0:
             return
-        if outcome.ambiguous:
-            self._remember(outcome.request, codec, outcome.sent_end)
+        asked = Pending(outcome.request, codec, outcome.sent_end)
+        pending = self._pending.get(slave, ())
+        if outcome.answer is None and not outcome.answered:
+            silent = outcome.fault is not None and outcome.fault.code in _SILENT
+            self._remember(asked, lingers=asked.sent_end + max(2 * timeout, QUIET_LEAST) if silent else None)
+        elif outcome.ambiguous and outcome.answer is None:
+            self._remember(asked, lingers=None)
             self.leave_alone(slave, timeout)
-        elif outcome.answer is not None or outcome.answered:
-            self.forget(slave)
-        else:
-            self._remember(outcome.request, codec, outcome.sent_end)
+        elif pending:
+            over = _over_by(outcome, codec, pending)
+            self._drop(slave, pending[:over], now)
+            if over < len(pending) or _alike(asked.request, codec, pending[over - 1]):
+                self._remember(asked, lingers=None)
 
-    def _answered(self, request: Request) -> None:
+    def _came_late(self, request: Request, now: float) -> None:
         """Drop `request` and, since a slave answers in order, what its slave was asked before."""
-        pending = self._pending.get(request.slave, [])
-        requests = [each.request for each in pending]
-        if request not in requests:
-            return
-        rest = pending[requests.index(request) + 1 :]
-        if rest:
-            self._pending[request.slave] = rest
-        else:
-            self.forget(request.slave)
+        pending = self._pending.get(request.slave, ())
+        for place, each in enumerate(pending):
+            if each.request == request:
+                self._lingers.pop(each, None)
+                self._drop(request.slave, pending[: place + 1], now)
+                return
 
-    def _remember(self, request: Request, codec: Codec, sent_end: float) -> None:
-        """Keep the newest of equal requests: a slave that answers it has answered those before."""
-        pending = [each for each in self._pending.get(request.slave, []) if each.request != request]
-        self._pending[request.slave] = [*pending, Pending(request, codec, sent_end)]
+    def _remember(self, asked: Pending, lingers: float | None) -> None:
+        slave = asked.request.slave
+        pending = self._pending.get(slave, ())
+        equals = [each for each in pending if each.request == asked.request]
+        if len(equals) >= EQUALS_KEPT:
+            self._forget(equals[0])
+            pending = tuple(each for each in pending if each is not equals[0])
+        self._pending[slave] = (*pending, asked)
+        if lingers is not None:
+            self._lingers[asked] = lingers
+
+    def _drop(self, slave: int, over: Iterable[Pending], now: float) -> None:
+        """Count these requests to `slave` as answered; those that linger are kept until then."""
+        gone = []
+        for each in over:
+            if self._lingers.get(each, now) > now:
+                self._over.add(each)
+            else:
+                self._forget(each)
+                gone.append(each)
+        kept = tuple(each for each in self._pending[slave] if each not in gone)
+        if kept:
+            self._pending[slave] = kept
+        else:
+            del self._pending[slave]
+            self._quiet_until.pop(slave, None)
+
+    def _forget(self, each: Pending) -> None:
+        self._lingers.pop(each, None)
+        self._over.discard(each)
+
+
+def _over_by(outcome: Outcome, codec: Codec, pending: tuple[Pending, ...]) -> int:
+    """Return how many of `pending`, the oldest first, are over by an answer to the request asked after them."""
+    if outcome.answer is None and outcome.fault is not None and outcome.fault.code is not FaultCode.EXCEPTION:
+        return 1
+    if outcome.answer is None:
+        return len(pending)
+    alike = (place for place, each in enumerate(pending, 1) if _alike(outcome.request, codec, each))
+    return next(alike, len(pending))
+
+
+def _alike(request: Request, codec: Codec, other: Pending) -> bool:
+    """Whether the answers of the two have one shape."""
+    return codec.shapes(request)[0] == other.codec.shapes(other.request)[0]
