@@ -186,6 +186,8 @@ class Bus:
 
     def _step(self, now: float, *, readable: bool) -> Step:
         heard = self.port.read() if readable else b""
+        if heard:
+            now = self._clock()  # a byte may have come after the turn began: it counts from when it was read
         if self._exchange is None:
             if heard:  # nobody asked for it: it restarts the silence
                 self.unsolicited += len(heard)
@@ -243,8 +245,9 @@ class Bus:
             if isinstance(action, Settled):
                 return self._settled(action.outcome)
             if self.port.waiting():  # the last look before we speak
+                data = self.port.read()
                 now = self._clock()
-                exchange.received(self.port.read(), now)
+                exchange.received(data, now)
                 continue
             begun = self._clock()
             self.port.write(action.frame)
