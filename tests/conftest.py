@@ -197,7 +197,7 @@ class Mosquitto:
         lines = [
             "per_listener_settings false",
             "persistence false",
-            "max_queued_messages 0",
+            "max_queued_messages 100000",  # with 0, no limit, 2.0.11 disconnects whoever publishes what is denied
             "log_type all",
             f"user {getpass.getuser()}",  # started by root it would change to a user that cannot read our files
             f"listener {self.port} 127.0.0.1",

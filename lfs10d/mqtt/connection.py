@@ -43,8 +43,8 @@ if TYPE_CHECKING:
 CONNECT_TIMEOUT = 5.0
 """Seconds for each address of the broker to answer, and for each step of the TLS handshake."""
 
-CONNACK_TIMEOUT = 10.0
-"""Seconds from an open connection to the broker's CONNACK."""
+CONNACK_TIMEOUT = 5.0
+"""Seconds from an open connection to the broker's CONNACK; amqtt 0.12 leaves a CONNECT of MQTT 5 unanswered."""
 
 RECEIVE_MAXIMUM = 64
 """Requests the broker may have under way to us: a flood waits there, not in our memory."""
@@ -243,7 +243,7 @@ class Connection:
         self.abandon()
         if events is not None:
             message = f"{self._settings.place}: connected, but says nothing: is mqtt.port that of an MQTT broker?"
-            events.ended(Ended(Ending.UNREACHABLE, message))
+            events.ended(Ended(Ending.WRONG_VERSION, message))
 
     def _cancel_connack(self) -> None:
         if self._connack is not None:

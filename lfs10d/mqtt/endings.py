@@ -49,9 +49,9 @@ class Ending(StrEnum):
     """What happened, as far as the next attempt depends on it."""
 
     UNREACHABLE = "unreachable"
-    """No CONNACK came: name, network, TLS, password file, or nothing said in time."""
+    """No CONNECT was sent: name, network, TLS, password file."""
     WRONG_VERSION = "wrong_version"
-    """The broker refuses this version of MQTT, or closed the connection in place of a CONNACK."""
+    """The broker refuses this version of MQTT, or sent no CONNACK at all, which old brokers do instead."""
     REFUSED = "refused"
     """The CONNACK says no for another reason."""
     LOST = "lost"

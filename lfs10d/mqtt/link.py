@@ -111,6 +111,10 @@ class Link:
             self._connection.abandon()
             self.ended(Ended(Ending.LOST, f"{self._settings.place}: {why}"))
 
+    def missed(self) -> None:
+        """Note that the broker had published our will before we came back."""
+        self._reconnect.missed()
+
     def renew(self, settings: BrokerSettings) -> None:
         """Begin anew with other settings, after `leave`."""
         self._settings = settings

@@ -2,12 +2,13 @@
 
 - A connection that held is renewed at once; then after 1, 2, 4 ... 30 s, each shortened by chance by up to a
   quarter, so that a hundred gateways do not come back in step.
-- Each round begins with the configured version. A broker that refuses 5, or closes the connection in place of
-  an answer, is asked in 3.1.1 at once: some old brokers say nothing. Nothing is remembered, because a broker
+- Each round begins with the configured version. A broker that refuses 5, or does not answer, is asked in
+  3.1.1 at once: some old brokers say nothing. Nothing is remembered, because a broker
   may be replaced by a better one.
 - Taken over by a client with our id, we wait 60 s, doubling to 1 h, until a connection has held for 2 h. Not
-  every broker says so (by 3.1.1 none can, mosquitto 2.0.11 does not): three connections in a row that do not
-  hold, without a failed attempt between them, are taken for that, and afterwards each one that does not hold.
+  every broker says so (by 3.1.1 none can, mosquitto 2.0.11 does not). So the third connection in a row that
+  does not hold is taken for that, if no attempt failed between them and the broker itself ended those before:
+  then it had published our will when we came back. A broker that was restarted has not.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ TAKEN_OVER_FORGOTTEN = 7200.0
 """Seconds (contract, section 3); the last is longer than the other side can be waiting."""
 
 SHORT_MOST = 3
-"""This many connections in a row that do not hold are another client with our id."""
+"""This many connections in a row that the broker ended before they held are another client with our id."""
 
 
 @dataclass(slots=True)
@@ -58,6 +59,7 @@ class Reconnect:
     _takeover: float = TAKEN_OVER_FIRST
     _since: float | None = None
     _short: int = 0
+    _unproved: bool = False
 
     def __post_init__(self) -> None:
         self.version = self.configured
@@ -65,6 +67,11 @@ class Reconnect:
     def accepted(self, now: float) -> None:
         """Note that the connection stands."""
         self._since = now
+
+    def missed(self) -> None:
+        """Note that the broker had published our will: it lives, and ended the last connection itself."""
+        self._short += self._unproved
+        self._unproved = False
 
     def held(self, now: float) -> None:
         """Forget a duplicate once the connection has held for as long as the other side may be waiting."""
@@ -83,13 +90,16 @@ class Reconnect:
             self.due = now
         else:
             self._short = 0
+            self._unproved = False
             self._later(now)
 
     def _lost(self, ended: Ended, life: float, now: float) -> None:
         if life >= TAKEN_OVER_FORGOTTEN:
             self._takeover = TAKEN_OVER_FIRST
-        self._short = self._short + 1 if life < HELD else 0
-        suspect = self._short >= (1 if self.duplicate else SHORT_MOST)
+        self._unproved = life < HELD
+        if not self._unproved:
+            self._short = 0
+        suspect = self._unproved and self._short >= SHORT_MOST - 1
         if ended.ending is Ending.TAKEN_OVER or suspect:
             self.duplicate = True
             self.due = now + self._takeover

@@ -209,9 +209,8 @@ class Uplink:
     def arrived(self, message: Incoming) -> None:
         """Take a request, or somebody's word that we are offline, or what is retained."""
         if message.topic == self._topics.availability:
-            if message.payload == OFFLINE.encode() and self._outbox.announced and not self._leaving:
-                # The will of our connection before, or somebody's mistake.
-                self.publish([_ONLINE])
+            if message.payload == OFFLINE.encode() and not self._leaving:
+                self._heard_offline()
             return
         now = asyncio.get_running_loop().time()
         if message.retained and self._sweep is not None and self._sweep.heard(message.topic, message.payload, now):
@@ -219,6 +218,13 @@ class Uplink:
         request = inbound(message, self._topics)
         if request is not None:
             self._requested(request)
+
+    def _heard_offline(self) -> None:
+        """Contradict the will of our connection before, or somebody's mistake; the burst will do so by itself."""
+        if self._outbox.announced:
+            self.publish([_ONLINE])
+        else:
+            self._link.missed()
 
     def _acknowledges_nothing(self) -> None:
         self._link.drop("acknowledges nothing any more")

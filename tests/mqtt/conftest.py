@@ -58,17 +58,15 @@ def _serving() -> Callable[[Answer], AbstractAsyncContextManager[int]]:
 class OldBroker:
     """A broker of 2014: MQTT 3.1.1 (level 4) and nothing else. It keeps what is published to it.
 
-    `refusal` is what a client of MQTT 5 is told: the CONNACK of section 3.2.2.3 of 3.1.1, or nothing.
+    `refusal` is what a client of MQTT 5 is told before it is thrown out; None: nothing, and it may stay.
     """
 
-    refusal: bytes = b"\x20\x02\x00\x01"
+    refusal: bytes | None = b"\x20\x02\x00\x01"
     levels: list[int] = field(default_factory=list)
     """The protocol level of each CONNECT."""
     published: list[tuple[str, bytes]] = field(default_factory=list)
     granted: bytes = b"\x01\x01"
     """What each filter of a SUBSCRIBE is told."""
-    kick_after: float | None = None
-    """Seconds after which an accepted client is thrown out without a word."""
 
     @contextlib.asynccontextmanager
     async def running(self) -> AsyncIterator[int]:
@@ -77,10 +75,8 @@ class OldBroker:
             yield port
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(self.kick_after):
-                while await self._answer(reader, writer):
-                    await writer.drain()
+        while await self._answer(reader, writer):
+            await writer.drain()
 
     async def _answer(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> bool:
         head = (await reader.readexactly(1))[0]
@@ -94,7 +90,12 @@ class OldBroker:
         body = await reader.readexactly(length)
         if head == CONNECT:
             self.levels.append(body[6])
-            writer.write(b"\x20\x02\x00\x00" if body[6] == 4 else self.refusal)
+            if body[6] == 4:
+                writer.write(b"\x20\x02\x00\x00")
+            elif self.refusal is None:
+                return True
+            else:
+                writer.write(self.refusal)
             return body[6] == 4
         if head & 0xF0 == PUBLISH:
             end = 2 + int.from_bytes(body[:2], "big")

@@ -7,6 +7,7 @@ import contextlib
 import logging
 import socket
 import subprocess
+import threading
 import time
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -199,9 +200,9 @@ def test_a_dropped_connection_is_made_anew(mosquitto: Mosquitto) -> None:
 # 3.1.1
 
 
-@pytest.mark.parametrize("refused_by", [b"\x20\x02\x00\x01", b"\x20\x03\x00\x84\x00", b""])
+@pytest.mark.parametrize("refused_by", [b"\x20\x02\x00\x01", b"\x20\x03\x00\x84\x00", b"", None])
 def test_a_broker_that_refuses_5_is_spoken_to_in_3_1_1_with_one_warning(
-    old_broker: OldBroker, refused_by: bytes, caplog: pytest.LogCaptureFixture
+    old_broker: OldBroker, refused_by: bytes | None, caplog: pytest.LogCaptureFixture
 ) -> None:
     async def scenario() -> None:
         old_broker.refusal = refused_by
@@ -230,17 +231,6 @@ def test_3_1_1_is_spoken_at_once_where_configured(old_broker: OldBroker, caplog:
 
     asyncio.run(scenario())
     assert not [record for record in caplog.records if record.levelno >= logging.WARNING]
-
-
-def test_a_client_with_our_id_is_suspected_after_three_short_connections(old_broker: OldBroker) -> None:
-    async def scenario() -> None:
-        old_broker.kick_after = 0.05
-        settings = {"version": Version.V311}
-        async with old_broker.running() as port, linked(settings_of(port, **settings)) as (link, witness):
-            await witness.until(lambda: len(witness.endings) == 3)
-            assert link.duplicate
-
-    asyncio.run(scenario())
 
 
 def test_a_broker_that_tells_of_the_takeover_is_believed_at_once(
@@ -423,6 +413,40 @@ def test_a_host_that_swallows_everything_holds_up_neither_the_loop_nor_the_end()
 
     with black_hole() as port:
         assert asyncio.run(scenario(port)) < 1.5
+
+
+def test_what_is_given_up_before_it_was_open_never_speaks_to_the_broker(mosquitto: Mosquitto) -> None:
+    given_up = threading.Event()
+
+    def password() -> Secret:
+        given_up.wait(PATIENCE)
+        return Secret("x")
+
+    async def scenario() -> None:
+        link = Link(settings_of(mosquitto.port, username="gate", password=password), Witness())
+        link.start()
+        await link.leave(1.0)
+        given_up.set()
+        for each in threading.enumerate():
+            if each.name.startswith("paho"):
+                await asyncio.to_thread(each.join, PATIENCE)
+
+    asyncio.run(scenario())
+    assert "New client connected" not in mosquitto.log
+
+
+def test_waiters_are_all_told_and_a_late_one_is_told_no_more(mosquitto: Mosquitto) -> None:
+    async def scenario() -> None:
+        link = Link(settings_of(mosquitto.port), Witness())
+        with pytest.raises(BrokerError):
+            await link.opened(0.0)
+        early = asyncio.create_task(link.opened(PATIENCE))
+        await asyncio.sleep(0)
+        link.start()
+        assert await early is await link.opened(PATIENCE)
+        await link.leave(1.0)
+
+    asyncio.run(scenario())
 
 
 def test_a_server_that_says_nothing_holds_up_nothing_either(serving: Serving) -> None:

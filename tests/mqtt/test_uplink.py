@@ -457,6 +457,47 @@ def test_nothing_is_lost_when_the_broker_is_killed_and_comes_back(mosquitto: Mos
     asyncio.run(scenario())
 
 
+def test_beyond_ten_thousand_samples_the_oldest_go_and_that_is_told_once(
+    unused_port: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def scenario() -> None:
+        async with running(Site(unused_port)) as uplink:
+            uplink.publish(sample(seq) for seq in range(1, 10_002))
+            uplink.publish([sample(10_002)])
+            assert uplink.backlog == telemetry.Backlog(depth=10_000, oldest_ts=3000, dropped=2)
+
+    asyncio.run(scenario())
+    assert sum("the oldest are dropped" in each for each in caplog.messages) == 1
+
+
+def test_a_connection_of_no_use_is_made_anew(mosquitto: Mosquitto) -> None:
+    async def scenario() -> None:
+        listener = mosquitto.subscribe(f"{B}/availability")
+        site = Site(mosquitto.port)
+        async with running(site) as uplink:
+            await online(listener)
+            uplink._acknowledges_nothing()
+            assert site.changes == [True, False]
+            await online(listener, 2)
+
+    asyncio.run(scenario())
+
+
+def test_a_reload_during_a_sweep_does_not_begin_another(mosquitto: Mosquitto) -> None:
+    mosquitto.publish(f"{B}/device/gone/state", "x", retain=True)
+
+    async def scenario() -> None:
+        listener = mosquitto.subscribe(f"{B}/device/gone/#")
+        async with running(Site(mosquitto.port)) as uplink:
+            await until(lambda: uplink._sweep is not None, "the sweep after the connect")
+            await uplink.reload()
+            await until(lambda: uplink._sweep is None, "its end")
+            await until(lambda: not listener.heard[-1].payload, "cleared")
+            assert len(listener.heard) == 2
+
+    asyncio.run(scenario())
+
+
 def test_other_settings_are_taken_at_a_reload(mosquitto: Mosquitto) -> None:
     async def scenario() -> None:
         listener = mosquitto.subscribe([f"{B}/availability", "$SYS/none"])

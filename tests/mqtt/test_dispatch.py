@@ -1,0 +1,277 @@
+"""Letters reach a connection in slices, and the broker's answers reach the outbox; in virtual time."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import selectors
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import pytest
+
+from lfs10d import telemetry
+from lfs10d.mqtt.dispatch import ACKNOWLEDGED_WITHIN, LETTERS_AT_ONCE, SAMPLES_AT_ONCE, Dispatch
+from lfs10d.mqtt.messages import Accepted
+from lfs10d.mqtt.outbox import PAST_AFTER, Outbox
+from lfs10d.mqtt.settings import Version
+from lfs10d.mqtt.topics import Topics
+from lfs10d.telemetry import Kind, Publication, Sample
+
+if TYPE_CHECKING:
+    from collections.abc import Coroutine
+
+    from lfs10d.mqtt.connection import Connection
+
+ONLINE = telemetry.retained("availability", "online")
+
+
+class VirtualSelector(selectors.SelectSelector):
+    """Waits for nothing: the time it was asked to wait passes at once."""
+
+    now = 0.0
+
+    def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
+        """Return what is ready now, else let the time pass."""
+        ready = super().select(0)
+        if not ready:
+            assert timeout is not None, "every task waits, and no timer is pending"
+            self.now += timeout
+        return ready
+
+
+def in_virtual_time(scenario: Coroutine[object, object, None]) -> None:
+    """Run a scenario in a loop whose clock only waiting moves."""
+    selector = VirtualSelector()
+    loop = asyncio.SelectorEventLoop(selector)
+    loop.time = lambda: selector.now  # type: ignore[method-assign]  # the loop's clock is what is replaced
+    try:
+        loop.run_until_complete(scenario)
+    finally:
+        loop.close()
+
+
+@dataclass
+class Wire:
+    """Stands in for a connection; keeps what is handed over, and at which turn of the loop."""
+
+    sent: list[tuple[str, bytes, int, bool, bytes | None]] = field(default_factory=list)
+    gone: bool = False
+
+    def publish(
+        self, topic: str, payload: bytes, *, qos: int = 1, retain: bool = False, correlation: bytes | None = None
+    ) -> int | None:
+        if self.gone:
+            return None
+        self.sent.append((topic, payload, qos, retain, correlation))
+        return len(self.sent)
+
+
+class Desk:
+    """A dispatch between an outbox and a wire, connected, its burst settled."""
+
+    def __init__(self, *, limit: int | None = None, receive_maximum: int = 65_535) -> None:
+        self.outbox = Outbox()
+        self.wire = Wire()
+        self.stuck = 0
+        self.dispatch = Dispatch(self.outbox, Topics("b/line0"), "line0", epoch_ms=lambda: 7, stuck=self._stuck)
+        self.accepted = Accepted(Version.V5, receive_maximum, limit)
+
+    def _stuck(self) -> None:
+        self.stuck += 1
+
+    async def connect(self) -> None:
+        connection: Connection = self.wire  # type: ignore[assignment]  # as much of one as is used
+        self.dispatch.connected(connection, self.accepted)
+        self.outbox.burst([], ONLINE)
+        await self.turn()
+        self.acknowledge()
+
+    async def turn(self, times: int = 50) -> None:
+        """Let the loop turn without time passing."""
+        self.dispatch.wake()
+        for _ in range(times):
+            await asyncio.sleep(0)
+
+    def acknowledge(self, reason: int = 0) -> None:
+        """Answer everything that was handed over."""
+        for mid in range(1, len(self.wire.sent) + 1):
+            self.dispatch.acknowledged(mid, reason)
+
+    def add(self, *publications: Publication) -> None:
+        for publication in publications:
+            self.outbox.add(publication, asyncio.get_running_loop().time())
+
+    @property
+    def topics(self) -> list[str]:
+        return [topic for topic, *_ in self.wire.sent]
+
+
+def sample(seq: int) -> Publication:
+    measured = Sample("a", "k", seq, 0, "synced", None, {}, (), "bad", "timeout", None)
+    return Publication("device/a/telemetry", {"seq": seq}, Kind.SAMPLE, retain=False, qos=1, sample=measured)
+
+
+def test_a_letter_goes_with_its_topic_qos_retain_flag_and_correlation() -> None:
+    async def scenario() -> None:
+        desk = Desk()
+        await desk.connect()
+        desk.add(telemetry.retained("device/a/stats", {}, qos=0))
+        desk.outbox.add(Publication("response/x", {}, Kind.RESPONSE, retain=False, qos=1), 0.0, correlation=b"\1")
+        await desk.turn()
+        assert desk.wire.sent == [
+            ("b/line0/availability", b"online", 1, True, None),
+            ("b/line0/device/a/stats", b"{}", 0, True, None),
+            ("b/line0/response/x", b"{}", 1, False, b"\1"),
+        ]
+
+    in_virtual_time(scenario())
+
+
+def test_a_few_letters_go_in_one_turn_of_the_loop() -> None:
+    async def scenario() -> None:
+        desk = Desk()
+        await desk.connect()
+        desk.add(*(sample(seq) for seq in range(1, 11)))
+        before = len(desk.wire.sent)
+        desk.dispatch.wake()
+        counts = []
+        for _ in range(3):
+            await asyncio.sleep(0)
+            counts.append(len(desk.wire.sent) - before)
+        assert counts == [LETTERS_AT_ONCE, 2 * LETTERS_AT_ONCE, 10]
+
+    in_virtual_time(scenario())
+
+
+@pytest.mark.parametrize(("receive_maximum", "window"), [(65_535, 20), (3, 3)])
+def test_no_more_is_under_way_than_the_broker_receives(receive_maximum: int, window: int) -> None:
+    async def scenario() -> None:
+        desk = Desk(receive_maximum=receive_maximum)
+        await desk.connect()
+        desk.add(*(sample(seq) for seq in range(1, 31)))
+        await desk.turn()
+        assert len(desk.wire.sent) == 1 + window
+
+    in_virtual_time(scenario())
+
+
+def test_an_array_is_serialised_in_slices_and_goes_by_itself_when_its_time_has_come() -> None:
+    async def scenario() -> None:
+        desk = Desk()
+        desk.add(*(sample(seq) for seq in range(1, 101)))
+        await asyncio.sleep(5.0)
+        await desk.connect()
+        await asyncio.sleep(PAST_AFTER - 0.1)
+        assert desk.topics == ["b/line0/availability"]
+        await asyncio.sleep(0.2)
+        await desk.turn(2 + 100 // SAMPLES_AT_ONCE)
+        assert desk.topics == ["b/line0/availability", "b/line0/device/a/history"]
+        told = json.loads(desk.wire.sent[1][1])
+        assert [each["seq"] for each in told] == list(range(1, 101))
+        assert all(each["historical"] for each in told)
+
+    in_virtual_time(scenario())
+
+
+def test_live_samples_pass_an_array_that_is_still_being_serialised() -> None:
+    async def scenario() -> None:
+        desk = Desk()
+        desk.add(*(sample(seq) for seq in range(1, 101)))
+        await asyncio.sleep(5.0)
+        await desk.connect()
+        await asyncio.sleep(PAST_AFTER)
+        await desk.turn(1)
+        desk.add(sample(101))
+        await desk.turn()
+        assert desk.topics[1:] == ["b/line0/device/a/telemetry", "b/line0/device/a/history"]
+
+    in_virtual_time(scenario())
+
+
+def test_an_array_whose_connection_is_lost_while_it_is_serialised_waits_again() -> None:
+    async def scenario() -> None:
+        desk = Desk()
+        desk.add(*(sample(seq) for seq in range(1, 101)))
+        await asyncio.sleep(5.0)
+        await desk.connect()
+        await asyncio.sleep(PAST_AFTER)
+        await desk.turn(1)
+        desk.dispatch.lost()
+        await desk.turn()
+        assert desk.topics == ["b/line0/availability"]
+        assert desk.outbox.depth == 100
+
+    in_virtual_time(scenario())
+
+
+def test_arrays_too_large_for_the_broker_are_cut_until_they_fit() -> None:
+    async def scenario() -> None:
+        desk = Desk(limit=2000)
+        desk.add(*(sample(seq) for seq in range(1, 41)))
+        await asyncio.sleep(5.0)
+        await desk.connect()
+        for _ in range(40):
+            await asyncio.sleep(0.5)
+            desk.acknowledge()
+        told = [json.loads(payload) for topic, payload, *_ in desk.wire.sent if topic.endswith("history")]
+        assert [each["seq"] for array in told for each in array] == list(range(1, 41))
+        assert all(len(payload) < 2000 for _, payload, *_ in desk.wire.sent)
+        assert desk.outbox.depth == 0
+
+    in_virtual_time(scenario())
+
+
+def test_what_is_lost_is_declared_with_the_wall_clock() -> None:
+    async def scenario() -> None:
+        desk = Desk()
+        await desk.connect()
+        desk.add(sample(1))
+        await desk.turn()
+        desk.acknowledge(0x97)
+        await asyncio.sleep(PAST_AFTER + 1)
+        assert json.loads(desk.wire.sent[-1][1]) == {
+            "v": 1, "type": "dropped", "ts": 7, "device": "a", "boot": "k", "from_seq": 1, "to_seq": 1, "count": 1,
+        }  # fmt: skip
+
+    in_virtual_time(scenario())
+
+
+def test_a_broker_that_acknowledges_nothing_is_given_up_after_a_minute() -> None:
+    async def scenario() -> None:
+        desk = Desk()
+        await desk.connect()
+        desk.add(sample(1))
+        await desk.turn()
+        await asyncio.sleep(ACKNOWLEDGED_WITHIN - 1)
+        assert desk.stuck == 0
+        await asyncio.sleep(2)
+        assert desk.stuck == 1
+
+    in_virtual_time(scenario())
+
+
+def test_what_the_connection_does_not_take_any_more_waits_for_the_next() -> None:
+    async def scenario() -> None:
+        desk = Desk()
+        await desk.connect()
+        desk.wire.gone = True
+        desk.add(sample(1))
+        await desk.turn()
+        desk.dispatch.lost()
+        desk.wire.gone = False
+        await desk.connect()
+        await desk.turn()
+        assert desk.topics[-1] == "b/line0/device/a/telemetry"
+
+    in_virtual_time(scenario())
+
+
+def test_an_answer_to_nothing_is_passed_over() -> None:
+    async def scenario() -> None:
+        desk = Desk()
+        await desk.connect()
+        desk.dispatch.acknowledged(4711, 0x87)
+        assert desk.outbox.announced
+
+    in_virtual_time(scenario())
