@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import deque
 from typing import TYPE_CHECKING, TypeAlias
 
+from lfs10d.jobs.poll import Poll
 from lfs10d.modbus.bus import Order, Wait
 from lfs10d.reading import Errand, Event, Exchanged, PortChanged, UartCounted, UartCounters
 from lfs10d.schedule import Rest, Schedule
@@ -55,6 +56,16 @@ class Poller:
     def submit(self, job: Job) -> None:
         """Have `job` done on the line."""
         self.post(lambda now: self._events.extend(self.schedule.submit(job, now)))
+
+    def read(self, device: str, request: int) -> None:
+        """Have a device polled now for a request, whose number comes back with the reading; none for an unknown one."""
+        self.post(lambda now: self._read(device, request, now))
+
+    def _read(self, name: str, request: int, now: float) -> None:
+        device = self.schedule.devices.get(name)
+        if device is not None:
+            poll = Poll(device, self.schedule.unanswered, due=now, errand=Errand.REQUEST, request=request)
+            self._events += self.schedule.submit(poll, now)
 
     def replace(self, specs: Iterable[DeviceSpec], rules: PollRules) -> None:
         """Poll these devices from now on."""
@@ -124,6 +135,7 @@ class Poller:
             ask.patience,
             ask.baudrate,
             self.schedule.unanswered.earlier(ask.request.slave),
+            self.schedule.unanswered.everybodys,
         )
         self.bus.ask(order)
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING, TypeAlias
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from lfs10d.modbus.frames import Codec, Request
     from lfs10d.modbus.timing import LineTiming
     from lfs10d.reading import Fault
@@ -35,7 +37,8 @@ class Attempt:
 
     `timeout` runs from the last bit of the request to the first byte of the answer; `patience` is the slave's
     learned p99 of the same (None: not learned). `adapter_latency` is the longest pause that the adapter may put
-    into one answer. `earlier` are the requests whose answers may still come. `turn` is how long to wait for
+    into one answer. `earlier` are the requests to this slave whose answers may still come, the oldest first,
+    `elsewhere` those to any slave, by slave id. `turn` is how long to wait for
     silence before giving up; `turnaround_delay` the silence after a broadcast. `gap` is the required silence
     where it is longer than the timing's (a change of rate). `paced`: the port is a real wire, on which nothing
     arrives sooner than the rate allows (not so on a pseudo terminal or behind a network bridge).
@@ -53,6 +56,7 @@ class Attempt:
     turnaround_delay: float = 0.1
     gap: float | None = None
     paced: bool = False
+    elsewhere: Mapping[int, tuple[Pending, ...]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

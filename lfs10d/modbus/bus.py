@@ -7,7 +7,7 @@ time nobody does.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import inf
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
@@ -19,7 +19,7 @@ from lfs10d.modbus.timing import LineTiming
 from lfs10d.reading import Fault, FaultCode, PortChanged
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from lfs10d.modbus.exchange import Pending
     from lfs10d.modbus.frames import Codec, Request
@@ -54,7 +54,10 @@ class LineRules:
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """One request to put on the line; `earlier` are those whose answers may still come. See `lfs10d.jobs.job.Ask`."""
+    """One request to put on the line; see `lfs10d.jobs.job.Ask`.
+
+    `earlier` are the requests to its slave whose answers may still come, `elsewhere` those to any slave.
+    """
 
     request: Request
     codec: Codec
@@ -62,6 +65,7 @@ class Order:
     patience: float | None = None
     baudrate: int | None = None
     earlier: tuple[Pending, ...] = ()
+    elsewhere: Mapping[int, tuple[Pending, ...]] = field(default_factory=dict)
 
 
 Step: TypeAlias = Wait | Outcome | PortChanged
@@ -232,6 +236,7 @@ class Bus:
             turn=order.timeout,
             turnaround_delay=self.rules.turnaround_delay,
             gap=self._gap,
+            elsewhere=order.elsewhere,
         )
         return Exchange(attempt, asked=now, quiet_since=self._quiet_since)
 

@@ -22,7 +22,8 @@ Rules
 4. What comes on a paced port before our request can have left the wire is noise, unless echo. On a port without
    pace such a right frame counts if nothing better comes in the usual time.
 5. The answer of an `earlier` request is dropped and told as late, and listening goes on. An answer that could be
-   that of another earlier request is marked as ambiguous: an exception looks the same for every shape.
+   that of another earlier request is marked as ambiguous: an exception looks the same for every shape. The late
+   answers of other slaves are looked for at the end, in what belongs to nothing.
 6. Silence ends the exchange: before the first byte after `timeout`; in a begun answer after t3.5 and the adapter's
    latency (ASCII: 1 s); after other bytes likewise, but not before the slave's usual turnaround; after a right
    frame that is no answer to us not before `timeout`. Pauses in what is received are never judged: adapters make
@@ -169,6 +170,7 @@ class Exchange:
             return Send(self._frame)
         if now >= self._give_up:
             self._pass(Happening.BABBLED)
+            self._reception.look_elsewhere()
             return self._settle(now, None, verdict.babble(self._attempt.turn))
         return Quiet(min(silent_at, self._give_up))
 
@@ -209,6 +211,7 @@ class Exchange:
         reception = self._reception
         if reception.answer is not None:
             self._pass(Happening.ANSWERED)
+            reception.look_elsewhere()
             return self._settle(reception.answer.last_at, reception.answer, None)
         first, bound = self._limits()
         until = min(self._until(first), bound)
@@ -216,6 +219,7 @@ class Exchange:
             until = min(first, bound)
         if now >= until:
             self._pass(Happening.EXPIRED)
+            reception.look_elsewhere()
             return self._settle(now, reception.spare, verdict.judge(self._attempt, reception))
         return Listen(until, min(max(now, reception.whole_at), until))
 

@@ -106,6 +106,10 @@ class Hunt:
         """Take a frame out of what is left to explain."""
         self._claims.append((catch.begin, catch.end))
 
+    def claimed(self, catch: Catch) -> bool:
+        """Whether a byte of this frame belongs to a claimed one."""
+        return any(catch.begin < end and begin < catch.end for begin, end in self._claims)
+
     def unclaimed(self, start: int) -> bytes:
         """Return what was heard from `start` on and belongs to no claimed frame (of the last `KEPT`)."""
         rest = bytearray()

@@ -129,21 +129,35 @@ class Reception:
         return max(0, count - 1 - int(room))
 
     def _seek_older(self, now: float) -> None:
-        """Drop the answers of earlier requests; since a slave answers in order, none older can follow them."""
+        """Drop the slave's answers to earlier requests; since it answers in order, none older can follow them."""
         for pending, quarry in tuple(self._older):
             if pending not in self._pending or (catch := self._hunt.seek(quarry)) is None:
                 continue
             self._hunt.claim(catch)
             for other in (self._normal, self._exception, *(other for _, other in self._older)):
                 other.skip(catch.end)
-            slave = pending.request.slave
-            count = self._pending.index(pending) + 1
-            before, after = self._pending[:count], self._pending[count:]
-            self._pending = [each for each in before if each.request.slave != slave] + after
+            del self._pending[: self._pending.index(pending) + 1]
             self._older = [older for older in self._older if older[0] in self._pending]
             self.late.append(LateAnswer(pending.request, max(0.0, catch.first_at - pending.sent_end)))
+            self.late_at = now
+
+    def look_elsewhere(self) -> None:
+        """Drop the late answers of other slaves too; called once, at the end: they can be many and come seldom."""
+        if not self._attempt.elsewhere or not self.unsolicited:
+            return
+        rest = self._hunt.unclaimed(0)
+        for slave, pending in self._attempt.elsewhere.items():
             if slave == self._attempt.request.slave:
-                self.late_at = now
+                continue
+            start = 0
+            for each in pending:
+                shapes = [shape for shape in each.codec.shapes(each.request) if shape.head in rest]
+                catches = [self._hunt.seek(Quarry(each.codec, shape, start)) for shape in shapes]
+                catch = min((catch for catch in catches if catch), key=lambda catch: catch.begin, default=None)
+                if catch is not None and not self._hunt.claimed(catch):
+                    self._hunt.claim(catch)
+                    self.late.append(LateAnswer(each.request, max(0.0, catch.first_at - each.sent_end)))
+                    start = catch.end
 
     def _seek_ours(self) -> None:
         quarries = [self._normal, self._exception]

@@ -383,12 +383,39 @@ def test_after_a_late_answer_the_slave_gets_its_usual_time_again() -> None:
     assert outcome.answer == VALUES
 
 
+OTHER = ReadRegisters(4, 0x0001, 2)
+LATE_OTHER = framed("040304414FD70A")
+AFTER_OTHER = replace(PLAIN, elsewhere={4: (Pending(OTHER, RTU, -0.3),)})
+
+
+@pytest.mark.parametrize(
+    ("arrivals", "fault"),
+    [
+        pytest.param([(0.05, LATE_OTHER), (0.1, ANSWER)], None, id="ours still comes"),
+        pytest.param([(0.05, ANSWER + LATE_OTHER)], None, id="behind ours"),
+        pytest.param([(0.05, LATE_OTHER)], FaultCode.LATE, id="alone"),
+    ],
+)
+def test_a_late_answer_of_another_slave_is_dropped_and_told(
+    arrivals: list[tuple[float, bytes]], fault: FaultCode | None
+) -> None:
+    outcome = carry_out(AFTER_OTHER, arrivals)
+    assert outcome.late == (LateAnswer(OTHER, 0.05 + 0.3),)
+    assert code(outcome) is fault
+    assert outcome.unsolicited == 0
+
+
 def test_a_late_answer_of_another_slave_gives_ours_no_more_time() -> None:
-    other = ReadRegisters(4, 0x0001, 2)
-    each = replace(PLAIN, earlier=(Pending(other, RTU, -0.3),))
-    outcome = carry_out(each, [(SENT_END + 0.199, framed("040304414FD70A"))])
-    assert [late.request for late in outcome.late] == [other]
-    assert outcome.ended == pytest.approx(SENT_END + 0.2)
+    outcome = carry_out(AFTER_OTHER, [(SENT_END + 0.199, LATE_OTHER)])
+    assert [late.request for late in outcome.late] == [OTHER]
+    assert outcome.ended == pytest.approx(SENT_END + 0.199 + HUSH)
+
+
+def test_late_answers_of_other_slaves_are_told_of_a_babbling_line_too() -> None:
+    each = replace(AFTER_OTHER, turn=0.01)
+    outcome = carry_out(each, [(0.001, LATE_OTHER), *((0.002 * n, b"\xff") for n in range(1, 9))], quiet_since=0.0)
+    assert code(outcome) is FaultCode.COLLISION
+    assert [late.request for late in outcome.late] == [OTHER]
 
 
 def test_a_late_answer_in_the_silence_is_told_too() -> None:

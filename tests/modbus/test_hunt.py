@@ -79,6 +79,16 @@ def test_first_and_last_byte_have_their_own_times() -> None:
     assert (caught.first_at, caught.last_at) == (0.0, 2.0)
 
 
+def test_a_frame_is_claimed_where_one_byte_of_it_is() -> None:
+    hunt, _, caught = fed(ANSWER)
+    assert caught is not None
+    assert not hunt.claimed(caught)
+    hunt.claim(caught)
+    assert hunt.claimed(caught)
+    assert hunt.claimed(Catch(b"", 8, 12, 0.0, 0.0))
+    assert not hunt.claimed(Catch(b"", 9, 12, 0.0, 0.0))
+
+
 def test_claimed_frames_are_explained() -> None:
     hunt, quarry, caught = fed(b"\xaa" + ANSWER + b"\xbb")
     assert caught is not None

@@ -96,11 +96,54 @@ def test_a_late_answer_is_claimed_wherever_it_lies() -> None:
     assert ear.leftover() == b"\xff"
 
 
-def test_a_late_answer_of_another_slave_is_not_the_slaves_own() -> None:
-    ear = reception(earlier=(ReadRegisters(4, 1, 2),))
-    ear.take(RTU.wrap(bytes.fromhex("040304414FD70A")), 0.05)
-    assert len(ear.late) == 1
+OTHER, OTHERS_ID = ReadRegisters(4, 1, 2), ReadRegisters(4, 5, 1)
+LATE_OTHER, LATE_ID = RTU.wrap(bytes.fromhex("040304414FD70A")), RTU.wrap(bytes.fromhex("0403020004"))
+
+
+def elsewhere(*requests: Request, heard: bytes) -> Reception:
+    """Return an ear that heard this while these were unanswered, and looked for them at the end."""
+    pending: dict[int, tuple[Pending, ...]] = {}
+    for each in requests:
+        pending[each.slave] = (*pending.get(each.slave, ()), Pending(each, RTU, -0.5))
+    ear = Reception(replace(reception()._attempt, elsewhere=pending), REQUEST)
+    ear.sent(0.0)
+    ear.take(heard, 0.05)
+    ear.look_elsewhere()
+    return ear
+
+
+@pytest.mark.parametrize(
+    ("requests", "heard", "late", "rest"),
+    [
+        pytest.param((OTHER,), LATE_OTHER, [OTHER], b"", id="alone"),
+        pytest.param((OTHER,), b"\xff" + LATE_OTHER + ANSWER, [OTHER], b"\xff", id="between noise and ours"),
+        pytest.param((OTHER,), ANSWER, [], b"", id="only ours came"),
+        pytest.param((OTHER,), LATE_OTHER[:-1] + b"\0", [], LATE_OTHER[:-1] + b"\0", id="broken"),
+        pytest.param((OTHER, OTHERS_ID), LATE_OTHER + LATE_ID, [OTHER, OTHERS_ID], b"", id="two of one slave"),
+        pytest.param((OTHER, OTHER), LATE_OTHER, [OTHER], b"", id="asked twice, answered once"),
+        pytest.param((OTHERS_ID, OTHER), LATE_OTHER + LATE_ID, [OTHERS_ID], LATE_OTHER, id="never out of turn"),
+        pytest.param((WHO,), LATE, [], LATE, id="the slave's own are not looked for here"),
+    ],
+)
+def test_late_answers_of_other_slaves_are_found_in_what_belongs_to_nothing(
+    requests: tuple[Request, ...], heard: bytes, late: list[Request], rest: bytes
+) -> None:
+    ear = elsewhere(*requests, heard=heard)
+    assert [each.request for each in ear.late] == late
+    assert ear.leftover() == rest
     assert ear.late_at < 0
+
+
+def test_a_frame_inside_our_answer_is_nobodys_late_answer() -> None:
+    inner = RTU.wrap(bytes.fromhex("048302"))
+    answer = RTU.wrap(bytes.fromhex("010306") + inner + b"\0")
+    pending = {4: (Pending(OTHER, RTU, -0.5),)}
+    ear = Reception(replace(reception(ReadRegisters(1, 1, 3))._attempt, elsewhere=pending), REQUEST)
+    ear.sent(0.0)
+    ear.take(b"\x04\x83" + answer, 0.05)
+    ear.look_elsewhere()
+    assert ear.answer is not None
+    assert (ear.late, ear.unsolicited) == ([], 2)
 
 
 def test_what_comes_too_early_on_a_wire_is_no_answer() -> None:
