@@ -1,17 +1,20 @@
 """Whether a request is obeyed. Pure: time is an argument.
 
-Checked in this order: empty (ignored), retained, too_large, rate_limited, invalid_json, unknown_request,
-not_allowed, repeated id, parameters. Whoever performs the request checks `busy`.
-
-A repeated `id` of the same request with the same content gets the first response again and is not executed twice;
-while the first runs the repeat waits for its end. With other content it is a `duplicate_conflict`.
+Rules
+-----
+1. Checked in this order: empty (ignored), retained, too_large, rate_limited, invalid_json, unknown_request,
+   not_allowed, repeated id, parameters. Whoever performs the request checks the rest, `busy` among it.
+2. The id of a request that passed `not_allowed` is remembered with its answer, whatever the answer is. Repeated
+   with the same parameters it gets that answer again and is not executed twice; while the first still runs the
+   repeat waits for its end. With other parameters it is a `duplicate_conflict`.
+3. What was rejected before that is not remembered: sent again later, it is judged again.
 """
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeAlias
+from math import inf
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from lfs10d import commands
 from lfs10d.commands import LARGEST, Answer, Call, Identifier, NoParameters, Parameters, RequestClass, rejected
@@ -24,9 +27,11 @@ RATE = 20.0
 BURST = 64
 """Requests at once."""
 REMEMBERED = 256
-"""Ids whose responses are kept."""
+"""Ids that are remembered, those of requests that still run besides."""
 REMEMBERED_FOR = 60.0
-"""How long a response is kept for its repeats, in s."""
+"""How long an answer is kept for its repeats, in s."""
+
+W = TypeVar("W")
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,36 +50,42 @@ class Ignored:
 
 @dataclass(frozen=True, slots=True)
 class Answered:
-    """The answer is known already; `clear`: the request was retained and must be cleared."""
+    """The answer is known already, after `took` s; `clear`: the request was retained and must be cleared."""
 
     call: Call
     answer: Answer
+    took: float = 0.0
     clear: bool = False
 
 
 @dataclass(slots=True)
-class Ticket:
-    """An admitted request: perform it and tell `Admission.done`. `repeats` are told the same in the end."""
+class _Memory(Generic[W]):
+    """What is remembered of a request by its id; `repeats` wait for its end."""
+
+    fingerprint: str
+    answer: Answer | None = None
+    took: float = 0.0
+    forget_at: float = inf
+    repeats: list[tuple[Call, W]] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True)
+class Ticket(Generic[W]):
+    """An admitted request, since monotonic `since`: perform it and tell `Admission.done`, once."""
 
     name: str
     call: Call
     parameters: Parameters
-    repeats: list[object] = field(default_factory=list)
-    answer: Answer | None = None
-    forget_at: float = 0.0
+    since: float
+    memory: _Memory[W]
 
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """A repeat of a request that is still running: it joined `ticket.repeats`."""
-
-    ticket: Ticket
+    """A repeat of a request that still runs: `Admission.done` will give it back."""
 
 
-Verdict: TypeAlias = Ignored | Answered | Ticket | Waiting
-
-
-class Admission:
+class Admission(Generic[W]):
     """`forms` are the requests known, by name; `allowed` the classes obeyed besides `always`."""
 
     def __init__(self, forms: Mapping[str, Form], allowed: frozenset[str]) -> None:
@@ -82,10 +93,12 @@ class Admission:
         self._forms = forms
         self._tokens = float(BURST)
         self._filled_at = 0.0
-        self._seen: OrderedDict[tuple[str, Identifier], Ticket] = OrderedDict()
+        self._seen: dict[tuple[str, Identifier], _Memory[W]] = {}
 
-    def admit(self, name: str, payload: bytes, *, retained: bool, whence: object, now: float) -> Verdict:
-        """Judge a request; `whence` is kept in the ticket of the one it repeats."""
+    def admit(
+        self, name: str, payload: bytes, *, retained: bool, whence: W, now: float
+    ) -> Ignored | Answered | Ticket[W] | Waiting:
+        """Judge a request; `whence` is kept for `done` if it repeats one that still runs."""
         if not payload:
             return Ignored()
         if retained:
@@ -95,26 +108,25 @@ class Admission:
         if len(payload) > LARGEST:
             message = f"the payload has {len(payload)} bytes; {LARGEST} are allowed"
             return Answered(Call(), rejected("too_large", message))
-        call, unreadable = commands.read(payload)
-        if not self._within_rate(now):
-            message = f"more than {RATE:g} requests a second; send it again later"
-            return Answered(call, rejected("rate_limited", message))
-        refusal = self._refusal(name, unreadable)
+        call, problem = commands.read(payload)
+        refusal = self._refusal(name, problem, now)
         if refusal is not None:
             return Answered(call, refusal)
-        return self._repeat(name, call, whence, now) or self._new(name, self._forms[name], call)
+        return self._repeated(name, call, whence, now) or self._new(name, call, problem, now)
 
-    def _refusal(self, name: str, unreadable: Answer | None) -> Answer | None:
-        """Return why the request is not obeyed, whatever its parameters."""
-        if unreadable is not None and unreadable.code == "invalid_json":
-            return unreadable
+    def _refusal(self, name: str, problem: Answer | None, now: float) -> Answer | None:
+        """Return why the request is not obeyed, whoever asks it with whatever parameters."""
+        if not self._within_rate(now):
+            return rejected("rate_limited", f"more than {RATE:g} requests a second; send it again later")
+        if problem is not None and problem.code == "invalid_json":
+            return problem
         form = self._forms.get(name)
         if form is None:
-            return rejected("unknown_request", f"known are: {', '.join(sorted(self._forms))}")
+            return rejected("unknown_request", f"no such request; known are: {', '.join(sorted(self._forms))}")
         if form.klass != "always" and form.klass not in self.allowed:
             message = f"requests of class {form.klass} are not obeyed; add it to `commands` in the configuration"
             return rejected("not_allowed", message)
-        return unreadable
+        return None
 
     def _within_rate(self, now: float) -> bool:
         self._tokens = min(BURST, self._tokens + (now - self._filled_at) * RATE)
@@ -124,45 +136,45 @@ class Admission:
         self._tokens -= 1
         return True
 
-    def _repeat(self, name: str, call: Call, whence: object, now: float) -> Answered | Waiting | None:
+    def _repeated(self, name: str, call: Call, whence: W, now: float) -> Answered | Waiting | None:
         if call.key is None:
             return None
         first = self._seen.get((name, call.key))
-        if first is None or (first.answer is not None and now >= first.forget_at):
+        if first is None or now >= first.forget_at:
             return None
-        if not _same(first.call.parameters, call.parameters):
+        if first.fingerprint != call.fingerprint:
             message = "this id was used for another request; give every request an id of its own"
             return Answered(call, rejected("duplicate_conflict", message))
         if first.answer is None:
-            first.repeats.append(whence)
-            return Waiting(first)
-        return Answered(call, first.answer)
+            first.repeats.append((call, whence))
+            return Waiting()
+        return Answered(call, first.answer, first.took)
 
-    def _new(self, name: str, form: Form, call: Call) -> Answered | Ticket:
-        parameters = commands.parameters_of(form.parameters, call)
+    def _new(self, name: str, call: Call, problem: Answer | None, now: float) -> Answered | Ticket[W]:
+        form = self._forms[name]
+        memory = _Memory[W](call.fingerprint)
+        self._remember(name, call, memory)
+        parameters = problem or commands.parameters_of(form.parameters, call)
         if isinstance(parameters, Answer):
+            memory.answer, memory.forget_at = parameters, now + form.remembered_for
             return Answered(call, parameters)
-        ticket = Ticket(name, call, parameters)
-        if call.key is not None:
-            self._seen[name, call.key] = ticket
-            self._seen.move_to_end((name, call.key))
-            self._forget_oldest()
-        return ticket
+        return Ticket(name, call, parameters, now, memory)
 
-    def _forget_oldest(self) -> None:
-        """Keep the last ids; one that still runs is never forgotten."""
-        excess = len(self._seen) - REMEMBERED
-        for key in [key for key, ticket in self._seen.items() if ticket.answer is not None][: max(excess, 0)]:
+    def _remember(self, name: str, call: Call, memory: _Memory[W]) -> None:
+        """Keep the ids that are to be kept longest; one whose request still runs is never forgotten."""
+        if call.key is None:
+            return
+        self._seen.pop((name, call.key), None)
+        over = [key for key, known in self._seen.items() if known.answer is not None]
+        over.sort(key=lambda key: self._seen[key].forget_at)
+        for key in over[: max(len(over) - REMEMBERED + 1, 0)]:
             del self._seen[key]
+        self._seen[name, call.key] = memory
 
-    def done(self, ticket: Ticket, answer: Answer, now: float) -> list[object]:
-        """Note how it ended; return whence repeats came that wait for it."""
-        ticket.answer = answer
-        ticket.forget_at = now + self._forms[ticket.name].remembered_for
-        repeats, ticket.repeats = ticket.repeats, []
+    def done(self, ticket: Ticket[W], answer: Answer, now: float) -> list[tuple[Call, W]]:
+        """Note how it ended; return the repeats that wait for it, with their `whence`."""
+        memory = ticket.memory
+        memory.answer, memory.took = answer, now - ticket.since
+        memory.forget_at = now + self._forms[ticket.name].remembered_for
+        repeats, memory.repeats = memory.repeats, []
         return repeats
-
-
-def _same(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
-    """Compare as JSON does: 1 is not true, though Python says so."""
-    return repr(sorted(one.items())) == repr(sorted(other.items()))

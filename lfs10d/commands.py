@@ -6,17 +6,20 @@ its keys are parameters.
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import from_json
 
-from lfs10d.kinds import PLAIN_ERROR
 from lfs10d.telemetry import VERSION
+from lfs10d.wording import in_words
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from pydantic_core import ErrorDetails
 
 LARGEST = 4096
 """Bytes of a request's payload."""
@@ -64,7 +67,11 @@ class NoParameters(Parameters):
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """How a request ended. `rejected`: no write was sent and nothing changed; `failed`: a write may have been sent."""
+    """How a request ended.
+
+    `rejected`: no write was sent and nothing changed. `failed`: a write may have been sent, or the reading asked
+    for failed.
+    """
 
     status: Status
     data: object = None
@@ -73,13 +80,16 @@ class Answer:
     facts: Mapping[str, object] = field(default_factory=dict)
     """Further keys of the error object, such as `param` and `exception_code`."""
 
-    OK: ClassVar[Status] = "ok"
-
     def error(self) -> dict[str, object] | None:
         """Return the error object; None where there is none."""
         if self.code is None:
             return None
-        return {"code": self.code, "message": self.message, "param": None, **self.facts}
+        return {"code": self.code, "message": self.message, **self.facts}
+
+
+def ok(data: object = None) -> Answer:
+    """Return the answer to a request that was carried out."""
+    return Answer("ok", data)
 
 
 def rejected(code: ErrorCode, message: str, *, param: str | None = None, **facts: object) -> Answer:
@@ -89,21 +99,20 @@ def rejected(code: ErrorCode, message: str, *, param: str | None = None, **facts
 
 def failed(code: ErrorCode, message: str, *, data: object = None, **facts: object) -> Answer:
     """Return the answer to a request that may have sent a write, or asked for a reading that failed."""
-    return Answer("failed", data, code, message, facts)
+    return Answer("failed", data, code, message, {"param": None, **facts})
 
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """A request that could be read: `content` is the whole object, `parameters` the same without its ids."""
+    """What could be read of a request: its ids, what it asks in its own words, and the same as one text.
+
+    Equal fingerprints are equal parameters as JSON sees them: in any order, but 1 is neither true nor 1.0.
+    """
 
     id: Identifier | None = None
     transaction: Identifier | None = None
-    content: Mapping[str, Any] = field(default_factory=dict)
-
-    @property
-    def parameters(self) -> dict[str, Any]:
-        """What is asked, in the request's own words."""
-        return {key: value for key, value in self.content.items() if key not in {"id", "transaction"}}
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    fingerprint: str = ""
 
     @property
     def key(self) -> Identifier | None:
@@ -126,30 +135,36 @@ class Call:
 
 
 def read(payload: bytes) -> tuple[Call, Answer | None]:
-    """Read a payload of at most `LARGEST` bytes; the answer is the rejection of one that cannot be read."""
+    """Read a payload of at most `LARGEST` bytes; the answer is the rejection of one that is wrong as a whole.
+
+    It is `invalid_json`, or `invalid_param` for an id that is none.
+    """
     try:
         content = from_json(payload, allow_inf_nan=False)
     except ValueError:
-        return Call(), rejected("invalid_json", "the payload is no JSON")
+        return Call(), rejected("invalid_json", "the payload is no JSON in UTF-8")
     if not isinstance(content, dict):
         return Call(), rejected("invalid_json", 'the payload must be a JSON object, {"id": "a1"} for example')
     ids: dict[str, Identifier | None] = {}
-    problem: Answer | None = None
+    problem = None
     for key in ("id", "transaction"):
-        value = content.get(key)
-        ids[key] = _identifier(value)
+        value = content.pop(key, None)
+        ids[key] = value if _is_identifier(value) else None
         if value is not None and ids[key] is None and problem is None:
-            message = f"must be text of at most {LONGEST_ID} characters or a whole number"
-            problem = rejected("invalid_param", f"{key}: {message}", param=key)
-    return Call(ids["id"], ids["transaction"], content), problem
+            message = f"{key}: must be text of at most {LONGEST_ID} characters or a whole number"
+            problem = rejected("invalid_param", message, param=key)
+    try:
+        fingerprint = json.dumps(content, sort_keys=True, allow_nan=False)
+    except ValueError:  # 1e999 is read as infinity
+        problem = rejected("invalid_json", "the payload holds a number that is too large")
+        return Call(ids["id"], ids["transaction"]), problem
+    return Call(ids["id"], ids["transaction"], content, fingerprint), problem
 
 
-def _identifier(value: object) -> Identifier | None:
-    if isinstance(value, bool):
-        return None
-    if isinstance(value, int):
-        return value
-    return value if isinstance(value, str) and len(value) <= LONGEST_ID else None
+def _is_identifier(value: object) -> bool:
+    if isinstance(value, str):
+        return len(value) <= LONGEST_ID
+    return isinstance(value, int) and not isinstance(value, bool)
 
 
 def parameters_of(form: type[Parameters], call: Call) -> Parameters | Answer:
@@ -157,23 +172,21 @@ def parameters_of(form: type[Parameters], call: Call) -> Parameters | Answer:
     try:
         return form.model_validate(call.parameters)
     except ValidationError as error:
-        detail = error.errors(include_url=False, include_input=False)[0]
-        param = str(detail["loc"][0]) if detail["loc"] else None
-        return rejected("invalid_param", f"{_shortened(param)}: {_in_words(form, detail)}", param=_shortened(param))
+        details = error.errors(include_url=False)
+        unknown = (detail for detail in details if detail["type"] == "extra_forbidden")
+        return _refused(form, next(unknown, details[0]))  # the slip of a key explains why another is missing
 
 
-def _shortened(param: str | None) -> str | None:
-    return param if param is None or len(param) <= LONGEST_ID else f"{param[: LONGEST_ID - 3]}..."
-
-
-def _in_words(form: type[Parameters], detail: Mapping[str, Any]) -> str:
+def _refused(form: type[Parameters], detail: ErrorDetails) -> Answer:
+    param = str(detail["loc"][0]) if detail["loc"] else None
+    if param is not None and len(param) > LONGEST_ID:
+        param = f"{param[: LONGEST_ID - 3]}..."
     match detail["type"]:
         case "extra_forbidden":
-            known = ", ".join(form.model_fields) or "none"
-            return f"no such parameter; known are: {known}"
+            known = ", ".join(field.alias or key for key, field in form.model_fields.items())
+            words = f"is no parameter of this request; it takes {known or 'none'}"
         case "missing":
-            return "is missing"
-        case kind if kind == PLAIN_ERROR:
-            return str(detail["ctx"]["message"])
+            words = "is missing"
         case _:
-            return str(detail["msg"])
+            words = in_words(detail)
+    return rejected("invalid_param", words if param is None else f"{param}: {words}", param=param)

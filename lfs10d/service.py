@@ -5,10 +5,11 @@ from __future__ import annotations
 import asyncio
 import logging
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 from lfs10d.admission import Admission, Answered, Ignored, Ticket, Waiting
-from lfs10d.commands import Answer, Call, failed
+from lfs10d.commands import Answer, Call, failed, rejected
 from lfs10d.logs import escape
 
 if TYPE_CHECKING:
@@ -19,21 +20,19 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-DEEPEST = 2
-"""Levels of the longest name of a request."""
 LONGEST_NAME = 64
 """Characters of a request's name that are told back."""
+FLOOD_TOLD_EVERY = 60.0
+"""How often the log says that there are too many requests, in s."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Whence:
-    """Where the answer to one request goes."""
+    """Where the answer to one request goes: a topic under B, with the request's Correlation Data."""
 
     topic: str
     correlation: bytes | None
     name: str
-    call: Call
-    since: float
 
 
 class Service:
@@ -56,8 +55,10 @@ class Service:
         self._powers = powers
         self._respond = respond
         self._clear = clear
-        self._admission = Admission({name: request.form for name, request in requests.items()}, allowed)
-        self._running: set[asyncio.Task[None]] = set()
+        self._admission = Admission[_Whence]({name: request.form for name, request in requests.items()}, allowed)
+        self._running: set[asyncio.Task[Answer]] = set()
+        self._ending = False
+        self._flood_told_until = 0.0
 
     def allow(self, classes: frozenset[str]) -> None:
         """Obey these classes of requests from now on."""
@@ -67,45 +68,69 @@ class Service:
         """Take a request; its answer comes now or later, once."""
         now = asyncio.get_running_loop().time()
         name = "/".join(request.levels)
-        known = name in self._requests
-        own = f"response/{name}" if known else "response/unknown"
-        shown = name[:LONGEST_NAME]
-        whence = _Whence(request.response_topic or own, request.correlation, shown, Call(), now)
+        own = f"response/{name}" if name in self._requests else "response/unknown"
+        whence = _Whence(request.response_topic or own, request.correlation, name[:LONGEST_NAME])
         verdict = self._admission.admit(name, request.payload, retained=request.retained, whence=whence, now=now)
         match verdict:
             case Ignored():
                 return
-            case Answered(call=call, answer=answer):
+            case Answered(call=call, answer=answer, took=took):
                 if verdict.clear:
                     self._clear(request.topic)
-                self._tell(whence, call, answer)
-            case Waiting(ticket=ticket):
-                log.debug("request %s is a repeat of one that still runs", escape(ticket.name))
+                self._log_answered(whence.name, answer, now)
+                self._tell(whence, call, answer, took)
+            case Waiting():
+                log.debug("request %s repeats one that still runs", escape(whence.name))
             case Ticket():
-                task = asyncio.create_task(self._perform(verdict, whence), name=f"request {name}")
-                self._running.add(task)
-                task.add_done_callback(self._running.discard)
+                self._begin(verdict, whence)
 
-    async def _perform(self, ticket: Ticket, whence: _Whence) -> None:
-        try:
-            answer = await self._requests[ticket.name].perform(ticket.parameters, self._powers)
-        except asyncio.CancelledError:
+    def _begin(self, ticket: Ticket[_Whence], whence: _Whence) -> None:
+        if self._ending:
+            self._end(ticket, whence, rejected("cancelled", "the daemon is ending"))
+            return
+        perform = self._requests[ticket.name].perform(ticket.parameters, self._powers)
+        task = asyncio.create_task(perform, name=f"request {ticket.name}")
+        self._running.add(task)
+        task.add_done_callback(partial(self._performed, ticket, whence))
+
+    def _performed(self, ticket: Ticket[_Whence], whence: _Whence, task: asyncio.Task[Answer]) -> None:
+        """Answer a request whose task is over, however it ended, begun or not."""
+        self._running.discard(task)
+        if task.cancelled():
             answer = failed("cancelled", "the daemon is ending")
-        except Exception:  # every request is answered, whatever we did wrong
-            log.exception("request %s failed by a mistake of ours", ticket.name)
+        elif (mistake := task.exception()) is not None:
+            log.error("request %s failed by a mistake of ours", ticket.name, exc_info=mistake)
             answer = failed("internal", "a fault of lfs10d itself; its log says more")
-        repeats = self._admission.done(ticket, answer, asyncio.get_running_loop().time())
-        for each in (whence, *repeats):
-            if isinstance(each, _Whence):
-                self._tell(each, ticket.call, answer)
+        else:
+            answer = task.result()
+        self._end(ticket, whence, answer)
 
-    def _tell(self, whence: _Whence, call: Call, answer: Answer) -> None:
-        took = asyncio.get_running_loop().time() - whence.since
-        log.info("request %s: %s%s", escape(whence.name), answer.status, f" ({answer.code})" if answer.code else "")
+    def _end(self, ticket: Ticket[_Whence], whence: _Whence, answer: Answer) -> None:
+        repeats = self._admission.done(ticket, answer, asyncio.get_running_loop().time())
+        quiet = self._requests[ticket.name].form.klass == "always" and answer.status == "ok"
+        level = logging.DEBUG if quiet else logging.INFO
+        log.log(level, "request %s: %s", ticket.name, _in_short(answer))
+        for call, where in ((ticket.call, whence), *repeats):
+            self._tell(where, call, answer, ticket.memory.took)
+
+    def _log_answered(self, name: str, answer: Answer, now: float) -> None:
+        """Log a request that was answered at once; of a flood only that there is one."""
+        if answer.code != "rate_limited":
+            log.info("request %s: %s", escape(name), _in_short(answer))
+        elif now >= self._flood_told_until:
+            self._flood_told_until = now + FLOOD_TOLD_EVERY
+            log.warning("more requests come in than are obeyed; those beyond are rejected")
+
+    def _tell(self, whence: _Whence, call: Call, answer: Answer, took: float) -> None:
         self._respond(whence.topic, call.response(whence.name, answer, took * 1000), whence.correlation)
 
     async def stop(self) -> None:
-        """Answer what still runs as cancelled."""
+        """Answer what still runs as cancelled, and what comes from now on."""
+        self._ending = True
         for task in self._running:
             task.cancel()
         await asyncio.gather(*self._running, return_exceptions=True)
+
+
+def _in_short(answer: Answer) -> str:
+    return f"{answer.status} ({answer.code})" if answer.code else answer.status

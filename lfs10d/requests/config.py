@@ -5,25 +5,23 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from lfs10d.admission import Form
-from lfs10d.commands import Answer, rejected
+from lfs10d.commands import Answer, NoParameters, ok, rejected
 from lfs10d.errors import ConfigError
 from lfs10d.requests.request import Powers, Request
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from lfs10d.commands import NoParameters
-
 
 async def get(_: NoParameters, powers: Powers) -> Answer:
     """Tell the effective configuration."""
-    return Answer("ok", powers.configuration())
+    return ok(powers.configuration())
 
 
 async def reload(_: NoParameters, powers: Powers) -> Answer:
     """Read the files again; a broken one changes nothing."""
     try:
-        return Answer("ok", await powers.reload())
+        return ok(await powers.reload())
     except ConfigError as error:
         return rejected("invalid_param", str(error.problems[0]))
 

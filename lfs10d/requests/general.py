@@ -5,23 +5,21 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from lfs10d.admission import Form
-from lfs10d.commands import Answer
+from lfs10d.commands import Answer, NoParameters, ok
 from lfs10d.requests.request import Powers, Request
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from lfs10d.commands import NoParameters
-
 
 async def health(_: NoParameters, powers: Powers) -> Answer:
     """Tell how everything is."""
-    return Answer("ok", powers.health())
+    return ok(powers.health())
 
 
 async def republish(_: NoParameters, powers: Powers) -> Answer:
     """Send every retained topic once more."""
-    return Answer("ok", {"topics": powers.republish()})
+    return ok({"topics": powers.republish()})
 
 
 REQUESTS: Mapping[str, Request] = {
