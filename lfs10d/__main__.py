@@ -20,18 +20,30 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from types import FrameType
 
+STANDARD_ERROR = 2
 TRACEBACK = "LFS10D_TRACEBACK"
 """Set in the environment, it lets an error of the program itself show where it happened."""
 
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the verb that the arguments name and exit with its code."""
+    _hold_standard_descriptors()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     signal.signal(signal.SIGTERM, _terminated)
     code = _run(arguments)
     sys.exit(_flushed(code))
+
+
+def _hold_standard_descriptors() -> None:
+    """Put /dev/null where standard input, output or error was closed.
+
+    Else the next thing opened would take its number, and the log be written to the port.
+    """
+    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= STANDARD_ERROR:
+        pass
+    os.close(descriptor)
 
 
 def _terminated(signum: int, frame: FrameType | None) -> NoReturn:

@@ -7,45 +7,43 @@ hears comes here by one `call_soon_threadsafe` per exchange and goes through the
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 import os
 import signal
 import socket
 import sys
 import time
-from collections import deque
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
-from lfs10d import __version__, assembly, clock, logs
-from lfs10d.changes import difference
-from lfs10d.configfile import load
-from lfs10d.errors import ConfigError
+from lfs10d import __version__, assembly, clock, logs, reload
+from lfs10d.aside import aside
+from lfs10d.errors import ConfigError, StateError
 from lfs10d.facts import DaemonFacts, Instant
-from lfs10d.linethread import LineThread
-from lfs10d.modbus.bus import Bus
-from lfs10d.modbus.port import SerialPort
-from lfs10d.modbus.realtime import sharpen_timers, take_precedence
+from lfs10d.firstburst import FirstBurst
+from lfs10d.line import Line
+from lfs10d.logbook import Logbook
 from lfs10d.mqtt.settings import BrokerSettings
 from lfs10d.mqtt.uplink import Uplink
-from lfs10d.poller import Poller
-from lfs10d.reading import Event, Exchanged, Fault, FaultCode, PortChanged
+from lfs10d.powers import DaemonPowers
+from lfs10d.reading import Exchanged, Fault, FaultCode, PortChanged
 from lfs10d.requests.table import REQUESTS
-from lfs10d.schedule import Schedule
 from lfs10d.service import Service
-from lfs10d.statedir import status_file
+from lfs10d.statedir import prepare, status_file
 from lfs10d.station import Station
 from lfs10d.statusfile import StatusFile
 from lfs10d.supervision import Supervision
 from lfs10d.systemd import Notifier
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Coroutine, Iterable
+    from pathlib import Path
 
     from lfs10d.boot import Boot
-    from lfs10d.config import Config
     from lfs10d.configfile import Loaded
+    from lfs10d.logbook import Entry
+    from lfs10d.reading import Event
     from lfs10d.secret import Secret
     from lfs10d.telemetry import Publication
 
@@ -53,26 +51,28 @@ log = logging.getLogger(__name__)
 
 SWITCH_INTERVAL = 1e-4
 """Seconds the interpreter lets one thread run on: at the default of 5 ms the line thread wakes up 5 ms late."""
-LINE_STOPS_WITHIN = 0.8
-"""How long the line thread is waited for at the end, in s."""
+LINE_STOPS_WITHIN = 0.4
+"""How long the line thread is waited for at the end, in s; with the uplink's 1.3 s it is over within 2 s."""
 FEATURES = ("history",)
+SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 
 
 class Daemon:
     """One line, from the port to the broker. Built and run inside an asyncio loop."""
 
-    def __init__(self, loaded: Loaded, boot: Boot, notifier: Notifier) -> None:
+    def __init__(self, loaded: Loaded, boot: Boot, state_directory: Path, notifier: Notifier) -> None:
         config = loaded.config
-        self._loaded = loaded
-        self._config = config
+        self._files = reload.Files(loaded, reload.imprint(loaded))
+        self._state_directory = state_directory
         self._notifier = notifier
         self._loop = asyncio.get_running_loop()
         self._over = asyncio.Event()
-        self._failure: BaseException | None = None
-        self._inbox: deque[list[Event]] = deque()
+        self._reloading = asyncio.Lock()
+        self._failed = False
         self._clock: clock.ClockState = "unknown"
         self._ready = False
         self._ticking: asyncio.TimerHandle | None = None
+        self._logbook = Logbook()
         self._facts = DaemonFacts(
             version=__version__,
             host=socket.gethostname(),
@@ -90,43 +90,43 @@ class Daemon:
             backlog=lambda: self._uplink.backlog,
         )
         self._uplink = Uplink(
-            self._broker_settings(config),
+            self._broker_settings(),
             base=f"{config.mqtt.base_topic}/{config.line.name}",
             line=config.line.name,
-            burst=lambda: self._station.burst(self._now()),
+            burst=lambda: self._first_burst.burst(self._station.burst(self._now())),
             stands_behind=self._station.topics,
             requested=lambda request: self._service.requested(request),  # noqa: PLW0108 - built below
             epoch_ms=lambda: self._now().ts(),
             changed=self._uplink_changed,
+            announced=self._announced,
+        )
+        self._first_burst = FirstBurst(self._station.burst(self._now()))
+        self._powers = DaemonPowers(
+            self._station, self._uplink, now=self._now, running=lambda: self._files.loaded, reload=self._reload
         )
         self._service = Service(
             REQUESTS,
-            self,
+            self._powers,
             allowed=frozenset(config.commands),
             respond=self._uplink.respond,
             clear=self._uplink.clear_retained,
         )
-        self._port = SerialPort(assembly.port_settings(config.line))
-        bus = Bus(self._port, assembly.line_rules(config.line), time.monotonic)
-        schedule = Schedule(assembly.line_timing(config.line), time.monotonic())
-        specs = assembly.device_specs(config, loaded.profiles)
-        schedule.replace(specs, assembly.poll_rules(config.poll), time.monotonic())
-        self._poller = Poller(bus, schedule, self._from_line, time.monotonic)
-        self._line = LineThread(self._poller, prepare=self._prepare_line, failed=self._line_failed)
+        self._line = Line(config, loaded.profiles, heard=self._heard, failed=self._line_failed)
         file = status_file(config.line.name, os.environ)
         self._supervision = Supervision(
             notifier,
             None if file is None else StatusFile(file),
             declared=lambda: self._line.declared,
-            snapshot=self.health,
+            snapshot=self._powers.health,
             summary=self._summary,
         )
 
-    def _broker_settings(self, config: Config) -> BrokerSettings:
-        return BrokerSettings.of(config.mqtt, client_id=config.mqtt.client_id or "", password=self._password)
+    def _broker_settings(self) -> BrokerSettings:
+        mqtt = self._files.loaded.config.mqtt
+        return BrokerSettings.of(mqtt, client_id=mqtt.client_id or "", password=self._password)
 
     def _password(self) -> Secret | None:
-        return self._loaded.password()
+        return self._files.loaded.password()
 
     def _now(self) -> Instant:
         return Instant(time.monotonic(), time.time(), self._clock)
@@ -137,180 +137,184 @@ class Daemon:
             self._loop.add_signal_handler(number, self._over.set)
         self._loop.add_signal_handler(signal.SIGHUP, self._hang_up)
         sys.setswitchinterval(SWITCH_INTERVAL)
-        tasks = [
-            asyncio.create_task(self._watch_clock(), name="clock"),
-            asyncio.create_task(self._supervision.run(), name="supervision"),
-        ]
+        config = self._files.loaded.config
+        log.info(
+            "lfs10d %s, boot %s: %s on %s at %d baud, %d slaves, broker %s:%d",
+            __version__, self._facts.boot, config.line.name, config.line.port, config.line.baudrate,
+            len(config.slaves), config.mqtt.host, config.mqtt.port,
+        )  # fmt: skip
+        self._look_at_storage()
+        tasks = [self._begin("clock", self._watch_clock()), self._begin("supervision", self._supervision.run())]
         try:
             self._line.start()
             await self._uplink.start()
             self._tick()
-            if not any(slave.enabled for slave in self._config.slaves):
+            if not any(slave.enabled for slave in config.slaves):
                 self._tell_ready()
             await self._over.wait()
         finally:
             self._notifier.stopping("stopping")
-            self._line.stop()
             for task in tasks:
                 task.cancel()
             await self._service.stop()
-            await asyncio.to_thread(self._line.join, LINE_STOPS_WITHIN)
+            await self._line.stop(LINE_STOPS_WITHIN)
             await self._uplink.stop()
-        return 0 if self._failure is None else 1
+        log.info("ended")
+        return 1 if self._failed else 0
 
-    # -- the line thread
+    # -- the line
 
-    def _prepare_line(self) -> None:
-        """Make the line's thread wake up on time; runs in it, before its first turn."""
-        if not sharpen_timers():
-            log.debug("the timer slack of the line's thread cannot be set: gaps are 50 us longer than need be")
-        if self._config.line.realtime and (refusal := take_precedence()) is not None:
-            log.warning("%s", refusal)
-
-    def _from_line(self, events: list[Event]) -> None:
-        """Take what was heard, in the line's thread, over to the loop."""
-        self._inbox.append(events)
-        with contextlib.suppress(RuntimeError):  # the loop is closed: we are ending
-            self._loop.call_soon_threadsafe(self._heard)
-
-    def _heard(self) -> None:
-        while self._inbox:
-            now = self._now()
-            published: list[Publication] = []
-            for event in self._inbox.popleft():
-                self._log(event)
-                published += self._station.heard(event, now)
-            self._publish(published)
-            if not self._ready:
+    def _heard(self, events: list[Event]) -> None:
+        now = self._now()
+        port, frames = self._line.port, log.isEnabledFor(logging.DEBUG)
+        published: list[Publication] = []
+        for event in events:
+            self._enter(self._logbook.happened(event, port=port.settings.path, notices=port.notices, frames=frames))
+            known = self._station.heard(event, now)
+            self._enter(self._logbook.published(known))
+            published += known
+            if isinstance(event, Exchanged) or (isinstance(event, PortChanged) and event.fault is not None):
                 self._tell_ready()
+        self._publish(published)
 
     def _publish(self, publications: Iterable[Publication]) -> None:
-        self._uplink.publish(publications)
+        self._uplink.publish(self._first_burst.passing(publications))
         if self._ticking is not None and self._station.due() < self._ticking.when():
             self._tick()
 
-    def _log(self, event: Event) -> None:
-        if isinstance(event, PortChanged):
-            if event.fault is not None:
-                log.warning("%s; tried again until it is back", event.fault.message)
-                return
-            log.info("port %s is open", self._port.settings.path)
-            for notice in self._port.notices:
-                log.warning("%s", notice)
-        elif isinstance(event, Exchanged) and log.isEnabledFor(logging.DEBUG):
-            sent, heard = event.sent.hex(" "), event.heard.hex(" ") or "nothing"
-            log.debug(
-                "slave %d: sent %s, heard %s%s", event.slave, sent, heard, f": {event.fault}" if event.fault else ""
-            )
+    def _enter(self, entries: Iterable[Entry]) -> None:
+        for entry in entries:
+            log.log(entry.level, "%s", entry.text)
 
     def _line_failed(self, error: BaseException) -> None:
-        """End the daemon: the line's thread, in which this runs, ended by a mistake."""
-        self._failure = error
-        log.error("the line's thread ended: %s", error, exc_info=error)
-        self._loop.call_soon_threadsafe(self._over.set)
+        """End the daemon: its line's thread ended by a mistake."""
+        self._failed = True
+        log.error("the line's thread ended", exc_info=error)
+        self._over.set()
 
     # -- time
+
+    def _begin(self, name: str, work: Coroutine[None, None, None]) -> asyncio.Task[None]:
+        """Have something done until the end; if it ends by a mistake, so does the daemon."""
+        task = self._loop.create_task(work, name=name)
+        task.add_done_callback(self._task_over)
+        return task
+
+    def _task_over(self, task: asyncio.Task[None]) -> None:
+        if not task.cancelled() and (error := task.exception()) is not None:
+            self._failed = True
+            log.error("the %s ended", task.get_name(), exc_info=error)
+            self._over.set()
 
     def _tick(self) -> None:
         """Publish what time alone makes known, and come back when more is due."""
         if self._ticking is not None:
             self._ticking.cancel()
-        self._uplink.publish(self._station.tick(self._now()))
+        self._uplink.publish(self._first_burst.passing(self._station.tick(self._now())))
         self._ticking = self._loop.call_at(self._station.due(), self._tick)
 
     async def _watch_clock(self) -> None:
         while True:
-            self._clock = await asyncio.to_thread(clock.look)
+            self._clock = await aside(clock.look, "clock")
             await asyncio.sleep(clock.LOOK_AGAIN[self._clock])
 
     # -- the service manager
 
     def _tell_ready(self) -> None:
-        self._ready = True
-        self._notifier.ready(self._summary())
+        if not self._ready:
+            self._ready = True
+            self._notifier.ready(self._summary())
 
     def _summary(self) -> str:
         broker = "connected" if self._uplink.connected else "away"
         return f"{self._station.summary(self._now())}, broker {broker}"
 
+    # -- the files
+
+    def _look_at_storage(self) -> None:
+        """Raise or clear the error of a state directory that cannot be written."""
+        try:
+            prepare(self._state_directory)
+        except StateError as error:
+            log.warning("%s", error)
+            self._publish(self._station.line_failed(Fault(FaultCode.STORAGE_FULL, str(error)), self._now()))
+        else:
+            self._publish(self._station.line_recovered(FaultCode.STORAGE_FULL, self._now()))
+
     def _hang_up(self) -> None:
         self._notifier.reloading()
         task = self._loop.create_task(self._reload_by_signal(), name="reload")
-        task.add_done_callback(lambda _: self._notifier.ready(self._summary()))
+        task.add_done_callback(self._reloaded)
+
+    def _reloaded(self, task: asyncio.Task[None]) -> None:
+        if not task.cancelled() and (mistake := task.exception()) is not None:
+            log.error("the reload failed by a mistake of ours", exc_info=mistake)
+        if self._ready:
+            self._notifier.ready(self._summary())
 
     async def _reload_by_signal(self) -> None:
         try:
-            done = await self.reload()
+            plan = await self._reload()
         except ConfigError as error:
             for problem in error.problems:
                 log.error("%s", problem)  # noqa: TRY400 - for a person; where in our code says nothing
             log.error("the configuration is not reloaded: the running one stays")  # noqa: TRY400
         else:
-            log.info("reloaded: %s", ", ".join(done["applied"]) or "nothing changed")
-            if done["restart_required"]:
-                log.warning("takes effect at the next restart only: %s", ", ".join(done["restart_required"]))
+            log.info("reloaded: %s", ", ".join(plan.applied) or "nothing changed")
+            if plan.restart_required:
+                log.warning("takes effect at the next restart only: %s", ", ".join(plan.restart_required))
+
+    async def _reload(self) -> reload.Plan:
+        """Read the files again and apply what changed; raises ConfigError and changes nothing if one is wrong."""
+        async with self._reloading:
+            found = await aside(partial(reload.read, self._files.loaded.path), "reload")
+            plan = reload.plan(self._files, found)
+            self._files = replace(found, loaded=plan.loaded)
+            self._apply(plan)
+            await self._uplink.reload(self._broker_settings() if plan.broker else None)
+            return plan
+
+    def _apply(self, plan: reload.Plan) -> None:
+        config = plan.loaded.config
+        if plan.log:
+            logs.install(config.log.level, config.log.format)
+        if plan.polling or plan.realtime:
+            self._line.take(config, plan.loaded.profiles, line=plan.line, realtime=plan.realtime)
+            devices = assembly.device_facts(config, plan.loaded.profiles)
+            self._publish(self._station.configure(assembly.line_facts(config.line), devices, self._now()))
+        self._service.allow(frozenset(config.commands))
+        self._look_at_storage()
+        self._facts = replace(self._facts, config_hash=assembly.config_hash(config))
+        self._publish(self._station.introduce(self._facts, self._now()))
 
     # -- the broker
+
+    def _announced(self) -> None:
+        self._uplink.publish(self._first_burst.settle(self._station.burst(self._now())))
 
     def _uplink_changed(self) -> None:
         version = self._uplink.version
         now = self._now()
         if version is not None:
             self._facts = replace(self._facts, mqtt={"version": str(version)})
-            self._uplink.publish(self._station.introduce(self._facts, now))
+            self._publish(self._station.introduce(self._facts, now))
+            self._publish(self._station.admitting("denied" if self._uplink.requests_denied else "ok", now))
         if self._uplink.duplicate:
             message = "another client has taken our client id; give every daemon an mqtt.client_id of its own"
-            self._uplink.publish(self._station.line_failed(Fault(FaultCode.DUPLICATE_CLIENT, message), now))
+            self._publish(self._station.line_failed(Fault(FaultCode.DUPLICATE_CLIENT, message), now))
         else:
-            self._uplink.publish(self._station.line_recovered(FaultCode.DUPLICATE_CLIENT, now))
-
-    # -- what requests may use
-
-    def health(self) -> dict[str, object]:
-        """Return how the daemon, the line and the devices are."""
-        backlog = self._uplink.backlog
-        return {
-            **self._station.snapshot(self._now()),
-            "broker": {"connected": self._uplink.connected, "depth": backlog.depth, "dropped": backlog.dropped},
-        }
-
-    def republish(self) -> int:
-        """Send every retained topic once more; return how many."""
-        self._uplink.republish()
-        return len(self._station.topics()) + 1
-
-    def configuration(self) -> dict[str, object]:
-        """Return the effective configuration and where what is no default comes from."""
-        origins = {key: str(origin) for key, origin in self._loaded.origins.items() if origin.kind != "default"}
-        return {"config": self._config.model_dump(mode="json"), "origins": origins}
-
-    async def reload(self) -> dict[str, list[str]]:
-        """Read the files again and apply what changed; raises ConfigError and changes nothing if one is wrong."""
-        loaded = await asyncio.to_thread(load, self._loaded.path)
-        found = difference(self._config, loaded.config)
-        before, config = self._config, found.target
-        self._loaded, self._config = loaded, config
-        if {"slaves", "poll", "line"} & found.sections:
-            line = config.line
-            if before.line != line:
-                self._poller.reconfigure(assembly.port_settings(line), assembly.line_rules(line))
-                self._poller.post(lambda _: self._prepare_line())
-            self._poller.replace(assembly.device_specs(config, loaded.profiles), assembly.poll_rules(config.poll))
-            self._line.wake()
-            devices = assembly.device_facts(config, loaded.profiles)
-            self._publish(self._station.configure(assembly.line_facts(line), devices, self._now()))
-        self._service.allow(frozenset(config.commands))
-        logs.install(config.log.level, config.log.format)
-        self._facts = replace(self._facts, config_hash=assembly.config_hash(config))
-        self._publish(self._station.introduce(self._facts, self._now()))
-        await self._uplink.reload(self._broker_settings(config) if before.mqtt != config.mqtt else None)
-        return {"applied": list(found.applied), "restart_required": list(found.restart_required)}
+            self._publish(self._station.line_recovered(FaultCode.DUPLICATE_CLIENT, now))
 
 
-async def run(loaded: Loaded, boot: Boot) -> int:
+async def run(loaded: Loaded, boot: Boot, state_directory: Path) -> int:
     """Run the daemon of one configuration until it is told to end; return the exit code."""
     notifier = Notifier()
     try:
-        return await Daemon(loaded, boot, notifier).run()
+        return await Daemon(loaded, boot, state_directory, notifier).run()
     finally:
         notifier.close()
+        loop = asyncio.get_running_loop()
+        for number in SIGNALS:
+            # Asked to end once more while ending: that is under way, and it ends in order.
+            loop.remove_signal_handler(number)
+            signal.signal(number, signal.SIG_IGN)

@@ -23,7 +23,7 @@ class StatusFile:
 
     def show(self, status: Mapping[str, object]) -> bool:
         """Replace the content; returns whether it could be written. Nothing is synced: it is of the moment."""
-        text = json.dumps(status, allow_nan=False, separators=(",", ":"))
+        text = _json(status)
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._draft.write_text(text, encoding="utf-8")
@@ -38,3 +38,19 @@ class StatusFile:
         for path in (self.path, self._draft):
             with contextlib.suppress(OSError):
                 path.unlink(missing_ok=True)
+
+
+def _json(status: Mapping[str, object]) -> str:
+    """Return the status as JSON, each device by itself: the encoder holds the interpreter, and the line must wake."""
+    members = []
+    for key, value in status.items():
+        if isinstance(value, list):
+            text = f"[{','.join(_encoded(item) for item in value)}]"
+        else:
+            text = _encoded(value)
+        members.append(f"{_encoded(key)}:{text}")
+    return f"{{{','.join(members)}}}"
+
+
+def _encoded(value: object) -> str:
+    return json.dumps(value, allow_nan=False, separators=(",", ":"))

@@ -44,6 +44,12 @@ def device_topic(device: str, leaf: str) -> str:
     return f"device/{device}/{leaf}"
 
 
+def device_of(topic: str, leaf: str) -> str | None:
+    """Return the device that `device_topic` gave this topic, None where it is another leaf or no device's."""
+    levels = topic.split("/")
+    return levels[1] if len(levels) == 3 and levels[0] == "device" and levels[2] == leaf else None  # noqa: PLR2004
+
+
 class Kind(StrEnum):
     """How a publication is treated while the broker is away."""
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-import logging
+import contextlib
+import faulthandler
 import os
 import selectors
+import signal
 import time
 from pathlib import Path
 
@@ -19,7 +21,7 @@ from lfs10d.disk import Disk
 from lfs10d.errors import StateError
 from lfs10d.statedir import prepare, state_directory
 
-log = logging.getLogger(__name__)
+STANDARD_ERROR = 2
 
 EXAMPLES = """\b
 Examples:
@@ -38,13 +40,22 @@ Examples:
 )
 def command(config: Path, state_dir: Path | None) -> int:
     """Run the daemon: poll the line, publish to the broker, until SIGTERM or Ctrl-C."""
+    # Before the daemon takes its signals: the files are read as they are anyway, and an end is an end.
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    # The watchdog of the service manager ends us by SIGABRT: where every thread stood is the last thing told.
+    faulthandler.enable(STANDARD_ERROR)
+    try:
+        return _run(config, state_dir)
+    except KeyboardInterrupt:
+        return 0
+
+
+def _run(config: Path, state_dir: Path | None) -> int:
     loaded = load(config)
     logs.install(loaded.config.log.level, loaded.config.log.format)
     directory = state_directory(config, loaded.config.line.name, chosen=state_dir, environment=os.environ)
-    try:
+    with contextlib.suppress(StateError):  # the daemon looks again, and tells
         prepare(directory)
-    except StateError as error:
-        log.warning("%s", error)
     life = boot.begin(directory, Disk(), time.time())
     with asyncio.Runner(loop_factory=lambda: asyncio.SelectorEventLoop(selectors.EpollSelector())) as runner:
-        return runner.run(run(loaded, life))
+        return runner.run(run(loaded, life, directory))

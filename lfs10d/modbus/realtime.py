@@ -6,6 +6,7 @@ others want the processor.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import resource
 import threading
@@ -42,3 +43,10 @@ def take_precedence() -> str | None:
             "in the service set LimitRTPRIO=10 and RestrictRealtime=no, or set line.realtime to false"
         )
     return None
+
+
+def yield_precedence() -> None:
+    """Make the calling thread an ordinary one again; nothing happens to one that is."""
+    # The flag stays: taking it off would need a privilege, and we start nothing from this thread.
+    with contextlib.suppress(OSError):
+        os.sched_setscheduler(0, os.SCHED_OTHER | os.SCHED_RESET_ON_FORK, os.sched_param(0))

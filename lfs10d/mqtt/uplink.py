@@ -45,8 +45,9 @@ class Uplink:
     """Built and called in the thread of the asyncio loop, while it runs.
 
     `base` is `B`. `burst()` returns every retained topic but `availability`; `stands_behind()` the retained
-    topics under `B` that are ours; `requested` takes each request; `changed` is told of every connect, loss and
-    takeover, whose state is then in the properties; `epoch_ms()` is the wall clock.
+    topics under `B` that are ours; `requested` takes each request; `changed` is told of every connect, loss,
+    takeover and subscription, whose state is then in the properties; `announced` of every burst after a connect
+    that the broker has whole; `epoch_ms()` is the wall clock.
     """
 
     def __init__(
@@ -60,12 +61,15 @@ class Uplink:
         requested: Callable[[InboundRequest], None],
         epoch_ms: Callable[[], int],
         changed: Callable[[], None] = lambda: None,
+        announced: Callable[[], None] = lambda: None,
     ) -> None:
         self._topics = Topics(base)
         self._burst = burst
         self._stands_behind = stands_behind
         self._requested = requested
         self._changed = changed
+        self._announced = announced
+        self._announcing = False
         self._link = Link(settings, self, will=Will(self._topics.availability, OFFLINE.encode()))
         self._outbox = Outbox(detection=2.0 * settings.keepalive)
         self._dispatch = Dispatch(self._outbox, self._topics, line, epoch_ms=epoch_ms, stuck=self._acknowledges_nothing)
@@ -76,6 +80,8 @@ class Uplink:
         self._leaving = False
         self._progress = asyncio.Event()
         self._drop_told = False
+        self.requests_denied = False
+        """The broker refused the subscription to requests: none will come over this connection."""
 
     @property
     def connected(self) -> bool:
@@ -176,8 +182,9 @@ class Uplink:
             return
         self._dispatch.connected(standing, accepted)
         self._subscription = standing.subscribe([Filter(self._topics.requests), Filter(self._topics.availability)])
+        self.requests_denied = False
         self._outbox.burst(self._burst(), _ONLINE)
-        self._sweep_wanted = True
+        self._announcing = self._sweep_wanted = True
         self._dispatch.wake()
         self._changed()
 
@@ -195,16 +202,22 @@ class Uplink:
         if mid == self._farewell:
             self._farewell = None
         self._dispatch.acknowledged(mid, reason)
-        if self._sweep_wanted and self._outbox.announced:
-            self._begin_sweep()
+        if self._outbox.announced:
+            if self._announcing:
+                self._announcing = False
+                self._announced()
+            if self._sweep_wanted:
+                self._begin_sweep()
         self._progress.set()
 
     def subscribed(self, mid: int, reasons: tuple[int, ...]) -> None:
         """Complain once about requests that will never come."""
         if mid == self._subscription:
+            self.requests_denied = bool(reasons) and reasons[0] >= REFUSED_FROM
             for topic, reason in zip((self._topics.requests, self._topics.availability), reasons, strict=False):
                 if reason >= REFUSED_FROM:
                     log.warning("the broker refuses to let us subscribe to %s: %s", topic, reason_in_words(reason))
+            self._changed()
 
     def arrived(self, message: Incoming) -> None:
         """Take a request, or somebody's word that we are offline, or what is retained."""

@@ -1,0 +1,48 @@
+"""The first burst of a boot says that nothing is known of any device, whatever was measured meanwhile. Pure.
+
+A broker may retain what the daemon said in an earlier life; a subscriber must see it taken back before anything new.
+Until that burst is settled, newer states are held back; then they follow at once.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from lfs10d.telemetry import AVAILABILITY, ERROR, STATE, device_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from lfs10d.telemetry import Publication
+
+_LEAVES = (STATE, AVAILABILITY, ERROR)
+
+
+class FirstBurst:
+    """`publications` are a burst from before the first reading."""
+
+    def __init__(self, publications: Iterable[Publication]) -> None:
+        self._unknown = {each.topic: each for each in publications if _held(each)}
+        self.settled = False
+
+    def burst(self, publications: Iterable[Publication]) -> list[Publication]:
+        """Return a burst with nothing known of the devices; the same one once the first is settled."""
+        if self.settled:
+            return list(publications)
+        return [self._unknown.get(each.topic, each) for each in publications]
+
+    def passing(self, publications: Iterable[Publication]) -> list[Publication]:
+        """Return what need not wait for the first burst."""
+        return [each for each in publications if self.settled or each.payload is None or not _held(each)]
+
+    def settle(self, publications: Iterable[Publication]) -> list[Publication]:
+        """Take that the broker has the first burst; return of a new one what was held back."""
+        if self.settled:
+            return []
+        self.settled = True
+        held = [each for each in publications if _held(each)]
+        return [each for each in held if self._unknown.get(each.topic) != each]
+
+
+def _held(publication: Publication) -> bool:
+    return publication.sample is None and any(device_of(publication.topic, leaf) for leaf in _LEAVES)

@@ -1,0 +1,120 @@
+"""The line as the daemon holds it: port, bus, schedule and poller, and the thread that owns them.
+
+What the thread hears is taken over to the asyncio loop by one `call_soon_threadsafe` per exchange.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import time
+from collections import deque
+from typing import TYPE_CHECKING
+
+from lfs10d import assembly
+from lfs10d.linethread import LineThread
+from lfs10d.modbus.bus import Bus
+from lfs10d.modbus.port import SerialPort
+from lfs10d.modbus.realtime import sharpen_timers, take_precedence, yield_precedence
+from lfs10d.poller import Poller
+from lfs10d.schedule import Schedule
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from lfs10d.config import Config
+    from lfs10d.profiles.schema import Profile
+    from lfs10d.reading import Event
+
+log = logging.getLogger(__name__)
+
+
+class Line:
+    """Built in the thread of the asyncio loop; `heard(events)` and `failed(error)` are called there.
+
+    `failed` is told what ended the line's thread by mistake.
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        profiles: Mapping[str, Profile],
+        *,
+        heard: Callable[[list[Event]], None],
+        failed: Callable[[BaseException], None],
+    ) -> None:
+        line = config.line
+        self.port = SerialPort(assembly.port_settings(line))
+        bus = Bus(self.port, assembly.line_rules(line), time.monotonic)
+        schedule = Schedule(assembly.line_timing(line), time.monotonic())
+        schedule.replace(
+            assembly.device_specs(config, profiles), assembly.poll_rules(config.poll), time.monotonic()
+        )  # fmt: skip
+        self.poller = Poller(bus, schedule, self._take_over, time.monotonic)
+        self._realtime = line.realtime
+        self._heard = heard
+        self._failed = failed
+        self._loop = asyncio.get_running_loop()
+        self._inbox: deque[list[Event]] = deque()
+        self._thread = LineThread(self.poller, prepare=self._prepare, failed=self._tell_failed)
+
+    def start(self) -> None:
+        """Open the port and poll."""
+        self._thread.start()
+
+    async def stop(self, within: float) -> None:
+        """Give the port back and end; after `within` s the thread is left to itself."""
+        self._thread.stop()
+        await asyncio.to_thread(self._thread.join, within)
+
+    def wake(self) -> None:
+        """Have what was given to the poller looked at now."""
+        self._thread.wake()
+
+    @property
+    def declared(self) -> float:
+        """The monotonic time by which the thread promised its next turn."""
+        return self._thread.declared
+
+    def take(self, config: Config, profiles: Mapping[str, Profile], *, line: bool, realtime: bool) -> None:
+        """Poll by another configuration from now on; `line` and `realtime` tell whether those changed."""
+        if line:
+            self.poller.reconfigure(assembly.port_settings(config.line), assembly.line_rules(config.line))
+        if realtime:
+            wanted = self._realtime = config.line.realtime
+            self.poller.post(lambda _: _precede(wanted=wanted))
+        self.poller.replace(assembly.device_specs(config, profiles), assembly.poll_rules(config.poll))
+        self.wake()
+
+    # -- in the line's thread
+
+    def _prepare(self) -> None:
+        """Make the thread wake up on time; runs before its first turn."""
+        if not sharpen_timers():
+            log.debug("the timer slack of the line's thread cannot be set: gaps are 50 us longer than need be")
+        if self._realtime:
+            _precede(wanted=True)
+
+    def _take_over(self, events: list[Event]) -> None:
+        self._inbox.append(events)
+        with contextlib.suppress(RuntimeError):  # the loop is closed: we are ending
+            self._loop.call_soon_threadsafe(self._empty)
+
+    def _tell_failed(self, error: BaseException) -> None:
+        with contextlib.suppress(RuntimeError):
+            self._loop.call_soon_threadsafe(self._failed, error)
+
+    # -- in the loop again
+
+    def _empty(self) -> None:
+        while self._inbox:
+            self._heard(self._inbox.popleft())
+
+
+def _precede(*, wanted: bool) -> None:
+    """Put the calling thread under SCHED_FIFO, or make it an ordinary one again."""
+    if not wanted:
+        yield_precedence()
+    elif (refusal := take_precedence()) is not None:
+        log.warning("%s", refusal)
