@@ -71,8 +71,8 @@ class Search:
         return waiting / self.share
 
     def cost(self, timing: LineTiming) -> float:
-        """Return how long one request takes on the wire, in s, the silence before it included."""
-        return timing.gap + timing.transmission(len(self.codec.encode(self.opening(self.ids[0]))))
+        """Return how long one request takes on the wire, in s; the silence before it lies in the time-out before it."""
+        return timing.transmission(len(self.codec.encode(self.opening(self.ids[0]))))
 
     def opening(self, slave: int) -> ReadRegisters:
         """Return the read that each id is asked first."""

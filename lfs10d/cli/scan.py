@@ -1,0 +1,204 @@
+"""`lfs10d scan`: who is on the line, and what to write into the configuration."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from lfs10d.cli import EXIT_FAILED, EXIT_UNAVAILABLE, findings, json_option, roof
+from lfs10d.cli.columns import columns
+from lfs10d.cli.holder import instead
+from lfs10d.cli.lineoptions import LineOptions, baudrate_of, line_options, take
+from lfs10d.cli.ownline import OwnLine
+from lfs10d.cli.scanview import view
+from lfs10d.errors import PortBusyError, PortError
+from lfs10d.jobs.scan import Scan
+from lfs10d.jobs.search import FIRST_TIMEOUT, Search, ids_of
+from lfs10d.modbus.frames import Codec, Framing
+from lfs10d.profiles.library import builtin_names, load_profile
+from lfs10d.reading import FaultCode
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from lfs10d.profiles.schema import Profile
+
+LOOK_EVERY = 0.1
+"""How often the progress is drawn, in s."""
+
+EXAMPLES = """\b
+Examples:
+  lfs10d scan /dev/ttyUSB0                          all ids at 9600 and 19200 baud, about a minute
+  lfs10d scan /dev/ttyUSB0 --ids 1-20               the first twenty ids, a few seconds
+  lfs10d scan /dev/ttyUSB0 --baudrate 9600 --json   one rate, for programs
+"""
+
+
+def _ids(context: click.Context, parameter: click.Parameter, value: str) -> tuple[int, ...]:
+    try:
+        return ids_of(value)
+    except ValueError as error:
+        raise click.BadParameter(str(error), context, parameter) from error
+
+
+def _rates(context: click.Context, parameter: click.Parameter, value: str) -> tuple[int, ...]:
+    del context, parameter
+    return tuple(dict.fromkeys(baudrate_of(part) for part in value.split(",")))
+
+
+@click.command("scan", epilog=EXAMPLES)
+@click.argument("port")
+@click.option("--ids", callback=_ids, default="1-255", show_default=True, metavar="IDS", help="Such as 1-20,255.")
+@click.option(
+    "--baudrate",
+    "rates",
+    callback=_rates,
+    default="9600,19200",
+    show_default=True,
+    metavar="RATES",
+    help="Rates to try.",
+)
+@click.option("--profile", "profiles", multiple=True, metavar="FILE", help="A profile of your own to recognise.")
+@line_options
+@json_option
+def command(ids: tuple[int, ...], rates: tuple[int, ...], profiles: tuple[str, ...], **options: Any) -> int:  # noqa: ANN401  # `take` types them
+    """Find out who is on the line at PORT.
+
+    Asks every id at every rate; nothing is ever written to a device. The port must be free. Exit code 1 if nobody
+    answers.
+    """
+    as_json = options.pop("as_json")
+    line = take(options)
+    known = (*(load_profile(each, relative_to=Path()) for each in profiles), *_builtin(line.framing))
+    search = Search(
+        ids,
+        tuple(line.timing(rate) for rate in rates),
+        Codec(line.framing),
+        tuple(profile for profile in known if line.framing.value in profile.framings),
+        timeout=line.timeout or FIRST_TIMEOUT,
+    )
+    if not search.profiles:
+        raise click.UsageError(f"none of these profiles speaks {line.framing.value}")
+    result = _Result(Scan(search), line)
+    code = _scan(result, as_json=as_json)
+    if as_json:
+        click.echo(json.dumps(result.report(), indent=2, allow_nan=False))
+    else:
+        result.show()
+    return code
+
+
+def _builtin(framing: Framing) -> Iterator[Profile]:
+    for name in builtin_names():
+        profile = load_profile(name, relative_to=Path())
+        if framing.value in profile.framings:
+            yield profile
+
+
+@dataclass(slots=True)
+class _Result:
+    scan: Scan
+    line: LineOptions
+    framing_errors: int | None = None
+    opened: bool = False
+
+    def report(self) -> dict[str, Any]:
+        """Return everything for JSON."""
+        progress = self.scan.progress
+        return {
+            "port": self.line.port,
+            "complete": self.scan.complete,
+            "asked": progress.asked,
+            "total": progress.total,
+            "found": [findings.plain(finding) for finding in self.scan.found],
+            "noisy_ids": self.scan.noise.ids,
+            "echo": self.scan.noise.echoed,
+            "framing_errors": self.framing_errors,
+        }
+
+    def show(self) -> None:
+        """Print what was found, or what it means that nobody was."""
+        if not self.opened:
+            return
+        found = self.scan.found
+        if found:
+            _show_table([findings.row(finding) for finding in found])
+            click.echo()
+            click.echo("# To poll them, save this as lfs10d.yaml, then: lfs10d run -c lfs10d.yaml")
+            for text in findings.snippet(found, self.line):
+                click.echo(text)
+        if found and not self.scan.noise.ids:
+            return
+        if found:
+            click.echo()
+        for text in self._explanation():
+            click.echo(text, err=True)
+
+    def _explanation(self) -> Iterator[str]:
+        noise, asked = self.scan.noise, self.scan.progress.asked
+        if noise.last is not None:
+            yield f"At {noise.ids} of {asked} ids bytes were heard that are no answer: {noise.last.message}."
+            yield f"The last of them: {noise.last.heard.hex(' ').upper() or 'nothing'}"
+        if self.scan.found or not self.scan.complete:
+            return
+        code = FaultCode.TIMEOUT if noise.last is None else noise.last.code
+        seen = roof.Symptoms(code, noise.echoed, self.framing_errors)
+        other = "Do the sensors speak at another rate, or with parity? See --baudrate and --parity."
+        yield from roof.lines(roof.meaning(seen), (*roof.checks(seen), other))
+
+
+def _scan(result: _Result, *, as_json: bool) -> int:
+    """Scan to the end, or until it is ended; return the exit code."""
+    scan, port = result.scan, result.line.port
+    first_rate = scan.search.timings[0].baudrate
+    try:
+        with OwnLine(result.line.settings(first_rate)) as line:
+            while not line.events(LOOK_EVERY):
+                pass  # until the port is open
+            result.opened = True
+            with view(scan, port, quiet=as_json) as drawn:
+                line.submit(scan)
+                while not scan.over:
+                    line.events(LOOK_EVERY)
+                    drawn.update()
+            result.framing_errors = None if line.uart is None else line.uart.framing
+            while not scan.complete and line.events(LOOK_EVERY):
+                pass  # the reason why it did not come to its end is among them
+    except KeyboardInterrupt:
+        progress = scan.progress
+        click.echo(f"Stopped after {progress.asked} of {progress.total} ids; this was found so far:", err=True)
+        return EXIT_FAILED
+    except PortError as error:
+        click.echo(f"lfs10d: {error}", err=True)
+        if isinstance(error, PortBusyError):
+            for text in instead(port, slave=None):
+                click.echo(text, err=True)
+        return EXIT_UNAVAILABLE
+    return 0 if scan.found else EXIT_FAILED
+
+
+def _show_table(rows: list[tuple[str, ...]]) -> None:
+    if not sys.stdout.isatty():
+        for text in columns(findings.HEAD, rows, right=findings.RIGHT):
+            click.echo(text)
+        return
+    # Only a terminal needs rich; importing it takes longer than the rest of the verb.
+    from rich import box  # noqa: PLC0415
+    from rich.console import Console  # noqa: PLC0415
+    from rich.table import Table  # noqa: PLC0415
+    from rich.text import Text  # noqa: PLC0415
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for index, head in enumerate(findings.HEAD):
+        right = index in findings.RIGHT
+        table.add_column(head, justify="right" if right else "left", no_wrap=right, style="cyan" if not index else None)
+    for row in rows:
+        *cells, remark = (Text(cell) for cell in row)
+        remark.stylize("yellow")
+        table.add_row(*cells, remark)
+    Console().print(table)
