@@ -54,6 +54,11 @@ def poll_rules(poll: PollConfig) -> PollRules:
     return PollRules(retries=poll.retries, offline_after=poll.offline_after, probe_interval_max=poll.probe_interval_max)
 
 
+def usual_codec(line: LineConfig) -> Codec:
+    """Return how the frames of a slave that is not configured are read."""
+    return Codec(Framing(line.framing))
+
+
 def device_specs(config: Config, profiles: Mapping[str, Profile]) -> tuple[DeviceSpec, ...]:
     """Return the devices for the schedule; `profiles` by the configuration's word for each."""
     return tuple(_device_spec(slave, config.line, profiles[slave.profile]) for slave in config.slaves)

@@ -102,7 +102,12 @@ class Daemon:
         )
         self._first_burst = FirstBurst(self._station.burst(self._now()))
         self._powers = DaemonPowers(
-            self._station, self._uplink, now=self._now, running=lambda: self._files.loaded, reload=self._reload
+            self._station,
+            self._uplink,
+            now=self._now,
+            running=lambda: self._files.loaded,
+            reload=self._reload,
+            poll=lambda device, request: self._line.read(device, request),  # noqa: PLW0108 - built below
         )
         self._service = Service(
             REQUESTS,
@@ -172,7 +177,7 @@ class Daemon:
             self._enter(self._logbook.happened(event, port=port.settings.path, notices=port.notices, frames=frames))
             known = self._station.heard(event, now)
             self._enter(self._logbook.published(known))
-            published += known
+            published += [*known, *self._powers.heard(event, known, now)]
             if isinstance(event, Exchanged) or (isinstance(event, PortChanged) and event.fault is not None):
                 self._tell_ready()
         self._publish(published)
@@ -269,8 +274,10 @@ class Daemon:
         async with self._reloading:
             found = await aside(partial(reload.read, self._files.loaded.path), "reload")
             plan = reload.plan(self._files, found)
+            before = self._files.loaded.config
             self._files = replace(found, loaded=plan.loaded)
             self._apply(plan)
+            self._powers.reconfigured(before, plan.loaded.config)
             await self._uplink.reload(self._broker_settings() if plan.broker else None)
             return plan
 

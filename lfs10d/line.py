@@ -77,6 +77,11 @@ class Line:
         """The monotonic time by which the thread promised its next turn."""
         return self._thread.declared
 
+    def read(self, device: str, request: int) -> None:
+        """Have a device polled now for a request, whose number comes back with the reading."""
+        self.poller.read(device, request)
+        self.wake()
+
     def take(self, config: Config, profiles: Mapping[str, Profile], *, line: bool, realtime: bool) -> None:
         """Poll by another configuration from now on; `line` and `realtime` tell whether those changed."""
         if line:

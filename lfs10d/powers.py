@@ -4,20 +4,29 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable
+from lfs10d import assembly
+from lfs10d.inquiries import Inquiries, Inquiry, altered
+from lfs10d.reading import Exchanged, Reading
+from lfs10d.tracing import Trace
 
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable, Iterable
+
+    from lfs10d.config import Config
     from lfs10d.configfile import Loaded
     from lfs10d.facts import Instant
     from lfs10d.mqtt.uplink import Uplink
+    from lfs10d.reading import Event
     from lfs10d.reload import Plan
     from lfs10d.station import Station
+    from lfs10d.telemetry import Publication
 
 
 class DaemonPowers:
     """`Powers` of `lfs10d.requests.request` on a running daemon.
 
-    `now` gives the moment, `running` the configuration that holds, `reload` takes up the files as they are.
+    `now` gives the moment, `running` the configuration that holds, `reload` takes up the files as they are, `poll`
+    has the line thread poll a device for the request of a number.
     """
 
     def __init__(
@@ -28,12 +37,15 @@ class DaemonPowers:
         now: Callable[[], Instant],
         running: Callable[[], Loaded],
         reload: Callable[[], Awaitable[Plan]],
+        poll: Callable[[str, int], None],
     ) -> None:
         self._station = station
         self._uplink = uplink
         self._now = now
         self._running = running
         self._reload = reload
+        self._inquiries = Inquiries(poll)
+        self._trace: Trace | None = None
 
     def health(self) -> dict[str, object]:
         """Return how the daemon, the line and the devices are."""
@@ -58,3 +70,46 @@ class DaemonPowers:
         """Read the files again and apply what changed; raises ConfigError and changes nothing if one is wrong."""
         done = await self._reload()
         return {"applied": list(done.applied), "restart_required": list(done.restart_required)}
+
+    def devices(self) -> tuple[str, ...]:
+        """Return the names of the configured devices."""
+        return tuple(slave.name for slave in self._running().config.slaves)
+
+    async def read(self, device: str) -> Inquiry | None:
+        """Poll a device now."""
+        return await self._inquiries.read(device)
+
+    def trace(self, duration: float) -> None:
+        """Tell every frame for `duration` s from now on."""
+        loaded = self._running()
+        codecs = {spec.slave: spec.codec for spec in assembly.device_specs(loaded.config, loaded.profiles)}
+        until = self._now().mono + duration
+        self._trace = Trace(until, codecs, assembly.usual_codec(loaded.config.line))
+
+    def cancel(self) -> tuple[str, ...]:
+        """End the trace, if there is one."""
+        tracing = self._trace is not None and self._now().mono < self._trace.until
+        self._trace = None
+        return ("trace",) if tracing else ()
+
+    # -- what they need to know of the line
+
+    def heard(self, event: Event, published: Iterable[Publication], now: Instant) -> list[Publication]:
+        """Take an event of the line thread with what the station made of it; return what is told besides."""
+        if isinstance(event, Reading):
+            self._inquiries.heard(event, published)
+        elif isinstance(event, Exchanged) and self._trace is not None:
+            if now.mono < self._trace.until:
+                return self._trace.told(event, now)
+            self._trace = None
+        return []
+
+    def reconfigured(self, before: Config, after: Config) -> None:
+        """Take note of another configuration: polls of devices that are no longer the same have no reading."""
+        self._inquiries.abandon(altered(_identities(before), _identities(after)))
+
+
+def _identities(config: Config) -> dict[str, object]:
+    """Return what makes each device this one and no other on the line."""
+    framing = config.line.framing
+    return {slave.name: (slave.id, slave.profile, slave.checksum, slave.enabled, framing) for slave in config.slaves}

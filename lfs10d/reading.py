@@ -68,6 +68,7 @@ class Reading:
     was given up. `rtt` runs from the request's first bit to the answer's last byte; None for a failed poll.
     `online` and `response_timeout` are the device's state after this poll. `failed_attempts` are the codes of
     the attempts before the last. `overruns` counts the points of the grid missed since the reading before.
+    `requests` are the numbers of the requests that asked for it.
     """
 
     device: str
@@ -80,6 +81,7 @@ class Reading:
     probe: bool = False
     failed_attempts: tuple[FaultCode, ...] = ()
     overruns: int = 0
+    requests: tuple[int, ...] = ()
 
 
 class Errand(StrEnum):

@@ -115,7 +115,9 @@ class Schedule:
             self._jobs.submit(job, now)
             return []
         job.cut_off(now)
-        return [_reading(job.device, now, self._lost)] if wanted and isinstance(job, Poll) else []
+        if not wanted or not isinstance(job, Poll):
+            return []
+        return [_reading(job.device, now, self._lost, requests=_requests([job]))]
 
     def wake(self, job: Job, now: float) -> None:
         """End the `Hold` of `job`."""
@@ -146,9 +148,13 @@ class Schedule:
         self._probing.stop()
         for device in self.devices.values():
             device.cut_off()
-        requested = [job.device.name for job in jobs if isinstance(job, Poll) and self._wanted(job)]
-        told = [device for device in self.devices.values() if device.spec.enabled or device.name in requested]
-        return [_reading(device, now, fault) for device in told]
+        polls = [job for job in jobs if isinstance(job, Poll) and self._wanted(job)]
+        wanted = {poll.device.name for poll in polls if poll.errand is Errand.REQUEST}
+        told = [device for device in self.devices.values() if device.spec.enabled or device.name in wanted]
+        return [
+            _reading(device, now, fault, requests=_requests(poll for poll in polls if poll.device is device))
+            for device in told
+        ]
 
     def retime(self, timing: LineTiming) -> None:
         """Take the times of the line's new rate; what was learned at another rate is forgotten."""
@@ -267,7 +273,7 @@ class Schedule:
             self._probing.review(self.devices.values(), now)
         elif device.health is Health.OFFLINE:
             self._probing.plan(now)
-        return _reading(device, poll.at, poll.fault, poll)
+        return _reading(device, poll.at, poll.fault, poll, requests=_requests([poll]))
 
 
 def _another(old: DeviceSpec, new: DeviceSpec) -> bool:
@@ -282,7 +288,13 @@ def _wire_time(device: Device, timing: LineTiming) -> float:
     return timing.exchange(len(codec.encode(request)), codec.answer_size(request))
 
 
-def _reading(device: Device, at: float, fault: Fault | None, poll: Poll | None = None) -> Reading:
+def _requests(polls: Iterable[Poll]) -> tuple[int, ...]:
+    return tuple(poll.request for poll in polls if poll.request is not None)
+
+
+def _reading(
+    device: Device, at: float, fault: Fault | None, poll: Poll | None = None, *, requests: tuple[int, ...]
+) -> Reading:
     overruns, device.overruns = device.overruns, 0
     return Reading(
         device=device.name,
@@ -295,4 +307,5 @@ def _reading(device: Device, at: float, fault: Fault | None, poll: Poll | None =
         probe=poll is not None and poll.errand is Errand.PROBE,
         failed_attempts=tuple(poll.failed_attempts) if poll else (),
         overruns=overruns,
+        requests=requests,
     )

@@ -7,7 +7,8 @@ Rules
 2. A number is published only with a good reading, and availability is `online` while one is shown: it goes
    before a good state and after a bad one.
 3. The state shows the newest sample at most once a second, but a change of quality or error at once.
-4. A disabled device has one sample that says so, and then none.
+4. A disabled device has one sample that says so, and then none but those of polls that a request wants; of these
+   nothing else is shown.
 """
 
 from __future__ import annotations
@@ -88,6 +89,10 @@ class Standing:
         """
         fault = reading.fault
         ts = now.ts(reading.at)
+        if not self.facts.enabled:
+            self.seq += 1
+            sample = self._form(self.seq, ts, now, reading)
+            return [self._telling(sample, sample.payload(self._line))]
         if fault is None:
             self._last_good = reading.at
             changed = self._alarm.ended(ts)
@@ -186,8 +191,8 @@ class Standing:
         """Publish a sample, and the state and availability as far as they change by it."""
         shown = self._sample
         self._sample = sample
-        self._payload = payload = sample.payload(self._line)
-        published = [Publication(self._telemetry, payload, Kind.SAMPLE, retain=False, qos=1, sample=sample)]
+        self._payload = sample.payload(self._line)
+        published = [self._telling(sample, self._payload)]
         turned, self.online = online is not self.online, online
         if turned and online:
             published.append(self._availability())
@@ -198,6 +203,9 @@ class Standing:
         if turned and not online:
             published.append(self._availability())
         return published
+
+    def _telling(self, sample: Sample, payload: dict[str, object]) -> Publication:
+        return Publication(self._telemetry, payload, Kind.SAMPLE, retain=False, qos=1, sample=sample)
 
     def _state(self, now: Instant) -> Publication:
         """Return the newest state, which is then shown."""

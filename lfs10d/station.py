@@ -93,7 +93,8 @@ class Station:
     def heard(self, happened: Event, now: Instant) -> list[Publication]:
         """Take one event of the line thread; return what it makes known, in order.
 
-        Readings of devices unknown or disabled (the poll was under way when they went) are passed over.
+        Readings of devices unknown, or disabled and wanted by no request, are passed over: the poll was under way
+        when they went.
         """
         published = self._watch_clock(now)
         match happened:
@@ -263,7 +264,7 @@ class Station:
 
     def _read(self, reading: Reading, now: Instant) -> list[Publication]:
         standing = self._standings.get(reading.device)
-        if standing is None or not standing.facts.enabled:
+        if standing is None or not (standing.facts.enabled or reading.requests):
             return []
         apart = standing.tally.polled(reading, now.ts(reading.at))
         if reading.overruns:

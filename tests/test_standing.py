@@ -295,3 +295,15 @@ def test_a_state_may_come_a_little_early_and_no_earlier() -> None:
     watched.poll(10, 1.0)
     assert "state" not in watched.poll(11 - 2 * STATE_EARLY, 1.0)
     assert "state" in watched.poll(11 - STATE_EARLY / 2, 1.0)
+
+
+def test_a_poll_that_a_request_wants_of_a_disabled_device_is_a_numbered_sample_and_nothing_else() -> None:
+    watched = Watched()
+    watched.standing.reconfigure(replace(FACTS, enabled=False), instant(1))
+    shown = watched.shown
+    (sample,) = watched.publish(2, 7.5)
+    assert (sample.topic, sample.sample is not None) == ("device/a/telemetry", True)
+    assert cast("Mapping[str, object]", sample.payload)["wind_speed"] == 7.5
+    assert cast("Mapping[str, object]", sample.payload)["seq"] == 2
+    assert watched.poll(3, TIMEOUT) == ["telemetry"]
+    assert watched.shown == shown

@@ -506,3 +506,9 @@ def test_a_snapshot_is_plain_json_with_line_and_devices() -> None:
         ("a", True, 1.0),
         ("b", False, None),
     ]
+
+
+def test_a_reading_of_a_disabled_device_is_told_only_if_a_request_wants_it() -> None:
+    told = station(replace(ONE_VALUE, enabled=False))
+    assert told.heard(good("a", 1), instant(1)) == []
+    assert topics(told.heard(replace(good("a", 2), requests=(1,)), instant(2))) == ["device/a/telemetry"]

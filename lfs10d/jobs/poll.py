@@ -30,7 +30,7 @@ _NOTHING: frozenset[int] = frozenset()
 
 
 class Poll:
-    """One poll of `device`; `due` orders it among the others.
+    """One poll of `device`; `due` orders it among the others. `request` is the number of the request that wants it.
 
     When it is over `values` or `fault` is set, `at` says when, `rtt` how long the last exchange took.
     """
@@ -38,9 +38,12 @@ class Poll:
     share = 1.0
     excludes = _NOTHING
 
-    def __init__(self, device: Device, unanswered: Unanswered, *, due: float, errand: Errand) -> None:
+    def __init__(
+        self, device: Device, unanswered: Unanswered, *, due: float, errand: Errand, request: int | None = None
+    ) -> None:
         self.device = device
         self.errand = errand
+        self.request = request
         self.due = due
         self.values: dict[str, Number] = {}
         self.fault: Fault | None = None

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable
+    from collections.abc import Callable, Coroutine
 
     from lfs10d.admission import Form
     from lfs10d.commands import Answer
+    from lfs10d.inquiries import Inquiry
 
 
 class Powers(Protocol):
@@ -17,6 +18,22 @@ class Powers(Protocol):
 
     def health(self) -> dict[str, object]:
         """Return how the daemon, the line and the devices are, as in `status.json`."""
+        ...
+
+    def devices(self) -> tuple[str, ...]:
+        """Return the names of the configured devices, disabled ones too."""
+        ...
+
+    async def read(self, device: str) -> Inquiry | None:
+        """Poll a configured device now; None if it was removed or became another one before it was asked."""
+        ...
+
+    def trace(self, duration: float) -> None:
+        """Tell every frame for `duration` s from now on, whatever was said before."""
+        ...
+
+    def cancel(self) -> tuple[str, ...]:
+        """End what ends before its time when told to; return what that was: `trace`."""
         ...
 
     def republish(self) -> int:
@@ -35,7 +52,7 @@ class Powers(Protocol):
         ...
 
 
-Perform: TypeAlias = "Callable[[Any, Powers], Awaitable[Answer]]"
+Perform: TypeAlias = "Callable[[Any, Powers], Coroutine[Any, Any, Answer]]"
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from lfs10d.requests import config, general
+from lfs10d.requests import config, device, general, line
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from lfs10d.requests.request import Request
 
-REQUESTS: Mapping[str, Request] = {**general.REQUESTS, **config.REQUESTS}
+REQUESTS: Mapping[str, Request] = {
+    **general.REQUESTS,
+    **config.REQUESTS,
+    **device.REQUESTS,
+    **line.REQUESTS,
+}

@@ -1,0 +1,43 @@
+"""`line/trace` and `line/cancel`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import Field
+
+from lfs10d.admission import Form
+from lfs10d.commands import Answer, NoParameters, Parameters, ok
+from lfs10d.kinds import Duration
+from lfs10d.requests.request import Powers, Request
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+LONGEST = 600.0
+"""s for which a trace may go on."""
+USUAL = 30.0
+"""s for which it goes on where nothing is said."""
+
+
+class HowLong(Parameters):
+    """For how long."""
+
+    duration: Annotated[float, Duration(0.1, LONGEST)] = Field(default=USUAL, alias="for")
+
+
+async def trace(parameters: HowLong, powers: Powers) -> Answer:
+    """Tell every frame on `trace` for a while."""
+    powers.trace(parameters.duration)
+    return ok({"for": parameters.duration})
+
+
+async def cancel(_: NoParameters, powers: Powers) -> Answer:
+    """End a trace."""
+    return ok({"cancelled": list(powers.cancel())})
+
+
+REQUESTS: Mapping[str, Request] = {
+    "line/trace": Request(Form("sensors", HowLong), trace),
+    "line/cancel": Request(Form("sensors"), cancel),
+}

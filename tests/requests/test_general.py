@@ -1,0 +1,18 @@
+"""`health` and `republish`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tests.requests.conftest import Ask, FakePowers
+
+
+def test_health_is_told(ask: Ask) -> None:
+    answer = ask("health")
+    assert (answer.status, answer.data) == ("ok", {"v": 1})
+
+
+def test_republish_sends_everything_once_more_and_tells_how_much(ask: Ask, powers: FakePowers) -> None:
+    assert ask("republish").data == {"topics": 17}
+    assert powers.done == ["republish"]

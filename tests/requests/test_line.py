@@ -1,0 +1,34 @@
+"""`line/trace` and `line/cancel`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from tests.requests.conftest import Ask, FakePowers
+
+
+@pytest.mark.parametrize(
+    ("payload", "seconds"), [("{}", 30.0), ('{"for":"10m"}', 600.0), ('{"for":5}', 5.0), ('{"for":"250ms"}', 0.25)]
+)
+def test_a_trace_begins_for_the_time_asked_or_half_a_minute(
+    ask: Ask, powers: FakePowers, payload: str, seconds: float
+) -> None:
+    answer = ask("line/trace", payload)
+    assert (answer.status, answer.data, powers.done) == ("ok", {"for": seconds}, [seconds])
+
+
+@pytest.mark.parametrize("payload", ['{"for":"10m1s"}', '{"for":601}', '{"for":0}', '{"for":-1}', '{"for":"5"}'])
+def test_a_trace_longer_than_ten_minutes_or_of_no_duration_is_refused(
+    ask: Ask, powers: FakePowers, payload: str
+) -> None:
+    answer = ask("line/trace", payload)
+    assert (answer.code, answer.facts["param"], powers.done) == ("invalid_param", "for", [])
+
+
+def test_what_is_cancelled_is_told(ask: Ask, powers: FakePowers) -> None:
+    powers.running = ("trace",)
+    assert ask("line/cancel").data == {"cancelled": ["trace"]}
+    assert ask("line/cancel").data == {"cancelled": []}

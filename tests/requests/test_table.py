@@ -1,0 +1,34 @@
+"""The table of requests against the contract's."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from lfs10d.requests.table import REQUESTS
+
+if TYPE_CHECKING:
+    from tests.requests.conftest import Ask, FakePowers
+
+CLASSES = {
+    "config/get": "always",
+    "health": "always",
+    "republish": "always",
+    "config/reload": "polling",
+    "device/read": "polling",
+    "line/trace": "sensors",
+    "line/cancel": "sensors",
+}
+
+
+@pytest.mark.parametrize(("name", "klass"), CLASSES.items())
+def test_every_request_is_of_the_class_the_contract_says(name: str, klass: str) -> None:
+    assert REQUESTS[name].form.klass == klass
+
+
+@pytest.mark.parametrize("name", sorted(REQUESTS))
+def test_no_request_takes_a_parameter_it_does_not_know(ask: Ask, powers: FakePowers, name: str) -> None:
+    answer = ask(name, '{"nonsense":1}')
+    assert (answer.status, answer.code, answer.facts["param"]) == ("rejected", "invalid_param", "nonsense")
+    assert powers.done == []
