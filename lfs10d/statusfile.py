@@ -42,14 +42,15 @@ class StatusFile:
 
 def _json(status: Mapping[str, object]) -> str:
     """Return the status as JSON, each device by itself: the encoder holds the interpreter, and the line must wake."""
-    members = []
-    for key, value in status.items():
-        if isinstance(value, list):
-            text = f"[{','.join(_encoded(item) for item in value)}]"
-        else:
-            text = _encoded(value)
-        members.append(f"{_encoded(key)}:{text}")
+    members = (
+        f"{_encoded(key)}:{f'[{_joined(value)}]' if isinstance(value, list) else _encoded(value)}"
+        for key, value in status.items()
+    )
     return f"{{{','.join(members)}}}"
+
+
+def _joined(items: list[object]) -> str:
+    return ",".join(_encoded(item) for item in items)
 
 
 def _encoded(value: object) -> str:
