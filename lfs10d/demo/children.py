@@ -141,7 +141,11 @@ def passing_folder() -> Iterator[Path]:
     """Give an empty folder that is gone afterwards, even if we are killed."""
     folder = tempfile.mkdtemp(prefix="lfs10d-demo-")
     caretaker = subprocess.Popen(  # noqa: S603  # a line of ours
-        ["/bin/sh", "-c", _CARETAKER, folder], stdin=subprocess.PIPE, start_new_session=True
+        ["/bin/sh", "-c", _CARETAKER, folder],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
     )
     try:
         yield Path(folder)

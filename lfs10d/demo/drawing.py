@@ -18,11 +18,13 @@ if TYPE_CHECKING:
     from lfs10d.demo.brokers import Broker
     from lfs10d.demo.picture import Picture, Row
 
-LEAST_WIDTH: Final = 72
-LEAST_HEIGHT: Final = 22
+LEAST_WIDTH: Final = 80
+LEAST_HEIGHT: Final = 20
 """What the table needs; a smaller terminal gets plain lines."""
 ERROR_WIDTH: Final = 30
+TREND_LEAST: Final = 4
 TREND_MOST: Final = 40
+"""Samples shown, as there is room."""
 _BESIDE_TREND: Final = 32 + ERROR_WIDTH
 _STORM: Final = 16.0
 """m/s at which a bar of the trend is full."""
@@ -59,18 +61,21 @@ class TableView:
 
     def turn(self) -> None:
         """Draw what is known now."""
-        self._live.update(draw(self._picture, self._broker, self._console), refresh=True)
+        self._live.update(self._drawn(), refresh=True)
 
     def __exit__(self, *_: object) -> None:
         """End."""
         self._live.stop()
-        self._console.print(draw(self._picture, self._broker, self._console))
+        self._console.print(self._drawn())
+
+    def _drawn(self) -> Group:
+        unicode = self._console.encoding.startswith("utf")
+        return draw(self._picture, self._broker, self._console.width, unicode=unicode)
 
 
-def draw(picture: Picture, broker: Broker, console: Console) -> Group:
-    """Return the whole view for a terminal of this width."""
-    unicode = console.encoding.startswith("utf")
-    trend = min(TREND_MOST, console.width - _BESIDE_TREND)
+def draw(picture: Picture, broker: Broker, width: int, *, unicode: bool = True) -> Group:
+    """Return the whole view for a terminal of this width in characters, in ASCII if it has no `unicode`."""
+    trend = min(TREND_MOST, max(TREND_LEAST, width - _BESIDE_TREND))
     return Group(
         Text.assemble(("lfs10d demo", "bold"), f"  {wording.SUBJECT}"),
         Text(wording.data_flow(broker), "dim"),

@@ -40,7 +40,7 @@ def figures(line: LineFigures | None) -> str:
         return ""
     return (
         f"{line.polls_per_s:.1f} polls/s, {line.load_pct:.0f} % of the wire; "
-        f"silence before a request: {line.gap_min / 1000:.2f} ms or more, {line.gap_required / 1000:.2f} needed"
+        f"shortest gap {line.gap_min / 1000:.2f} ms, {line.gap_required / 1000:.2f} needed"
     )
 
 
