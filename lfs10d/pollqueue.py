@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from lfs10d.jobs.poll import Poll
 from lfs10d.reading import Errand
-from lfs10d.roster import Device, Health
+from lfs10d.roster import Device
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -65,7 +65,7 @@ class PollQueue:
 
     def enqueue(self, device: Device) -> None:
         """Let `device` wait for its next point of the grid, if it is to be polled and does not wait yet."""
-        if device.queued or not device.spec.enabled or device.health is Health.OFFLINE:
+        if device.queued or not device.spec.enabled or device.doubtful:
             return
         device.queued = True
         if device.spec.interval == 0:
@@ -96,7 +96,7 @@ class PollQueue:
                 return entry
             else:
                 device.queued = False
-                if device.health is not Health.OFFLINE:
+                if not device.doubtful:
                     return self._begin(device, now)
         return None
 

@@ -1,4 +1,4 @@
-"""Which offline device is probed next, and when.
+"""Which offline or doubtful device is probed next, and when.
 
 An offline device is probed after 1 s, 2 s, 4 s ... up to `probe_interval_max`. All probes together take at most 5 % of
 the line while any device answers. While none does they have the line in turn, each at most once a second; the first
@@ -10,14 +10,16 @@ from __future__ import annotations
 from math import inf
 from typing import TYPE_CHECKING
 
-from lfs10d.roster import Device, Health
 from lfs10d.share import Share
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-PROBE_SHARE = 0.05
-"""The part of the line that all probes together may take while any device answers."""
+    from lfs10d.roster import Device
+
+PROBE_SHARE = 0.04
+"""The part of the line that probes are given while any device answers: what one of them takes beyond that, and the
+polls that some sensors ignore right after it, must fit into the 5 % that all probes together may cost."""
 PROBE_CREDIT = 1.0
 """Line time in s that probes may take ahead of their share, so that a single dead device is probed at 1, 2, 4 s."""
 PROBE_SPACING = 1.0
@@ -36,7 +38,7 @@ class Probing:
     def review(self, devices: Iterable[Device], now: float) -> None:
         """Look at all devices again, after any change of health or configuration."""
         polled = [device for device in devices if device.spec.enabled]
-        self._offline = [device for device in polled if device.health is Health.OFFLINE]
+        self._offline = [device for device in polled if device.doubtful]
         answering = any(device.online for device in polled)
         if answering and not self.anyone_online:
             for device in self._offline:

@@ -8,7 +8,9 @@ Rules
 3. Exception 06 (busy) proves it alive and counts neither as error nor towards offline.
 4. The time-out is fixed, or learned: 2 x p99 of the last 100 answers + 20 ms within 50 ms..1 s. A slave never
    heard is given 200, 400, 1000 ms on its first polls. A late answer counts with the time it took.
-5. A probe of an OFFLINE device waits 200 ms, every fourth one 1 s.
+5. A probe of an OFFLINE device waits 200 ms or what was learned, every fourth one 1 s.
+6. An UNHEARD device that did not answer its first poll is doubtful: asked on as an OFFLINE one is, within the share
+   of probes, so that the absent cost the present little from the start.
 
 ======== =================== =============================================== =========
 from     answer or alive     failed poll                                     port lost
@@ -74,6 +76,11 @@ class DeviceSpec:
     interval: float
     enabled: bool = True
     response_timeout: float | None = None
+
+    def begins_anew(self, before: DeviceSpec) -> bool:
+        """Whether nothing that was learned of the device as it was `before` holds for it now."""
+        reborn = self.enabled and not before.enabled
+        return reborn or (self.slave, self.profile, self.codec) != (before.slave, before.profile, before.codec)
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,6 +149,11 @@ class Device:
         return self.health is Health.ONLINE
 
     @property
+    def doubtful(self) -> bool:
+        """It is probed, not polled (rule 6)."""
+        return self.health is Health.OFFLINE or (self.health is Health.UNHEARD and self.failures > 0)
+
+    @property
     def timeout(self) -> float:
         """How long its next poll waits for the first byte of an answer, in s (rules 4 and 5)."""
         if self.spec.response_timeout is not None:
@@ -155,9 +167,11 @@ class Device:
     @property
     def probe_timeout(self) -> float:
         """How long its next probe waits, in s (rule 5); a fixed time-out holds for probes too."""
-        if self.spec.response_timeout is not None:
-            return self.spec.response_timeout
-        return LEARNED_MOST if self.probes % PATIENT_PROBE_EVERY == PATIENT_PROBE_EVERY - 1 else PROBE_TIMEOUT
+        if self.spec.response_timeout is not None or self.health is Health.UNHEARD:
+            return self.timeout
+        if self.probes % PATIENT_PROBE_EVERY == PATIENT_PROBE_EVERY - 1:
+            return LEARNED_MOST
+        return PROBE_TIMEOUT if self.turnarounds.p99 is None else max(PROBE_TIMEOUT, self.timeout)
 
     @property
     def retries(self) -> int:
@@ -178,9 +192,9 @@ class Device:
             self.answered()
             return
         self.failures += 1
+        self.probe_exempt = False
         if self.health is Health.OFFLINE:
             self.probes += 1
-            self.probe_exempt = False
             self.probe_interval = min(2 * self.probe_interval, self.rules.probe_interval_max)
             self.next_probe = now + self.probe_interval
         elif self.failures >= self.rules.offline_after:

@@ -7,7 +7,9 @@ Rules
 2. A slave id that a job excludes is polled by nobody while the job runs.
 3. When the port is lost every device is offline and gets one reading; nothing is due until it is back, then every
    device is due at once.
-4. One poll, one reading; none if its device is no longer configured, or no longer enabled and nobody requested it.
+4. While nobody answers, a device silent right after another was silent is asked once more at once: some sensors
+   ignore the request after one to a dead neighbour.
+5. One poll, one reading; none if its device is no longer configured, or no longer enabled and nobody requested it.
 """
 
 from __future__ import annotations
@@ -18,11 +20,12 @@ from typing import TYPE_CHECKING, TypeAlias
 from lfs10d.jobs.job import Again, Ask, Hold, Job, Later
 from lfs10d.jobs.poll import Poll
 from lfs10d.jobs.queue import JobQueue
+from lfs10d.jobs.telling import tell, tell_lost
 from lfs10d.modbus.frames import ReadRegisters
 from lfs10d.modbus.unanswered import Unanswered
 from lfs10d.pollqueue import PollQueue, back_on_grid, spread
 from lfs10d.probing import Probing
-from lfs10d.reading import Errand, Fault, Reading
+from lfs10d.reading import Errand, Fault, FaultCode
 from lfs10d.roster import LEARNED_MOST, Device, DeviceSpec, Health, PollRules
 
 if TYPE_CHECKING:
@@ -30,6 +33,7 @@ if TYPE_CHECKING:
 
     from lfs10d.modbus.exchange import Outcome
     from lfs10d.modbus.timing import LineTiming
+    from lfs10d.reading import Reading
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +61,7 @@ class Schedule:
         self._probing = Probing(now)
         self._jobs = JobQueue()
         self._current: tuple[Job, Ask] | None = None
+        self._silent: int | None = None
         self._lost: Fault | None = None
 
     # -- what is to be polled
@@ -70,7 +75,7 @@ class Schedule:
         fresh: list[Device] = []
         for spec in specs:
             device = before.get(spec.name)
-            if device is None or _another(device.spec, spec):
+            if device is None or spec.begins_anew(device.spec):
                 device = Device(spec, rules, spec.slave)
                 if self._lost:
                     device.cut_off()
@@ -101,7 +106,7 @@ class Schedule:
         self._probing.review(polled, now)
 
     def _wanted(self, poll: Poll) -> bool:
-        """Whether the reading of this poll is of any use (rule 4)."""
+        """Whether the reading of this poll is of any use (rule 5)."""
         device = poll.device
         useful = device.spec.enabled or poll.errand is Errand.REQUEST
         return useful and self.devices.get(device.name) is device
@@ -111,13 +116,14 @@ class Schedule:
     def submit(self, job: Job, now: float) -> list[Reading]:
         """Take a job; it is asked as soon as its class and its share allow. While the port is lost it is cut off."""
         wanted = not isinstance(job, Poll) or self._wanted(job)
-        if wanted and self._lost is None:
+        lost = self._lost
+        if wanted and lost is None:
             self._jobs.submit(job, now)
             return []
         job.cut_off(now)
-        if not wanted or not isinstance(job, Poll):
+        if not wanted or lost is None or not isinstance(job, Poll):
             return []
-        return [_reading(job.device, now, self._lost, requests=_requests([job]))]
+        return [tell_lost(job.device, lost, now, [job])]
 
     def wake(self, job: Job, now: float) -> None:
         """End the `Hold` of `job`."""
@@ -151,10 +157,7 @@ class Schedule:
         polls = [job for job in jobs if isinstance(job, Poll) and self._wanted(job)]
         wanted = {poll.device.name for poll in polls if poll.errand is Errand.REQUEST}
         told = [device for device in self.devices.values() if device.spec.enabled or device.name in wanted]
-        return [
-            _reading(device, now, fault, requests=_requests(poll for poll in polls if poll.device is device))
-            for device in told
-        ]
+        return [tell_lost(device, fault, now, polls) for device in told]
 
     def retime(self, timing: LineTiming) -> None:
         """Take the times of the line's new rate; what was learned at another rate is forgotten."""
@@ -224,6 +227,9 @@ class Schedule:
         self.unanswered.settled(outcome, ask.codec, ask.timeout, now)
         self._learn(outcome)
         self._spend(job, outcome, now)
+        if self._ignored(outcome) and isinstance(job, Poll) and self._wanted(job):
+            self._jobs.resume(job)
+            return []
         following = job.heard(outcome, now)
         if isinstance(job, Poll) and not self._wanted(job):
             job.cut_off(now)
@@ -236,6 +242,14 @@ class Schedule:
             return []
         self._jobs.over(job)
         return [self._finish(job, now)] if isinstance(job, Poll) else []
+
+    def _ignored(self, outcome: Outcome) -> bool:
+        """Whether the request may have been ignored only for the one before it (rule 4)."""
+        before, self._silent = self._silent, None
+        if outcome.fault is None or outcome.fault.code is not FaultCode.TIMEOUT:
+            return False
+        self._silent = outcome.request.slave
+        return not self._probing.anyone_online and before not in (None, self._silent)
 
     def _learn(self, outcome: Outcome) -> None:
         """Learn how long answers take, late ones included, whoever asked."""
@@ -265,20 +279,15 @@ class Schedule:
             device.failed(poll.fault, now)
         if poll.errand is not Errand.REQUEST:
             device.polling = False
-        if before is Health.OFFLINE and device.online:
+        if before is not Health.ONLINE and device.online:
             back_on_grid(device, now)
         if not device.polling:
             self._polls.enqueue(device)
-        if device.health is not before:
+        if device.health is not before or device.health is Health.UNHEARD:
             self._probing.review(self.devices.values(), now)
         elif device.health is Health.OFFLINE:
             self._probing.plan(now)
-        return _reading(device, poll.at, poll.fault, poll, requests=_requests([poll]))
-
-
-def _another(old: DeviceSpec, new: DeviceSpec) -> bool:
-    reborn = new.enabled and not old.enabled
-    return reborn or (old.slave, old.profile, old.codec) != (new.slave, new.profile, new.codec)
+        return tell(poll)
 
 
 def _wire_time(device: Device, timing: LineTiming) -> float:
@@ -286,26 +295,3 @@ def _wire_time(device: Device, timing: LineTiming) -> float:
     request = ReadRegisters(device.slave, block.address, block.count, block.function)
     codec = device.spec.codec
     return timing.exchange(len(codec.encode(request)), codec.answer_size(request))
-
-
-def _requests(polls: Iterable[Poll]) -> tuple[int, ...]:
-    return tuple(poll.request for poll in polls if poll.request is not None)
-
-
-def _reading(
-    device: Device, at: float, fault: Fault | None, poll: Poll | None = None, *, requests: tuple[int, ...]
-) -> Reading:
-    overruns, device.overruns = device.overruns, 0
-    return Reading(
-        device=device.name,
-        at=at,
-        values=poll.good if poll else None,
-        fault=fault,
-        rtt=poll.rtt if poll else None,
-        online=device.online,
-        response_timeout=device.timeout,
-        probe=poll is not None and poll.errand is Errand.PROBE,
-        failed_attempts=tuple(poll.failed_attempts) if poll else (),
-        overruns=overruns,
-        requests=requests,
-    )
