@@ -1,9 +1,10 @@
 """One connection to the broker from its beginning to its end; the only importer of paho.
 
-paho runs one thread per connection. Its callbacks do nothing but pass on what happened to the asyncio loop: to
-take a lock there would dead-lock with `publish`. It keeps no queue and reconnects nothing here; both are others'
-business. Nothing in this module blocks the loop: name resolution, connecting, TLS, and reading the
-password and the certificates all happen in paho's thread, and a thread that hangs there is left to itself.
+A thread of its own, gone afterwards, does what may block: the password and the certificates are read, the name is
+resolved, the socket is connected, TLS is agreed upon, CONNECT is sent. A thread that hangs there is left to itself.
+From then on paho runs in the asyncio loop: a thread for it would wake twice for every message (see
+docs/decisions/0003-one-loop.md). Its callbacks only pass on what happened, to be dealt with when paho is done: to
+publish inside a callback would wait for paho itself. It keeps no queue and reconnects nothing here.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import socket
+import threading
 from typing import TYPE_CHECKING
 
 from paho.mqtt.client import Client, ConnectFlags, DisconnectFlags, MQTTMessage
@@ -46,39 +48,11 @@ CONNECT_TIMEOUT = 5.0
 CONNACK_TIMEOUT = 5.0
 """Seconds from an open connection to the broker's CONNACK; amqtt 0.12 leaves a CONNECT of MQTT 5 unanswered."""
 
+UPKEEP_EVERY = 1.0
+"""Seconds between two looks at the keepalive."""
+
 RECEIVE_MAXIMUM = 64
 """Requests the broker may have under way to us: a flood waits there, not in our memory."""
-
-
-class _Client(Client):
-    """paho's client whose thread prepares itself, never prints a traceback, and says when it is over."""
-
-    prepare: Callable[[], None]
-    over: Callable[[Ended | None], None]
-    explain: Callable[[Exception], Ended]
-
-    def loop_forever(
-        self,
-        timeout: float = 1.0,
-        retry_first_connection: bool = False,  # noqa: ARG002, FBT001, FBT002 - paho's signature; it is never retried
-    ) -> MQTTErrorCode:
-        ended: Ended | None = None
-        try:
-            self.prepare()
-            return super().loop_forever(timeout, retry_first_connection=False)
-        except Exception as caught:  # noqa: BLE001 - whatever a broker provokes ends this connection and no more
-            ended = self.explain(caught)
-            return MQTTErrorCode.MQTT_ERR_UNKNOWN
-        finally:
-            self.over(ended)
-            self._forget()
-
-    def _forget(self) -> None:
-        # Without the way back to the connection no cycle is left, and the sockets are closed with the last
-        # reference rather than when the garbage collector comes by.
-        self.on_socket_open = self.on_connect = self.on_disconnect = None
-        self.on_publish = self.on_subscribe = self.on_message = None
-        del self.prepare, self.over, self.explain
 
 
 class Connection:
@@ -94,13 +68,16 @@ class Connection:
         self._left = False
         self._abandoned = False
         self._connack: asyncio.TimerHandle | None = None
+        self._upkeep: asyncio.TimerHandle | None = None
+        self._descriptor: int | None = None  # while the loop watches the socket
+        self._writing = False
         self._client = self._build(will)
-        self._client.loop_start()
+        threading.Thread(target=self._connect, name="connect", daemon=True).start()
 
-    def _build(self, will: Will | None) -> _Client:
+    def _build(self, will: Will | None) -> Client:
         settings = self._settings
         five = self._version is Version.V5
-        client = _Client(
+        client = Client(
             CallbackAPIVersion.VERSION2,
             settings.client_id,
             clean_session=None if five else True,
@@ -112,10 +89,8 @@ class Connection:
         client.max_inflight_messages_set(0)  # the outbox counts
         if will is not None:
             client.will_set(will.topic, will.payload, qos=1, retain=True)
-        client.prepare = self._prepare
-        client.over = self._over
-        client.explain = self._explain
         client.on_socket_open = self._on_socket_open
+        client.on_socket_close = self._on_socket_close
         client.on_connect = self._on_connect
         client.on_disconnect = self._on_disconnect
         client.on_publish = self._on_publish
@@ -134,14 +109,28 @@ class Connection:
     # From the loop
 
     def publish(
-        self, topic: str, payload: bytes, *, qos: int = 1, retain: bool = False, correlation: bytes | None = None
+        self,
+        topic: str,
+        payload: bytes,
+        *,
+        qos: int = 1,
+        retain: bool = False,
+        response_topic: str | None = None,
+        correlation: bytes | None = None,
     ) -> int | None:
-        """Hand over one message; return its id, None where there is no connection now. By 5: `correlation`."""
+        """Hand over one message; return its id, None where there is no connection now.
+
+        By 3.1.1 there is neither `response_topic` nor `correlation`.
+        """
         properties = None
-        if correlation is not None and self._version is Version.V5:
+        if self._version is Version.V5 and (response_topic is not None or correlation is not None):
             properties = _properties(PacketTypes.PUBLISH)
-            properties.CorrelationData = correlation
+            if response_topic is not None:
+                properties.ResponseTopic = response_topic
+            if correlation is not None:
+                properties.CorrelationData = correlation
         info = self._client.publish(topic, payload, qos, retain, properties)
+        self._watch_writing()
         return info.mid if info.rc == MQTTErrorCode.MQTT_ERR_SUCCESS else None
 
     def subscribe(self, filters: Sequence[Filter]) -> int | None:
@@ -163,37 +152,52 @@ class Connection:
             )
         else:
             _, mid = self._client.subscribe([(each.topic, each.qos) for each in filters])
+        self._watch_writing()
         return mid
 
     def unsubscribe(self, topics: Sequence[str]) -> None:
         """End subscriptions."""
         self._client.unsubscribe(list(topics))
+        self._watch_writing()
 
     def leave(self) -> None:
         """Disconnect in order, which makes the broker drop the will; `ended` follows if the broker lives."""
         self._left = True
         self._client.disconnect()
+        self._watch_writing()
 
     def abandon(self) -> None:
         """End it at once and say nothing more; the broker publishes the will."""
         self._abandoned = True
         self._events = None
+        self._close()
+
+    def _close(self) -> None:
+        """Stop watching the socket and close it without a word."""
         self._cancel_connack()
+        self._unwatch()
         opened = self._client.socket()
         if isinstance(opened, socket.socket):
             with contextlib.suppress(OSError):
-                # Below TLS: its own shutdown would wait, and races with paho's thread.
+                # Below TLS, whose own shutdown would wait.
                 socket.socket.shutdown(opened, socket.SHUT_RDWR)
+            opened.close()
 
-    # In paho's thread
+    # In the thread that connects
 
-    def _prepare(self) -> None:
-        settings = self._settings
-        if settings.username is not None:
-            password = settings.password()
-            self._client.username_pw_set(settings.username, None if password is None else password.reveal())
-        if settings.tls is not None:
-            self._client.tls_set_context(tls_context(settings.tls))
+    def _connect(self) -> None:
+        try:
+            settings = self._settings
+            if settings.username is not None:
+                password = settings.password()
+                self._client.username_pw_set(settings.username, None if password is None else password.reveal())
+            if settings.tls is not None:
+                self._client.tls_set_context(tls_context(settings.tls))
+            self._client.reconnect()
+        except Exception as caught:  # noqa: BLE001 - whatever a broker provokes ends this connection and no more
+            self._post(self._failed, failed(caught, self._settings))
+        else:
+            self._post(self._watch)
 
     def _on_socket_open(self, _client: Client, _userdata: object, opened: object) -> None:
         if self._abandoned and isinstance(opened, socket.socket):
@@ -201,37 +205,93 @@ class Connection:
             raise ConnectionAbortedError
         self._post(self._begin_connack)
 
-    def _on_connect(
-        self, _c: Client, _u: object, _flags: ConnectFlags, reason: ReasonCode, properties: Properties | None
-    ) -> None:
-        self._post(self._answered, reason.value, properties)
-
-    def _on_disconnect(
-        self, _c: Client, _u: object, flags: DisconnectFlags, reason: ReasonCode, _p: Properties | None
-    ) -> None:
-        self._post(self._gone, reason.value if flags.is_disconnect_packet_from_server else None)
-
-    def _on_publish(self, _c: Client, _u: object, mid: int, reason: ReasonCode, _p: Properties) -> None:
-        self._post(self._acknowledged, mid, reason.value)
-
-    def _on_subscribe(self, _c: Client, _u: object, mid: int, reasons: list[ReasonCode], _p: Properties | None) -> None:
-        self._post(self._subscribed, mid, tuple(reason.value for reason in reasons))
-
-    def _on_message(self, _client: Client, _userdata: object, message: MQTTMessage) -> None:
-        self._post(self._arrived, message)
-
-    def _explain(self, error: Exception) -> Ended:
-        return failed(error, self._settings)
-
-    def _over(self, ended: Ended | None) -> None:
-        self._post(self._finished, ended)
-
     def _post(self, call: Callable[..., None], *values: object) -> None:
         # The loop is closed when an abandoned thread outlives it.
         with contextlib.suppress(RuntimeError):
             self._loop.call_soon_threadsafe(call, *values)
 
-    # In the loop again
+    # The socket, in the loop
+
+    def _watch(self) -> None:
+        """Take the connected socket over from the thread."""
+        opened = self._client.socket()
+        if self._abandoned:
+            self._close()
+        elif not isinstance(opened, socket.socket):
+            self._gone(None)
+        else:
+            self._descriptor = opened.fileno()
+            self._loop.add_reader(self._descriptor, self._readable, opened)
+            self._keep_up()
+            self._watch_writing()
+
+    def _unwatch(self) -> None:
+        if self._upkeep is not None:
+            self._upkeep.cancel()
+        if self._descriptor is not None:
+            self._loop.remove_reader(self._descriptor)
+            self._loop.remove_writer(self._descriptor)
+        self._descriptor = self._upkeep = None
+        self._writing = False
+
+    def _readable(self, opened: socket.socket) -> None:
+        pending = getattr(opened, "pending", None)  # what TLS has decrypted makes no descriptor readable
+        try:
+            self._client.loop_read()
+            while pending is not None and self._descriptor is not None and pending():
+                self._client.loop_read()
+        except Exception as caught:  # noqa: BLE001 - as above
+            self._close()
+            self._failed(failed(caught, self._settings))
+        else:
+            self._watch_writing()
+
+    def _watch_writing(self) -> None:
+        """Come back when the socket takes more, as long as paho has more for it."""
+        wanted = self._descriptor is not None and self._client.want_write()
+        if wanted is self._writing or self._descriptor is None:
+            return
+        self._writing = wanted
+        if wanted:
+            self._loop.add_writer(self._descriptor, self._writable)
+        else:
+            self._loop.remove_writer(self._descriptor)
+
+    def _writable(self) -> None:
+        self._client.loop_write()
+        self._watch_writing()
+
+    def _keep_up(self) -> None:
+        """Let paho send its pings, and notice that none is answered."""
+        self._upkeep = self._loop.call_later(UPKEEP_EVERY, self._keep_up)
+        self._client.loop_misc()
+        self._watch_writing()
+
+    # Callbacks of paho
+
+    def _on_socket_close(self, _client: Client, _userdata: object, _closing: object) -> None:
+        self._unwatch()
+
+    def _on_connect(
+        self, _c: Client, _u: object, _flags: ConnectFlags, reason: ReasonCode, properties: Properties | None
+    ) -> None:
+        self._loop.call_soon(self._answered, reason.value, properties)
+
+    def _on_disconnect(
+        self, _c: Client, _u: object, flags: DisconnectFlags, reason: ReasonCode, _p: Properties | None
+    ) -> None:
+        self._loop.call_soon(self._gone, reason.value if flags.is_disconnect_packet_from_server else None)
+
+    def _on_publish(self, _c: Client, _u: object, mid: int, reason: ReasonCode, _p: Properties) -> None:
+        self._loop.call_soon(self._acknowledged, mid, reason.value)
+
+    def _on_subscribe(self, _c: Client, _u: object, mid: int, reasons: list[ReasonCode], _p: Properties | None) -> None:
+        self._loop.call_soon(self._subscribed, mid, tuple(reason.value for reason in reasons))
+
+    def _on_message(self, _client: Client, _userdata: object, message: MQTTMessage) -> None:
+        self._loop.call_soon(self._arrived, message)
+
+    # What became of it
 
     def _begin_connack(self) -> None:
         self._opened = True
@@ -281,18 +341,25 @@ class Connection:
             ending = Ending.TAKEN_OVER if reason == SESSION_TAKEN_OVER else Ending.LOST
             self._end(Ended(ending, f"{place}: {reason_in_words(reason)}", reason))
 
-    def _finished(self, ended: Ended | None) -> None:
-        """Note that paho's thread is over, `ended` by an error of its own or after its `on_disconnect`."""
-        if ended is not None and not self._opened:
-            self._end(ended)
-        else:
+    def _failed(self, ended: Ended) -> None:
+        """Note an error of our own side, or one of the socket before it was open."""
+        if self._opened:
             self._gone(None)
+        else:
+            self._end(ended)
 
     def _end(self, ended: Ended) -> None:
         events, self._events = self._events, None
         self._cancel_connack()
+        self._forget()
         if events is not None:
             events.ended(ended)
+
+    def _forget(self) -> None:
+        # Without the way back to us no cycle is left, and what paho holds is freed with the last reference.
+        client = self._client
+        client.on_socket_open = client.on_socket_close = client.on_connect = client.on_disconnect = None
+        client.on_publish = client.on_subscribe = client.on_message = None
 
     def _acknowledged(self, mid: int, reason: int) -> None:
         if self._events is not None:

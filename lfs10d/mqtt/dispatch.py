@@ -58,6 +58,7 @@ class Dispatch:
         self._sent: dict[int, tuple[Letter, float]] = {}
         self._assembly: tuple[Array, list[bytes]] | None = None
         self._turn: asyncio.Handle | None = None
+        self._sending = False
         self._alarm: asyncio.TimerHandle | None = None
 
     def connected(self, connection: Connection, accepted: Accepted) -> None:
@@ -77,9 +78,9 @@ class Dispatch:
         self._outbox.lost(self._now())
 
     def wake(self) -> None:
-        """Send soon what there is to send."""
-        if self._connection is not None and self._turn is None:
-            self._turn = asyncio.get_running_loop().call_soon(self._send_some)
+        """Send what there is to send: some at once, the rest soon."""
+        if self._connection is not None and self._turn is None and not self._sending:
+            self._send_some()
 
     def acknowledged(self, mid: int, reason: int) -> None:
         """Note the broker's answer to a message."""
@@ -101,17 +102,26 @@ class Dispatch:
 
     def _send_some(self) -> None:
         self._turn = None
+        self._sending = True
+        emptied = self._send_a_few()
+        self._sending = False
+        if emptied:
+            self._set_alarm()
+        else:
+            self._turn = asyncio.get_running_loop().call_soon(self._send_some)
+
+    def _send_a_few(self) -> bool:
+        """Send up to `LETTERS_AT_ONCE`; return whether nothing more may go now."""
         for _ in range(LETTERS_AT_ONCE):
             letter = self._outbox.next(self._now())
             if letter is None:
-                self._set_alarm()
-                return
+                return True
             if isinstance(letter, Array):
                 self._assembly = (letter, [])
                 asyncio.get_running_loop().call_soon(self._assemble, letter)
             else:
                 self._send_encoded(letter)
-        self.wake()
+        return False
 
     def _send_encoded(self, letter: Retained | Message | Live | Declaration) -> None:
         if isinstance(letter, Declaration):

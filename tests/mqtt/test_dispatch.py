@@ -135,8 +135,8 @@ def test_a_few_letters_go_in_one_turn_of_the_loop() -> None:
         desk.add(*(sample(seq) for seq in range(1, 11)))
         before = len(desk.wire.sent)
         desk.dispatch.wake()
-        counts = []
-        for _ in range(3):
+        counts = [len(desk.wire.sent) - before]
+        for _ in range(2):
             await asyncio.sleep(0)
             counts.append(len(desk.wire.sent) - before)
         assert counts == [LETTERS_AT_ONCE, 2 * LETTERS_AT_ONCE, 10]

@@ -54,8 +54,12 @@ class Site:
             stands_behind=lambda: frozenset(self.retained),
             requested=self.requests.append,
             epoch_ms=lambda: 1_795_298_022_003,
-            changed=lambda: self.changes.append(self.uplink.connected),
+            changed=self._changed,
         )
+
+    def _changed(self) -> None:
+        if self.changes[-1:] != [self.uplink.connected]:
+            self.changes.append(self.uplink.connected)
 
 
 async def until(claim: Callable[[], bool], what: str, *, within: float = PATIENCE) -> None:
