@@ -20,7 +20,7 @@ from lfs10d.errors import PortBusyError
 from lfs10d.modbus.frames import Checksum, Codec, describe
 from lfs10d.profiles.library import load_profile
 from lfs10d.quantities import duration_text, seconds
-from lfs10d.reading import ALIVE_CODES, Exchanged, Fault, FaultCode, Reading
+from lfs10d.reading import ALIVE_CODES, Exchanged, Fault, FaultCode, Reading, UartCounters
 from lfs10d.roster import DeviceSpec, PollRules
 
 if TYPE_CHECKING:
@@ -173,7 +173,7 @@ def _take(wanted: _Wanted, course: _Course, reading: Reading, line: OwnLine) -> 
             click.echo(text)
     if fault is not None and final and not course.explained and not wanted.as_json:
         course.explained = True
-        for text in _explained(wanted, course, fault, line):
+        for text in _explained(wanted, course, fault, line.uart):
             click.echo(text, err=True)
     if wanted.watch or not final:
         return None
@@ -226,7 +226,7 @@ def _bar(wanted: _Wanted, reading: Reading) -> str:
     return click.style(block * min(BAR_MOST, round(reading.values["wind_speed"] / BAR_UNIT)), fg="cyan")
 
 
-def _explained(wanted: _Wanted, course: _Course, fault: Fault, line: OwnLine) -> Iterator[str]:
+def _explained(wanted: _Wanted, course: _Course, fault: Fault, uart: UartCounters | None) -> Iterator[str]:
     """Yield what was asked and heard, what it means and what to check."""
     how = f"{wanted.baudrate} baud {wanted.line.character}"
     attempts = f"{course.failures} attempt{'s' * (course.failures > 1)}"
@@ -239,7 +239,7 @@ def _explained(wanted: _Wanted, course: _Course, fault: Fault, line: OwnLine) ->
         yield f"  {what}  {text.ljust(width)}  {_meant(frame, wanted)}".rstrip()
     yield ""
     echoed = any(each.sent and each.heard.startswith(each.sent) for each in course.exchanges)
-    framing = None if line.uart is None else line.uart.framing
+    framing = None if uart is None else uart.framing
     seen = roof.Symptoms(fault.code, echoed, framing)
     yield from roof.lines(roof.meaning(seen), (*_own_advice(wanted, fault), *roof.checks(seen)))
 

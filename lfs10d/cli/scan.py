@@ -86,6 +86,8 @@ def command(ids: tuple[int, ...], rates: tuple[int, ...], profiles: tuple[str, .
         raise click.UsageError(f"none of these profiles speaks {line.framing.value}")
     result = _Result(Scan(search), line)
     code = _scan(result, as_json=as_json)
+    if not result.opened:
+        return code
     if as_json:
         click.echo(json.dumps(result.report(), indent=2, allow_nan=False))
     else:
@@ -123,8 +125,6 @@ class _Result:
 
     def show(self) -> None:
         """Print what was found, or what it means that nobody was."""
-        if not self.opened:
-            return
         found = self.scan.found
         if found:
             _show_table([findings.row(finding) for finding in found])

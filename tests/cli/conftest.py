@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
+import os
+import pty
+import signal
+import struct
 import subprocess
 import sys
+import termios
 from typing import TYPE_CHECKING, Protocol
 
 import pytest
 
+from lfs10d.simulator.line import SimulatedLine
+from lfs10d.simulator.pty import PtyLine
+
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
 
@@ -43,3 +54,48 @@ def small(tmp_path: Path) -> Path:
     file = tmp_path / "lfs10d.yaml"
     file.write_text("line: {port: /dev/x}\nslaves: [2, {id: 3, interval: 250ms}]\nmqtt: {host: localhost}\n")
     return file
+
+
+class AtTerminal(Protocol):
+    """Calls the program with arguments at a terminal of `columns`, where it prints all it has to say."""
+
+    def __call__(self, *arguments: str, columns: int = 80, until: str | None = None) -> tuple[int, str]:
+        """Return the exit code and what came to the terminal; press Ctrl-C when `until` was seen."""
+
+
+@pytest.fixture
+def at_terminal(tmp_path: Path) -> AtTerminal:
+    """Return the program, to be called at a terminal."""
+
+    def call(*arguments: str, columns: int = 80, until: str | None = None) -> tuple[int, str]:
+        master, slave = pty.openpty()
+        fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 40, columns, 0, 0))
+        environment = {"PATH": "/usr/bin:/bin", "HOME": str(tmp_path), "TERM": "xterm-256color", "LANG": "C.UTF-8"}
+        with subprocess.Popen(
+            [sys.executable, "-m", "lfs10d", *arguments],
+            cwd=tmp_path,
+            env=environment,
+            stdin=slave,
+            stdout=slave,
+            stderr=slave,
+        ) as process:
+            os.close(slave)
+            seen = b""
+            with contextlib.suppress(OSError):  # EIO: the program has closed its end
+                while piece := os.read(master, 65536):
+                    seen += piece
+                    if until is not None and until.encode() in seen:
+                        until = None
+                        process.send_signal(signal.SIGINT)
+            os.close(master)
+            code = process.wait(timeout=60)
+        return code, seen.decode()
+
+    return call
+
+
+@pytest.fixture
+def sensors(tmp_path: Path) -> Iterator[PtyLine]:
+    """Give a line without sensors on a pseudo terminal; `tell` it to `add` some."""
+    with PtyLine(SimulatedLine(seed=1), link=tmp_path / "line0") as line:
+        yield line
