@@ -1,4 +1,4 @@
-"""What all tests share: programs they need, a real mosquitto, and an independent listener.
+"""What all tests share: programs they need, a real mosquitto, an independent listener, a certificate authority.
 
 `needs("program", ...)` marks a test that starts a program: where it is absent the test fails in CI (`CI` is
 set) and is skipped elsewhere, with one line that says what to install.
@@ -284,3 +284,51 @@ def mosquitto(tmp_path: Path) -> Iterator[Mosquitto]:
     broker.start()
     yield broker
     broker.close()
+
+
+@dataclass(frozen=True)
+class Authority:
+    """A certificate authority of this test run's own, made by the openssl command."""
+
+    folder: Path
+    openssl: str
+
+    @property
+    def ca(self) -> str:
+        """The certificate of the authority."""
+        return str(self.folder / "ca.pem")
+
+    def found(self) -> None:
+        """Make the authority itself."""
+        self._run("req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes",
+                  "-days", "2", "-subj", "/CN=lfs10d test authority",
+                  "-addext", "keyUsage=critical,keyCertSign,cRLSign",
+                  "-keyout", "ca.key", "-out", "ca.pem")  # fmt: skip
+
+    def issue(self, name: str, *names: str, days: int = 2) -> tuple[str, str]:
+        """Return the files of a certificate for `names` (as openssl writes them: `DNS:localhost`) and its key.
+
+        With `days` below 0 it has expired.
+        """
+        (self.folder / f"{name}.ext").write_text(
+            f"subjectAltName={','.join(names) or 'DNS:' + name}\n"
+            "authorityKeyIdentifier=keyid\nsubjectKeyIdentifier=hash\n"
+        )
+        self._run("req", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes",
+                  "-subj", f"/CN={name}", "-keyout", f"{name}.key", "-out", f"{name}.csr")  # fmt: skip
+        self._run("x509", "-req", "-in", f"{name}.csr", "-CA", "ca.pem", "-CAkey", "ca.key", "-CAcreateserial",
+                  "-days", str(days), "-extfile", f"{name}.ext", "-out", f"{name}.pem")  # fmt: skip
+        return str(self.folder / f"{name}.pem"), str(self.folder / f"{name}.key")
+
+    def _run(self, *arguments: str) -> None:
+        subprocess.run([self.openssl, *arguments], cwd=self.folder, check=True, capture_output=True, timeout=60)
+
+
+@pytest.fixture
+def authority(tmp_path: Path) -> Authority:
+    """Give an authority that has issued nothing yet."""
+    folder = tmp_path / "authority"
+    folder.mkdir()
+    made = Authority(folder, path_of("openssl"))
+    made.found()
+    return made

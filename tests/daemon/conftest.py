@@ -15,6 +15,7 @@ import sys
 import threading
 import time
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -25,7 +26,6 @@ from lfs10d.simulator.wire import Format
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
-    from pathlib import Path
 
     from lfs10d.simulator.line import SimulatedLine
     from tests.conftest import Heard, Listener, Mosquitto
@@ -109,9 +109,9 @@ class Run:
         return self.process.wait(within)
 
     @property
-    def threads(self) -> dict[str, int]:
-        """Its threads: the id by the name (Python 3.14 names them by itself) or by the id as text."""
-        return {name: int(name) for name in os.listdir(f"/proc/{self.process.pid}/task")}
+    def threads(self) -> list[int]:
+        """The ids of its threads."""
+        return [int(task.name) for task in Path(f"/proc/{self.process.pid}/task").iterdir()]
 
 
 class View:
@@ -179,7 +179,7 @@ def _parsed(payload: bytes) -> Any:  # noqa: ANN401
 
 def good(sample: Mapping[str, Any]) -> bool:
     """Tell whether a sample carries a value."""
-    return sample["quality"] == "good"
+    return bool(sample["quality"] == "good")
 
 
 @dataclass

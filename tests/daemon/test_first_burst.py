@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from tests.daemon.conftest import View, good
@@ -13,7 +14,21 @@ if TYPE_CHECKING:
 
 LINE_TOPICS = {"info", "devices", "line/state", "line/error", "line/stats"}
 DEVICE_LEAVES = {"state", "config", "availability", "error", "stats"}
-SAMPLE = {"v", "line", "device", "boot", "seq", "ts", "time", "clock", "wind_speed", "unit", "quality", "error", "rtt_ms"}
+SAMPLE = {
+    "v",
+    "line",
+    "device",
+    "boot",
+    "seq",
+    "ts",
+    "time",
+    "clock",
+    "wind_speed",
+    "unit",
+    "quality",
+    "error",
+    "rtt_ms",
+}
 
 
 def test_the_first_burst_says_that_nothing_is_known_and_ends_with_online(site: Site, view: View) -> None:
@@ -63,7 +78,7 @@ def test_the_state_is_shown_at_most_once_a_second(site: Site, view: View) -> Non
 
     shown = [state["ts"] for state in view.history_of("device/slave-1/state") if good(state)]
     assert 2 <= len(shown) <= 6
-    assert all(later - earlier >= 900 for earlier, later in zip(shown, shown[1:], strict=False))
+    assert all(later - earlier >= 900 for earlier, later in pairwise(shown))
 
 
 def test_what_was_retained_in_an_earlier_life_is_taken_back_before_anything_new(

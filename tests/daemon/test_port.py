@@ -19,7 +19,7 @@ BACK_WITHIN = 2.0
 
 
 def lost(error: dict[str, Any]) -> bool:
-    return error["code"] == "port_lost"
+    return bool(error["code"] == "port_lost")
 
 
 def test_a_port_pulled_out_is_one_error_of_the_line_and_is_back_at_once(site: Site, view: View) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from lfs10d.simulator.faults import Kind
+from lfs10d.simulator.line import SimulatedLine
 from tests.daemon.conftest import eventually, good, tell
 
 if TYPE_CHECKING:
@@ -91,10 +92,10 @@ def test_when_all_are_silent_each_is_reported_and_all_come_back(site: Site, view
     view.wait("device/slave-1/state", good)
     view.wait("device/slave-2/state", good)
 
-    tell(served, lambda line: [sensor.power_cut() for sensor in line.sensors])
+    tell(served, lambda line: line.power_cut(served.now()))
     for device in ("slave-1", "slave-2"):
         view.wait(f"device/{device}/availability", "offline".__eq__)
-    tell(served, lambda line: [sensor.power_up() for sensor in line.sensors])
+    tell(served, SimulatedLine.power_up)
     for device in ("slave-1", "slave-2"):
         view.wait(f"device/{device}/availability", "online".__eq__)
 

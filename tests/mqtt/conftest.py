@@ -1,10 +1,9 @@
-"""Brokers that are not mosquitto, and a certificate authority, for the tests of the connection."""
+"""Brokers that are not mosquitto, for the tests of the connection."""
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-import subprocess
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -13,7 +12,6 @@ import pytest
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Awaitable, Callable
     from contextlib import AbstractAsyncContextManager
-    from pathlib import Path
 
 Answer: TypeAlias = "Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]"
 
@@ -108,51 +106,6 @@ class OldBroker:
         elif head == PINGREQ:
             writer.write(b"\xd0\x00")
         return head != DISCONNECT
-
-
-@dataclass(frozen=True)
-class Authority:
-    """A certificate authority of this test run's own, made by the openssl command."""
-
-    folder: Path
-    openssl: str
-
-    @property
-    def ca(self) -> str:
-        """The certificate of the authority."""
-        return str(self.folder / "ca.pem")
-
-    def found(self) -> None:
-        """Make the authority itself."""
-        self._run("req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes",
-                  "-days", "2", "-subj", "/CN=lfs10d test authority",
-                  "-addext", "keyUsage=critical,keyCertSign,cRLSign",
-                  "-keyout", "ca.key", "-out", "ca.pem")  # fmt: skip
-
-    def issue(self, name: str, *names: str) -> tuple[str, str]:
-        """Return the files of a certificate for `names` (as openssl writes them: `DNS:localhost`) and its key."""
-        (self.folder / f"{name}.ext").write_text(
-            f"subjectAltName={','.join(names) or 'DNS:' + name}\n"
-            "authorityKeyIdentifier=keyid\nsubjectKeyIdentifier=hash\n"
-        )
-        self._run("req", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes",
-                  "-subj", f"/CN={name}", "-keyout", f"{name}.key", "-out", f"{name}.csr")  # fmt: skip
-        self._run("x509", "-req", "-in", f"{name}.csr", "-CA", "ca.pem", "-CAkey", "ca.key", "-CAcreateserial",
-                  "-days", "2", "-extfile", f"{name}.ext", "-out", f"{name}.pem")  # fmt: skip
-        return str(self.folder / f"{name}.pem"), str(self.folder / f"{name}.key")
-
-    def _run(self, *arguments: str) -> None:
-        subprocess.run([self.openssl, *arguments], cwd=self.folder, check=True, capture_output=True, timeout=60)
-
-
-@pytest.fixture
-def authority(tmp_path: Path, program: Callable[[str], str]) -> Authority:
-    """Give an authority that has issued nothing yet."""
-    folder = tmp_path / "authority"
-    folder.mkdir()
-    made = Authority(folder, program("openssl"))
-    made.found()
-    return made
 
 
 @pytest.fixture

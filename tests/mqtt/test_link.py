@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from lfs10d.mqtt.endings import Ended
-    from tests.conftest import Mosquitto
-    from tests.mqtt.conftest import Answer, Authority, OldBroker
+    from tests.conftest import Authority, Mosquitto
+    from tests.mqtt.conftest import Answer, OldBroker
 
     Serving: TypeAlias = Callable[[Answer], AbstractAsyncContextManager[int]]
 

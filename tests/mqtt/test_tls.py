@@ -14,7 +14,7 @@ from lfs10d.mqtt.settings import Tls
 from lfs10d.mqtt.tls import tls_context
 
 if TYPE_CHECKING:
-    from tests.mqtt.conftest import Authority
+    from tests.conftest import Authority
 
 
 def test_certificate_and_name_are_checked_from_tls_1_2_on() -> None:
