@@ -15,7 +15,7 @@ from lfs10d.reading import FaultCode, Number
 
 Milliseconds = Annotated[int, Field(description="epoch milliseconds, UTC")]
 Count = Annotated[int, Field(ge=0, description="since boot")]
-Version = Literal[1]
+Version = Annotated[Literal[1], Field(description="of the payload's form")]
 Clock = Annotated[telemetry.Clock, Field(description="how far the wall clock can be trusted")]
 Errors = Annotated[dict[FaultCode, Count], Field(description="how often each failure happened")]
 
@@ -42,8 +42,8 @@ class SamplePayload(Payload):
     clock: Clock
     unit: str | None = Field(None, description="unit of the one value")
     units: dict[str, str] | None = Field(None, description="units by name, where there are several values")
-    quality: Literal["good", "bad"]
-    error: FaultCode | None
+    quality: Literal["good", "bad"] = Field(description="of the value")
+    error: FaultCode | None = Field(description="why there is no value")
     rtt_ms: float | None = Field(ge=0, description="first bit of the request to last of the answer")
     historical: Literal[True] | None = Field(None, description="set on `history`")
 
@@ -88,7 +88,7 @@ class NoError(Payload):
     v: Version
     active: Literal[False]
     code: None
-    last_code: FaultCode | None
+    last_code: FaultCode | None = Field(description="what it was")
     cleared: Milliseconds | None
 
 
@@ -96,15 +96,15 @@ class Info(Payload):
     """The daemon."""
 
     v: Version
-    version: str
-    host: str
-    boot: str
-    previous_boot: str | None
+    version: str = Field(description="of lfs10d")
+    host: str = Field(description="name of the gateway")
+    boot: str = Field(description="this life of the daemon, sortable by start")
+    previous_boot: str | None = Field(description="the one before; null: not known")
     started: Milliseconds
-    config_hash: str
+    config_hash: str = Field(description="differs where the effective configuration differs")
     changes: int = Field(ge=0, description="changes made by requests that the file does not say")
     mqtt: dict[str, Any] = Field(description="protocol in use")
-    features: list[str]
+    features: list[str] = Field(description="what this daemon can do")
     clock: Clock
 
 
@@ -112,7 +112,7 @@ class DeviceEntry(Payload):
     """One polled slave."""
 
     name: str
-    id: int = Field(ge=1, le=255)
+    id: int = Field(ge=1, le=255, description="slave id")
     label: str | None
     profile: str
     enabled: bool
@@ -129,7 +129,7 @@ class LineState(Payload):
     databits: Literal[7, 8]
     stopbits: Literal[1, 2]
     framing: Literal["rtu", "ascii"]
-    open: bool
+    open: bool = Field(description="the port can be used")
     activity: str = Field(description="polling, scanning, changing_baudrate, paused ...")
     requests: Literal["ok", "denied"] = Field(description="denied: the broker refused us `B/request/#`")
 
@@ -145,10 +145,10 @@ class Gaps(Payload):
 class Uart(Payload):
     """The driver's own counters."""
 
-    framing: int
-    parity: int
-    overrun: int
-    break_: int = Field(alias="break")
+    framing: int = Field(description="stop bit missing: wrong rate, A and B swapped, noise")
+    parity: int = Field(description="parity wrong")
+    overrun: int = Field(description="bytes lost in the adapter or the kernel")
+    break_: int = Field(alias="break", description="line held low for longer than a character")
 
 
 class Store(Payload):
@@ -165,22 +165,22 @@ class LineStats(Payload):
     v: Version
     ts: Milliseconds
     load_pct: float | None = Field(ge=0, le=100, description="share of the time in which the line is in use")
-    polls_per_s: float | None = Field(ge=0)
+    polls_per_s: float | None = Field(ge=0, description="good and failed")
     cycle_s: float | None = Field(ge=0, description="longest time between two polls of one device")
-    gap_required_us: float
-    gap_us: Gaps
+    gap_required_us: float = Field(description="silence kept before each request")
+    gap_us: Gaps = Field(description="silence measured before our requests")
     exchanges: Count
     errors: Errors
-    unsolicited_bytes: Count
-    uart: Uart | None = Field(description="null where the driver does not count")
-    store: Store
+    unsolicited_bytes: int = Field(ge=0, description="heard and part of no answer, since boot")
+    uart: Uart | None = Field(description="errors the driver counted; null where it does not")
+    store: Store = Field(description="what waits for the broker")
 
 
 class DeviceConfig(Payload):
     """How a device is polled."""
 
     v: Version
-    slave: int = Field(ge=1, le=255)
+    slave: int = Field(ge=1, le=255, description="slave id")
     label: str | None
     profile: str
     interval: float = Field(ge=0, description="s")
@@ -203,8 +203,8 @@ class DeviceStats(Payload):
     polls: Count
     good: Count
     errors: Errors
-    rtt_ms: RoundTrip
-    response_timeout_ms: float | None
+    rtt_ms: RoundTrip = Field(description="times of its last 100 answers")
+    response_timeout_ms: float | None = Field(description="as set or learned")
     last_good_ts: Milliseconds | None
 
 
@@ -241,7 +241,7 @@ class Dropped(Payload):
 class RequestError(Payload):
     """Why a request was not carried out."""
 
-    code: str
+    code: str = Field(description="see below")
     message: str = Field(description="for people")
     param: str | None = Field(None, description="the parameter that is wrong")
     exception_code: int | None = Field(None, description="of a sensor's Modbus exception")
@@ -251,15 +251,15 @@ class Response(Payload):
     """The one answer to a request."""
 
     v: Version
-    id: str | int | None
+    id: str | int | None = Field(description="as in the request")
     transaction: str | int | None = Field(None, description="as in the request, where it had one")
-    request: str | None
+    request: str | None = Field(description="its name")
     status: Literal["ok", "rejected", "failed"] = Field(
         description="rejected: no write was sent and nothing changed; failed: a write may have been sent"
     )
-    data: Any
+    data: Any = Field(description="what was asked for")
     error: RequestError | None
-    took_ms: float = Field(ge=0)
+    took_ms: float = Field(ge=0, description="from its arrival to this answer")
 
 
 class Trace(Payload):
@@ -267,9 +267,9 @@ class Trace(Payload):
 
     v: Version
     ts: Milliseconds
-    direction: Literal["tx", "rx"]
+    direction: Literal["tx", "rx"] = Field(description="tx: sent by us")
     gap_us: float | None = Field(description="silence before it")
-    hex: str
+    hex: str = Field(description="its bytes")
     text: str = Field(description="its meaning, for people")
 
 
