@@ -1,116 +1,161 @@
-"""The difference of two configurations as effects: every reload, and later every request, takes this one path."""
+"""What requests changed of the configuration, each with what the file said then; and what a request does to it. Pure.
+
+How the changes and the file as it is now go together is told in `lfs10d.threeway`. What is said of a device is a
+mapping of keys of `SlaveConfig`, without its name, to values as the program uses them.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
-
-from lfs10d.configfile import leaves
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 if TYPE_CHECKING:
-    from lfs10d.config import Config, SlaveConfig
+    from collections.abc import Iterator
 
-RESTART_KEYS = frozenset({"line.name", "mqtt.base_topic"})
-"""Left for a restart: under them stands every topic."""
+OPTIONS = ("interval", "enabled", "label", "response_timeout")
+"""What a request may change of a device, in the order of the file."""
 
-
-@dataclass(frozen=True, slots=True)
-class Change:
-    """One key with another value: `line.baudrate`, `slaves.mast-top.interval`; devices go by their names."""
-
-    key: str
-    old: Any
-    new: Any
-
-    @property
-    def section(self) -> str:
-        """The first part of the key: `line`, `slaves`, `mqtt` ..."""
-        return self.key.partition(".")[0]
+Saying: TypeAlias = Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
-class Difference:
-    """What a reload has to do. `target` is the new configuration with what needs a restart left as it was.
+class Said:
+    """What the file says: each slave by its name, in order; `usual` are the values of keys it says nothing of."""
 
-    `added` and `removed` are names of devices; `changed` holds keys of what stays.
+    slaves: Mapping[str, Saying]
+    baudrate: int = 9600
+    usual: Saying = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Rate:
+    """The line's rate: `now` was verified, `file` is what the file said then."""
+
+    file: int
+    now: int
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a device answers: its slave id, and the rate, or the line's where that is None."""
+
+    id: int
+    baudrate: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Verified:
+    """Where a device was verified last; `file` is the id in the file then, None where the file had no such device."""
+
+    place: Place
+    file: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceChange:
+    """What was changed of one name.
+
+    `removed` is what the file said of a device that is polled no more, `added` what holds of one that a request
+    added (after the removal, if both are there), and `added_at` where that one answered. `options` hold of a device
+    of the file, which said `instead_of` of these keys; a key missing there was not in the file. `verified` is of the
+    device of the file, removed or not.
     """
 
-    target: Config
-    added: tuple[str, ...]
-    removed: tuple[str, ...]
-    changed: tuple[Change, ...]
-    restart_required: tuple[str, ...]
-
-    @property
-    def applied(self) -> tuple[str, ...]:
-        """What takes effect, for the answer to `config/reload`."""
-        devices = (f"slaves.{name}" for name in (*self.added, *self.removed))
-        return (*(change.key for change in self.changed), *devices)
-
-    @property
-    def sections(self) -> frozenset[str]:
-        """Sections in which anything takes effect."""
-        return frozenset(key.partition(".")[0] for key in self.applied)
+    removed: Saying | None = None
+    added: Saying | None = None
+    added_at: Place | None = None
+    options: Saying = field(default_factory=dict)
+    instead_of: Saying = field(default_factory=dict)
+    verified: Verified | None = None
 
     def __bool__(self) -> bool:
-        return bool(self.applied or self.restart_required)
+        return bool(self.count)
+
+    @property
+    def count(self) -> int:
+        """How many changes these are."""
+        wholes = (self.removed, self.added, self.verified)
+        return sum(whole is not None for whole in wholes) + len(self.options)
+
+    @property
+    def proven(self) -> Place | None:
+        """Where the device that holds was verified last, None if it never was."""
+        if self.added is not None:
+            return self.added_at
+        return None if self.verified is None else self.verified.place
 
 
-def difference(old: Config, new: Config) -> Difference:
-    """Return what leads from one resolved configuration to another; the running one is `old`."""
-    target, restart = _without_restart(old, new)
-    before = {slave.name: slave for slave in old.slaves}
-    after = {slave.name: slave for slave in target.slaves}
-    changed = [
-        Change(key, was, now) for (key, was), (_, now) in zip(_plain(old), _plain(target), strict=True) if was != now
-    ]
-    for name, slave in after.items():
-        if name in before:
-            changed += _changes(before[name], slave)
-    return Difference(
-        target=target,
-        added=tuple(name for name in after if name not in before),
-        removed=tuple(name for name in before if name not in after),
-        changed=tuple(changed),
-        restart_required=restart,
-    )
+@dataclass(frozen=True, slots=True)
+class Changes:
+    """All that requests changed; `baudrate` is the line's."""
+
+    devices: Mapping[str, DeviceChange] = field(default_factory=dict)
+    baudrate: Rate | None = None
+
+    @property
+    def count(self) -> int:
+        """How many changes there are."""
+        return sum(change.count for change in self.devices.values()) + (self.baudrate is not None)
+
+    def of(self, name: str) -> DeviceChange:
+        """Return what was changed of a device, which may be nothing."""
+        return self.devices.get(name, DeviceChange())
+
+    def with_device(self, name: str, change: DeviceChange) -> Changes:
+        """Return the changes with another one of this device; one that changes nothing is left out."""
+        devices = {**self.devices, name: change}
+        return replace(self, devices={key: value for key, value in devices.items() if value})
+
+    # -- what requests do
+
+    def adding(self, name: str, entry: Saying, verified: Place | None = None) -> Changes:
+        """Return the changes with one more device; nobody has this name now."""
+        return self.with_device(name, replace(self.of(name), added=entry, added_at=verified))
+
+    def removing(self, name: str, said: Said) -> Changes:
+        """Return the changes without this device, be it the file's or one that was added."""
+        return self.with_device(name, DeviceChange(removed=said.slaves.get(name), verified=self.of(name).verified))
+
+    def setting(self, name: str, options: Saying, said: Said) -> Changes:
+        """Return the changes with other options of a device that is there now.
+
+        An option that is set to what the file gives anyway is no change any more.
+        """
+        change = self.of(name)
+        if change.added is not None:
+            return self.with_device(name, replace(change, added={**change.added, **options}))
+        entry = said.slaves[name]
+        wanted = {**change.options, **options}
+        wanted = {key: value for key, value in wanted.items() if value != value_of(entry, key, said)}
+        base = {key: entry[key] for key in wanted if key in entry}
+        return self.with_device(name, replace(change, options=wanted, instead_of=base))
+
+    def resetting(self, name: str, keys: frozenset[str] | None = None) -> Changes:
+        """Return the changes without those of a device's options, or of these `keys` only; facts stay.
+
+        Without `keys` a device that was added goes and one that was removed comes back.
+        """
+        change = self.of(name)
+        if keys is None:
+            return self.with_device(name, DeviceChange(verified=change.verified))
+        options = {key: value for key, value in change.options.items() if key not in keys}
+        base = {key: value for key, value in change.instead_of.items() if key not in keys}
+        return self.with_device(name, replace(change, options=options, instead_of=base))
 
 
-def _without_restart(old: Config, new: Config) -> tuple[Config, tuple[str, ...]]:
-    update: dict[str, Any] = {}
-    restart: list[str] = []
-    mqtt: dict[str, Any] = {}
-    if new.line.name != old.line.name:
-        restart.append("line.name")
-        update["line"] = new.line.model_copy(update={"name": old.line.name})
-        # The default client id holds the line's name; who we are follows the topics.
-        if new.mqtt.client_id == (old.mqtt.client_id or "").replace(f"-{old.line.name}", f"-{new.line.name}"):
-            mqtt["client_id"] = old.mqtt.client_id
-    if new.mqtt.base_topic != old.mqtt.base_topic:
-        restart.append("mqtt.base_topic")
-        mqtt["base_topic"] = old.mqtt.base_topic
-    if mqtt:
-        update["mqtt"] = new.mqtt.model_copy(update=mqtt)
-    return new.model_copy(update=update), tuple(restart)
+def keys(changes: Changes) -> Iterator[str]:
+    """Yield what was changed, by key as in `lfs10d.difference`."""
+    if changes.baudrate is not None:
+        yield "line.baudrate"
+    for name, change in changes.devices.items():
+        if change.removed is not None or change.added is not None:
+            yield f"slaves.{name}"
+        yield from (f"slaves.{name}.{key}" for key in change.options)
+        if change.verified is not None:
+            yield f"slaves.{name}.id"
 
 
-def _plain(config: Config) -> list[tuple[str, Any]]:
-    """Return every key but the slaves'; `mqtt.tls` and `line.rs485` are null or a whole section."""
-    pairs: list[tuple[str, Any]] = []
-    for section in type(config).model_fields:
-        value = getattr(config, section)
-        if section == "slaves":
-            continue
-        if isinstance(value, tuple):
-            pairs.append((section, value))
-        else:
-            pairs += ((f"{section}.{key}", getattr(value, key)) for key in type(value).model_fields)
-    return pairs
-
-
-def _changes(before: SlaveConfig, after: SlaveConfig) -> list[Change]:
-    return [
-        Change(f"slaves.{after.name}.{path[-1]}", was, now)
-        for (path, was), (_, now) in zip(leaves(before), leaves(after), strict=True)
-        if was != now
-    ]
+def value_of(entry: Saying, key: str, said: Said) -> Any:  # noqa: ANN401  # any value of the configuration
+    """Return what the file gives for a key of a slave, said there or not."""
+    return entry.get(key, said.usual.get(key))

@@ -296,13 +296,14 @@ def resolved(config: Config, *, stem: str, host: str) -> Config:
     return config.model_copy(
         update={
             "line": config.line.model_copy(update={"name": line}),
-            "slaves": tuple(_inherited(slave, config.poll) for slave in config.slaves),
+            "slaves": tuple(inherited(slave, config.poll) for slave in config.slaves),
             "mqtt": _named(config.mqtt, line, host),
         }
     )
 
 
-def _inherited(slave: SlaveConfig, poll: PollConfig) -> SlaveConfig:
+def inherited(slave: SlaveConfig, poll: PollConfig) -> SlaveConfig:
+    """Return a slave as it is polled: with its name, and with what `poll` says where it says nothing itself."""
     update: dict[str, Any] = {"name": device_name(slave)}
     for key in ("interval", "response_timeout"):
         if key not in slave.model_fields_set:

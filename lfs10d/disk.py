@@ -148,3 +148,8 @@ class Disk:
         if self.files.exists(path):
             self.files.remove(path)
             self.files.sync_folder(path.parent)
+
+    def put_aside(self, path: Path, target: Path) -> None:
+        """Give a file another name in the same folder."""
+        self.files.rename(path, target)
+        self.files.sync_folder(path.parent)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lfs10d.changes import difference
+from lfs10d.difference import difference
 from lfs10d.configfile import load
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from lfs10d.changes import Change, difference
+from lfs10d.difference import Change, difference
 from lfs10d.config import Config, resolved
 
 
