@@ -88,7 +88,7 @@ class Service:
         if self._ending:
             self._end(ticket, whence, rejected("cancelled", "the daemon is ending"))
             return
-        perform = self._requests[ticket.name].perform(ticket.parameters, self._powers)
+        perform = self._requests[ticket.name].perform(ticket.parameters, self._powers, ticket.call)
         task = asyncio.create_task(perform, name=f"request {ticket.name}")
         self._running.add(task)
         task.add_done_callback(partial(self._performed, ticket, whence))

@@ -19,6 +19,8 @@ from lfs10d.service import Service
 if TYPE_CHECKING:
     from collections.abc import Coroutine
 
+    from lfs10d.commands import Call
+
 
 class Text(Parameters):
     """Any text."""
@@ -52,17 +54,18 @@ class Bench:
             clear=self.cleared.append,
         )
 
-    async def _echo(self, parameters: Text, powers: Powers) -> Answer:
+    async def _echo(self, parameters: Text, powers: Powers, call: Call) -> Answer:
         assert powers is POWERS
+        assert call.parameters.get("text", "") == parameters.text
         self.performed.append("echo")
         return ok({"text": parameters.text})
 
-    async def _wait(self, parameters: Text, _: Powers) -> Answer:
+    async def _wait(self, parameters: Text, _: Powers, __: Call) -> Answer:
         self.performed.append(f"wait {parameters.text}")
         await self.gate.wait()
         return ok({"text": parameters.text})
 
-    async def _break(self, _: NoParameters, powers: Powers) -> Answer:
+    async def _break(self, _: NoParameters, powers: Powers, __: Call) -> Answer:
         raise RuntimeError(f"a mistake with {powers}")
 
     def ask(

@@ -12,13 +12,15 @@ from lfs10d.requests.request import Powers, Request
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from lfs10d.commands import Call
 
-async def get(_: NoParameters, powers: Powers) -> Answer:
+
+async def get(_: NoParameters, powers: Powers, __: Call) -> Answer:
     """Tell the effective configuration."""
     return ok(powers.configuration())
 
 
-async def reload(_: NoParameters, powers: Powers) -> Answer:
+async def reload(_: NoParameters, powers: Powers, __: Call) -> Answer:
     """Read the files again; a broken one changes nothing."""
     try:
         return ok(await powers.reload())

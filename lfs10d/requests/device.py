@@ -13,7 +13,7 @@ from lfs10d.requests.request import Powers, Request
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from lfs10d.commands import ErrorCode
+    from lfs10d.commands import Call, ErrorCode
 
 
 class OneDevice(Parameters):
@@ -28,7 +28,7 @@ def unknown_device(device: str, powers: Powers) -> Answer:
     return rejected("unknown_device", f"there is no device {device}; configured are: {known}", param="device")
 
 
-async def read(parameters: OneDevice, powers: Powers) -> Answer:
+async def read(parameters: OneDevice, powers: Powers, _: Call) -> Answer:
     """Poll a device now, in turn with everybody else."""
     device = parameters.device
     if device not in powers.devices():

@@ -11,13 +11,15 @@ from lfs10d.requests.request import Powers, Request
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from lfs10d.commands import Call
 
-async def health(_: NoParameters, powers: Powers) -> Answer:
+
+async def health(_: NoParameters, powers: Powers, __: Call) -> Answer:
     """Tell how everything is."""
     return ok(powers.health())
 
 
-async def republish(_: NoParameters, powers: Powers) -> Answer:
+async def republish(_: NoParameters, powers: Powers, __: Call) -> Answer:
     """Send every retained topic once more."""
     return ok({"topics": powers.republish()})
 

@@ -14,6 +14,8 @@ from lfs10d.requests.request import Powers, Request
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from lfs10d.commands import Call
+
 LONGEST = 600.0
 """s for which a trace may go on."""
 USUAL = 30.0
@@ -26,13 +28,13 @@ class HowLong(Parameters):
     duration: Annotated[float, Duration(0.1, LONGEST)] = Field(default=USUAL, alias="for")
 
 
-async def trace(parameters: HowLong, powers: Powers) -> Answer:
+async def trace(parameters: HowLong, powers: Powers, _: Call) -> Answer:
     """Tell every frame on `trace` for a while."""
     powers.trace(parameters.duration)
     return ok({"for": parameters.duration})
 
 
-async def cancel(_: NoParameters, powers: Powers) -> Answer:
+async def cancel(_: NoParameters, powers: Powers, __: Call) -> Answer:
     """End a trace."""
     return ok({"cancelled": list(powers.cancel())})
 

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine
 
     from lfs10d.admission import Form
-    from lfs10d.commands import Answer
+    from lfs10d.commands import Answer, Call
     from lfs10d.inquiries import Inquiry
 
 
@@ -52,7 +52,8 @@ class Powers(Protocol):
         ...
 
 
-Perform: TypeAlias = "Callable[[Any, Powers], Coroutine[Any, Any, Answer]]"
+Perform: TypeAlias = "Callable[[Any, Powers, Call], Coroutine[Any, Any, Answer]]"
+"""Takes the parameters in their form, the powers, and the call they came with."""
 
 
 @dataclass(frozen=True, slots=True)

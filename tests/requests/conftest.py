@@ -78,6 +78,6 @@ def ask(powers: FakePowers) -> Ask:
         if isinstance(verdict, Answered):
             return verdict.answer
         assert isinstance(verdict, Ticket)
-        return asyncio.run(REQUESTS[name].perform(verdict.parameters, powers))
+        return asyncio.run(REQUESTS[name].perform(verdict.parameters, powers, verdict.call))
 
     return ask
