@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from docs.generate import configuration, mqtt
+from docs.generate import architecture, configuration, mqtt
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -32,6 +32,7 @@ def _page(name: str, parts: Callable[[], Mapping[str, str]]) -> Callable[[], str
 
 
 PAGES: Mapping[str, Callable[[], str]] = {
+    "architecture.md": _page("architecture.md", architecture.parts),
     "configuration.md": _page("configuration.md", configuration.parts),
     "mqtt.md": _page("mqtt.md", mqtt.parts),
 }

@@ -26,7 +26,7 @@ TREND_LEAST: Final = 4
 TREND_MOST: Final = 40
 """Samples shown, as there is room."""
 _BESIDE_TREND: Final = 32 + ERROR_WIDTH
-_STORM: Final = 16.0
+_STORM: Final = 12.0
 """m/s at which a bar of the trend is full."""
 _BARS: Final = "▁▂▃▄▅▆▇█"
 _PLAIN_BARS: Final = "_.-~=+*#"

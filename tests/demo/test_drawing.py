@@ -45,13 +45,13 @@ def test_it_fits_the_terminal(told: Told, width: int) -> None:
 
 def test_a_row_has_id_name_speed_trend_state_and_error(told: Told) -> None:
     told.availability("bridge", "online")
-    for speed in (0.0, 8.0, None, 40.0, 7.254):
+    for speed in (0.0, 6.0, None, 40.0, 7.254):
         told.sample("bridge", speed, None if speed is not None else "crc")
     assert row_of(screen(told), "bridge").split() == [
         "8",
         "bridge",
         "7.25",
-        "▁▅x█▄",
+        "▁▅x█▅",
         "online",
         *["1", "of", "5", "polls", "failed"],
     ]
