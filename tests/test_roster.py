@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -135,8 +136,48 @@ def test_when_the_port_comes_back_nothing_is_known_of_it() -> None:
     device.answered()
     device.polling = True
     device.cut_off()
-    assert device.health is Health.OFFLINE
-    assert not device.polling
+    lost, polling = device.health, device.polling
     device.reconnected()
-    assert device.health is Health.UNHEARD
+    assert (lost, polling, device.health) == (Health.OFFLINE, False, Health.UNHEARD)
     assert device.name == "mast"
+
+
+def test_one_that_did_not_answer_its_first_poll_is_in_doubt_until_it_is_heard() -> None:
+    device = a_device()
+    doubts = [device.doubtful]
+    device.failed(SILENCE, 0.0)
+    doubts.append(device.doubtful)
+    assert device.probe_timeout == 0.4
+    device.answered()
+    for _ in range(3):
+        doubts.append(device.doubtful)
+        device.failed(SILENCE, 0.0)
+    assert [*doubts, device.doubtful] == [False, True, False, False, False, True]
+
+
+def test_a_probe_of_one_that_answers_slowly_waits_as_long_as_was_learned() -> None:
+    device = a_device(rules=PollRules(offline_after=1))
+    for _ in range(20):
+        device.turnarounds.learn(0.25)
+    device.answered()
+    device.failed(SILENCE, 0.0)
+    assert device.probe_timeout == pytest.approx(0.52)
+
+
+@pytest.mark.parametrize(
+    ("changed", "anew"),
+    [
+        ({"slave": 4}, True),
+        ({"codec": Codec(Framing.ASCII)}, True),
+        ({"interval": 2.0, "response_timeout": 0.3}, False),
+        ({"enabled": False}, False),
+    ],
+)
+def test_what_was_learned_holds_until_another_slave_is_meant(changed: dict[str, object], *, anew: bool) -> None:
+    spec = a_device().spec
+    assert replace(spec, **changed).begins_anew(spec) is anew  # type: ignore[arg-type]  # names and values go together
+
+
+def test_one_that_is_enabled_again_begins_anew() -> None:
+    spec = a_device().spec
+    assert spec.begins_anew(replace(spec, enabled=False))
