@@ -1,0 +1,272 @@
+"""The live table: what is known of a line as lines of styled text, for a terminal of any size. Pure.
+
+A line is a tuple of pieces, each a text and its style in rich's words ("" is plain).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, TypeAlias
+
+from lfs10d.logs import escape
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from lfs10d.cli.live import Device, Live
+
+Piece: TypeAlias = tuple[str, str]
+Line: TypeAlias = tuple[Piece, ...]
+
+JUST: Final = 5.0
+"""s for which it is marked that a device came or went."""
+
+_TROUBLES: Final = {
+    "timeout": "no answer",
+    "crc": "garbled answer",
+    "malformed": "broken answer",
+    "wrong_slave": "another slave answers",
+    "wrong_function": "answers something else",
+    "exception": "refuses",
+    "out_of_range": "impossible value",
+    "not_finite": "not a number",
+    "late": "answers too late",
+    "collision": "line never silent",
+    "disabled": "disabled",
+    "port_lost": "port lost",
+    "port_busy": "port in use",
+    "config_conflict": "id in conflict",
+}
+_MARKS: Final = {"moved": ">", "came": "+", "went": "-"}
+_MARK_STYLES: Final = {"moved": "bold black on green", "came": "bold green", "went": "bold red"}
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """Where it comes from, in words; `alive`: what is shown is of now."""
+
+    words: str
+    alive: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One device as it is shown. `stale`: what is shown is not of now."""
+
+    name: str
+    slave: str
+    label: str
+    value: str
+    state: str
+    age: str
+    rtt: str
+    just: str
+    stale: bool
+    good: bool
+
+
+def rows(live: Live, source: Source, *, now: float, wall: float) -> list[Row]:
+    """Return the devices as they are to be shown."""
+    movers = {device.name for device in live.movers(now)} if source.alive else set()
+    return [
+        _row(live, device, source, now=now, wall=wall, moved=device.name in movers) for device in live.devices.values()
+    ]
+
+
+def _row(live: Live, device: Device, source: Source, *, now: float, wall: float, moved: bool) -> Row:
+    stale = not source.alive or (device.good and live.late(device, wall))
+    just = "moved" if moved else ""
+    if source.alive and device.turned is not None and now - device.turned[0] < JUST:
+        just = "came" if device.turned[1] else "went"
+    values = [
+        f"{_number(value)} {escape(device.units.get(name, ''))}".rstrip() for name, value in device.values.items()
+    ]
+    age = live.age(device, wall) if device.enabled else None
+    return Row(
+        name=escape(device.name),
+        slave="" if device.slave is None else str(device.slave),
+        label=escape(device.label or ""),
+        value=", ".join(values) or "-",
+        state=_state(device, stale=stale),
+        age="" if age is None else age_text(age),
+        rtt="" if device.rtt_ms is None or stale else f"{device.rtt_ms:.0f} ms",
+        just=just,
+        stale=stale,
+        good=device.good,
+    )
+
+
+def _number(value: float) -> str:
+    """Return a number as it is, a fraction with two decimals: figures that stand still are read at a glance."""
+    return str(value) if isinstance(value, int) else f"{value:.2f}"
+
+
+def _state(device: Device, *, stale: bool) -> str:
+    """Return availability and what ails it, in words."""
+    if not device.enabled:
+        return "disabled"
+    if device.good:
+        return "old value" if stale else "good"
+    if device.error is None:
+        return "not heard yet"
+    trouble = _TROUBLES.get(device.error, escape(device.error))
+    if device.online or device.error in {"port_lost", "port_busy", "config_conflict"}:
+        return trouble
+    return f"offline: {trouble}"
+
+
+def age_text(seconds: float) -> str:
+    """Return an age in at most four characters: 0.4s, 12s, 5m, 3h, 20d."""
+    if seconds < 9.95:  # noqa: PLR2004 - the largest with one decimal
+        return f"{seconds:.1f}s"
+    for unit, length in (("s", 1), ("m", 60), ("h", 3600)):
+        if seconds < 100 * length:
+            return f"{seconds / length:.0f}{unit}"
+    return f"{seconds / 86_400:.0f}d"
+
+
+# The table
+
+
+@dataclass(frozen=True, slots=True)
+class _Column:
+    head: str
+    of: Callable[[Row], str]
+    right: bool = False
+    least: int = 0
+    most: int = 40
+
+
+_NAME = _Column("sensor", lambda row: row.name, least=6, most=20)
+_ID = _Column("id", lambda row: row.slave, right=True, least=3)
+_VALUE = _Column("value", lambda row: row.value, right=True, least=9, most=24)
+_STATE = _Column("state", lambda row: row.state, least=9, most=30)
+_AGE = _Column("age", lambda row: row.age, right=True, least=4)
+_RTT = _Column("answer", lambda row: row.rtt, right=True, least=6)
+_LABEL = _Column("label", lambda row: row.label, most=30)
+
+_ALL: Final = (_NAME, _ID, _VALUE, _STATE, _AGE, _RTT, _LABEL)
+_GIVEN_UP_FIRST: Final = (_LABEL, _RTT, _AGE, _ID)
+"""What a narrow terminal does without, in this order."""
+LEAST_LABEL: Final = 6
+"""A label cut shorter than this tells nothing."""
+
+
+def table(shown: Sequence[Row], width: int) -> list[Line]:
+    """Return head and rows for a terminal `width` columns wide; none of the lines is longer."""
+    widths = _widths(shown, width)
+    head: list[Piece] = [("  ", "")]
+    head += [(_cell(column.head, size, right=column.right) + " ", "bold dim") for column, size in widths.items()]
+    return [_cut(tuple(head), width), *(_cut(_line(row, widths), width) for row in shown)]
+
+
+def _line(row: Row, widths: dict[_Column, int]) -> Line:
+    pieces: list[Piece] = [(f"{_MARKS.get(row.just, ' ')} ", _MARK_STYLES.get(row.just, ""))]
+    for column, size in widths.items():
+        style = ""
+        if row.stale or row.state == "disabled":
+            style = "dim"
+        elif column is _STATE:
+            style = "green" if row.good else "bold red"
+        elif row.just == "moved" and column in (_NAME, _VALUE):
+            style = "bold green"
+        elif column is _VALUE and row.good:
+            style = "bold"
+        pieces.append((_cell(column.of(row), size, right=column.right) + " ", style))
+    return tuple(pieces)
+
+
+def _widths(shown: Sequence[Row], width: int) -> dict[_Column, int]:
+    """Return the columns there is room for and how wide they are; the label has what is left."""
+    wanted = {
+        column: min(column.most, max(column.least, len(column.head), *(len(column.of(row)) for row in shown), 0))
+        for column in _ALL
+        if column is not _LABEL or any(row.label for row in shown)
+    }
+    for column in _GIVEN_UP_FIRST:
+        excess = 2 + sum(wanted.values()) + len(wanted) - width
+        if excess <= 1:  # the last column needs no space behind it
+            break
+        if column is _LABEL and wanted.get(column, 0) - excess + 1 >= LEAST_LABEL:
+            wanted[column] -= excess - 1
+        else:
+            wanted.pop(column, None)
+    return wanted
+
+
+def _cell(text: str, size: int, *, right: bool) -> str:
+    cut = text if len(text) <= size else text[: size - 1] + "~"
+    return cut.rjust(size) if right else cut.ljust(size)
+
+
+def _cut(line: Line, width: int) -> Line:
+    """Return the line without what does not fit and without spaces at its end."""
+    pieces: list[Piece] = []
+    for text, style in line:
+        if width > 0:
+            pieces.append((text[:width], style))
+        width -= len(text)
+    while pieces and not pieces[-1][0].strip():
+        pieces.pop()
+    if pieces:
+        pieces[-1] = pieces[-1][0].rstrip(), pieces[-1][1]
+    return tuple(pieces)
+
+
+def header(live: Live, source: Source, width: int, *, pace: bool = True) -> list[Line]:
+    """Return what is to be known of the line and where all this comes from; `pace`: also what changes all the time."""
+    line = live.line
+    words = [f"{live.name}: {escape(str(line.get('port', '?')))}"]
+    if "baudrate" in line:
+        parity = str(line.get("parity", "?"))[:1].upper()
+        words.append(f"{line['baudrate']} baud {line.get('databits')}{parity}{line.get('stopbits')}")
+    if line.get("activity", "polling") != "polling":
+        words.append(escape(str(line["activity"])))
+    load, polls = (line.get("load_pct"), line.get("polls_per_s")) if pace else (None, None)
+    if load is not None:
+        words.append(f"load {load} %")
+    if polls is not None:
+        words.append(f"{polls} polls/s")
+    lines: list[Line] = [((", ".join(words), "bold"),), ((source.words, "" if source.alive else "bold yellow"),)]
+    if line.get("open") is False and live.line_error is None:
+        lines.append((("the port is not open", "bold red"),))
+    if live.line_error is not None:
+        lines.append(((escape(live.line_error), "bold red"),))
+    return [piece for whole in lines for piece in _wrapped(whole, width)]
+
+
+def _wrapped(line: Line, width: int) -> Iterable[Line]:
+    """Yield a line of one piece as several that fit."""
+    ((text, style),) = line
+    current = ""
+    for word in text.split(" "):
+        if current and len(current) + 1 + len(word) > width:
+            yield ((current[:width], style),)
+            current = "  " + word
+        else:
+            current = f"{current} {word}" if current else word
+    yield ((current[:width], style),)
+
+
+def screen(live: Live, source: Source, size: tuple[int, int], *, now: float, wall: float) -> list[Line]:
+    """Return everything for a terminal of `size` columns and lines; where lines are short, the worst rows first."""
+    width, height = size
+    shown = rows(live, source, now=now, wall=wall)
+    above = [*header(live, source, width), ()]
+    legend = "> moved just now   + came   - went   Ctrl-C ends"
+    room = max(1, height - len(above) - 3)
+    left = len(shown) - room
+    if left > 0:
+        kept = sorted(sorted(range(len(shown)), key=lambda place: _rank(shown[place]))[: room - 1])
+        hidden = [row for place, row in enumerate(shown) if place not in kept]
+        well = sum(row.good and not row.stale for row in hidden)
+        legend = f"{len(hidden)} more ({well} good): a taller window shows them   {legend}"
+        shown = [shown[place] for place in kept]
+    return [*above, *table(shown, width), (), _cut(((legend, "dim"),), width)]
+
+
+def _rank(row: Row) -> int:
+    """Return how much a row wants to be seen: what moves, what fails, the rest."""
+    if row.just:
+        return 0
+    return 2 if row.good and not row.stale else 1

@@ -1,0 +1,146 @@
+"""`lfs10d request`: ask the running daemon for something and show what it says."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import secrets
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from lfs10d.cli import EXIT_FAILED, config_option, json_option
+from lfs10d.cli.answers import told, verdict
+from lfs10d.cli.keyvalue import IDS, KeyValueError, content_of
+from lfs10d.cli.livelines import health
+from lfs10d.cli.login import Login, login, login_options
+from lfs10d.cli.spinner import spinning
+from lfs10d.cli.visitor import Visitor
+from lfs10d.commands import LARGEST
+from lfs10d.errors import FailedError
+from lfs10d.quantities import duration_text, seconds
+from lfs10d.requests.table import REQUESTS
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from click.shell_completion import CompletionItem
+
+USUAL_TIMEOUT = 10.0
+"""Seconds after which the response no longer comes."""
+PATIENT = frozenset({"line/scan", "line/baudrate", "line/adopt", "device/readdress"})
+"""Requests that take as long as they take: scans and physical changes."""
+
+EXAMPLES = """\b
+Examples:
+  lfs10d request health                            how the daemon, the line and every sensor are
+  lfs10d request device/read device=mast-top       poll one sensor now
+  lfs10d request line/trace for=1m                 the frames of a minute, on topic trace
+  lfs10d request config/reload -c site.yaml        the daemon of another file reads it again
+  lfs10d request device/read device=north --json   the response as the broker brought it
+"""
+
+
+def _timeout(context: click.Context, parameter: click.Parameter, value: str | None) -> float | None:
+    try:
+        return None if value is None else seconds(value)
+    except ValueError:
+        raise click.BadParameter(f"{value!r} is no duration; write 500ms or 10s", context, parameter) from None
+
+
+def _name(context: click.Context, parameter: click.Parameter, value: str) -> str:
+    levels = value.split("/")
+    if not value.isprintable() or "+" in value or "#" in value or "" in levels:
+        known = ", ".join(sorted(REQUESTS))
+        raise click.BadParameter(f"{value!r} is no name of a request; known are: {known}", context, parameter)
+    return value
+
+
+def _complete(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    from click.shell_completion import CompletionItem  # noqa: PLC0415  # only when a shell asks
+
+    del context, parameter
+    return [CompletionItem(name) for name in sorted(REQUESTS) if name.startswith(incomplete)]
+
+
+@click.command("request", epilog=EXAMPLES)
+@click.argument("name", callback=_name, shell_complete=_complete)
+@click.argument("parameters", nargs=-1, metavar="[KEY=VALUE]...")
+@config_option
+@click.option(
+    "--timeout",
+    callback=_timeout,
+    metavar="DURATION",
+    help=f"How long to wait for the response. Default: {duration_text(USUAL_TIMEOUT)}, no end for what takes longer.",
+)
+@login_options
+@json_option
+def command(**options: Any) -> int:  # noqa: ANN401  # eight options; `_Wanted` names and types them
+    """Send the request NAME to the running daemon; print its response.
+
+    NAME is one such as device/read. Each VALUE is read as the request wants it: text, a number, true, a duration, or
+    JSON. Exit code 0 if it was carried out, 1 if not or if nothing was answered in time, 69 if the broker or the
+    daemon is away.
+    """
+    wanted = _Wanted(**options)
+    content = wanted.content
+    visited = login(wanted.config, "request", username=wanted.username, password_file=wanted.password_file)
+    response = asyncio.run(_ask(wanted, visited, content))
+    if response is None:
+        message = f"no response to {wanted.name} within {duration_text(wanted.patience or 0)}"
+        raise FailedError(f"{message}; whether it was obeyed is not known")
+    done = response.get("status") == "ok"
+    if wanted.as_json:
+        click.echo(json.dumps(response, indent=2, ensure_ascii=False))
+    else:
+        click.echo(verdict(response), err=not done)
+        data = response.get("data")
+        for text in health(data) if wanted.name == "health" and isinstance(data, dict) else told(response):
+            click.echo(text)
+    return 0 if done else EXIT_FAILED
+
+
+@dataclass(frozen=True, slots=True)
+class _Wanted:
+    """The options as given; `timeout` in s."""
+
+    name: str
+    parameters: tuple[str, ...]
+    config: Path
+    timeout: float | None
+    username: str | None
+    password_file: Path | None
+    as_json: bool
+
+    @property
+    def patience(self) -> float | None:
+        """How long to wait for the response in s; None: until it comes."""
+        if self.timeout is not None or self.name in PATIENT:
+            return self.timeout
+        return USUAL_TIMEOUT
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """The payload; it has an id, by which a daemon that speaks 3.1.1 is understood."""
+        known = REQUESTS.get(self.name)
+        try:
+            content = content_of(self.parameters, None if known is None else known.form.parameters)
+        except KeyValueError as error:
+            raise click.UsageError(str(error)) from None
+        if not any(content.get(key) for key in IDS):
+            content["id"] = secrets.token_hex(6)
+        if len(json.dumps(content).encode()) > LARGEST:
+            raise click.UsageError(f"these parameters are more than the {LARGEST} bytes that a request may have")
+        return content
+
+
+async def _ask(wanted: _Wanted, visited: Login, content: dict[str, Any]) -> dict[str, Any] | None:
+    visitor = Visitor(visited)
+    try:
+        async with spinning(f"{wanted.name} ..."):
+            await visitor.enter()
+            await visitor.find_daemon()
+            return await visitor.ask(wanted.name, content, wanted.patience)
+    finally:
+        await visitor.leave()

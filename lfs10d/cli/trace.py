@@ -1,0 +1,157 @@
+"""`lfs10d trace`: the frames of the line as they go over the wire, from the running daemon."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import secrets
+import shutil
+import signal
+import sys
+from collections import deque
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from lfs10d import telemetry
+from lfs10d.cli import EXIT_FAILED, config_option, json_option
+from lfs10d.cli.answers import verdict
+from lfs10d.cli.login import Login, login, login_options
+from lfs10d.cli.spinner import spinning
+from lfs10d.cli.visitor import Visitor, parsed
+from lfs10d.errors import BrokerError, FailedError
+from lfs10d.logs import escape
+from lfs10d.mqtt.messages import Filter
+from lfs10d.quantities import duration_text, seconds
+from lfs10d.requests.line import LONGEST, USUAL
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from lfs10d.mqtt.messages import Incoming
+
+ANSWERS_WITHIN: Final = 10.0
+LAST_FRAMES: Final = 0.5
+"""s after its end in which the last frames of a trace come in."""
+ONE_LINE: Final = 96
+"""Columns from which the bytes stand beside their meaning, below it otherwise."""
+HEX_COLUMNS: Final = 26
+"""Nine bytes: the answer of a wind sensor."""
+
+EXAMPLES = """\b
+Examples:
+  lfs10d trace                       half a minute of frames
+  lfs10d trace --for 2m -c site.yaml two minutes of another daemon's line
+  lfs10d trace | grep 'slave 3'      what concerns one slave
+  lfs10d trace --json                for programs
+"""
+
+
+def _duration(context: click.Context, parameter: click.Parameter, value: str) -> float:
+    try:
+        duration = seconds(value)
+    except ValueError:
+        duration = 0.0
+    if not 0.1 <= duration <= LONGEST:  # noqa: PLR2004 - as the request has it
+        message = f"{value!r} is no duration up to {duration_text(LONGEST)}; write 30s or 2m"
+        raise click.BadParameter(message, context, parameter)
+    return duration
+
+
+@click.command("trace", epilog=EXAMPLES)
+@config_option
+@click.option(
+    "--for",
+    "duration",
+    callback=_duration,
+    default=duration_text(USUAL),
+    show_default=True,
+    metavar="DURATION",
+    help=f"How long, at most {duration_text(LONGEST)}.",
+)
+@login_options
+@json_option
+def command(config: Path, duration: float, username: str | None, password_file: Path | None, *, as_json: bool) -> int:
+    """Show the frames of the running daemon's line, decoded, for a while or until Ctrl-C.
+
+    Each with its time, the silence before it, where it goes (> sent, < heard), its meaning and its bytes. It needs
+    requests of class `sensors`. Exit code 1 if the daemon refuses, 69 if the broker or the daemon is away.
+    """
+    with contextlib.suppress(KeyboardInterrupt):
+        visited = login(config, "trace", username=username, password_file=password_file)
+        return asyncio.run(_trace(visited, duration, as_json=as_json))
+    return 0
+
+
+async def _trace(visited: Login, duration: float, *, as_json: bool) -> int:
+    over = asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        asyncio.get_running_loop().add_signal_handler(number, over.set)
+    topic = visited.topics.full(telemetry.TRACE)
+    frames: deque[Any] = deque()
+
+    def arrived(message: Incoming) -> None:
+        if message.topic == topic:
+            frames.append(parsed(message.payload))
+
+    visitor = Visitor(visited, [Filter(topic, qos=0)], arrived)
+    show = asyncio.create_task(_show(visitor, frames, duration, as_json=as_json))
+    end = asyncio.create_task(over.wait())
+    try:
+        await asyncio.wait({show, end}, return_when=asyncio.FIRST_COMPLETED)
+        return show.result() if show.done() else 0
+    finally:
+        for task in (show, end):
+            task.cancel()
+        await asyncio.gather(show, end, return_exceptions=True)
+        await visitor.leave()
+
+
+async def _show(visitor: Visitor, frames: deque[Any], duration: float, *, as_json: bool) -> int:
+    response = await _begin(visitor, duration)
+    if response.get("status") != "ok":
+        click.echo(verdict(response), err=True)
+        return EXIT_FAILED
+    loop = asyncio.get_running_loop()
+    deadline = loop.time() + duration + LAST_FRAMES
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else ONE_LINE
+    while await visitor.until(lambda: bool(frames) or not visitor.daemon_online, max(0.0, deadline - loop.time())):
+        while frames:
+            frame = frames.popleft()
+            if not isinstance(frame, dict):
+                continue
+            for text in [json.dumps(frame, ensure_ascii=False)] if as_json else lines(frame, width):
+                click.echo(text)
+        if not visitor.daemon_online:
+            raise BrokerError(f"{visitor.place}: the daemon went away")
+    return 0
+
+
+async def _begin(visitor: Visitor, duration: float) -> Mapping[str, Any]:
+    async with spinning("line/trace ..."):
+        await visitor.enter()
+        await visitor.find_daemon()
+        content = {"id": secrets.token_hex(6), "for": duration}
+        response = await visitor.ask("line/trace", content, ANSWERS_WITHIN)
+    if response is None:
+        raise FailedError(f"no response to line/trace within {duration_text(ANSWERS_WITHIN)}")
+    return response
+
+
+def lines(frame: Mapping[str, Any], width: int) -> list[str]:
+    """Return one frame in words: on one line, or on two where the terminal is narrow."""
+    ts, gap = frame.get("ts"), frame.get("gap_us")
+    when = "--:--:--.---"
+    if isinstance(ts, int):
+        with contextlib.suppress(OverflowError, ValueError, OSError):  # it may come from anybody
+            moment = datetime.fromtimestamp(ts / 1000, UTC).astimezone()
+            when = f"{moment:%H:%M:%S}.{moment.microsecond // 1000:03d}"
+    silence = f"{gap / 1000:8.2f} ms" if isinstance(gap, int | float) else " " * 11
+    sign = ">" if frame.get("direction") == "tx" else "<"
+    text, data = escape(str(frame.get("text", ""))), escape(str(frame.get("hex", "")))
+    if width >= ONE_LINE:
+        return [f"{when} {silence} {sign} {data:{HEX_COLUMNS}}  {text}"]
+    return [f"{when} {silence} {sign} {text}", f"{'':26}{data}"]

@@ -1,0 +1,247 @@
+"""`lfs10d watch`: every slave of the line, live: for the person on the roof who spins a cup."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import os
+import signal
+import sys
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import click
+
+from lfs10d import telemetry
+from lfs10d.cli import config_option, json_option
+from lfs10d.cli.live import Live
+from lfs10d.cli.livelines import LiveLines
+from lfs10d.cli.livetable import Source, age_text, screen
+from lfs10d.cli.login import Login, login, login_options
+from lfs10d.cli.spinner import spinning
+from lfs10d.cli.visitor import RETAINED_WITHIN, Visitor, parsed
+from lfs10d.errors import BrokerError, FailedError
+from lfs10d.mqtt.messages import Filter
+from lfs10d.statedir import status_places
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from rich.live import Live as Screen
+
+    from lfs10d.mqtt.messages import Incoming
+
+EVERY: Final = 0.5
+"""s between two looks: fast enough for a hand at a cup."""
+SETTLES_WITHIN: Final = 0.2
+"""s for the rest of what is retained, so that nothing is called unknown that is only on its way."""
+CONNECTS_WITHIN: Final = 6.0
+"""s the broker is given before the daemon's status file is shown; it is tried on."""
+FRESH: Final = 3.0
+"""s after which a status file, written every second, is no longer that of a running daemon."""
+LARGEST_STATUS: Final = 2**22
+"""Bytes; 255 devices take a tenth of it."""
+
+EXAMPLES = """\b
+Examples:
+  lfs10d watch                       the service's line
+  lfs10d watch -c site.yaml          the line of another daemon
+  lfs10d watch | grep mast-top       one line for each new value of one sensor
+  lfs10d watch --json                the same for programs
+"""
+
+
+@click.command("watch", epilog=EXAMPLES)
+@config_option
+@login_options
+@json_option
+def command(config: Path, username: str | None, password_file: Path | None, *, as_json: bool) -> int:
+    """Show every slave of the running daemon, live, until Ctrl-C.
+
+    From MQTT, or from the daemon's own status file where the broker or the daemon's connection to it is away; the
+    table says which, and what is old is shown as old. The sensor whose value just moved is marked. In a pipe each new
+    value is one line. Exit code 69 if there is neither a broker with this daemon nor a status file.
+    """
+    with contextlib.suppress(KeyboardInterrupt):
+        visited = login(config, "watch", username=username, password_file=password_file)
+        files = status_places(config, visited.config.line.name, os.environ)
+        asyncio.run(_Watch(visited, files).run(_output(as_json=as_json)))
+    return 0
+
+
+def _output(*, as_json: bool) -> Callable[[], _Lines | _Screen]:
+    terminal = sys.stdout.isatty() and os.environ.get("TERM") not in {None, "dumb"}
+    return _Screen if terminal and not as_json else lambda: _Lines(as_json=as_json)
+
+
+@dataclass(slots=True)
+class _Status:
+    """The daemon's status file as it was read last."""
+
+    path: Path
+    live: Live
+    ts: float
+    """When it was written, epoch s."""
+
+
+class _Watch:
+    """Looks at both sources and shows the better one."""
+
+    def __init__(self, visited: Login, files: tuple[Path, ...]) -> None:
+        self._line = visited.config.line.name
+        self._files = files
+        self._live = Live(self._line)
+        self._heard_at = 0.0
+        """When anything came by MQTT last, epoch s."""
+        self._status: _Status | None = None
+        topics = visited.topics
+        once = [telemetry.DEVICES, telemetry.INFO, telemetry.LINE_STATE, telemetry.LINE_ERROR, telemetry.LINE_STATS]
+        leaves = (telemetry.STATE, telemetry.TELEMETRY, telemetry.AVAILABILITY, telemetry.ERROR, telemetry.STATS)
+        filters = [*once, *(telemetry.device_topic("+", leaf) for leaf in leaves)]
+        self._visitor = Visitor(
+            visited, [Filter(topics.full(each), qos=0, retain_as_published=False) for each in filters], self._arrived
+        )
+
+    async def run(self, output: Callable[[], _Lines | _Screen]) -> None:
+        """Show until told to end; raises BrokerError where there is nothing to show."""
+        over = asyncio.Event()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            asyncio.get_running_loop().add_signal_handler(number, over.set)
+        begin = asyncio.create_task(self._begin())
+        end = asyncio.create_task(over.wait())
+        try:
+            await asyncio.wait({begin, end}, return_when=asyncio.FIRST_COMPLETED)
+            if begin.done():
+                begin.result()
+                await self._show(output(), over)
+        finally:
+            for task in (begin, end):
+                task.cancel()
+            await asyncio.gather(begin, end, return_exceptions=True)
+            await self._visitor.leave()
+
+    async def _begin(self) -> None:
+        """Wait for the first thing to show."""
+        why = ""
+        async with spinning("looking for the daemon ..."):
+            try:
+                await self._visitor.enter(CONNECTS_WITHIN)
+                await self._visitor.until(lambda: self._live.known, RETAINED_WITHIN)
+                await self._visitor.find_daemon()
+                await asyncio.sleep(SETTLES_WITHIN)
+            except (BrokerError, FailedError) as error:
+                why = str(error)
+        self._read()
+        if self._live.known or self._status is not None:
+            return
+        places = " or ".join(str(path) for path in self._files)
+        raise BrokerError(f"{why}; and no daemon on this machine has written its status to {places}")
+
+    async def _show(self, output: _Lines | _Screen, over: asyncio.Event) -> None:
+        with output:
+            while not over.is_set():
+                self._read()
+                live, source = self._best()
+                output.draw(live, source, now=time.monotonic(), wall=time.time())
+                with contextlib.suppress(TimeoutError):
+                    await asyncio.wait_for(over.wait(), EVERY)
+
+    def _best(self) -> tuple[Live, Source]:
+        """Return the better source: the broker where the daemon is online there, else a file that is being written."""
+        visitor, status = self._visitor, self._status
+        if visitor.daemon_online and self._live.known:
+            return self._live, Source(f"live from {visitor.place}", alive=True)
+        if not visitor.connected:
+            why = visitor.ended_by or f"{visitor.place}: not connected"
+        else:
+            why = f"{visitor.place}: the daemon is offline there"
+        if status is not None:
+            age = time.time() - status.ts
+            if abs(age) <= FRESH:
+                return status.live, Source(f"live from {status.path} ({why})", alive=True)
+            if not self._live.known or status.ts > self._heard_at:
+                words = f"NOT LIVE: the daemon wrote {status.path} {age_text(max(0.0, age))} ago and no more ({why})"
+                return status.live, Source(words, alive=False)
+        return self._live, Source(f"NOT LIVE: these are the last values heard ({why})", alive=False)
+
+    def _arrived(self, message: Incoming) -> None:
+        relative = self._visitor.topics.relative(message.topic)
+        if relative is None:
+            return
+        payload = parsed(message.payload)
+        if payload is None:
+            payload = message.payload.decode("utf-8", "replace")
+        self._heard_at = time.time()
+        self._live.heard(relative, payload, old=message.retained, now=time.monotonic(), wall=self._heard_at)
+
+    def _read(self) -> None:
+        """Read the status file of our line, if there is one; what was read before stays and grows old."""
+        for path in self._files:
+            try:
+                with path.open("rb") as file:
+                    status = parsed(file.read(LARGEST_STATUS))
+            except OSError:
+                continue
+            line = status.get("line") if isinstance(status, dict) else None
+            if not isinstance(line, dict) or line.get("name") != self._line:
+                continue
+            live = Live(self._line) if self._status is None else self._status.live
+            live.read(status, now=time.monotonic())
+            ts = status.get("ts")
+            self._status = _Status(path, live, ts / 1000 if isinstance(ts, int) else 0.0)
+            return
+
+
+class _Lines:
+    """For a pipe: each new value is one line, plain or JSON."""
+
+    def __init__(self, *, as_json: bool) -> None:
+        self._as_json = as_json
+        self._lines = LiveLines()
+
+    def __enter__(self) -> None:
+        """Begin."""
+
+    def __exit__(self, *_: object) -> None:
+        """End."""
+
+    def draw(self, live: Live, source: Source, *, now: float, wall: float) -> None:
+        """Print what is new."""
+        for plain, data in self._lines.news(live, source, now=now, wall=wall):
+            if self._as_json and data is not None:
+                click.echo(json.dumps(data, ensure_ascii=False))
+            elif not self._as_json:
+                click.echo(plain)
+
+
+class _Screen:
+    """For a terminal: the table on a screen of its own, and what it showed last when it ends."""
+
+    def __init__(self) -> None:
+        from rich.console import Console  # noqa: PLC0415  # for a terminal only
+        from rich.live import Live as Screen  # noqa: PLC0415
+
+        self._console = Console(highlight=False, markup=False, emoji=False)
+        self._screen: Screen = Screen(console=self._console, screen=True, auto_refresh=False)
+
+    def __enter__(self) -> None:
+        """Begin."""
+        self._screen.start()
+
+    def __exit__(self, *_: object) -> None:
+        """End."""
+        last = self._screen.renderable
+        self._screen.stop()
+        self._console.print(last)
+
+    def draw(self, live: Live, source: Source, *, now: float, wall: float) -> None:
+        """Draw it anew."""
+        from rich.text import Text  # noqa: PLC0415
+
+        size = self._console.size
+        lines = screen(live, source, (size.width, size.height), now=now, wall=wall)
+        text = Text("\n", no_wrap=True, overflow="crop").join(Text.assemble(*line) for line in lines)
+        self._screen.update(text, refresh=True)
