@@ -137,12 +137,11 @@ class View:
 
     def wait(self, topic: str, claim: Callable[[Any], Any] = bool) -> Any:  # noqa: ANN401
         """Wait until the newest version of a topic is as claimed; return it."""
-
-        def found() -> list[Any]:
-            newest = self.newest(topic)
-            return [newest] if newest is not None and claim(newest) else []
-
-        return eventually(found, f"{topic}, last {self.newest(topic)}")[0]
+        deadline = time.monotonic() + PATIENCE
+        while (newest := self.newest(topic)) is None or not claim(newest):
+            assert time.monotonic() < deadline, f"{topic} is {newest}"
+            time.sleep(0.01)
+        return newest
 
     def samples(self, device: str, *, once: bool = True) -> list[dict[str, Any]]:
         """Return the samples of a device, live and historical, in order of arrival; each `seq` once."""
