@@ -109,17 +109,16 @@ def test_offline_comes_with_the_nth_failure_in_a_row_only() -> None:
     for _ in range(3):
         assert device.online
         device.failed(SILENCE, 0.0)
-    assert device.health is Health.OFFLINE
+    assert not device.online
 
 
 @pytest.mark.parametrize("code", [FaultCode.EXCEPTION, FaultCode.OUT_OF_RANGE, FaultCode.NOT_FINITE])
 def test_a_refusal_or_a_bad_value_proves_it_alive(code: FaultCode) -> None:
     device = a_device(rules=PollRules(offline_after=1))
     device.failed(SILENCE, 0.0)
-    assert not device.online
+    before = device.online
     device.failed(Fault(code, "alive"), 1.0)
-    assert device.online
-    assert device.failures == 0
+    assert (before, device.online, device.failures) == (False, True, 0)
 
 
 def test_only_one_that_answers_is_tried_again() -> None:

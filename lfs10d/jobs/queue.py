@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from lfs10d.jobs.job import Hold, Job
 
 
+JOB_CREDIT = 0.1
+"""Line time in s that a job may take ahead of its share: what it could not use while another spoke is not lost."""
+
+
 class JobQueue:
     """The jobs of one line. `excluded` are the slave ids that belong to one of them for the moment."""
 
@@ -31,7 +35,7 @@ class JobQueue:
     def submit(self, job: Job, now: float) -> None:
         """Take a new job."""
         if job.share < 1:
-            self._shares[job] = Share(job.share, credit=0.0, now=now)
+            self._shares[job] = Share(job.share, credit=JOB_CREDIT, now=now)
         if job.excludes:
             self._excluding.append(job)
             self.excluded |= job.excludes

@@ -10,7 +10,7 @@ import pytest
 
 from lfs10d.jobs.job import Ask, Done, Hold, Next
 from lfs10d.jobs.poll import Poll
-from lfs10d.jobs.queue import JobQueue
+from lfs10d.jobs.queue import JOB_CREDIT, JobQueue
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.unanswered import Unanswered
 from lfs10d.profiles.library import load_profile
@@ -69,7 +69,7 @@ def test_a_job_keeps_to_its_share(queue: JobQueue) -> None:
     scan = Task(0.25)
     queue.submit(scan, 0.0)
     assert queue.choose(0.0) is scan
-    queue.spend(scan, 0.5, 0.5)
+    queue.spend(scan, 0.5 + JOB_CREDIT, 0.5)
     queue.resume(scan)
     assert queue.choose(0.6) is None
     assert queue.next_at(0.5) == pytest.approx(2.5)
