@@ -11,7 +11,8 @@ from lfs10d.modbus.bus import LineRules
 from lfs10d.modbus.frames import Checksum, Codec, Framing
 from lfs10d.modbus.settings import PortSettings, Rs485
 from lfs10d.modbus.timing import LineTiming
-from lfs10d.roster import DeviceSpec, PollRules
+from lfs10d.reading import Fault, FaultCode, Reading
+from lfs10d.roster import FIRST_TIMEOUTS, DeviceSpec, PollRules
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -57,6 +58,11 @@ def poll_rules(poll: PollConfig) -> PollRules:
 def usual_codec(line: LineConfig) -> Codec:
     """Return how the frames of a slave that is not configured are read."""
     return Codec(Framing(line.framing))
+
+
+def profile_codec(line: LineConfig, profile: Profile) -> Codec:
+    """Return how the frames of a device of this profile are read that is not configured yet."""
+    return Codec(Framing(line.framing), Checksum(profile.checksum))
 
 
 def device_specs(config: Config, profiles: Mapping[str, Profile]) -> tuple[DeviceSpec, ...]:
@@ -107,6 +113,22 @@ def device_facts(config: Config, profiles: Mapping[str, Profile]) -> tuple[Devic
         )
         for slave in config.slaves
     )
+
+
+def conflict_readings(conflicts: Mapping[str, str], at: float) -> list[Reading]:
+    """Return what there is to say of devices that must not be polled: that they are offline, and why."""
+    return [
+        Reading(
+            device=name,
+            at=at,
+            values=None,
+            fault=Fault(FaultCode.CONFIG_CONFLICT, why),
+            rtt=None,
+            online=False,
+            response_timeout=FIRST_TIMEOUTS[0],
+        )
+        for name, why in conflicts.items()
+    ]
 
 
 def config_hash(config: Config) -> str:

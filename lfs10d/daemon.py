@@ -14,11 +14,12 @@ import socket
 import sys
 import time
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING
 
-from lfs10d import __version__, assembly, clock, logs, reload
+from lfs10d import __version__, assembly, clock, logs, telemetry
 from lfs10d.aside import aside
+from lfs10d.changefile import ChangeFile
+from lfs10d.disk import Disk
 from lfs10d.errors import ConfigError, StateError
 from lfs10d.facts import DaemonFacts, Instant
 from lfs10d.firstburst import FirstBurst
@@ -29,6 +30,7 @@ from lfs10d.mqtt.uplink import Uplink
 from lfs10d.powers import DaemonPowers
 from lfs10d.reading import Exchanged, Fault, FaultCode, PortChanged
 from lfs10d.requests.table import REQUESTS
+from lfs10d.running import Running
 from lfs10d.service import Service
 from lfs10d.statedir import prepare, status_file
 from lfs10d.station import Station
@@ -37,13 +39,16 @@ from lfs10d.supervision import Supervision
 from lfs10d.systemd import Notifier
 
 if TYPE_CHECKING:
-    from collections.abc import Coroutine, Iterable
+    from collections.abc import Coroutine, Iterable, Mapping
     from pathlib import Path
 
     from lfs10d.boot import Boot
     from lfs10d.configfile import Loaded
+    from lfs10d.effective import Effective
     from lfs10d.logbook import Entry
     from lfs10d.reading import Event
+    from lfs10d.reload import Plan
+    from lfs10d.running import Edit
     from lfs10d.secret import Secret
     from lfs10d.telemetry import Publication
 
@@ -61,13 +66,12 @@ class Daemon:
     """One line, from the port to the broker. Built and run inside an asyncio loop."""
 
     def __init__(self, loaded: Loaded, boot: Boot, state_directory: Path, notifier: Notifier) -> None:
-        config = loaded.config
-        self._files = reload.Files(loaded, reload.imprint(loaded))
+        self._running = Running(loaded, ChangeFile(state_directory, Disk()), self._hold)
+        loaded, config = self._running.loaded, self._running.now.config
         self._state_directory = state_directory
         self._notifier = notifier
         self._loop = asyncio.get_running_loop()
         self._over = asyncio.Event()
-        self._reloading = asyncio.Lock()
         self._failed = False
         self._clock: clock.ClockState = "unknown"
         self._ready = False
@@ -79,6 +83,7 @@ class Daemon:
             boot=boot.id,
             previous_boot=boot.previous,
             config_hash=assembly.config_hash(config),
+            changes=self._running.now.changes.count,
             mqtt={"version": config.mqtt.version},
             features=FEATURES,
         )
@@ -105,9 +110,11 @@ class Daemon:
             self._station,
             self._uplink,
             now=self._now,
-            running=lambda: self._files.loaded,
+            running=self._running,
             reload=self._reload,
-            poll=lambda device, request: self._line.read(device, request),  # noqa: PLW0108 - built below
+            change=self._change,
+            line=lambda: self._line,
+            publish=self._publish,
         )
         self._service = Service(
             REQUESTS,
@@ -116,7 +123,7 @@ class Daemon:
             respond=self._uplink.respond,
             clear=self._uplink.clear_retained,
         )
-        self._line = Line(config, loaded.profiles, heard=self._heard, failed=self._line_failed)
+        self._line = Line(self._running.now.polled, loaded.profiles, heard=self._heard, failed=self._line_failed)
         file = status_file(config.line.name, os.environ)
         self._supervision = Supervision(
             notifier,
@@ -127,11 +134,11 @@ class Daemon:
         )
 
     def _broker_settings(self) -> BrokerSettings:
-        mqtt = self._files.loaded.config.mqtt
+        mqtt = self._running.now.config.mqtt
         return BrokerSettings.of(mqtt, client_id=mqtt.client_id or "", password=self._password)
 
     def _password(self) -> Secret | None:
-        return self._files.loaded.password()
+        return self._running.loaded.password()
 
     def _now(self) -> Instant:
         return Instant(time.monotonic(), time.time(), self._clock)
@@ -142,7 +149,7 @@ class Daemon:
             self._loop.add_signal_handler(number, self._over.set)
         self._loop.add_signal_handler(signal.SIGHUP, self._hang_up)
         sys.setswitchinterval(SWITCH_INTERVAL)
-        config = self._files.loaded.config
+        config = self._running.now.config
         log.info(
             "lfs10d %s, boot %s: %s on %s at %d baud, %d slaves, broker %s:%d",
             __version__, self._facts.boot, config.line.name, config.line.port, config.line.baudrate,
@@ -154,7 +161,8 @@ class Daemon:
             self._line.start()
             await self._uplink.start()
             self._tick()
-            if not any(slave.enabled for slave in config.slaves):
+            self._tell_news()
+            if not any(slave.enabled for slave in self._running.now.polled.slaves):
                 self._tell_ready()
             await self._over.wait()
         finally:
@@ -181,6 +189,8 @@ class Daemon:
             if isinstance(event, Exchanged) or (isinstance(event, PortChanged) and event.fault is not None):
                 self._tell_ready()
         self._publish(published)
+        if any(isinstance(event, PortChanged) and event.fault is None for event in events):
+            self._yield(self._running.now.conflicts)
 
     def _publish(self, publications: Iterable[Publication]) -> None:
         self._uplink.publish(self._first_burst.passing(publications))
@@ -241,8 +251,7 @@ class Daemon:
         try:
             prepare(self._state_directory)
         except StateError as error:
-            log.warning("%s", error)
-            self._publish(self._station.line_failed(Fault(FaultCode.STORAGE_FULL, str(error)), self._now()))
+            self._storage_failed(str(error))
         else:
             self._publish(self._station.line_recovered(FaultCode.STORAGE_FULL, self._now()))
 
@@ -269,30 +278,66 @@ class Daemon:
             if plan.restart_required:
                 log.warning("takes effect at the next restart only: %s", ", ".join(plan.restart_required))
 
-    async def _reload(self) -> reload.Plan:
+    async def _reload(self) -> Plan:
         """Read the files again and apply what changed; raises ConfigError and changes nothing if one is wrong."""
-        async with self._reloading:
-            found = await aside(partial(reload.read, self._files.loaded.path), "reload")
-            plan = reload.plan(self._files, found)
-            before = self._files.loaded.config
-            self._files = replace(found, loaded=plan.loaded)
-            self._apply(plan)
-            self._powers.reconfigured(before, plan.loaded.config)
-            await self._uplink.reload(self._broker_settings() if plan.broker else None)
-            return plan
+        plan = await self._running.reload()
+        self._tell_news()
+        return plan
 
-    def _apply(self, plan: reload.Plan) -> None:
-        config = plan.loaded.config
+    async def _change(self, edit: Edit) -> tuple[Effective, Effective]:
+        """Apply what a request changes; raises StateError and changes nothing if it cannot be kept."""
+        try:
+            return await self._running.change(edit)
+        except StateError as error:
+            self._storage_failed(str(error))
+            raise
+        finally:
+            self._tell_news()
+
+    def _tell_news(self) -> None:
+        """Tell what became of changes that a person overruled, or that cannot hold."""
+        news = self._running.news()
+        for dropped in news.dropped:
+            log.warning("%s: %s: what a request changed there is dropped", dropped.key, dropped.message)
+        for warning in news.warnings:
+            log.warning("%s", warning)
+        if news.storage is not None:
+            self._storage_failed(news.storage)
+        ts = self._now().ts()
+        self._publish(
+            telemetry.event(
+                "change_dropped", ts, key=lost.key, device=lost.device, lost=lost.lost, message=lost.message
+            )
+            for lost in news.dropped
+        )
+
+    def _storage_failed(self, message: str) -> None:
+        log.warning("%s", message)
+        self._publish(self._station.line_failed(Fault(FaultCode.STORAGE_FULL, message), self._now()))
+
+    async def _hold(self, plan: Plan, before: Effective) -> None:
+        """Put into force what holds from now on."""
+        now = self._running.now
+        config = now.config
         if plan.log:
             logs.install(config.log.level, config.log.format)
         if plan.polling or plan.realtime:
-            self._line.take(config, plan.loaded.profiles, line=plan.line, realtime=plan.realtime)
-            devices = assembly.device_facts(config, plan.loaded.profiles)
+            self._line.take(now.polled, now.loaded.profiles, line=plan.line, realtime=plan.realtime)
+            devices = assembly.device_facts(config, now.loaded.profiles)
             self._publish(self._station.configure(assembly.line_facts(config.line), devices, self._now()))
+            self._yield({name: why for name, why in now.conflicts.items() if name not in before.conflicts})
         self._service.allow(frozenset(config.commands))
         self._look_at_storage()
-        self._facts = replace(self._facts, config_hash=assembly.config_hash(config))
+        self._facts = replace(self._facts, config_hash=assembly.config_hash(config), changes=now.changes.count)
         self._publish(self._station.introduce(self._facts, self._now()))
+        self._powers.reconfigured(before.config, config)
+        await self._uplink.reload(self._broker_settings() if plan.broker else None)
+
+    def _yield(self, conflicts: Mapping[str, str]) -> None:
+        """Tell of devices that are not polled, for their slave id is another's."""
+        now = self._now()
+        for reading in assembly.conflict_readings(conflicts, now.mono):
+            self._publish(self._station.heard(reading, now))
 
     # -- the broker
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from lfs10d.config import Config
+    from lfs10d.jobs.job import Job
     from lfs10d.profiles.schema import Profile
     from lfs10d.reading import Event
 
@@ -80,6 +81,11 @@ class Line:
     def read(self, device: str, request: int) -> None:
         """Have a device polled now for a request, whose number comes back with the reading."""
         self.poller.read(device, request)
+        self.wake()
+
+    def submit(self, job: Job) -> None:
+        """Have a job done; what it calls, it calls in the line's thread."""
+        self.poller.submit(job)
         self.wake()
 
     def take(self, config: Config, profiles: Mapping[str, Profile], *, line: bool, realtime: bool) -> None:

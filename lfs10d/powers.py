@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 from typing import TYPE_CHECKING
 
 from lfs10d import assembly
 from lfs10d.inquiries import Inquiries, Inquiry, altered
+from lfs10d.jobs.knock import Knock
 from lfs10d.reading import Exchanged, Reading
+from lfs10d.telemetry import event
 from lfs10d.tracing import Trace
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterable
 
+    from lfs10d.commands import Call
     from lfs10d.config import Config
-    from lfs10d.configfile import Loaded
+    from lfs10d.effective import Effective
     from lfs10d.facts import Instant
+    from lfs10d.line import Line
     from lfs10d.mqtt.uplink import Uplink
+    from lfs10d.profiles.schema import Profile
     from lfs10d.reading import Event
     from lfs10d.reload import Plan
+    from lfs10d.running import Edit, Running
     from lfs10d.station import Station
     from lfs10d.telemetry import Publication
 
@@ -25,8 +33,8 @@ if TYPE_CHECKING:
 class DaemonPowers:
     """`Powers` of `lfs10d.requests.request` on a running daemon.
 
-    `now` gives the moment, `running` the configuration that holds, `reload` takes up the files as they are, `poll`
-    has the line thread poll a device for the request of a number.
+    `now` gives the moment, `running` has the configuration that holds, `reload` takes up the files as they are,
+    `change` what a request wants; `line()` is the line, `publish` tells the broker.
     """
 
     def __init__(
@@ -35,16 +43,21 @@ class DaemonPowers:
         uplink: Uplink,
         *,
         now: Callable[[], Instant],
-        running: Callable[[], Loaded],
+        running: Running,
         reload: Callable[[], Awaitable[Plan]],
-        poll: Callable[[str, int], None],
+        change: Callable[[Edit], Awaitable[tuple[Effective, Effective]]],
+        line: Callable[[], Line],
+        publish: Callable[[list[Publication]], None],
     ) -> None:
         self._station = station
         self._uplink = uplink
         self._now = now
         self._running = running
         self._reload = reload
-        self._inquiries = Inquiries(poll)
+        self._change = change
+        self._line = line
+        self._publish = publish
+        self._inquiries = Inquiries(lambda device, request: line().read(device, request))
         self._trace: Trace | None = None
 
     def health(self) -> dict[str, object]:
@@ -62,7 +75,7 @@ class DaemonPowers:
 
     def configuration(self) -> dict[str, object]:
         """Return the effective configuration and where what is no default comes from."""
-        loaded = self._running()
+        loaded = self._running.loaded
         origins = {key: str(origin) for key, origin in loaded.origins.items() if origin.kind != "default"}
         return {"config": loaded.config.model_dump(mode="json"), "origins": origins}
 
@@ -73,7 +86,7 @@ class DaemonPowers:
 
     def devices(self) -> tuple[str, ...]:
         """Return the names of the configured devices."""
-        return tuple(slave.name for slave in self._running().config.slaves)
+        return tuple(slave.name for slave in self._running.now.config.slaves)
 
     async def read(self, device: str) -> Inquiry | None:
         """Poll a device now."""
@@ -81,7 +94,7 @@ class DaemonPowers:
 
     def trace(self, duration: float) -> None:
         """Tell every frame for `duration` s from now on."""
-        loaded = self._running()
+        loaded = self._running.loaded
         codecs = {spec.slave: spec.codec for spec in assembly.device_specs(loaded.config, loaded.profiles)}
         until = self._now().mono + duration
         self._trace = Trace(until, codecs, assembly.usual_codec(loaded.config.line))
@@ -92,15 +105,44 @@ class DaemonPowers:
         self._trace = None
         return ("trace",) if tracing else ()
 
+    def effective(self) -> Effective:
+        """Return the configuration that holds."""
+        return self._running.now
+
+    async def change(self, edit: Edit) -> tuple[Effective, Effective]:
+        """Change what holds."""
+        return await self._change(edit)
+
+    def applied(self, request: str, call: Call, **facts: object) -> None:
+        """Tell on `event` what a request changed."""
+        self._publish([event("change_applied", self._now().ts(), request=request, id=call.key, **facts)])
+
+    async def knock(self, slave: int, profile: Profile) -> Knock:
+        """Ask one slave id whether anybody is there."""
+        loop = asyncio.get_running_loop()
+        over: asyncio.Future[Knock] = loop.create_future()
+
+        def settle(job: Knock) -> None:
+            if not over.done():
+                over.set_result(job)
+
+        def tell(job: Knock) -> None:
+            with contextlib.suppress(RuntimeError):  # the loop is closed: nobody waits any more
+                loop.call_soon_threadsafe(settle, job)
+
+        codec = assembly.profile_codec(self._running.now.config.line, profile)
+        self._line().submit(Knock(slave, profile, codec, tell))
+        return await over
+
     # -- what they need to know of the line
 
-    def heard(self, event: Event, published: Iterable[Publication], now: Instant) -> list[Publication]:
+    def heard(self, happened: Event, published: Iterable[Publication], now: Instant) -> list[Publication]:
         """Take an event of the line thread with what the station made of it; return what is told besides."""
-        if isinstance(event, Reading):
-            self._inquiries.heard(event, published)
-        elif isinstance(event, Exchanged) and self._trace is not None:
+        if isinstance(happened, Reading):
+            self._inquiries.heard(happened, published)
+        elif isinstance(happened, Exchanged) and self._trace is not None:
             if now.mono < self._trace.until:
-                return self._trace.told(event, now)
+                return self._trace.told(happened, now)
             self._trace = None
         return []
 

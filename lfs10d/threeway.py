@@ -28,11 +28,12 @@ _UNSAID = object()
 class Dropped:
     """A change that holds no more because a person edited the file: the value `lost`, and why.
 
-    `key` is as in `lfs10d.difference`: `slaves.mast-top.interval`, or `slaves.mast-top` for all of it.
+    `key` is as in `lfs10d.difference`: `slaves.mast-top.interval`, or `slaves.mast-top` for all of it. The file of
+    changes that could not be understood is one without a device.
     """
 
     key: str
-    device: str
+    device: str | None
     lost: Any
     message: str
 
