@@ -7,6 +7,7 @@ virtual one. Other threads only `post`.
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import astuple
 from typing import TYPE_CHECKING, TypeAlias
 
 from lfs10d.jobs.poll import Poll
@@ -30,15 +31,11 @@ Sink: TypeAlias = "Callable[[list[Event]], None]"
 
 
 class Poller:
-    """One line. `sink` takes what was heard, at most once per exchange; `clock` is the bus's.
-
-    `declared` is the time by which the next turn is promised: a watchdog may hold the thread to it.
-    """
+    """One line. `sink` takes what was heard, at most once per exchange; `clock` is the bus's."""
 
     def __init__(self, bus: Bus, schedule: Schedule, sink: Sink, clock: Callable[[], float]) -> None:
         self.bus = bus
         self.schedule = schedule
-        self.declared = clock()
         self._sink = sink
         self._clock = clock
         self._posted: deque[Callable[[float], None]] = deque()
@@ -46,6 +43,7 @@ class Poller:
         self._errand = Errand.POLL
         self._count_at = clock()
         self._first_counters: UartCounters | None = None
+        self._counted_before = self._counted = UartCounters(0, 0, 0, 0)
 
     # -- from any thread (the thread must be woken afterwards)
 
@@ -96,7 +94,6 @@ class Poller:
         if self._events:
             events, self._events = self._events, []
             self._sink(events)
-        self.declared = wait.until
         return wait
 
     def _advance(self, now: float, *, readable: bool) -> Wait | None:
@@ -163,6 +160,8 @@ class Poller:
     def _port_changed(self, changed: PortChanged) -> None:
         self._events.append(changed)
         if changed.fault is None:
+            self._first_counters, self._counted_before = None, self._counted  # another adapter begins at 0
+            self._count_at = changed.at
             self.schedule.port_opened(changed.at)
         else:
             self._events += self.schedule.port_lost(changed.fault, changed.at)
@@ -176,10 +175,6 @@ class Poller:
         if counters is None:
             return
         first = self._first_counters = self._first_counters or counters
-        since = UartCounters(
-            counters.framing - first.framing,
-            counters.parity - first.parity,
-            counters.overrun - first.overrun,
-            counters.breaks - first.breaks,
-        )
-        self._events.append(UartCounted(now, since))
+        each = zip(astuple(self._counted_before), astuple(counters), astuple(first), strict=True)
+        self._counted = UartCounters(*(before + count - start for before, count, start in each))
+        self._events.append(UartCounted(now, self._counted))
