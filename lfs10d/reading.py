@@ -5,15 +5,14 @@ Times are monotonic seconds of the line thread's clock; durations are seconds.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 Number: TypeAlias = int | float
-
-EXCEPTION_BUSY = 0x06
-"""Modbus exception 06, server device busy (Modbus Application Protocol V1.1b3, section 7; EH600 manual)."""
 
 
 class FaultCode(StrEnum):
@@ -47,17 +46,16 @@ PORT_CODES = frozenset({FaultCode.PORT_LOST, FaultCode.PORT_BUSY})
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """Why an exchange or a poll failed; `message` is for people, `heard` what came instead."""
+    """Why an exchange or a poll failed; `message` is for people, `heard` what came instead.
+
+    `busy`: by the device's profile the exception says that it is busy: no error, asked again later.
+    """
 
     code: FaultCode
     message: str
     exception_code: int | None = None
     heard: bytes = b""
-
-    @property
-    def busy(self) -> bool:
-        """The device says that it is busy (exception 06): no error, asked again later."""
-        return self.exception_code == EXCEPTION_BUSY
+    busy: bool = False
 
 
 @dataclass(frozen=True, slots=True)

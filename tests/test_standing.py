@@ -31,7 +31,7 @@ FACTS = DeviceFacts(
 )
 TIMEOUT = Fault(FaultCode.TIMEOUT, "no answer in 200 ms")
 CRC = Fault(FaultCode.CRC, "check wrong")
-BUSY = Fault(FaultCode.EXCEPTION, "busy", exception_code=6)
+BUSY = Fault(FaultCode.EXCEPTION, "busy", exception_code=6, busy=True)
 REFUSED = Fault(FaultCode.EXCEPTION, "illegal data", exception_code=3)
 LOST = Fault(FaultCode.PORT_LOST, "absent")
 

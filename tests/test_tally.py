@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 START = 1000.0
 TIMEOUT = Fault(FaultCode.TIMEOUT, "")
-BUSY = Fault(FaultCode.EXCEPTION, "busy", exception_code=6)
+BUSY = Fault(FaultCode.EXCEPTION, "busy", exception_code=6, busy=True)
 LOST = Fault(FaultCode.PORT_LOST, "")
 
 

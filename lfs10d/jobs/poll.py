@@ -12,6 +12,7 @@ Rules
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from lfs10d.jobs.job import Ask, Done, Hold, Later, Next
@@ -24,9 +25,15 @@ if TYPE_CHECKING:
     from lfs10d.modbus.exchange import Outcome
     from lfs10d.modbus.unanswered import Unanswered
     from lfs10d.profiles.blocks import Block
+    from lfs10d.profiles.schema import Profile
     from lfs10d.roster import Device
 
 _NOTHING: frozenset[int] = frozenset()
+
+
+def told_busy(fault: Fault, profile: Profile) -> Fault:
+    """Return the fault, marked as busy where the profile counts its exception so."""
+    return replace(fault, busy=True) if fault.exception_code in profile.busy_exceptions else fault
 
 
 class Poll:
@@ -105,7 +112,7 @@ class Poll:
             self.failed_attempts.append(fault.code)
             self.due = now
             return Later(now)
-        self.fault = fault
+        self.fault = None if fault is None else told_busy(fault, device.spec.profile)
         self.values = {}
         return Done()
 

@@ -142,6 +142,21 @@ def test_a_fault_of_the_line_is_tried_again_so_often_as_allowed(code: FaultCode)
     assert rig.poll.good is None
 
 
+@pytest.mark.parametrize(("codes", "busy"), [((2,), True), ((1, 2, 6), True), ((6,), False), ((), False)])
+def test_which_exceptions_mean_busy_is_the_profiles_word(codes: tuple[int, ...], *, busy: bool) -> None:
+    rig = Rig()
+    rig.device.spec = replace(rig.device.spec, profile=LFS10.model_copy(update={"busy_exceptions": codes}))
+    rig.begin()
+    rig.hears(0.0, code=FaultCode.EXCEPTION)
+    assert rig.poll.fault == Fault(FaultCode.EXCEPTION, "", 2, busy=busy)
+
+
+def test_a_fault_without_an_exception_is_never_busy() -> None:
+    rig = Rig(retries=0)
+    rig.hears(0.0, code=FaultCode.CRC)
+    assert rig.poll.fault == Fault(FaultCode.CRC, "")
+
+
 def test_a_refusal_and_a_bad_value_are_final() -> None:
     rig = Rig()
     assert rig.hears(0.0, code=FaultCode.EXCEPTION) == Done()
