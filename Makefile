@@ -4,17 +4,18 @@ VENV := .venv
 BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: demo test check format docs bench soak clean
+.PHONY: demo test check format docs bench clean
 
 $(VENV)/.demo: pyproject.toml
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --editable '.[demo]'
-	touch $@
+	@echo 'Setting up $(VENV), once; this takes a moment.'
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "needs Python 3.11 or newer: make PYTHON=python3.12 demo")'
+	@$(PYTHON) -m venv $(VENV)
+	@$(BIN)/pip install --quiet --editable '.[demo]'
+	@touch $@
 
-$(VENV)/.dev: pyproject.toml
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --editable '.[demo,dev]'
-	touch $@ $(VENV)/.demo
+$(VENV)/.dev: $(VENV)/.demo
+	@$(BIN)/pip install --quiet --editable '.[demo,dev]'
+	@touch $@
 
 demo: $(VENV)/.demo
 	@$(BIN)/lfs10d demo
