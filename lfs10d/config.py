@@ -37,6 +37,11 @@ DEFAULT_STEM = "lfs10d"
 
 DEFAULT_LINE = "line0"
 
+SlaveId: TypeAlias = Annotated[int, Whole(1, 255)]
+Label: TypeAlias = Annotated[str | None, Text(200, null=True)]
+Interval: TypeAlias = Annotated[float, Duration(0.02, DAY, zero="as fast as the line allows")]
+ResponseTimeout: TypeAlias = Annotated[float | None, Duration(0.01, 10, auto="learned")]
+
 CommandClass: TypeAlias = Literal["polling", "sensors", "registers"]
 
 
@@ -108,7 +113,7 @@ class LineConfig(Section):
 class PollConfig(Section):
     """How slaves are polled, unless a slave says otherwise."""
 
-    interval: Annotated[float, Duration(0.02, DAY, zero="as fast as the line allows")] = Field(
+    interval: Interval = Field(
         1.0,
         description="Time between two polls of one slave; 0 is as fast as the line allows, "
         "in turn with what the others leave.",
@@ -136,22 +141,18 @@ class PollConfig(Section):
 class SlaveConfig(Section):
     """One device on the line."""
 
-    id: Annotated[int, Whole(1, 255)] = Field(description="Slave id, 1 to 255; a profile may narrow it.")
+    id: SlaveId = Field(description="Slave id, 1 to 255; a profile may narrow it.")
     name: Annotated[str, Name()] = Field(
         "", description="Part of its topics, stable for life. Default: slave-<id as in the file>."
     )
-    label: Annotated[str | None, Text(200, null=True)] = Field(
-        None, description="For people: free text, never in a topic."
-    )
+    label: Label = Field(None, description="For people: free text, never in a topic.")
     profile: Annotated[str, FilePath()] = Field(
         "lfs10",
         description="lfs10, ld-e, fuling-dzb, eh600, or the path of a profile YAML, relative to this file.",
     )
-    interval: Annotated[float, Duration(0.02, DAY, zero="as fast as the line allows")] = Field(
-        1.0, description="Time between two polls. Default: poll.interval."
-    )
+    interval: Interval = Field(1.0, description="Time between two polls. Default: poll.interval.")
     enabled: Annotated[bool, Flag()] = Field(default=True, description="Whether it is polled.")
-    response_timeout: Annotated[float | None, Duration(0.01, 10, auto="learned")] = Field(
+    response_timeout: ResponseTimeout = Field(
         None, description="Time to its answer's first byte. Default: poll.response_timeout."
     )
     checksum: Annotated[Literal["crc", "sum"] | None, Choice(("crc", "sum"), null=True)] = Field(

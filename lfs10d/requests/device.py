@@ -1,19 +1,37 @@
-"""`device/read`."""
+"""`device/add`, `device/remove`, `device/options` and `device/read`."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 from lfs10d.admission import Form
-from lfs10d.commands import Answer, Parameters, failed, ok, rejected
-from lfs10d.kinds import Name
+from lfs10d.aside import aside
+from lfs10d.changes import OPTIONS, Place
+from lfs10d.commands import Answer, Parameters, failed, ok
+from lfs10d.config import Interval, Label, ResponseTimeout, SlaveConfig, SlaveId, default_device_name, inherited
+from lfs10d.contradictions import contradictions
+from lfs10d.effective import effective
+from lfs10d.errors import ConfigError
+from lfs10d.kinds import FilePath, Flag, Name, quoted
+from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.reading import FaultCode
-from lfs10d.requests.request import Powers, Request
+from lfs10d.requests.amending import amend, known_device, plainly, refuse, unknown_device
+from lfs10d.requests.request import Powers, RefusedError, Request
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from lfs10d.changes import Changes
     from lfs10d.commands import Call, ErrorCode
+    from lfs10d.effective import Effective
+    from lfs10d.profiles.schema import Profile
+
+SHOWN = ("label", "profile", "interval", "enabled", "response_timeout")
+"""What the answer tells of a device that was added."""
+STATED = ("label", "profile", "interval")
+"""What a request may state of a device it adds; the rest is as for any other."""
 
 
 class OneDevice(Parameters):
@@ -22,17 +40,165 @@ class OneDevice(Parameters):
     device: Annotated[str, Name()]
 
 
-def unknown_device(device: str, powers: Powers) -> Answer:
-    """Return the rejection of a name that no device has."""
-    known = ", ".join(powers.devices()) or "none"
-    return rejected("unknown_device", f"there is no device {device}; configured are: {known}", param="device")
+class NewDevice(Parameters):
+    """A device to be polled."""
+
+    slave: SlaveId
+    name: Annotated[str, Name()] = ""
+    label: Label = None
+    profile: Annotated[str, FilePath()] = "lfs10"
+    interval: Interval = 1.0
+    probe: Annotated[bool, Flag()] = True
+
+    @property
+    def device(self) -> str:
+        """Its name, or the default one."""
+        return self.name or default_device_name(self.slave)
+
+    @property
+    def entry(self) -> dict[str, Any]:
+        """What is said of it."""
+        stated = {key: getattr(self, key) for key in STATED if key in self.model_fields_set}
+        return {"id": self.slave, **stated}
+
+
+class Options(Parameters):
+    """What is to be changed of a device."""
+
+    device: Annotated[str, Name()]
+    interval: Interval = 1.0
+    enabled: Annotated[bool, Flag()] = True
+    label: Label = None
+    response_timeout: ResponseTimeout = None
+
+    @property
+    def wanted(self) -> dict[str, Any]:
+        """The options that were given."""
+        return {key: getattr(self, key) for key in OPTIONS if key in self.model_fields_set}
+
+
+async def add(parameters: NewDevice, powers: Powers, call: Call) -> Answer:
+    """Poll one more slave; with `probe` only if it answers."""
+    try:
+        profile = await _profile(parameters.profile, powers.effective())
+        _check_new(parameters, profile, powers.effective())
+        if parameters.probe:
+            await _knock(parameters.slave, profile, powers)
+
+        def edit(now: Effective) -> Changes:
+            _check_new(parameters, profile, now)
+            place = Place(parameters.slave) if parameters.probe else None
+            return now.changes.adding(parameters.device, parameters.entry, place)
+
+        _, now = await amend(edit, powers)
+        slave = known_device(parameters.device, now)
+    except RefusedError as error:
+        return error.answer
+    data = {"slave": slave.id, **plainly(slave, SHOWN)}
+    powers.applied("device/add", call, device=slave.name, **{"from": None, "to": data})
+    return ok({"device": slave.name, **data})
+
+
+async def _profile(word: str, now: Effective) -> Profile:
+    """Return a profile by its name or file. A file is one that is used already, or lies beside the configuration."""
+    known = now.loaded.profiles.get(word)
+    if known is not None:
+        return known
+    path = Path(word)
+    beside = not path.is_absolute() and ".." not in path.parts and path.suffix in {".yaml", ".yml"}
+    if word in builtin_names() or beside:
+        try:
+            return await aside(partial(load_profile, word, relative_to=now.file.path.parent.absolute()), "profile")
+        except ConfigError:
+            pass  # what is in a file is not told to whoever asks
+    names = ", ".join(builtin_names())
+    message = f"profile: {quoted(word)} is no profile; write {names}, or a profile's YAML file beside the configuration"
+    raise refuse("invalid_param", message, param="profile")
+
+
+def _check_new(wanted: NewDevice, profile: Profile, now: Effective) -> None:
+    """Raise RefusedError if there cannot be such a device."""
+    config = now.config
+    slave = inherited(SlaveConfig.model_construct(name=wanted.device, **wanted.entry), config.poll)
+    alone = config.model_copy(update={"slaves": (slave,)})
+    for found in contradictions(alone, {wanted.profile: profile}):
+        param = {"id": "slave"}.get(str(found.path[-1]), str(found.path[-1]))
+        raise refuse("invalid_param", f"{param}: {found.message}", param=param)
+    for other in config.slaves:
+        if any(wanted.slave == place.id for place in (Place(other.id), *now.places[other.name])):
+            raise refuse("address_in_use", f"slave id {wanted.slave} is that of {other.name}", param="slave")
+    if now.slave(wanted.device) is not None or now.changes.of(wanted.device).added is not None:
+        default = "" if wanted.name else "the default "
+        message = f"name: {default}{wanted.device} is taken; give it another name"
+        raise refuse("invalid_param", message, param="name")
+
+
+async def _knock(slave: int, profile: Profile, powers: Powers) -> None:
+    """Raise RefusedError unless there is an answer."""
+    knock = await powers.knock(slave, profile)
+    if knock.answered:
+        return
+    if knock.fault is None:
+        raise refuse("line_error", f"slave {slave} could not be asked: the port is lost")
+    heard = knock.fault.heard.hex(" ").upper()
+    message = f"slave {slave} does not answer: {knock.fault.message}; with probe false it is added all the same"
+    raise refuse("timeout", message, heard=heard)
+
+
+async def remove(parameters: OneDevice, powers: Powers, call: Call) -> Answer:
+    """Poll a device no more."""
+    device = parameters.device
+
+    def edit(now: Effective) -> Changes:
+        if now.changes.of(device).added is None:  # else it may be one that cannot be polled as things are
+            known_device(device, now)
+        return now.changes.removing(device, now.said)
+
+    try:
+        before, _ = await amend(edit, powers)
+    except RefusedError as error:
+        return error.answer
+    gone = before.slave(device)
+    data = None if gone is None else {"slave": gone.id, **plainly(gone, SHOWN)}
+    powers.applied("device/remove", call, device=device, **{"from": data, "to": None})
+    return ok({"device": device, "slave": None if gone is None else gone.id})
+
+
+async def options(parameters: Options, powers: Powers, call: Call) -> Answer:
+    """Change how a device is polled and called."""
+    device, wanted = parameters.device, parameters.wanted
+
+    def edit(now: Effective) -> Changes:
+        known_device(device, now)
+        changes = now.changes.setting(device, wanted, now.said)
+        why = effective(now.file, changes).suspended.get(device)
+        if why is not None:
+            param = why.partition(":")[0]
+            raise refuse("invalid_param", why, param=param if param in wanted else None)
+        return changes
+
+    try:
+        if not wanted:
+            message = f"nothing to change: give {', '.join(OPTIONS[:-1])} or {OPTIONS[-1]}"
+            raise refuse("invalid_param", message)
+        before, now = await amend(edit, powers)
+        keys = tuple(wanted)
+        old, new = plainly(known_device(device, before), keys), plainly(known_device(device, now), keys)
+    except RefusedError as error:
+        return error.answer
+    if old != new:
+        powers.applied("device/options", call, device=device, **{"from": old, "to": new})
+    return ok({"from": old, "to": new})
 
 
 async def read(parameters: OneDevice, powers: Powers, _: Call) -> Answer:
     """Poll a device now, in turn with everybody else."""
     device = parameters.device
     if device not in powers.devices():
-        return unknown_device(device, powers)
+        return unknown_device(device, powers.devices())
+    conflict = powers.effective().conflicts.get(device)
+    if conflict is not None:
+        return failed("line_error", f"{device} cannot be asked: {conflict}")
     inquiry = await powers.read(device)
     if inquiry is None:
         return failed("line_error", f"{device} was removed or changed before it could be asked")
@@ -44,4 +210,9 @@ async def read(parameters: OneDevice, powers: Powers, _: Call) -> Answer:
     return failed(code, f"{device}: {fault.message}", data=inquiry.sample, **facts)
 
 
-REQUESTS: Mapping[str, Request] = {"device/read": Request(Form("polling", OneDevice), read)}
+REQUESTS: Mapping[str, Request] = {
+    "device/add": Request(Form("polling", NewDevice), add),
+    "device/remove": Request(Form("polling", OneDevice), remove),
+    "device/options": Request(Form("polling", Options), options),
+    "device/read": Request(Form("polling", OneDevice), read),
+}

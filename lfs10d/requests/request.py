@@ -9,8 +9,23 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Coroutine
 
     from lfs10d.admission import Form
+    from lfs10d.changes import Changes
     from lfs10d.commands import Answer, Call
+    from lfs10d.effective import Effective
     from lfs10d.inquiries import Inquiry
+    from lfs10d.jobs.knock import Knock
+    from lfs10d.profiles.schema import Profile
+
+Edit: TypeAlias = "Callable[[Effective], Changes]"
+"""What a request makes of the changes, given what holds. Called in a thread of its own; raises what refuses it."""
+
+
+class RefusedError(Exception):
+    """A request is refused where it is being carried out; `answer` says why."""
+
+    def __init__(self, answer: Answer) -> None:
+        super().__init__(answer.message)
+        self.answer = answer
 
 
 class Powers(Protocol):
@@ -42,6 +57,25 @@ class Powers(Protocol):
 
     def configuration(self) -> dict[str, object]:
         """Return the effective configuration, secrets left out, and where its values come from."""
+        ...
+
+    def effective(self) -> Effective:
+        """Return the configuration that holds, with what requests changed."""
+        ...
+
+    async def change(self, edit: Edit) -> tuple[Effective, Effective]:
+        """Change what holds, on the disk first; return what held before and what holds now.
+
+        Raises StateError where it cannot be put on the disk, and what `edit` raises; nothing is changed then.
+        """
+        ...
+
+    def applied(self, request: str, call: Call, **facts: object) -> None:
+        """Tell everybody what a request changed."""
+        ...
+
+    async def knock(self, slave: int, profile: Profile) -> Knock:
+        """Ask a slave id that nobody polls whether anybody is there; return the job that is over."""
         ...
 
     async def reload(self) -> dict[str, list[str]]:

@@ -1,28 +1,65 @@
-"""The powers of a daemon that is not there."""
+"""The powers of a daemon that is not there: the configuration is real, on a disk in memory, the line is not."""
 
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING, Protocol
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
 
 import pytest
 
 from lfs10d.admission import Admission, Answered, Ticket
+from lfs10d.changefile import ChangeFile
+from lfs10d.configfile import load
+from lfs10d.disk import Disk
+from lfs10d.forgetful import ForgetfulFiles
+from lfs10d.jobs.knock import Knock
+from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.requests.table import REQUESTS
+from lfs10d.running import Running
 
 if TYPE_CHECKING:
-    from lfs10d.commands import Answer
+    from lfs10d.commands import Answer, Call
+    from lfs10d.effective import Effective
     from lfs10d.inquiries import Inquiry
+    from lfs10d.profiles.schema import Profile
+    from lfs10d.reading import Fault
+    from lfs10d.reload import Plan
+    from lfs10d.requests.request import Edit
+
+FILE = """\
+line: {port: tty, baudrate: 9600}
+poll: {interval: 2s}
+slaves:
+  - {id: 2, name: mast-top, interval: 1s}
+  - 3
+"""
+STATE = Path("/state")
 
 
 class FakePowers:
-    """Answers as told beforehand and notes what was done."""
+    """Answers as told beforehand and notes what was done. `at` are the slave ids that answer to a knock."""
 
-    def __init__(self) -> None:
+    def __init__(self, file: Path) -> None:
         self.done: list[object] = []
         self.inquiry: Inquiry | None = None
         self.running: tuple[str, ...] = ()
         self.broken: Exception | None = None
+        self.at: set[int] = set()
+        self.silence: Fault | None = None
+        self.told: list[dict[str, object]] = []
+        self.disk = ForgetfulFiles()
+        self.file = file
+        self.start()
+
+    def start(self) -> None:
+        """Begin anew, as a daemon does."""
+        self.holding = Running(load(self.file), ChangeFile(STATE, Disk(self.disk)), self._take)
+
+    async def _take(self, plan: Plan, before: Effective) -> None:
+        assert before is not self.holding.now
+        self.done.append(plan.applied)
 
     def health(self) -> dict[str, object]:
         return {"v": 1}
@@ -41,7 +78,23 @@ class FakePowers:
         return {"applied": ["poll.interval"], "restart_required": []}
 
     def devices(self) -> tuple[str, ...]:
-        return ("mast-top", "slave-3")
+        return tuple(slave.name for slave in self.holding.now.config.slaves)
+
+    def effective(self) -> Effective:
+        return self.holding.now
+
+    async def change(self, edit: Edit) -> tuple[Effective, Effective]:
+        return await self.holding.change(edit)
+
+    def applied(self, request: str, call: Call, **facts: object) -> None:
+        self.told.append({"request": request, "id": call.key, **facts})
+
+    async def knock(self, slave: int, profile: Profile) -> Knock:
+        self.done.append(f"knock {slave}")
+        knock = Knock(slave, profile, Codec(Framing.RTU), lambda _: None)
+        knock.answered = slave in self.at
+        knock.fault = None if knock.answered else self.silence
+        return knock
 
     async def read(self, device: str) -> Inquiry | None:
         self.done.append(f"read {device}")
@@ -63,8 +116,10 @@ class Ask(Protocol):
 
 
 @pytest.fixture
-def powers() -> FakePowers:
-    return FakePowers()
+def powers(tmp_path: Path) -> FakePowers:
+    file = tmp_path / "lfs10d.yaml"
+    file.write_text(FILE)
+    return FakePowers(file)
 
 
 @pytest.fixture
@@ -81,3 +136,21 @@ def ask(powers: FakePowers) -> Ask:
         return asyncio.run(REQUESTS[name].perform(verdict.parameters, powers, verdict.call))
 
     return ask
+
+
+class Asked(Protocol):
+    """Asks a request with parameters, and returns status, error code and param, and data."""
+
+    def __call__(self, name: str, **parameters: Any) -> tuple[str, Any]:  # noqa: ANN401
+        """Return `("ok", data)`, or the status and `(code, param)`."""
+
+
+@pytest.fixture
+def asked(ask: Ask) -> Asked:
+    def asked(name: str, **parameters: Any) -> tuple[str, Any]:  # noqa: ANN401
+        answer = ask(name, json.dumps(parameters))
+        json.dumps(answer.data, allow_nan=False)
+        error = answer.error()
+        return answer.status, answer.data if error is None else (error["code"], error["param"])
+
+    return asked
