@@ -129,7 +129,7 @@ class PollQueue:
 
 
 def back_on_grid(device: Device, now: float) -> None:
-    """Skip the points of the grid that passed while `device` was offline; they are no overruns."""
+    """Go on at the next point of the grid after one that was offline has answered; what passed is no overrun."""
     interval = device.spec.interval
-    if interval > 0 and device.due < now:
-        device.due += floor((now - device.due) / interval) * interval
+    if interval > 0 and device.due <= now:
+        device.due += (floor((now - device.due) / interval) + 1) * interval

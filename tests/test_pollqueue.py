@@ -172,6 +172,6 @@ def test_grids_are_laid_side_by_side_but_not_far_apart() -> None:
 def test_what_passed_while_offline_is_no_overrun() -> None:
     device = a_device(1, 1.0, due=0.5)
     back_on_grid(device, 100.2)
-    assert device.due == 99.5
+    assert device.due == 100.5
     back_on_grid(device, 50.0)
-    assert device.due == 99.5
+    assert device.due == 100.5
