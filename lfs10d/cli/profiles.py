@@ -137,6 +137,8 @@ def _device(profile: Profile) -> Iterator[Row]:
         yield "after silence", "twice the time-out is waited, for no read of another length is known"
     else:
         yield "after silence", f"{_span_of_registers(barrier.register, barrier.count)} is asked first (the barrier)"
+    if profile.run_commands:
+        yield "never written", f"{', '.join(map(_register, profile.run_commands))}: run commands"
     if profile.min_interval:
         yield "interval", f"at least {profile.min_interval:g} s"
 

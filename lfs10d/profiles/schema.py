@@ -156,6 +156,9 @@ class Profile(Facts):
         (), description="Registers that configure it."
     )
     barrier: Barrier | None = Field(None, description="A read of another length than any poll's.")
+    run_commands: Annotated[tuple[Register, ...], Field(strict=False)] = Field(
+        (), description="Registers that set something going; never written, whatever a request says."
+    )
     provenance: dict[str, Sentence] = Field({}, description="Where a plain key's fact comes from, by key.")
     notes: Annotated[tuple[Sentence, ...], Field(strict=False)] = Field((), description="What else to know.")
 
@@ -227,6 +230,14 @@ class Profile(Facts):
                 )
         return barrier
 
+    @field_validator("run_commands", mode="after")
+    @classmethod
+    def _run_commands_are_no_settings(cls, registers: tuple[int, ...], info: ValidationInfo) -> tuple[int, ...]:
+        settings = {setting.register: setting.name for setting in info.data.get("settings", ())}
+        taken = [(place, register) for place, register in enumerate(registers) if register in settings]
+        refuse([((place,), f"is the setting {settings[register]} already") for place, register in taken])
+        return registers
+
     @field_validator("provenance", mode="after")
     @classmethod
     def _provenance_is_of_keys(cls, provenance: dict[str, str]) -> dict[str, str]:
@@ -235,7 +246,7 @@ class Profile(Facts):
 
     def model_post_init(self, _context: Any, /) -> None:  # noqa: ANN401 - pydantic's signature
         """Batch the values once; reads and decoding are on the path of every poll."""
-        self._blocks = batch(self.values, _words_per_read(self.__dict__))
+        self._blocks = batch(self.values, self.most_words)
 
     @property
     def checksum(self) -> ChecksumName:
@@ -256,6 +267,11 @@ class Profile(Facts):
     def id_and_rate_registers(self) -> frozenset[int]:
         """Registers that only a verified change of id or rate may write."""
         return frozenset(fact.register for fact in (self.slave_id, self.baudrate) if fact is not None)
+
+    @property
+    def most_words(self) -> int:
+        """Registers that one read may ask for in every framing that the device speaks."""
+        return _words_per_read(self.__dict__)
 
     def setting_at(self, register: int) -> Setting | None:
         """Return the setting at a register; None where the profile knows none: never to be written."""

@@ -226,3 +226,25 @@ def test_a_key_of_another_kind_is_refused(profile_of: Build, key: str, wrong: ob
 
 def test_a_duration_may_be_written_as_in_the_configuration(profile_of: Build) -> None:
     assert profile_of(min_interval="250ms").min_interval == 0.25
+
+
+def test_what_sets_a_motor_going_is_no_setting(profile_of: Build) -> None:
+    settings = [{"name": "ramp", "register": 0x2000, "range": [1, 9], "writable": True}]
+    assert profile_of(settings=settings, run_commands=[0x1000]).run_commands == (0x1000,)
+    assert problems(profile_of, settings=settings, run_commands=[0x1000, 0x2000]) == [
+        (("run_commands", 1), "is the setting ramp already")
+    ]
+
+
+@pytest.mark.parametrize(
+    ("limits", "most"),
+    [
+        ({}, 125),
+        ({"max_words": 5}, 5),
+        ({"framings": ["ascii"], "ascii_max_data": 16}, 7),
+        ({"framings": ["rtu"], "ascii_max_data": 16}, 125),
+        ({"framings": ["rtu", "ascii"], "max_words": 5, "ascii_max_data": 16}, 5),
+    ],
+)
+def test_the_longest_read_fits_every_framing(profile_of: Build, limits: dict[str, Any], most: int) -> None:
+    assert profile_of(**limits).most_words == most
