@@ -13,11 +13,12 @@ from lfs10d.modbus.settings import PortSettings, Rs485
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.reading import Fault, FaultCode, Reading
 from lfs10d.roster import FIRST_TIMEOUTS, DeviceSpec, PollRules
+from lfs10d.storeopening import Limits
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from lfs10d.config import Config, LineConfig, PollConfig, SlaveConfig
+    from lfs10d.config import Config, LineConfig, PollConfig, SlaveConfig, StoreConfig
     from lfs10d.profiles.schema import Profile
 
 
@@ -129,6 +130,11 @@ def conflict_readings(conflicts: Mapping[str, str], at: float) -> list[Reading]:
         )
         for name, why in conflicts.items()
     ]
+
+
+def store_limits(store: StoreConfig) -> Limits:
+    """Return how much of the backlog is kept on disk, and for how long."""
+    return Limits(size=store.max_size, age=round(store.max_age * 1000))
 
 
 def config_hash(config: Config) -> str:

@@ -35,6 +35,7 @@ from lfs10d.service import Service
 from lfs10d.statedir import prepare, status_file
 from lfs10d.station import Station
 from lfs10d.statusfile import StatusFile
+from lfs10d.store import Store
 from lfs10d.supervision import Supervision
 from lfs10d.systemd import Notifier
 
@@ -74,6 +75,10 @@ class Daemon:
         self._over = asyncio.Event()
         self._failed = False
         self._clock: clock.ClockState = "unknown"
+        self._store_trouble: str | None = None
+        """Why the backlog cannot be kept on disk."""
+        self._storage_trouble: str | None = None
+        """What was last told of it, or of the whole state directory."""
         self._ready = False
         self._ticking: asyncio.TimerHandle | None = None
         self._logbook = Logbook()
@@ -105,6 +110,8 @@ class Daemon:
             changed=self._uplink_changed,
             announced=self._announced,
         )
+        store = Store(state_directory, boot=boot.id, limits=assembly.store_limits(config.store))
+        self._uplink.keep_in(store, self._store_troubled)
         self._first_burst = FirstBurst(self._station.burst(self._now()))
         self._powers = DaemonPowers(
             self._station,
@@ -230,7 +237,9 @@ class Daemon:
 
     async def _watch_clock(self) -> None:
         while True:
-            self._clock = await aside(clock.look, "clock")
+            before, self._clock = self._clock, await aside(clock.look, "clock")
+            if self._clock == "synced" != before:
+                self._uplink.synchronised()
             await asyncio.sleep(clock.LOOK_AGAIN[self._clock])
 
     # -- the service manager
@@ -247,13 +256,21 @@ class Daemon:
     # -- the files
 
     def _look_at_storage(self) -> None:
-        """Raise or clear the error of a state directory that cannot be written."""
+        """Raise or clear the error of a state directory that cannot be written, or of a backlog in it that cannot."""
+        trouble = self._store_trouble
         try:
             prepare(self._state_directory)
         except StateError as error:
-            self._storage_failed(str(error))
-        else:
+            trouble = str(error)
+        before, self._storage_trouble = self._storage_trouble, trouble
+        if trouble is None:
             self._publish(self._station.line_recovered(FaultCode.STORAGE_FULL, self._now()))
+        elif trouble != before:
+            self._storage_failed(trouble)
+
+    def _store_troubled(self, trouble: str | None) -> None:
+        self._store_trouble = trouble
+        self._look_at_storage()
 
     def _hang_up(self) -> None:
         self._notifier.reloading()
@@ -331,6 +348,7 @@ class Daemon:
         self._facts = replace(self._facts, config_hash=assembly.config_hash(config), changes=now.changes.count)
         self._publish(self._station.introduce(self._facts, self._now()))
         self._powers.reconfigured(before.config, config)
+        self._uplink.limit(assembly.store_limits(config.store))
         await self._uplink.reload(self._broker_settings() if plan.broker else None)
 
     def _yield(self, conflicts: Mapping[str, str]) -> None:

@@ -8,30 +8,41 @@ these go first, and their going is no loss.
 from __future__ import annotations
 
 from bisect import insort
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeAlias
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from lfs10d.loss import Key
     from lfs10d.telemetry import Sample
-
-Key: TypeAlias = tuple[str, str]
-"""Device and boot: one history array holds samples of one key."""
 
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """One sample that waits since `since` (monotonic s); `repeated`: the broker acknowledged it before."""
+    """One sample that waits since `since` (monotonic s); `repeated`: the broker acknowledged it before.
+
+    `shift` is the wall clock less the monotonic one when it was measured, in ms; None: of an earlier boot.
+    `row` is its id in the store, None where it is in memory alone.
+    """
 
     sample: Sample
     since: float
     repeated: bool = False
+    shift: int | None = None
+    row: int | None = None
 
     @property
     def key(self) -> Key:
-        """Device and boot."""
+        """Device and boot: one history array holds samples of one key."""
         return self.sample.device, self.sample.boot
+
+    def at(self, shift: int) -> Kept:
+        """Return it with the time that a clock tells that is synchronised now; unchanged if its own was."""
+        if self.shift is None or self.sample.clock == "synced":
+            return self
+        right = replace(self.sample, ts=self.sample.ts + shift - self.shift, clock="synced")
+        return replace(self, sample=right, shift=shift)
 
 
 def _seq(kept: Kept) -> int:
@@ -87,6 +98,16 @@ class History:
         self._count -= self._repeated
         self._repeated = 0
         return None
+
+    def correct(self, shift: int) -> None:
+        """Give all the time that the clock tells now that it is synchronised."""
+        for shelf in self._shelves.values():
+            shelf[:] = [kept.at(shift) for kept in shelf]
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._shelves.clear()
+        self._count = self._repeated = 0
 
     def oldest(self) -> Kept | None:
         """Return the one that waits longest, None where none waits."""

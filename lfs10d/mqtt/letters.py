@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, TypeAlias
 from lfs10d import telemetry
 
 if TYPE_CHECKING:
+    from lfs10d.loss import Loss
     from lfs10d.mqtt.history import Kept
-    from lfs10d.mqtt.losses import Loss
     from lfs10d.telemetry import Publication
 
 

@@ -5,8 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from lfs10d.loss import Loss, joined
+
 if TYPE_CHECKING:
-    from lfs10d.mqtt.history import Key
+    from collections.abc import Iterable
+
+    from lfs10d.loss import Key
     from lfs10d.telemetry import Sample
 
 MOST_RANGES = 8
@@ -14,32 +18,6 @@ MOST_RANGES = 8
 
 DECLARED_EVERY = 60.0
 """Seconds between two declarations of one device and boot on one connection, so that a lasting cause is no flood."""
-
-
-@dataclass(frozen=True, slots=True)
-class Loss:
-    """`count` samples lost within `from_seq`..`to_seq`, both included."""
-
-    device: str
-    boot: str
-    from_seq: int
-    to_seq: int
-    count: int
-
-    @property
-    def key(self) -> Key:
-        """Device and boot."""
-        return self.device, self.boot
-
-    def joined(self, other: Loss) -> Loss:
-        """Return both as one."""
-        return Loss(
-            self.device,
-            self.boot,
-            min(self.from_seq, other.from_seq),
-            max(self.to_seq, other.to_seq),
-            self.count + other.count,
-        )
 
 
 @dataclass(slots=True)
@@ -58,18 +36,17 @@ class Losses:
 
     def restore(self, loss: Loss) -> None:
         """Put back a loss whose declaration was not acknowledged."""
-        ranges = self._waiting.setdefault(loss.key, [])
-        ranges.append(loss)
-        ranges.sort(key=lambda each: each.from_seq)
-        merged = ranges[:1]
-        for each in ranges[1:]:
-            if each.from_seq <= merged[-1].to_seq + 1:
-                merged[-1] = merged[-1].joined(each)
-            else:
-                merged.append(each)
-        if len(merged) > MOST_RANGES:
-            merged[-2:] = [merged[-2].joined(merged[-1])]
-        self._waiting[loss.key] = merged
+        self._waiting[loss.key] = joined([*self._waiting.get(loss.key, ()), loss], MOST_RANGES)
+
+    def evicted(self, losses: Iterable[Loss]) -> None:
+        """Note that the store had no room for these."""
+        for loss in losses:
+            self.total += loss.count
+            self.restore(loss)
+
+    def waiting(self) -> list[Loss]:
+        """Return those that are not declared yet."""
+        return [loss for losses in self._waiting.values() for loss in losses]
 
     def connected(self) -> None:
         """Let every loss be declared at once on a new connection."""

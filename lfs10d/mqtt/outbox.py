@@ -7,16 +7,12 @@ The rules (contract, section 3):
 2. Of a retained topic only the newest version waits, and no second version goes while the first is under way.
    After a connect the whole burst goes first; its `last` (availability) only when all of it is settled, and
    everything else only after that.
-3. A sample that is older than 3 s when its turn comes goes on `history` instead: one device and one boot per
-   array, in order of seq, one array under way at a time and at most ten a second, so that live samples never
-   wait behind more than one array.
-4. The past is opened 10 s after a connect: subscribers come back later than we do. First what was lost is
-   declared, then the backlog goes. What was acknowledged from 10 s before a loss of the connection until then
-   goes once more, because an acknowledgement of a broker that dies is not durable.
-5. A letter leaves for ever when it is settled (PUBACK). A connection lost puts all that was under way back.
-6. At most `capacity` samples wait. Beyond that those go first that are only repeated, then the oldest, which
-   are declared.
-7. A refused letter is dead, and so is its topic until `reload()`. What does not fit the broker's limits is dead
+3. A sample that is older than 3 s when its turn comes belongs to the past, whose rules are in `past`; live samples
+   never wait behind more than one array of it.
+4. A letter leaves for ever when it is settled (PUBACK). A connection lost puts all that was under way back.
+5. At most `capacity` samples wait in memory. Beyond that those go first that are only repeated, then the oldest,
+   which are declared.
+6. A refused letter is dead, and so is its topic until `reload()`. What does not fit the broker's limits is dead
    alone; an array is first cut smaller. A dead sample is declared like an evicted one.
 
 ====================  =========================  ============================  =========================
@@ -25,7 +21,8 @@ letter                settled                    connection lost               r
 `Retained`            gone                       gone (the burst renews it),   gone
                                                  a clearing one waits again
 `Message`             gone                       waits again (QoS 0: gone)     gone
-`Live`, `Array`       kept 10 s for rule 4       waits again                   declared
+`Live`, `Array`       kept 10 s for a second     waits again                   declared
+                      sending
 `Declaration`         gone                       waits again                   waits for `reload()`
 ====================  =========================  ============================  =========================
 """
@@ -37,9 +34,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from lfs10d import telemetry
-from lfs10d.mqtt.history import History, Kept
-from lfs10d.mqtt.letters import Array, Declaration, Letter, Live, Message, Retained, samples_of
-from lfs10d.mqtt.losses import Losses
+from lfs10d.mqtt.history import Kept
+from lfs10d.mqtt.letters import Array, Letter, Live, Message, Retained, samples_of
+from lfs10d.mqtt.past import Past
+from lfs10d.mqtt.retention import Retention
 from lfs10d.telemetry import Kind, Publication
 
 if TYPE_CHECKING:
@@ -50,15 +48,6 @@ CAPACITY = 10_000
 
 LIVE_FOR = 3.0
 """Seconds after which a sample is history (contract, section 3)."""
-
-ARRAY_MOST = 100
-"""Samples in one history array (contract, section 3)."""
-
-ARRAY_EVERY = 0.1
-"""Seconds from one history array to the next: the bounded rate of the contract, 1000 samples a second."""
-
-PAST_AFTER = 10.0
-"""Seconds after a connect at which the past is opened; also how far back of a loss is sent again."""
 
 MESSAGES_MOST = 1000
 """Responses and events that wait while the broker is away; and traces while it is slow."""
@@ -75,37 +64,33 @@ class Outbox:
 
     def __init__(self, *, capacity: int = CAPACITY, detection: float = 40.0) -> None:
         self._capacity = capacity
-        self._detection = detection
         self._window = 0  # 0: not connected
         self._under_way: dict[Letter, None] = {}
-        self._retained: dict[str, Retained] = {}
+        self._retention = Retention()
         self._messages: deque[Message] = deque(maxlen=MESSAGES_MOST)
         self._live: deque[Live] = deque()
         self._traces: deque[Message] = deque(maxlen=MESSAGES_MOST)
-        self._history = History()
-        self._losses = Losses()
-        self._burst: set[str] = set()
-        self._last: Retained | None = None
-        self._closing: Retained | None = None  # the `last` that is not settled yet
-        self._past_from = 0.0
-        self._array_at = 0.0
-        self._array_most = ARRAY_MOST
-        self._acknowledged: deque[tuple[float, Kept]] = deque(maxlen=capacity)
-        self._repeat = False
         self._refused: set[str] = set()
         self._unfit: set[str] = set()
+        self.past = Past(capacity=capacity, detection=detection)
+        """What is no longer live."""
 
     # What comes in
 
-    def add(self, publication: Publication, now: float, *, correlation: bytes | None = None) -> None:
-        """Take one publication; while the broker is away only samples, events, responses and clearings stay."""
+    def add(
+        self, publication: Publication, now: float, *, correlation: bytes | None = None, shift: int | None = None
+    ) -> None:
+        """Take one publication; while the broker is away only samples, events, responses and clearings stay.
+
+        `shift` is the wall clock less the monotonic one now, in ms.
+        """
         if publication.sample is not None:
-            self._live.append(Live(publication, Kept(publication.sample, now)))
-            self._age(now)
+            self._live.append(Live(publication, Kept(publication.sample, now, shift=shift)))
+            self.age(now)
             self._make_room()
         elif publication.kind is Kind.RETAINED:
             if self._window or publication.payload is None:
-                self._retained[publication.topic] = Retained(publication)
+                self._retention.add(publication)
         elif publication.kind is Kind.TRACE:
             if self._window:
                 self._traces.append(Message(publication))
@@ -114,49 +99,37 @@ class Outbox:
 
     def burst(self, publications: Iterable[Publication], last: Publication) -> None:
         """Send all retained topics, then `last`, then everything else."""
-        for publication in publications:
-            self._retained[publication.topic] = Retained(publication)
-            self._burst.add(publication.topic)
-        self._last = self._closing = Retained(last)
+        self._retention.burst(publications, last)
 
     # What happens to the connection
 
     def connected(self, now: float, *, window: int = IN_FLIGHT_MOST) -> None:
         """Begin to send: at most `window` letters under way at once. `burst` is to follow."""
         self._window = window
-        self._past_from = now + PAST_AFTER
-        self._array_at = self._past_from
-        self._array_most = ARRAY_MOST
-        self._losses.connected()
+        self.past.connected(now)
 
     def lost(self, now: float) -> None:
-        """Put back what was under way (rule 5), and remember to repeat what was acknowledged lately (rule 4)."""
+        """Put back what was under way (rule 4), and remember to repeat what was acknowledged lately."""
         self._window = 0
-        if not self._repeat:
-            self._forget(now - PAST_AFTER - self._detection)
-        self._repeat = True
         self._traces.clear()
-        self._burst.clear()
-        self._last = self._closing = None
-        self._retained = {topic: each for topic, each in self._retained.items() if each.publication.payload is None}
+        self._retention.lost()
+        self.past.lost(now)
         under_way, self._under_way = list(self._under_way), {}
         for letter in reversed(under_way):
             self._put_back(letter)
+        self._make_room()
 
     def _put_back(self, letter: Letter) -> None:
         match letter:
-            case Retained(publication=publication):
-                if publication.payload is None:
-                    self._retained.setdefault(letter.topic, letter)
+            case Retained():
+                self._retention.put_back(letter)
             case Message(publication=publication):
                 if publication.qos and len(self._messages) < MESSAGES_MOST:
                     self._messages.appendleft(letter)
             case Live():
                 self._live.appendleft(letter)
-            case Array(samples=samples):
-                self._history.extend(samples)
             case _:
-                self._losses.restore(letter.loss)
+                self.past.put_back(letter)
 
     # What goes out
 
@@ -170,79 +143,35 @@ class Outbox:
         return letter
 
     def _next(self, now: float) -> Letter | None:
-        retained = self._next_retained()
-        if retained is not None or self._last is not None:
+        retained = self._retention.next(self._refused)
+        if retained is not None or self._retention.first:
             return retained
-        self._age(now)
+        self.age(now)
         for queue in (self._messages, self._live, self._traces):
             while queue:
                 letter = queue.popleft()
                 if letter.topic not in self._refused:
                     return letter
-                self._dead(letter)
-        return self._next_past(now)
-
-    def _next_retained(self) -> Retained | None:
-        busy = {each.topic for each in self._under_way if isinstance(each, Retained)}
-        for topic in list(self._retained):
-            if topic in self._refused:
-                del self._retained[topic]
-                self._burst.discard(topic)
-            elif topic not in busy:
-                return self._retained.pop(topic)
-        if self._burst or self._last is None or self._last.topic in busy:
-            return None
-        last, self._last = self._last, None
-        if last.topic not in self._refused:
-            return last
-        self._closing = None
-        return None
-
-    def _next_past(self, now: float) -> Array | Declaration | None:
-        if now < self._past_from or any(isinstance(each, Array | Declaration) for each in self._under_way):
-            return None
-        if self._repeat:
-            self._repeat = False
-            self._history.extend(replace(kept, repeated=True) for _, kept in self._acknowledged)
-            self._acknowledged.clear()
+                self.past.dead(letter)
+        if self.past.repeat(now):
             self._make_room()
-        if telemetry.EVENT not in self._refused:
-            loss = self._losses.take(now)
-            if loss is not None:
-                return Declaration(loss)
-        if now < self._array_at:
-            return None
-        while samples := self._history.take(self._array_most):
-            array = Array(samples)
-            if array.topic not in self._refused:
-                self._array_at = now + ARRAY_EVERY
-                return array
-            self._dead(array)
-        return None
+        return self.past.next(now, self._refused, self.past.dead)
 
     def due(self) -> float | None:
         """Return when `next` may have something though nothing happens before; None: not by time alone."""
-        if not self._window or any(isinstance(each, Array | Declaration) for each in self._under_way):
-            return None
-        declared = self._losses.due() if telemetry.EVENT not in self._refused else None
-        times = [] if declared is None else [declared]
-        if self._history or (self._repeat and self._acknowledged):
-            times.append(self._array_at)
-        return max(self._past_from, min(times)) if times else None
+        return self.past.due(self._refused) if self._window else None
 
     # What became of it
 
     def settled(self, letter: Letter, now: float) -> None:
         """Note that the broker has it."""
         self._over(letter)
-        if not self._repeat:
-            self._forget(now - PAST_AFTER)
-        self._acknowledged.extend((now, kept) for kept in samples_of(letter))
+        self.past.settled(letter, now)
 
     def refused(self, letter: Letter, reason: int) -> bool:
         """Note that the broker refused it with reason code >= 0x80; return True if its topic is to be reported."""
         self._over(letter)
-        self._dead(letter)
+        self.past.dead(letter)
         if reason in TRANSIENT_REASONS or letter.topic in self._refused:
             return False
         self._refused.add(letter.topic)
@@ -255,11 +184,9 @@ class Outbox:
         """
         self._over(letter)
         if isinstance(letter, Array) and len(letter.samples) > 1:
-            self._array_most = len(letter.samples) // 2
-            self._array_at = 0.0
-            self._history.extend(letter.samples)
+            self.past.cut(letter)
             return False
-        self._dead(letter)
+        self.past.dead(letter)
         if letter.topic in self._unfit:
             return False
         self._unfit.add(letter.topic)
@@ -275,29 +202,20 @@ class Outbox:
     def _over(self, letter: Letter) -> None:
         del self._under_way[letter]
         if isinstance(letter, Retained):
-            self._burst.discard(letter.topic)
-        if letter is self._closing:
-            self._closing = None
-
-    def _dead(self, letter: Letter) -> None:
-        if isinstance(letter, Declaration):
-            self._losses.restore(letter.loss)
-        for kept in samples_of(letter):
-            if not kept.repeated:
-                self._losses.add(kept.sample)
+            self._retention.over(letter)
+        self.past.over(letter)
 
     # What waits
 
     @property
     def announced(self) -> bool:
         """We are connected, and the burst and its `last` are settled."""
-        return self._window > 0 and self._closing is None
+        return self._window > 0 and self._retention.announced
 
     @property
     def idle(self) -> bool:
         """Nothing is under way, and nothing but the past waits."""
-        waiting = self._retained or self._messages or self._live or self._last
-        return not self._under_way and not waiting
+        return not (self._under_way or self._retention or self._messages or self._live)
 
     @property
     def under_way(self) -> tuple[Letter, ...]:
@@ -306,38 +224,62 @@ class Outbox:
 
     @property
     def depth(self) -> int:
-        """Samples that wait or are under way."""
-        return len(self._live) + len(self._history) + sum(1 for _ in self._samples_under_way())
+        """Samples that wait or are under way, those in the store included."""
+        return self._in_memory() + self.past.stored.depth
 
     @property
     def dropped(self) -> int:
         """Samples that were lost since the start, declared or not."""
-        return self._losses.total
+        return self.past.losses.total
 
     @property
     def backlog(self) -> telemetry.Backlog:
         """What `line/stats` says of it."""
-        oldest = self._history.oldest()
-        waiting = [*self._samples_under_way(), *([oldest] if oldest else [])]
-        if self._live:
-            waiting.append(self._live[0].kept)
-        first = min(waiting, key=lambda kept: kept.since, default=None)
-        return telemetry.Backlog(self.depth, first.sample.ts if first else None, self.dropped)
+        oldest_ts = self.past.stored.oldest()
+        if oldest_ts is None:
+            waiting = [*self._under_way_alone(), *self.past.waiting(), *(live.kept for live in list(self._live)[:1])]
+            first = min(waiting, key=lambda kept: kept.since, default=None)
+            oldest_ts = first.sample.ts if first else None
+        return telemetry.Backlog(self.depth, oldest_ts, self.dropped)
 
-    def _samples_under_way(self) -> Iterator[Kept]:
+    def _in_memory(self) -> int:
+        """Return how many samples are in memory alone."""
+        return len(self._live) + len(self.past) + sum(1 for _ in self._under_way_alone())
+
+    def _under_way_alone(self) -> Iterator[Kept]:
+        """Return the samples under way that are not in the store."""
         for letter in self._under_way:
-            yield from samples_of(letter)
+            yield from (kept for kept in samples_of(letter) if kept.row is None)
 
-    def _age(self, now: float) -> None:
+    def next_old(self) -> float | None:
+        """Return when the oldest live sample becomes history; None: there is none."""
+        return self._live[0].kept.since + LIVE_FOR if self._live else None
+
+    def age(self, now: float) -> None:
+        """Let live samples that are too old for it wait with the past."""
         while self._live and now - self._live[0].kept.since > LIVE_FOR:
-            self._history.add(self._live.popleft().kept)
+            self.past.history.add(self._live.popleft().kept)
 
     def _make_room(self) -> None:
-        while self.depth > self._capacity and (self._history or self._live):
-            kept = self._history.evict() if self._history else self._live.popleft().kept
+        history = self.past.history
+        while self._in_memory() > self._capacity and (history or self._live):
+            kept = history.evict() if history else self._live.popleft().kept
             if kept is not None:
-                self._losses.add(kept.sample)
+                self.past.losses.add(kept.sample)
 
-    def _forget(self, before: float) -> None:
-        while self._acknowledged and self._acknowledged[0][0] < before:
-            self._acknowledged.popleft()
+    # The clock
+
+    def correct(self, shift: int) -> None:
+        """Give what waits the time that the clock tells now that it is synchronised; `shift` as in `add`."""
+        self._live = deque(_corrected(live, shift) for live in self._live)
+        self.past.correct(shift)
+
+
+def _corrected(live: Live, shift: int) -> Live:
+    kept = live.kept.at(shift)
+    payload = live.publication.payload
+    if kept is live.kept or not isinstance(payload, dict):
+        return live
+    sample = kept.sample
+    told = {**payload, "ts": sample.ts, "time": telemetry.iso_time(sample.ts), "clock": sample.clock}
+    return Live(replace(live.publication, payload=told, sample=sample), kept)

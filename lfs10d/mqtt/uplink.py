@@ -19,6 +19,7 @@ from lfs10d.mqtt.link import Link
 from lfs10d.mqtt.messages import Filter, Will
 from lfs10d.mqtt.orphans import Sweep
 from lfs10d.mqtt.outbox import Outbox
+from lfs10d.mqtt.stowage import Stowage
 from lfs10d.mqtt.topics import OFFLINE, ONLINE, Topics
 from lfs10d.telemetry import Kind, Publication
 
@@ -30,13 +31,17 @@ if TYPE_CHECKING:
     from lfs10d.mqtt.inbound import InboundRequest
     from lfs10d.mqtt.messages import Accepted, Incoming
     from lfs10d.mqtt.settings import BrokerSettings, Version
+    from lfs10d.store import Store
+    from lfs10d.storeopening import Limits
 
 log = logging.getLogger(__name__)
 
 DRAIN_WITHIN = 0.4
 FAREWELL_WITHIN = 0.6
 LEAVE_WITHIN = 0.3
-"""Seconds of a clean exit: for what still waits, for `offline` to be acknowledged, for the connection to close."""
+KEEP_WITHIN = 0.6
+"""Seconds of a clean exit: for what still waits, for `offline` to be acknowledged, for the connection to close; and
+for the disk to keep what the broker did not take."""
 
 _ONLINE = telemetry.retained(telemetry.AVAILABILITY, ONLINE)
 
@@ -80,6 +85,8 @@ class Uplink:
         self._leaving = False
         self._progress = asyncio.Event()
         self._drop_told = False
+        self._epoch_ms = epoch_ms
+        self._stowage: Stowage | None = None
         self.requests_denied = False
         """The broker refused the subscription to requests: none will come over this connection."""
 
@@ -105,11 +112,49 @@ class Uplink:
 
     async def start(self) -> None:
         """Begin to connect; what is published before waits."""
+        if self._stowage is not None:
+            self._stowage.start()
         self._link.start()
 
+    def keep_in(self, store: Store, troubled: Callable[[str | None], None]) -> None:
+        """Keep on disk what the broker does not take; to be called before `start`.
+
+        `troubled` is told why that is not possible, and None when it is again.
+        """
+        self._stowage = Stowage(
+            self._outbox,
+            store,
+            epoch_ms=self._epoch_ms,
+            wake=self._dispatch.wake,
+            troubled=troubled,
+            tell=lambda event: self.publish([event]),
+        )
+
+    def limit(self, limits: Limits) -> None:
+        """Take other limits for what is kept on disk."""
+        if self._stowage is not None:
+            self._stowage.limit(limits)
+
+    def synchronised(self) -> None:
+        """Note that the wall clock is right now: what waits is given the time it should have had."""
+        shift = self._shift(asyncio.get_running_loop().time())
+        self._outbox.correct(shift)
+        if self._stowage is not None:
+            self._stowage.correct(shift)
+
+    def _shift(self, now: float) -> int:
+        """Return the wall clock less the monotonic one, in ms."""
+        return self._epoch_ms() - round(now * 1000)
+
+    def _poke(self) -> None:
+        if self._stowage is not None:
+            self._stowage.poke()
+
     async def stop(self) -> None:
-        """Send what waits, say `offline`, disconnect; at most 1.5 s, whatever the broker does."""
+        """Send what waits, say `offline`, disconnect, keep the rest; at most 1.9 s, whatever broker and disk do."""
         await self._part()
+        if self._stowage is not None:
+            await self._stowage.stop(KEEP_WITHIN)
 
     async def reload(self, settings: BrokerSettings | None = None) -> None:
         """Try again what the broker refused, clear what nobody stands behind; connect anew if given settings."""
@@ -134,13 +179,16 @@ class Uplink:
     def publish(self, publications: Iterable[Publication]) -> None:
         """Send these, or keep them while the broker is away."""
         now = asyncio.get_running_loop().time()
+        shift = self._shift(now)
         dropped = self._outbox.dropped
         for publication in publications:
-            self._outbox.add(publication, now)
+            self._outbox.add(publication, now, shift=shift)
         if self._outbox.dropped > dropped and not self._drop_told:
             self._drop_told = True
             log.warning("more samples wait for the broker than there is room for: the oldest are dropped")
         self._dispatch.wake()
+        if self._outbox.past.away or self._outbox.past.spill_due() is not None:
+            self._poke()
 
     def respond(self, topic: str, payload: telemetry.Payload, correlation: bytes | None = None) -> None:
         """Answer a request on `topic` (under `B`), by MQTT 5 with its Correlation Data."""
@@ -162,6 +210,8 @@ class Uplink:
         if standing is not None:
             self._farewell = standing.publish(self._topics.availability, OFFLINE.encode(), retain=True)
             await self._until(lambda: self._farewell is None, loop.time() + FAREWELL_WITHIN)
+            if self.connected and self._farewell is None:
+                self._outbox.past.part()
         await self._link.leave(LEAVE_WITHIN)
 
     async def _until(self, reached: Callable[[], bool], deadline: float) -> None:
@@ -186,6 +236,7 @@ class Uplink:
         self._outbox.burst(self._burst(), _ONLINE)
         self._announcing = self._sweep_wanted = True
         self._dispatch.wake()
+        self._poke()
         self._changed()
 
     def ended(self, ended: Ended) -> None:
@@ -195,6 +246,7 @@ class Uplink:
         self._sweep = self._farewell = None
         self._drop_told = False
         self._progress.set()
+        self._poke()
         self._changed()
 
     def acknowledged(self, mid: int, reason: int) -> None:
@@ -202,6 +254,8 @@ class Uplink:
         if mid == self._farewell:
             self._farewell = None
         self._dispatch.acknowledged(mid, reason)
+        if self._outbox.past.stored.rows:
+            self._poke()
         if self._outbox.announced:
             if self._announcing:
                 self._announcing = False

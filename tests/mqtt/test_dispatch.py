@@ -13,7 +13,8 @@ import pytest
 from lfs10d import telemetry
 from lfs10d.mqtt.dispatch import ACKNOWLEDGED_WITHIN, LETTERS_AT_ONCE, SAMPLES_AT_ONCE, Dispatch
 from lfs10d.mqtt.messages import Accepted
-from lfs10d.mqtt.outbox import PAST_AFTER, Outbox
+from lfs10d.mqtt.outbox import Outbox
+from lfs10d.mqtt.past import PAST_AFTER
 from lfs10d.mqtt.settings import Version
 from lfs10d.mqtt.topics import Topics
 from lfs10d.telemetry import Kind, Publication, Sample

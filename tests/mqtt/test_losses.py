@@ -5,7 +5,8 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.mqtt.losses import DECLARED_EVERY, MOST_RANGES, Loss, Losses
+from lfs10d.loss import Loss
+from lfs10d.mqtt.losses import DECLARED_EVERY, MOST_RANGES, Losses
 from lfs10d.telemetry import Sample
 
 

@@ -10,9 +10,11 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
 from lfs10d import telemetry
+from lfs10d.loss import Loss
 from lfs10d.mqtt.letters import Array, Declaration, Letter, Live, Message, Retained, samples_of
-from lfs10d.mqtt.losses import DECLARED_EVERY, Loss
-from lfs10d.mqtt.outbox import ARRAY_EVERY, ARRAY_MOST, LIVE_FOR, MESSAGES_MOST, PAST_AFTER, Outbox
+from lfs10d.mqtt.losses import DECLARED_EVERY
+from lfs10d.mqtt.outbox import LIVE_FOR, MESSAGES_MOST, Outbox
+from lfs10d.mqtt.past import ARRAY_EVERY, ARRAY_MOST, PAST_AFTER
 from lfs10d.telemetry import Kind, Publication, Sample
 
 if TYPE_CHECKING:

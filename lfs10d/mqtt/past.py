@@ -1,0 +1,267 @@
+"""The past: samples that are no longer live, in the store and in memory, and what was lost of them. Pure.
+
+The rules (contract, section 3):
+
+1. The past is opened 10 s after a connect: subscribers come back later than we do. First what was lost is declared;
+   then it goes oldest first, by boot and seq: what lies in the store, then what waits in memory. One device and one
+   boot per array, one array under way at a time and at most ten a second.
+2. What was acknowledged from 10 s before a loss until the past is opened goes once more, in its place by seq, because
+   an acknowledgement of a broker that dies is not durable.
+3. While the broker has been away for more than 3 s, what waits here is handed to the store, at first at once, then
+   every 5 s; and whenever half of the memory is taken, which happens where the broker is too slow.
+   What the store cannot take waits in memory.
+
+So everything in the store is older than everything in memory.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from lfs10d import telemetry
+from lfs10d.mqtt.history import History, Kept
+from lfs10d.mqtt.letters import Array, Declaration, samples_of
+from lfs10d.mqtt.losses import Losses
+from lfs10d.mqtt.stored import AGAIN_WITHIN, Stored
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from collections.abc import Set as AbstractSet
+
+    from lfs10d.loss import Loss
+    from lfs10d.mqtt.letters import Letter
+
+ARRAY_MOST = 100
+"""Samples in one history array (contract, section 3)."""
+
+ARRAY_EVERY = 0.1
+"""Seconds from one history array to the next: the bounded rate of the contract, 1000 samples a second."""
+
+PAST_AFTER = 10.0
+"""Seconds after a connect at which the past is opened (contract, section 3)."""
+
+AWAY_AFTER = 3.0
+"""Seconds without the broker after which samples are kept on disk."""
+
+SPILL_EVERY = 5.0
+"""Seconds from one commit to the next; and to the next attempt where the store cannot take anything."""
+
+SPILL_MOST = 1000
+"""Samples in one commit: about 30 ms of the store's thread."""
+
+
+class Past:
+    """The rules above. `detection`: seconds in which a dead connection is noticed at the latest."""
+
+    def __init__(self, *, capacity: int, detection: float) -> None:
+        self._capacity = capacity
+        self._detection = detection
+        self._connected = False
+        self._away_since = float("-inf")
+        self._open_from = 0.0
+        self._array_at = 0.0
+        self._array_most = ARRAY_MOST
+        self._under_way: Array | Declaration | None = None
+        self._acknowledged: deque[tuple[float, Kept]] = deque(maxlen=capacity)
+        self._repeat = False
+        self._spilling: list[Kept] = []
+        self._spill_at = float("-inf")
+        self.history = History()
+        """What waits in memory."""
+        self.stored = Stored()
+        """What waits in the store."""
+        self.losses = Losses()
+        """What will never come."""
+
+    # The connection
+
+    def connected(self, now: float) -> None:
+        """Note that the broker is there."""
+        self._connected = True
+        self._open_from = self._array_at = now + PAST_AFTER
+        self._array_most = ARRAY_MOST
+        self.losses.connected()
+
+    def lost(self, now: float) -> None:
+        """Note that it is gone; what was under way is put back by the outbox."""
+        if self._connected:
+            self._away_since = now
+        self._connected = False
+        if not self._repeat:
+            self._forget(now - AGAIN_WITHIN - self._detection)
+        self._repeat = True
+        self._under_way = None
+        self.stored.rewind()
+
+    def part(self) -> None:
+        """Note that we part from a broker that has answered everything: what it has needs no second sending."""
+        if not self._repeat:
+            self._acknowledged.clear()
+        self.stored.release_all()
+
+    # What goes
+
+    def next(self, now: float, refused: AbstractSet[str], dead: Callable[[Letter], None]) -> Array | Declaration | None:
+        """Take what goes next, after `repeat`; None: nothing. `dead` is told what the broker would refuse."""
+        if now < self._open_from or self._under_way is not None:
+            return None
+        if telemetry.EVENT not in refused:
+            loss = self.losses.take(now)
+            if loss is not None:
+                self._under_way = Declaration(loss)
+                return self._under_way
+        if now < self._array_at:
+            return None
+        while samples := self._take():
+            array = Array(samples)
+            if array.topic not in refused:
+                self._array_at = now + ARRAY_EVERY
+                self._under_way = array
+                return array
+            dead(array)
+        return None
+
+    def _take(self) -> tuple[Kept, ...]:
+        if self.stored.page:
+            return self.stored.page.take(self._array_most)
+        return () if self.stored.more else self.history.take(self._array_most)
+
+    def repeat(self, now: float) -> bool:
+        """Once the past is open, let what was acknowledged around the loss wait once more; return True if it does."""
+        if not self._repeat or now < self._open_from:
+            return False
+        self._repeat = False
+        self._take_acknowledged()
+        return True
+
+    def _take_acknowledged(self) -> None:
+        self.history.extend(replace(kept, repeated=True) for _, kept in self._acknowledged)
+        self._acknowledged.clear()
+
+    def due(self, refused: AbstractSet[str]) -> float | None:
+        """Return when `next` may have something though nothing happens before; None: not by time alone."""
+        if self._under_way is not None:
+            return None
+        declared = self.losses.due() if telemetry.EVENT not in refused else None
+        times = [] if declared is None else [declared]
+        in_memory = not self.stored.more and (self.history or (self._repeat and self._acknowledged))
+        if self.stored.page or in_memory:
+            times.append(self._array_at)
+        return max(self._open_from, min(times)) if times else None
+
+    # What became of it
+
+    def over(self, letter: Letter) -> None:
+        """Note that a letter is no longer under way."""
+        if letter is self._under_way:
+            self._under_way = None
+
+    def settled(self, letter: Letter, now: float) -> None:
+        """Note that the broker has it."""
+        if not self._repeat:
+            self._forget(now - AGAIN_WITHIN)
+        rows = [kept.row for kept in samples_of(letter) if kept.row is not None]
+        if rows:
+            self.stored.settled(rows, now)
+        else:
+            self._acknowledged.extend((now, kept) for kept in samples_of(letter))
+
+    def dead(self, letter: Letter) -> None:
+        """Note that it will never be delivered."""
+        if isinstance(letter, Declaration):
+            self.losses.restore(letter.loss)
+        for kept in samples_of(letter):
+            if not kept.repeated:
+                self.losses.add(kept.sample)
+            if kept.row is not None:
+                self.stored.release([kept.row])
+
+    def cut(self, array: Array) -> None:
+        """Let an array that is too large wait again, to go in halves, and so those after it on this connection."""
+        self._array_most = len(array.samples) // 2
+        self._array_at = 0.0
+        (self.history if array.samples[0].row is None else self.stored.page).extend(array.samples)
+
+    def put_back(self, letter: Array | Declaration) -> None:
+        """Let what was under way wait again; what is in the store does so anyway."""
+        if isinstance(letter, Declaration):
+            self.losses.restore(letter.loss)
+        else:
+            self.history.extend(kept for kept in letter.samples if kept.row is None)
+
+    def _forget(self, before: float) -> None:
+        while self._acknowledged and self._acknowledged[0][0] < before:
+            self._acknowledged.popleft()
+
+    # The store
+
+    @property
+    def away(self) -> bool:
+        """The broker is."""
+        return not self._connected
+
+    def spill_at_last(self) -> bool:
+        """Tell whether there is anything for the store before the daemon ends."""
+        return bool(self.history or (self._repeat and self._acknowledged))
+
+    def spill_due(self) -> float | None:
+        """Return when `spill` is wanted for what waits here; None: for nothing."""
+        if self._spilling:
+            return None
+        if len(self.history) > self._capacity // 2:
+            return self._spill_at
+        if self._connected or not self.spill_at_last():
+            return None
+        return max(self._away_since + AWAY_AFTER, self._spill_at)
+
+    def spill(self) -> list[Kept]:
+        """Take what the store shall keep; `spilled` or `not_spilled` is to follow."""
+        if not self._connected and self._repeat:
+            self._take_acknowledged()
+        while len(self._spilling) < SPILL_MOST and self.history:
+            self._spilling += self.history.take(SPILL_MOST - len(self._spilling))
+        return self._spilling
+
+    def spilled(self, evicted: tuple[Loss, ...], now: float) -> None:
+        """Note that the store has it, and what it had to evict."""
+        self._spilling = []
+        self.stored.more = True
+        self.losses.evicted(evicted)
+        self._spill_at = float("-inf") if self.history else now + SPILL_EVERY
+
+    def not_spilled(self, now: float) -> None:
+        """Let it wait in memory, since the store cannot take it."""
+        self.history.extend(self._spilling)
+        self._spilling = []
+        self._spill_at = now + SPILL_EVERY
+
+    def page_due(self) -> float | None:
+        """Return when the next page of the store is wanted; None: none is."""
+        wanted = self._connected and self.stored.more and not self.stored.page
+        return self._open_from if wanted else None
+
+    def undeclared(self) -> list[Loss]:
+        """Return the losses that are not declared, one under way included."""
+        under_way = [self._under_way.loss] if isinstance(self._under_way, Declaration) else []
+        return under_way + self.losses.waiting()
+
+    def correct(self, shift: int) -> None:
+        """Give what waits the time that the clock tells now that it is synchronised."""
+        self.history.correct(shift)
+        self.stored.page.correct(shift)
+        self._spilling = [kept.at(shift) for kept in self._spilling]
+
+    # How much
+
+    def __len__(self) -> int:
+        """Count the samples that wait in memory alone."""
+        return len(self.history) + len(self._spilling)
+
+    def waiting(self) -> Iterator[Kept]:
+        """Return the oldest of what waits in memory."""
+        yield from self._spilling[:1]
+        oldest = self.history.oldest()
+        if oldest is not None:
+            yield oldest
