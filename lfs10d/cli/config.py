@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 import json
+import os
+import stat
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from lfs10d.changefile import ChangeFile
 from lfs10d.cli import config_option, json_option
 from lfs10d.cli.columns import columns
 from lfs10d.config import Config, Section
 from lfs10d.configfile import Loaded, leaves, load
 from lfs10d.coreschema import render
+from lfs10d.credentials import reason
+from lfs10d.disk import Disk
 from lfs10d.document import path_text
+from lfs10d.effective import Effective, effective, merged_data
+from lfs10d.errors import StateError
 from lfs10d.kinds import Duration, Size
 from lfs10d.quantities import duration_text, size_text
+from lfs10d.statedir import state_directory
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from collections.abc import Iterator
 
 EXAMPLES = """\b
 Examples:
@@ -30,27 +39,68 @@ Examples:
 @click.command("config", epilog=EXAMPLES)
 @config_option
 @click.option("--merged", is_flag=True, help="Print YAML to put into the file.")
+@click.option(
+    "--state-dir",
+    type=click.Path(path_type=Path),
+    metavar="DIRECTORY",
+    help="Where the daemon keeps state. Default: as `lfs10d run` has it.",
+)
 @json_option
-def command(config: Path, *, merged: bool, as_json: bool) -> int:
+def command(config: Path, state_dir: Path | None, *, merged: bool, as_json: bool) -> int:
     """Print the effective configuration, each value with its origin.
 
-    Passwords are never shown: the file names a file that holds one.
+    That is the file and what requests changed, which the daemon keeps in its state directory; exit code 1 if that
+    cannot be read. Passwords are never shown: the file names a file that holds one.
     """
     if merged and as_json:
         raise click.UsageError("--merged prints YAML; leave --json out")
-    loaded = load(config, files=False)
+    file = load(config, files=False)
+    directory = state_directory(config, file.config.line.name, chosen=state_dir, environment=os.environ)
+    now = _with_changes(file, directory, chosen=state_dir is not None)
     if merged:
-        click.echo(render(loaded.document.data), nl=False)
+        click.echo(render(merged_data(now)), nl=False)
     elif as_json:
-        click.echo(json.dumps(_report(loaded), indent=2, allow_nan=False))
+        click.echo(json.dumps(_report(now.loaded), indent=2, allow_nan=False))
     else:
+        loaded = now.loaded
         rows = [
             (path_text(path), _written(loaded.config, path, value), str(loaded.origins[path_text(path)]))
             for path, value in leaves(loaded.config)
         ]
         for text in columns(("key", "value", "origin"), rows):
             click.echo(text)
+    for warning in _warnings(now):
+        click.echo(f"lfs10d: {warning}", err=True)
     return 0
+
+
+def _with_changes(file: Loaded, directory: Path, *, chosen: bool) -> Effective:
+    """Return what holds; raises StateError rather than tell half of it.
+
+    Where nobody named the directory and there is none, no daemon ever ran by this file, and nothing was changed.
+    """
+    why = None
+    try:
+        if not stat.S_ISDIR(directory.stat().st_mode):
+            why = "it is no directory"
+    except FileNotFoundError:
+        why = "it is not there" if chosen else None
+    except OSError as error:
+        why = reason(error)
+    if why is not None:
+        raise StateError(f"the state directory {directory} cannot be read: {why}")
+    found = ChangeFile(directory, Disk()).read()
+    if found.trouble is not None:
+        raise StateError(f"what requests changed cannot be understood: {found.trouble}")
+    return effective(file, found.changes)
+
+
+def _warnings(now: Effective) -> Iterator[str]:
+    """Yield what the daemon will do to changes that do not fit the file any more."""
+    for lost in now.dropped:
+        yield f"{lost.key}: {lost.message}: what a request changed there is dropped at the next start or reload"
+    for name, why in {**now.suspended, **now.conflicts}.items():
+        yield f"{name}: {why}"
 
 
 def _report(loaded: Loaded) -> dict[str, Any]:

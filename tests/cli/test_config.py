@@ -8,8 +8,13 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from lfs10d.changefile import FILE_NAME, ChangeFile
+from lfs10d.changes import Changes
 from lfs10d.cli.config import command
 from lfs10d.configfile import load
+from lfs10d.disk import Disk
+from lfs10d.effective import said
+from lfs10d.errors import StateError
 
 TEXT = """\
 line: {port: /dev/x, extra_gap: 0.5ms}
@@ -23,6 +28,7 @@ store: {max_size: 5MB}
 @pytest.fixture(autouse=True)
 def in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("STATE_DIRECTORY", str(tmp_path / "state"))
 
 
 def config(*arguments: str, text: str = TEXT) -> str:
@@ -75,3 +81,71 @@ def test_merged_is_yaml_and_not_json() -> None:
     result = CliRunner().invoke(command, ["--merged", "--json"])
     assert result.exit_code == 2
     assert "--merged prints YAML; leave --json out" in result.stderr
+
+
+def changed(directory: str = "state") -> None:
+    """Leave what a daemon leaves: slave-2 is polled every 250 ms, slave-3 no more, roof is new."""
+    Path("lfs10d.yaml").write_text(TEXT)
+    Path("secret").write_text("hunter2")
+    file = said(load(Path("lfs10d.yaml")))
+    changes = Changes().setting("slave-2", {"interval": 0.25, "response_timeout": 0.1}, file).removing("slave-3", file)
+    Path(directory).mkdir()
+    ChangeFile(Path(directory), Disk()).save(changes.adding("roof", {"id": 9, "label": "Roof"}))
+
+
+def test_what_requests_changed_is_shown_as_such() -> None:
+    changed()
+    rows = {line.split()[0]: line.split()[1:] for line in config().splitlines()}
+    assert rows["slaves[0].interval"] == ["250ms", "changes.yaml"]
+    assert rows["slaves[0].response_timeout"] == ["100ms", "changes.yaml"]
+    assert rows["slaves[0].id"] == ["2", "lfs10d.yaml:3"]
+    assert rows["slaves[1].name"] == ["roof", "changes.yaml"]
+    assert rows["slaves[1].interval"] == ["2s", "lfs10d.yaml:2", "(poll.interval)"]
+    assert rows["slaves[1].enabled"] == ["true", "default"]
+    assert "slaves[2].id" not in rows
+
+
+def test_merged_holds_what_requests_changed_and_then_no_change_is_left() -> None:
+    changed()
+    before = json.loads(config("--json"))["config"]
+    merged = config("--merged")
+    after = json.loads(config("--json", text=merged))
+    assert after["config"] == before
+    assert "changes.yaml" not in after["origins"].values()
+    assert config("--merged", text=merged) == merged
+
+
+def test_what_does_not_fit_the_file_any_more_is_told() -> None:
+    changed()
+    result = CliRunner().invoke(command, ["-c", "lfs10d.yaml"], catch_exceptions=False)
+    assert result.stderr == ""
+    Path("lfs10d.yaml").write_text(TEXT.replace("[2,", "[{id: 2, interval: 3s}, {id: 9, name: nine},"))
+    result = CliRunner().invoke(command, ["-c", "lfs10d.yaml"], catch_exceptions=False)
+    assert result.exit_code == 0
+    lost, conflict = result.stderr.splitlines()
+    assert lost.startswith("lfs10d: slaves.slave-2.interval: the file says something else now")
+    assert conflict.startswith("lfs10d: roof: slave id 9 is taken by nine")
+
+
+def test_another_state_directory_may_be_named() -> None:
+    changed("elsewhere")
+    assert "changes.yaml" in config("--state-dir", "elsewhere")
+    assert "changes.yaml" not in config()
+
+
+@pytest.mark.parametrize("arguments", [[], ["--merged"], ["--json"]])
+@pytest.mark.parametrize("state", ["a file", "no changes", "named and missing", "a folder for a file"])
+def test_half_the_truth_is_never_told(state: str, arguments: list[str]) -> None:
+    Path("lfs10d.yaml").write_text(TEXT)
+    match state:
+        case "a file":
+            Path("state").write_text("")
+        case "no changes":
+            Path("state").mkdir()
+            Path("state", FILE_NAME).write_text("nonsense: true")
+        case "named and missing":
+            arguments = [*arguments, "--state-dir", "nowhere"]
+        case _:
+            Path("state", FILE_NAME).mkdir(parents=True)
+    with pytest.raises(StateError):
+        CliRunner().invoke(command, ["-c", "lfs10d.yaml", *arguments], catch_exceptions=False, standalone_mode=False)
