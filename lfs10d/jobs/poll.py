@@ -25,15 +25,14 @@ if TYPE_CHECKING:
     from lfs10d.modbus.exchange import Outcome
     from lfs10d.modbus.unanswered import Unanswered
     from lfs10d.profiles.blocks import Block
-    from lfs10d.profiles.schema import Profile
     from lfs10d.roster import Device
 
 _NOTHING: frozenset[int] = frozenset()
 
 
-def told_busy(fault: Fault, profile: Profile) -> Fault:
-    """Return the fault, marked as busy where the profile counts its exception so."""
-    return replace(fault, busy=True) if fault.exception_code in profile.busy_exceptions else fault
+def told_busy(fault: Fault, exceptions: tuple[int, ...]) -> Fault:
+    """Return the fault, marked as busy where its exception is one of those that mean so."""
+    return replace(fault, busy=True) if fault.exception_code in exceptions else fault
 
 
 class Poll:
@@ -112,7 +111,7 @@ class Poll:
             self.failed_attempts.append(fault.code)
             self.due = now
             return Later(now)
-        self.fault = None if fault is None else told_busy(fault, device.spec.profile)
+        self.fault = None if fault is None else told_busy(fault, device.spec.profile.busy_exceptions)
         self.values = {}
         return Done()
 

@@ -39,6 +39,9 @@ Rate: TypeAlias = Literal[1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200]
 MOST_WORDS = 125
 """Registers of one read (Modbus Application Protocol V1.1b3, section 6.3)."""
 
+BUSY_EXCEPTIONS = (6,)
+"""Server device busy (Modbus Application Protocol V1.1b3, section 7; EH600: the maker's fuller manual)."""
+
 BYTE_COUNT = 1
 """Byte before the registers of an answer; it counts as data (Fuling DZB manual, appendix B)."""
 
@@ -144,7 +147,7 @@ class Profile(Facts):
     )
     min_interval: Annotated[float, Duration(0, 86400)] = Field(0.0, description="Shortest time between two polls.")
     busy_exceptions: Annotated[tuple[Annotated[int, Whole(1, 255)], ...], Field(strict=False)] = Field(
-        (6,), description="Exception codes that mean: ask again later."
+        BUSY_EXCEPTIONS, description="Exception codes that mean: ask again later."
     )
     factory: Factory | None = Field(None, description="How a new one comes.")
     slave_id: IdRegister | None = Field(None, description="Where its slave id is set.")
