@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lfs10d.difference import difference
 from lfs10d.configfile import load
+from lfs10d.difference import difference
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

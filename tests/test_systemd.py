@@ -1,10 +1,12 @@
-"""What the service manager is told, by a real socket."""
+"""What the service manager is told, by a real socket; and our units as it judges them."""
 
 from __future__ import annotations
 
 import os
 import socket
+import subprocess
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -14,8 +16,7 @@ from hypothesis import strategies as st
 from lfs10d.systemd import Notifier, notify_address, watchdog_seconds
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
+    from collections.abc import Callable, Iterator
 
 
 class Manager:
@@ -165,3 +166,55 @@ def test_no_variable_is_too_odd(name: str) -> None:
     address = notify_address({"NOTIFY_SOCKET": name})
 
     assert address is None or name[0] in "/@"
+
+
+UNITS = Path(__file__).parent.parent / "systemd"
+LARGEST_EXPOSURE = 15
+"""Tenths of systemd-analyze's exposure level (contract, section 6)."""
+
+
+def analysed(program: Callable[[str], str], *arguments: str) -> str:
+    """Return what systemd-analyze prints; it must be content."""
+    done = subprocess.run(
+        [program("systemd-analyze"), *arguments], check=False, capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr
+    return done.stdout + done.stderr
+
+
+@pytest.mark.needs("systemd-analyze")
+@pytest.mark.parametrize("unit", ["lfs10d.service", "lfs10d@.service"])
+def test_a_unit_is_sandboxed(unit: str, program: Callable[[str], str]) -> None:
+    told = analysed(program, "security", "--offline=true", f"--threshold={LARGEST_EXPOSURE}", str(UNITS / unit))
+
+    assert "Overall exposure level" in told
+
+
+@pytest.mark.needs("systemd-analyze")
+@pytest.mark.parametrize("unit", ["lfs10d.service", "lfs10d@roof.service"])
+def test_a_unit_is_understood_without_a_complaint(unit: str, tmp_path: Path, program: Callable[[str], str]) -> None:
+    text = (UNITS / unit.replace("roof", "")).read_text()
+    # It looks whether the program is there; on the machine of the test it is not.
+    (tmp_path / unit).write_text(text.replace("/opt/lfs10d/bin/lfs10d", "/bin/true"))
+
+    told = analysed(program, "verify", "--man=no", str(tmp_path / unit))
+
+    assert not [line for line in told.splitlines() if "lfs10d" in line]
+
+
+def test_the_units_differ_in_nothing_but_their_instance() -> None:
+    plain, instance = ((UNITS / name).read_text().splitlines() for name in ("lfs10d.service", "lfs10d@.service"))
+
+    different = [
+        (one, other) for one, other in zip(plain, instance, strict=True) if one != other and not one.startswith("#")
+    ]
+
+    assert different == [
+        ("Description=lfs10d: RS485 wind sensors to MQTT", "Description=lfs10d: RS485 wind sensors to MQTT (%i)"),
+        (
+            "ExecStart=/opt/lfs10d/bin/lfs10d run -c /etc/lfs10d/lfs10d.yaml",
+            "ExecStart=/opt/lfs10d/bin/lfs10d run -c /etc/lfs10d/%i.yaml",
+        ),
+        ("StateDirectory=lfs10d", "StateDirectory=lfs10d-%i"),
+        ("RuntimeDirectory=lfs10d", "RuntimeDirectory=lfs10d-%i"),
+    ]

@@ -40,7 +40,8 @@ def take_precedence() -> str | None:
     except OSError as error:
         return (
             f"line.realtime is set, but the system does not permit SCHED_FIFO ({error.strerror}): "
-            "in the service set LimitRTPRIO=10 and RestrictRealtime=no, or set line.realtime to false"
+            "in a service add systemd/realtime.conf.example as a drop-in, elsewhere raise the limit (ulimit -r 10), "
+            "or set line.realtime to false"
         )
     return None
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import pytest
 
-from lfs10d.modbus.realtime import PRIORITY, sharpen_timers, take_precedence
+from lfs10d.modbus.realtime import PRIORITY, sharpen_timers, take_precedence, yield_precedence
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -79,7 +79,8 @@ def test_where_it_is_not_permitted_the_reason_says_what_to_do(monkeypatch: pytes
 
     assert take_precedence() == (
         "line.realtime is set, but the system does not permit SCHED_FIFO (Operation not permitted): "
-        "in the service set LimitRTPRIO=10 and RestrictRealtime=no, or set line.realtime to false"
+        "in a service add systemd/realtime.conf.example as a drop-in, elsewhere raise the limit (ulimit -r 10), "
+        "or set line.realtime to false"
     )
 
 
@@ -90,4 +91,25 @@ def test_the_kernel_agrees_whether_it_was_permitted() -> None:
     refused, policy = in_a_thread(lambda: (take_precedence(), os.sched_getscheduler(0)))
 
     assert (refused is None) == (policy & os.SCHED_FIFO != 0)
+    assert os.sched_getscheduler(0) == before
+
+
+def test_a_thread_that_yields_is_an_ordinary_one_again() -> None:
+    def give_and_take() -> int:
+        take_precedence()
+        yield_precedence()
+        return os.sched_getscheduler(0)
+
+    assert in_a_thread(give_and_take) & ~os.SCHED_RESET_ON_FORK == os.SCHED_OTHER
+
+
+def test_a_system_that_lets_nobody_yield_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+
+    monkeypatch.setattr(os, "sched_setscheduler", refuse)
+    before = os.sched_getscheduler(0)
+
+    yield_precedence()
+
     assert os.sched_getscheduler(0) == before
