@@ -13,7 +13,7 @@ from lfs10d.modbus.settings import PortSettings, Rs485
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.reading import Fault, FaultCode, Reading
 from lfs10d.roster import FIRST_TIMEOUTS, DeviceSpec, PollRules
-from lfs10d.storeopening import Limits
+from lfs10d.store.opening import Limits
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

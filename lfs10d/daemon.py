@@ -35,7 +35,7 @@ from lfs10d.service import Service
 from lfs10d.statedir import prepare, status_file
 from lfs10d.station import Station
 from lfs10d.statusfile import StatusFile
-from lfs10d.store import Store
+from lfs10d.store.backlog import Store
 from lfs10d.supervision import Supervision
 from lfs10d.systemd import Notifier
 
@@ -102,7 +102,6 @@ class Daemon:
         self._uplink = Uplink(
             self._broker_settings(),
             base=f"{config.mqtt.base_topic}/{config.line.name}",
-            line=config.line.name,
             burst=lambda: self._first_burst.burst(self._station.burst(self._now())),
             stands_behind=self._station.topics,
             requested=lambda request: self._service.requested(request),  # noqa: PLW0108 - built below

@@ -16,7 +16,7 @@ from lfs10d.mqtt.history import History, Kept
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from lfs10d.storefile import Row
+    from lfs10d.store.samplefile import Row
 
 PAGE_ROWS = 3200
 """Samples of a page: for up to 32 devices its arrays are full."""

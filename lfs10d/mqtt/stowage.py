@@ -13,16 +13,16 @@ from lfs10d import telemetry
 from lfs10d.mqtt.past import SPILL_EVERY
 from lfs10d.mqtt.stored import PAGE_ROWS
 from lfs10d.ownthread import OwnThread
-from lfs10d.store import StoreError
-from lfs10d.storefile import Entry
+from lfs10d.store.backlog import StoreError
+from lfs10d.store.samplefile import Entry
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
 
     from lfs10d.mqtt.outbox import Outbox
     from lfs10d.mqtt.past import Past
-    from lfs10d.store import Store
-    from lfs10d.storeopening import Limits
+    from lfs10d.store.backlog import Store
+    from lfs10d.store.opening import Limits
     from lfs10d.telemetry import Publication
 
 log = logging.getLogger(__name__)

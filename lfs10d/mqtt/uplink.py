@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from lfs10d.mqtt.inbound import InboundRequest
     from lfs10d.mqtt.messages import Accepted, Incoming
     from lfs10d.mqtt.settings import BrokerSettings, Version
-    from lfs10d.store import Store
-    from lfs10d.storeopening import Limits
+    from lfs10d.store.backlog import Store
+    from lfs10d.store.opening import Limits
 
 log = logging.getLogger(__name__)
 
@@ -49,7 +49,7 @@ _ONLINE = telemetry.retained(telemetry.AVAILABILITY, ONLINE)
 class Uplink:
     """Built and called in the thread of the asyncio loop, while it runs.
 
-    `base` is `B`. `burst()` returns every retained topic but `availability`; `stands_behind()` the retained
+    `base` is `B`, whose last level is the line's name. `burst()` returns every retained topic but `availability`; `stands_behind()` the retained
     topics under `B` that are ours; `requested` takes each request; `changed` is told of every connect, loss,
     takeover and subscription, whose state is then in the properties; `announced` of every burst after a connect
     that the broker has whole; `epoch_ms()` is the wall clock.
@@ -60,7 +60,6 @@ class Uplink:
         settings: BrokerSettings,
         *,
         base: str,
-        line: str,
         burst: Callable[[], Iterable[Publication]],
         stands_behind: Callable[[], AbstractSet[str]],
         requested: Callable[[InboundRequest], None],
@@ -77,6 +76,7 @@ class Uplink:
         self._announcing = False
         self._link = Link(settings, self, will=Will(self._topics.availability, OFFLINE.encode()))
         self._outbox = Outbox(detection=2.0 * settings.keepalive)
+        line = base.rpartition("/")[2]
         self._dispatch = Dispatch(self._outbox, self._topics, line, epoch_ms=epoch_ms, stuck=self._acknowledges_nothing)
         self._sweep: Sweep | None = None
         self._sweep_wanted = False

@@ -49,7 +49,6 @@ class Site:
         self.uplink = Uplink(
             self.settings,
             base=B,
-            line="line0",
             burst=lambda: [telemetry.retained(topic, payload) for topic, payload in self.retained.items()],
             stands_behind=lambda: frozenset(self.retained),
             requested=self.requests.append,

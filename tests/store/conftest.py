@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from lfs10d.storefile import Entry
-from lfs10d.storeopening import Limits
+from lfs10d.store.opening import Limits
+from lfs10d.store.samplefile import Entry
 from lfs10d.telemetry import Sample
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 from lfs10d.loss import Loss
-from lfs10d.storefile import StoreFile, runs
-from lfs10d.storeopening import ForeignError, Limits
-from lfs10d.storerow import DamagedError
+from lfs10d.store.opening import ForeignError, Limits
+from lfs10d.store.row import DamagedError
+from lfs10d.store.samplefile import SampleFile, runs
 from tests.store.conftest import BOOT, ROOMY, START, entries, sample
 
 if TYPE_CHECKING:
@@ -31,30 +31,30 @@ def path(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def file(path: Path) -> Iterator[StoreFile]:
+def file(path: Path) -> Iterator[SampleFile]:
     """Give a new file."""
-    opened = StoreFile(path, boot=BOOT, limits=ROOMY)
+    opened = SampleFile(path, boot=BOOT, limits=ROOMY)
     yield opened
     opened.close()
 
 
-def keep(file: StoreFile, *samples: Sample, shift: int = START) -> tuple[Loss, ...]:
+def keep(file: SampleFile, *samples: Sample, shift: int = START) -> tuple[Loss, ...]:
     return file.append(entries(*samples, shift=shift), losses=file.losses, now=NOW)
 
 
-def kept(file: StoreFile) -> list[Sample]:
+def kept(file: SampleFile) -> list[Sample]:
     return [row.sample for row in file.read(0, 1_000_000)]
 
 
-def reopened(file: StoreFile, path: Path, *, boot: str = BOOT, limits: Limits = ROOMY) -> StoreFile:
+def reopened(file: SampleFile, path: Path, *, boot: str = BOOT, limits: Limits = ROOMY) -> SampleFile:
     file.close()
-    return StoreFile(path, boot=boot, limits=limits)
+    return SampleFile(path, boot=boot, limits=limits)
 
 
 # In and out
 
 
-def test_samples_come_back_as_they_were_in_order_of_arrival_after_a_restart(file: StoreFile, path: Path) -> None:
+def test_samples_come_back_as_they_were_in_order_of_arrival_after_a_restart(file: SampleFile, path: Path) -> None:
     samples = [
         sample(1),
         sample(1, "b", values={"wind_speed": 12.99, "direction": 270, "gust": 1e300}),
@@ -71,14 +71,14 @@ def test_samples_come_back_as_they_were_in_order_of_arrival_after_a_restart(file
     other.close()
 
 
-def test_a_page_begins_after_an_id(file: StoreFile) -> None:
+def test_a_page_begins_after_an_id(file: SampleFile) -> None:
     keep(file, *(sample(seq) for seq in range(1, 6)))
     page = file.read(0, 2)
     assert [row.sample.seq for row in page] == [1, 2]
     assert [row.sample.seq for row in file.read(page[-1].id, 9)] == [3, 4, 5]
 
 
-def test_what_is_let_go_is_gone_and_what_it_took_is_used_again(file: StoreFile, path: Path) -> None:
+def test_what_is_let_go_is_gone_and_what_it_took_is_used_again(file: SampleFile, path: Path) -> None:
     keep(file, *(sample(seq, values={"x": seq, "y": 2}) for seq in range(1, 4001)))
     size = path.stat().st_size + path.with_name("backlog.db-wal").stat().st_size
     file.delete([row.id for row in file.read(0, 4000)], losses=())
@@ -88,7 +88,7 @@ def test_what_is_let_go_is_gone_and_what_it_took_is_used_again(file: StoreFile, 
     assert [each.seq for each in kept(file)] == [5000]
 
 
-def test_the_file_shrinks_while_most_of_it_is_free(file: StoreFile, path: Path) -> None:
+def test_the_file_shrinks_while_most_of_it_is_free(file: SampleFile, path: Path) -> None:
     for start in range(1, 60_001, 2000):
         keep(file, *(sample(seq) for seq in range(start, start + 2000)))
     full = path.stat().st_size
@@ -99,7 +99,7 @@ def test_the_file_shrinks_while_most_of_it_is_free(file: StoreFile, path: Path) 
     assert path.stat().st_size < full / 2
 
 
-def test_holes_between_what_is_let_go_stay(file: StoreFile) -> None:
+def test_holes_between_what_is_let_go_stay(file: SampleFile) -> None:
     keep(file, *(sample(seq) for seq in range(1, 9)))
     rows = file.read(0, 8)
     file.delete([rows[0].id, rows[1].id, rows[4].id], losses=())
@@ -108,13 +108,13 @@ def test_holes_between_what_is_let_go_stay(file: StoreFile) -> None:
 
 
 def test_ids_go_on_where_the_caller_says(path: Path) -> None:
-    file = StoreFile(path, boot=BOOT, limits=ROOMY, first=500)
+    file = SampleFile(path, boot=BOOT, limits=ROOMY, first=500)
     keep(file, sample(1))
     assert [row.id for row in file.read(0, 9)] == [500]
     file.close()
 
 
-def test_a_sample_takes_about_thirty_bytes(file: StoreFile, path: Path) -> None:
+def test_a_sample_takes_about_thirty_bytes(file: SampleFile, path: Path) -> None:
     for start in range(1, 40_001, 8):
         if start % 1000 == 1:
             batch = [sample(seq, f"d{device}") for device in range(8) for seq in range(start, start + 125)]
@@ -138,7 +138,7 @@ def test_runs_of_numbers() -> None:
 def test_file_and_log_never_take_more_than_the_limit_and_the_oldest_goes_exactly_declared(
     path: Path, size: int
 ) -> None:
-    file = StoreFile(path, boot=BOOT, limits=replace(ROOMY, size=size))
+    file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, size=size))
     lost: list[Loss] = []
     largest = 0
     for start in range(1, 70_001, 1000):
@@ -155,7 +155,7 @@ def test_file_and_log_never_take_more_than_the_limit_and_the_oldest_goes_exactly
 
 
 def test_what_is_too_old_is_evicted_and_declared(path: Path) -> None:
-    file = StoreFile(path, boot=BOOT, limits=replace(ROOMY, age=10_000))
+    file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, age=10_000))
     keep(file, *(sample(seq) for seq in range(1, 1001)))
     lost = file.append(entries(sample(1001)), losses=(), now=START + 910_500)
     assert lost == (Loss("a", BOOT, 1, 900, 900),)
@@ -165,7 +165,7 @@ def test_what_is_too_old_is_evicted_and_declared(path: Path) -> None:
 
 
 def test_of_samples_without_a_clock_nobody_knows_the_age(path: Path) -> None:
-    file = StoreFile(path, boot=BOOT, limits=replace(ROOMY, age=10_000))
+    file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, age=10_000))
     keep(file, sample(1, clock="unsynced", ts=0))
     assert file.append(entries(sample(2)), losses=(), now=START + 3000) == ()
     keep(file, sample(3, clock="unsynced"))
@@ -175,7 +175,7 @@ def test_of_samples_without_a_clock_nobody_knows_the_age(path: Path) -> None:
 
 
 def test_what_is_under_way_stays_and_what_was_delivered_is_no_loss(path: Path) -> None:
-    file = StoreFile(path, boot=BOOT, limits=replace(ROOMY, age=1000))
+    file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, age=1000))
     keep(file, *(sample(seq) for seq in range(1, 7)))
     ids = [row.id for row in file.read(0, 6)]
     lost = file.append(entries(sample(7)), losses=(), now=START + 10**6, beyond=ids[1], delivered=frozenset({ids[3]}))
@@ -185,14 +185,14 @@ def test_what_is_under_way_stays_and_what_was_delivered_is_no_loss(path: Path) -
 
 
 def test_what_is_only_repeated_is_no_loss(path: Path) -> None:
-    file = StoreFile(path, boot=BOOT, limits=replace(ROOMY, age=1000))
+    file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, age=1000))
     file.append(entries(sample(1), repeated=True), losses=(), now=NOW)
     assert file.append(entries(sample(2)), losses=(), now=START + 10**6) == ()
     assert [each.seq for each in kept(file)] == [2]
     file.close()
 
 
-def test_other_limits_hold_from_the_next_sample_on(file: StoreFile) -> None:
+def test_other_limits_hold_from_the_next_sample_on(file: SampleFile) -> None:
     keep(file, *(sample(seq) for seq in range(1, 4)))
     file.limit(replace(ROOMY, age=1000))
     assert file.append(entries(sample(4)), losses=(), now=START + 10**6) == (Loss("a", BOOT, 1, 3, 3),)
@@ -201,7 +201,7 @@ def test_other_limits_hold_from_the_next_sample_on(file: StoreFile) -> None:
 # Losses
 
 
-def test_losses_are_kept_across_a_restart_until_they_are_declared(file: StoreFile, path: Path) -> None:
+def test_losses_are_kept_across_a_restart_until_they_are_declared(file: SampleFile, path: Path) -> None:
     losses = (Loss("a", "k0000001", 1, 5, 5), Loss("b", BOOT, 2, 9, 3))
     file.append(entries(sample(1)), losses=losses, now=NOW)
     other = reopened(file, path)
@@ -215,7 +215,7 @@ def test_losses_are_kept_across_a_restart_until_they_are_declared(file: StoreFil
 # The clock
 
 
-def test_a_clock_set_right_corrects_this_boots_samples_and_no_others(file: StoreFile, path: Path) -> None:
+def test_a_clock_set_right_corrects_this_boots_samples_and_no_others(file: SampleFile, path: Path) -> None:
     keep(file, sample(1, boot="k0000001", clock="unsynced", ts=77))
     other = reopened(file, path)
     uptime = 500_000
@@ -234,7 +234,7 @@ def test_a_clock_set_right_corrects_this_boots_samples_and_no_others(file: Store
 # What happened though it failed
 
 
-def test_samples_from_an_id_on_can_be_taken_back(file: StoreFile) -> None:
+def test_samples_from_an_id_on_can_be_taken_back(file: SampleFile) -> None:
     keep(file, sample(1), sample(2))
     first = file.next
     assert not file.take_back(first)
@@ -244,7 +244,7 @@ def test_samples_from_an_id_on_can_be_taken_back(file: StoreFile) -> None:
     assert file.rows == 2
 
 
-def test_a_transaction_that_fails_leaves_no_trace(file: StoreFile, path: Path) -> None:
+def test_a_transaction_that_fails_leaves_no_trace(file: SampleFile, path: Path) -> None:
     keep(file, sample(1))
 
     def fail(_: object) -> None:
@@ -260,13 +260,13 @@ def test_a_transaction_that_fails_leaves_no_trace(file: StoreFile, path: Path) -
 # Files that are not ours, or not whole
 
 
-def test_a_later_schema_is_refused(file: StoreFile, path: Path) -> None:
+def test_a_later_schema_is_refused(file: SampleFile, path: Path) -> None:
     file.close()
     db = sqlite3.connect(path)
     db.execute("PRAGMA user_version = 2")
     db.close()
     with pytest.raises(ForeignError, match="schema 2, ours is 1") as refused:
-        StoreFile(path, boot=BOOT, limits=ROOMY)
+        SampleFile(path, boot=BOOT, limits=ROOMY)
     assert refused.value.later
 
 
@@ -278,14 +278,14 @@ def test_somebody_elses_database_is_refused(path: Path, statement: str) -> None:
     db.close()
     before = path.read_bytes()
     with pytest.raises(ForeignError, match="another program"):
-        StoreFile(path, boot=BOOT, limits=ROOMY)
+        SampleFile(path, boot=BOOT, limits=ROOMY)
     assert path.read_bytes() == before
 
 
 def test_text_is_no_database(path: Path) -> None:
     path.write_text("not a database " * 1000)
     with pytest.raises(sqlite3.DatabaseError):
-        StoreFile(path, boot=BOOT, limits=ROOMY)
+        SampleFile(path, boot=BOOT, limits=ROOMY)
 
 
 @pytest.mark.parametrize(
@@ -297,7 +297,7 @@ def test_text_is_no_database(path: Path) -> None:
     ],
 )
 def test_an_era_or_a_series_that_was_changed_is_found_when_the_file_is_opened(
-    file: StoreFile, path: Path, statement: str
+    file: SampleFile, path: Path, statement: str
 ) -> None:
     keep(file, sample(1))
     file.close()
@@ -306,7 +306,7 @@ def test_an_era_or_a_series_that_was_changed_is_found_when_the_file_is_opened(
     db.commit()
     db.close()
     with pytest.raises(DamagedError):
-        StoreFile(path, boot=BOOT, limits=ROOMY)
+        SampleFile(path, boot=BOOT, limits=ROOMY)
 
 
 @pytest.mark.parametrize(
@@ -320,14 +320,14 @@ def test_an_era_or_a_series_that_was_changed_is_found_when_the_file_is_opened(
         "DELETE FROM further",
     ],
 )
-def test_a_sample_that_was_changed_is_never_read(file: StoreFile, path: Path, statement: str) -> None:
+def test_a_sample_that_was_changed_is_never_read(file: SampleFile, path: Path, statement: str) -> None:
     keep(file, sample(1, values={"x": 1.5, "y": 2.5}))
     file.close()
     db = sqlite3.connect(path)
     db.execute(statement)
     db.commit()
     db.close()
-    other = StoreFile(path, boot=BOOT, limits=ROOMY)
+    other = SampleFile(path, boot=BOOT, limits=ROOMY)
     with pytest.raises(DamagedError):
         other.read(0, 9)
     other.close()
@@ -342,7 +342,7 @@ class Written:
     def __init__(self, folder: Path) -> None:
         self.path = folder / "backlog.db"
         self.log = folder / "backlog.db-wal"
-        file = StoreFile(self.path, boot=BOOT, limits=ROOMY)
+        file = SampleFile(self.path, boot=BOOT, limits=ROOMY)
         self.committed = [(0, 0)]
         self.samples: list[Sample] = []
         for _ in range(12):
@@ -361,7 +361,7 @@ class Written:
         path.write_bytes(file)
         (folder / "backlog.db-wal").write_bytes(wal)
         try:
-            store = StoreFile(path, boot=BOOT, limits=ROOMY)
+            store = SampleFile(path, boot=BOOT, limits=ROOMY)
         except (DamagedError, sqlite3.DatabaseError):
             return None
         try:

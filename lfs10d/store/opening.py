@@ -17,7 +17,7 @@ import sqlite3
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from lfs10d.storerow import DamagedError
+from lfs10d.store.row import DamagedError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

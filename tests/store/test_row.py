@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lfs10d.profiles.registers import shortest
-from lfs10d.storerow import DamagedError, Series, check, pack, pack_rtt, unpack, unpack_rtt, values_from, values_of
+from lfs10d.store.row import DamagedError, Series, check, pack, pack_rtt, unpack, unpack_rtt, values_from, values_of
 from lfs10d.telemetry import Sample
 
 FLOAT32_BITS = st.integers(0, 2**32 - 1).filter(lambda bits: 0 < bits >> 23 & 0xFF < 0xFF or not bits & 0x7FFFFFFF)

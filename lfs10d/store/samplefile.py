@@ -9,11 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from lfs10d import storeopening
 from lfs10d.loss import Loss, joined
-from lfs10d.storecatalogue import Catalogue
-from lfs10d.storeopening import PAGE, Limits, number, transaction
-from lfs10d.storerow import Cell, DamagedError, check, pack_rtt, unpack_rtt, values_from, values_of
+from lfs10d.store import opening
+from lfs10d.store.catalogue import Catalogue
+from lfs10d.store.opening import PAGE, Limits, number, transaction
+from lfs10d.store.row import Cell, DamagedError, check, pack_rtt, unpack_rtt, values_from, values_of
 from lfs10d.telemetry import Sample
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def unheard(evicted: tuple[Loss, ...]) -> None:
     del evicted
 
 
-class StoreFile:
+class SampleFile:
     """The file at `path`, made if there is none; `first` is the least id of what is appended.
 
     Raises as the methods do, and ForeignError.
@@ -67,7 +67,7 @@ class StoreFile:
     def __init__(self, path: Path, *, boot: str, limits: Limits, first: int = 1) -> None:
         self._boot = boot
         self._limits = limits
-        self._db = storeopening.connect(path, boot=boot, limits=limits)
+        self._db = opening.connect(path, boot=boot, limits=limits)
         try:
             self._catalogue = Catalogue(self._db, boot=boot)
             self.losses = tuple(
@@ -85,7 +85,7 @@ class StoreFile:
     def limit(self, limits: Limits) -> None:
         """Take other limits; they hold from the next `append` on."""
         self._limits = limits
-        storeopening.limit(self._db, limits)
+        opening.limit(self._db, limits)
 
     def close(self) -> None:
         """Let go of the file."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from lfs10d.storerow import DamagedError, Series, check
+from lfs10d.store.row import DamagedError, Series, check
 
 if TYPE_CHECKING:
     import sqlite3

@@ -24,17 +24,17 @@ from typing import TYPE_CHECKING, TypeVar
 
 from lfs10d.disk import Disk
 from lfs10d.errors import StateError
-from lfs10d.storefile import StoreFile
-from lfs10d.storeopening import ForeignError
-from lfs10d.storerow import DamagedError
+from lfs10d.store.opening import ForeignError
+from lfs10d.store.row import DamagedError
+from lfs10d.store.samplefile import SampleFile
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
     from collections.abc import Set as AbstractSet
 
     from lfs10d.loss import Loss
-    from lfs10d.storefile import Entry, Row
-    from lfs10d.storeopening import Limits
+    from lfs10d.store.opening import Limits
+    from lfs10d.store.samplefile import Entry, Row
 
 T = TypeVar("T")
 
@@ -84,7 +84,7 @@ class Store:
         self._boot = boot
         self._limits = limits
         self._disk = Disk() if disk is None else disk
-        self._file: StoreFile | None = None
+        self._file: SampleFile | None = None
         self._next = 1
         self._doubtful: tuple[int, tuple[Loss, ...]] | None = None
         self._aside = 0
@@ -133,9 +133,9 @@ class Store:
         beyond: int = 0,
         delivered: AbstractSet[int] = frozenset(),
     ) -> tuple[Loss, ...]:
-        """Keep samples, as `StoreFile.append` does. Raises StoreError: then they are not kept."""
+        """Keep samples, as `SampleFile.append` does. Raises StoreError: then they are not kept."""
 
-        def append(file: StoreFile) -> tuple[Loss, ...]:
+        def append(file: SampleFile) -> tuple[Loss, ...]:
             before = self._settle_doubt(file)
             self._doubtful = (file.next, ())
             evicted = file.append(
@@ -151,7 +151,7 @@ class Store:
         if self._doubtful is not None:
             self._doubtful = (self._doubtful[0], evicted)
 
-    def _settle_doubt(self, file: StoreFile) -> tuple[Loss, ...]:
+    def _settle_doubt(self, file: SampleFile) -> tuple[Loss, ...]:
         """Take back samples whose writing failed and happened nevertheless; return what was evicted by that."""
         if self._doubtful is None:
             return ()
@@ -169,13 +169,13 @@ class Store:
             self._use(lambda file: file.delete(ids, losses=losses))
 
     def correct(self, shift: int) -> None:
-        """Set the time of this boot's samples right, as `StoreFile.correct` does. Raises StoreError."""
+        """Set the time of this boot's samples right, as `SampleFile.correct` does. Raises StoreError."""
         if not self._unused:
             self._use(lambda file: file.correct(shift))
 
     # The file
 
-    def _use(self, operation: Callable[[StoreFile], T]) -> T:
+    def _use(self, operation: Callable[[SampleFile], T]) -> T:
         """Do something with the file; if it turns out not to be ours, do it with a new one."""
         while True:
             try:
@@ -192,10 +192,10 @@ class Store:
                 self._next = file.next
                 return result
 
-    def _open(self) -> StoreFile:
+    def _open(self) -> SampleFile:
         if self._file is None:
             self.path.parent.mkdir(mode=0o750, parents=True, exist_ok=True)
-            self._file = StoreFile(self.path, boot=self._boot, limits=self._limits, first=self._next)
+            self._file = SampleFile(self.path, boot=self._boot, limits=self._limits, first=self._next)
         return self._file
 
     def _close(self) -> None:
