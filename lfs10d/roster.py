@@ -10,7 +10,8 @@ Rules
    heard is given 200, 400, 1000 ms on its first polls. A late answer counts with the time it took.
 5. A probe of an OFFLINE device waits 200 ms or what was learned, every fourth one 1 s.
 6. An UNHEARD device that did not answer its first poll is doubtful: asked on as an OFFLINE one is, within the share
-   of probes, so that the absent cost the present little from the start.
+   of probes, so that the absent cost the present little from the start; when the first other one answers, at once
+   but for 200 ms only.
 
 ======== =================== =============================================== =========
 from     answer or alive     failed poll                                     port lost
@@ -167,8 +168,10 @@ class Device:
     @property
     def probe_timeout(self) -> float:
         """How long its next probe waits, in s (rule 5); a fixed time-out holds for probes too."""
-        if self.spec.response_timeout is not None or self.health is Health.UNHEARD:
+        if self.spec.response_timeout is not None:
             return self.timeout
+        if self.health is Health.UNHEARD:
+            return PROBE_TIMEOUT if self.probe_exempt else self.timeout
         if self.probes % PATIENT_PROBE_EVERY == PATIENT_PROBE_EVERY - 1:
             return LEARNED_MOST
         return PROBE_TIMEOUT if self.turnarounds.p99 is None else max(PROBE_TIMEOUT, self.timeout)
@@ -197,10 +200,11 @@ class Device:
             self.probes += 1
             self.probe_interval = min(2 * self.probe_interval, self.rules.probe_interval_max)
             self.next_probe = now + self.probe_interval
-        elif self.failures >= self.rules.offline_after:
+            return
+        if self.failures >= self.rules.offline_after:
             self.health = Health.OFFLINE
             self.probe_interval = min(PROBE_INTERVAL_LEAST, self.rules.probe_interval_max)
-            self.next_probe = now + self.probe_interval
+        self.next_probe = now + self.probe_interval
 
     def cut_off(self) -> None:
         """Note that the port is lost, and with it any poll under way."""

@@ -7,8 +7,8 @@ Rules
 2. A slave id that a job excludes is polled by nobody while the job runs.
 3. When the port is lost every device is offline and gets one reading; nothing is due until it is back, then every
    device is due at once.
-4. While nobody answers, a device silent right after another was silent is asked once more at once: some sensors
-   ignore the request after one to a dead neighbour.
+4. A device that is never heard, or probed in turn with others, and is silent right after another was silent, is asked
+   once more at once: some sensors ignore the request after one to a dead neighbour.
 5. One poll, one reading; none if its device is no longer configured, or no longer enabled and nobody requested it.
 """
 
@@ -118,7 +118,8 @@ class Schedule:
         wanted = not isinstance(job, Poll) or self._wanted(job)
         lost = self._lost
         if wanted and lost is None:
-            self._jobs.submit(job, now)
+            probes = job.errand is Errand.PROBE
+            self._jobs.submit(job, now, self._probing.account if probes else None)
             return []
         job.cut_off(now)
         if not wanted or lost is None or not isinstance(job, Poll):
@@ -227,7 +228,8 @@ class Schedule:
         self.unanswered.settled(outcome, ask.codec, ask.timeout, now)
         self._learn(outcome)
         self._spend(job, outcome, now)
-        if self._ignored(outcome) and isinstance(job, Poll) and self._wanted(job):
+        ignored = self._ignored(outcome)
+        if ignored and isinstance(job, Poll) and self._benefits(job.device) and self._wanted(job):
             self._jobs.resume(job)
             return []
         following = job.heard(outcome, now)
@@ -249,7 +251,11 @@ class Schedule:
         if outcome.fault is None or outcome.fault.code is not FaultCode.TIMEOUT:
             return False
         self._silent = outcome.request.slave
-        return not self._probing.anyone_online and before not in (None, self._silent)
+        return before not in (None, self._silent)
+
+    def _benefits(self, device: Device) -> bool:
+        """Whether a doubt about silence is worth another exchange at once (rule 4)."""
+        return device.health is Health.UNHEARD or device.probe_exempt or not self._probing.anyone_online
 
     def _learn(self, outcome: Outcome) -> None:
         """Learn how long answers take, late ones included, whoever asked."""
