@@ -1,0 +1,84 @@
+"""From the configuration to what each part is built from."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from lfs10d import assembly
+from lfs10d.configfile import load
+from lfs10d.modbus.frames import Checksum, Framing
+from lfs10d.modbus.settings import PortSettings, Rs485
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from lfs10d.configfile import Loaded
+
+FILE = """
+line:
+  {port: /dev/ttyUSB0, baudrate: 19200, parity: even, stopbits: 2, extra_gap: 5ms, turnaround_delay: 50ms, echo: "on",
+   low_latency: false, rs485: {rts_on_send: false, rts_after_send: true, delay_before_send: 1ms, delay_after_send: 2ms}}
+poll: {interval: 250ms, retries: 2, offline_after: 5, probe_interval_max: 30s}
+slaves:
+  - {id: 3, name: mast, label: "Mast, 10 m", response_timeout: 300ms}
+  - {id: 4, profile: eh600, interval: 5s, enabled: false, checksum: sum}
+mqtt: {host: localhost}
+"""
+
+
+@pytest.fixture
+def loaded(tmp_path: Path) -> Loaded:
+    """Give a configuration in which nothing is a default."""
+    file = tmp_path / "lfs10d.yaml"
+    file.write_text(FILE)
+    return load(file)
+
+
+def test_the_port_is_opened_as_configured(loaded: Loaded) -> None:
+    assert assembly.port_settings(loaded.config.line) == PortSettings(
+        path="/dev/ttyUSB0", baudrate=19200, parity="even", databits=8, stopbits=2, low_latency=False,
+        rs485=Rs485(rts_on_send=False, rts_after_send=True, delay_before_send=0.001, delay_after_send=0.002),
+    )  # fmt: skip
+
+
+def test_the_line_is_spoken_on_as_configured(loaded: Loaded) -> None:
+    rules = assembly.line_rules(loaded.config.line)
+    timing = assembly.line_timing(loaded.config.line)
+
+    assert (rules.extra_gap, rules.turnaround_delay, rules.echo) == (0.005, 0.05, "on")
+    assert timing.bits == 12
+    assert timing.gap == pytest.approx(3.5 * 12 / 19200 + 0.005)
+    assert assembly.line_facts(loaded.config.line).gap_required == timing.gap
+
+
+def test_devices_are_polled_and_described_as_configured(loaded: Loaded) -> None:
+    mast, other = assembly.device_specs(loaded.config, loaded.profiles)
+    rules = assembly.poll_rules(loaded.config.poll)
+
+    assert (mast.name, mast.slave, mast.interval, mast.enabled, mast.response_timeout) == ("mast", 3, 0.25, True, 0.3)
+    assert (mast.codec.framing, mast.codec.checksum) == (Framing.RTU, Checksum.CRC)
+    assert (other.name, other.slave, other.interval, other.enabled, other.response_timeout) == (
+        "slave-4", 4, 5.0, False, None,
+    )  # fmt: skip
+    assert other.codec.checksum is Checksum.SUM
+    assert (rules.retries, rules.offline_after, rules.probe_interval_max) == (2, 5, 30.0)
+    facts = assembly.device_facts(loaded.config, loaded.profiles)
+    assert [(one.name, one.slave, one.label, one.profile) for one in facts] == [
+        ("mast", 3, "Mast, 10 m", "lfs10"),
+        ("slave-4", 4, None, "eh600"),
+    ]
+    assert facts[0].units == {"wind_speed": "m/s"}
+    assert facts[0].offline_after == 5
+
+
+def test_the_hash_tells_configurations_apart(loaded: Loaded, tmp_path: Path) -> None:
+    same, other = tmp_path / "same" / "lfs10d.yaml", tmp_path / "other" / "lfs10d.yaml"
+    for file, text in ((same, FILE + "# a comment\n"), (other, FILE.replace("250ms", "251ms"))):
+        file.parent.mkdir()
+        file.write_text(text)
+
+    assert assembly.config_hash(load(same).config) == assembly.config_hash(loaded.config)
+    assert assembly.config_hash(load(other).config) != assembly.config_hash(loaded.config)
+    assert len(assembly.config_hash(loaded.config)) == 12
