@@ -232,6 +232,7 @@ class Bus:
             patience=order.patience,
             echo=self._echo.state,
             adapter_latency=self.port.adapter_latency,
+            paced=self.port.paced,
             earlier=order.earlier,
             turn=order.timeout,
             turnaround_delay=self.rules.turnaround_delay,

@@ -49,6 +49,8 @@ class Port(Protocol):
     settings: PortSettings
     adapter_latency: float
     """Longest pause that the adapter may put into one answer, as found at opening: 0.004 or 0.020."""
+    paced: bool
+    """Whether nothing arrives sooner than the rate allows; not so on a pseudo terminal."""
 
     def open(self) -> None:
         """Open by path, lock and set; raises PortLostError or PortBusyError, which say what to do."""
@@ -93,6 +95,7 @@ class SerialPort:
     def __init__(self, settings: PortSettings) -> None:
         self.settings = settings
         self.adapter_latency = USB_LATENCY
+        self.paced = True
         self.notices: tuple[str, ...] = ()
         self._fd = -1
         self._hangup = select.poll()
@@ -214,6 +217,7 @@ class SerialPort:
             release(fd)
             raise
         self.adapter_latency = latency.adapter
+        self.paced = not is_pty(fd)
         self.notices = tuple(notice for notice in (latency.notice, refused) if notice)
 
     def _refused(self, code: int) -> PortError:

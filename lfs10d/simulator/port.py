@@ -78,6 +78,7 @@ class SimulatedPort:
         self.confirmed = confirmed
         self.counts = counts
         self.adapter_latency = USUAL_LATENCY
+        self.paced = True
         self.adapter = Adapter(line, format_of(settings), echo=echo, latency=nanoseconds(latency))
         self.plugged = True
         self.locked = False

@@ -40,6 +40,7 @@ class FakePort:
     def __init__(self) -> None:
         self.settings = SETTINGS
         self.adapter_latency = 0.004
+        self.paced = True
         self.calls: list[str] = []
         self.written: list[bytes] = []
         self.incoming = b""

@@ -179,6 +179,7 @@ def test_what_came_before_the_opening_is_forgotten(far_end: FarEnd) -> None:
 def test_a_pty_counts_no_errors_and_confirms_no_low_latency(port: SerialPort) -> None:
     assert port.counters() is None
     assert port.adapter_latency == 0.020
+    assert not port.paced
     assert port.notices == ()
 
 
