@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field
+from math import isfinite
 from typing import TYPE_CHECKING, Any, Final
 
 from lfs10d.cli.answers import BESIDES
@@ -39,7 +40,6 @@ class Device:
     units: dict[str, str] = field(default_factory=dict)
     good: bool = False
     error: str | None = None
-    message: str | None = None
     rtt_ms: float | None = None
     good_ts: float | None = None
     trail: deque[tuple[float, float]] = field(default_factory=deque)
@@ -74,7 +74,6 @@ class Live:
         self.line: dict[str, Any] = {}
         """`line/state` and `line/stats`."""
         self.line_error: str | None = None
-        self.info: dict[str, Any] = {}
         self.known = False
         """Something of a daemon was heard."""
         self._met: dict[str, Device] = {}
@@ -93,8 +92,6 @@ class Live:
                 self.line.update(payload)
             case ["line", "error"] if isinstance(payload, dict):
                 self.line_error = _active(payload)
-            case ["info"] if isinstance(payload, dict):
-                self.info = payload
             case ["device", name, leaf]:
                 self._told(self._device(name), leaf, payload, old=old, now=now, wall=wall)
 
@@ -114,9 +111,7 @@ class Live:
         if leaf == "availability":
             self._available(device, payload == "online", now=None if old else now)
         elif isinstance(payload, dict):
-            if leaf == "error":
-                device.message = _active(payload)
-            elif leaf == "stats":
+            if leaf == "stats":
                 last = _number(payload.get("last_good_ts"))
                 if last is not None and (device.good_ts is None or last > device.good_ts):
                     device.good_ts = last
@@ -153,12 +148,11 @@ class Live:
         """Take the daemon's status as it was written, by the clock of this machine."""
         ts = _number(status.get("ts")) or 0.0
         self.known = True
-        line, info = status.get("line"), status.get("info")
+        line = status.get("line")
         if isinstance(line, dict):
             self.line = line
             error = line.get("error")
             self.line_error = _active(error) if isinstance(error, dict) else None
-        self.info = info if isinstance(info, dict) else {}
         self.devices = {}
         entries = status.get("devices")
         for entry in entries if isinstance(entries, list) else ():
@@ -171,12 +165,10 @@ class Live:
     def _restate(self, device: Device, entry: Mapping[str, Any], ts: float, *, now: float | None) -> None:
         _describe(device, entry, slave=entry.get("slave"))
         self._available(device, entry.get("online") is True, now=now)
-        values, units, alarm = entry.get("values"), entry.get("units"), entry.get("alarm")
-        seq = entry.get("seq")
+        values, units, seq = entry.get("values"), entry.get("units"), entry.get("seq")
         fresh = seq != device.seq
         device.seq = seq if isinstance(seq, int) else -1
         _sample(device, entry, values if isinstance(values, dict) else {}, units if isinstance(units, dict) else {})
-        device.message = _active(alarm) if isinstance(alarm, dict) else None
         age = _number(entry.get("age_s"))
         device.good_ts = None if age is None else ts - age * 1000
         if fresh and now is not None:
@@ -230,7 +222,13 @@ def _trail(device: Device, now: float) -> None:
 
 
 def _number(value: object) -> float | None:
-    return None if isinstance(value, bool) or not isinstance(value, int | float) else value
+    """Return a value that is a finite number; whole ones stay whole."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    try:
+        return value if isfinite(value) else None
+    except OverflowError:
+        return None
 
 
 def _active(error: Mapping[str, Any]) -> str | None:

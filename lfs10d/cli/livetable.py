@@ -11,12 +11,15 @@ from typing import TYPE_CHECKING, Final, TypeAlias
 from lfs10d.logs import escape
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from lfs10d.cli.live import Device, Live
 
 Piece: TypeAlias = tuple[str, str]
 Line: TypeAlias = tuple[Piece, ...]
+
+LONGEST_WORD: Final = 200
+"""Characters of one thing about the line: enough for the path of a port."""
 
 JUST: Final = 5.0
 """s for which it is marked that a device came or went."""
@@ -216,23 +219,27 @@ def _cut(line: Line, width: int) -> Line:
 def header(live: Live, source: Source, width: int, *, pace: bool = True) -> list[Line]:
     """Return what is to be known of the line and where all this comes from; `pace`: also what changes all the time."""
     line = live.line
-    words = [f"{live.name}: {escape(str(line.get('port', '?')))}"]
+    words = [f"{escape(live.name)}: {_said(line, 'port')}"]
     if "baudrate" in line:
-        parity = str(line.get("parity", "?"))[:1].upper()
-        words.append(f"{line['baudrate']} baud {line.get('databits')}{parity}{line.get('stopbits')}")
+        character = f"{_said(line, 'databits')}{_said(line, 'parity')[:1].upper()}{_said(line, 'stopbits')}"
+        words.append(f"{_said(line, 'baudrate')} baud {character}")
     if line.get("activity", "polling") != "polling":
-        words.append(escape(str(line["activity"])))
+        words.append(_said(line, "activity"))
     load, polls = (line.get("load_pct"), line.get("polls_per_s")) if pace else (None, None)
     if load is not None:
-        words.append(f"load {load} %")
+        words.append(f"load {_said(line, 'load_pct')} %")
     if polls is not None:
-        words.append(f"{polls} polls/s")
+        words.append(f"{_said(line, 'polls_per_s')} polls/s")
     lines: list[Line] = [((", ".join(words), "bold"),), ((source.words, "" if source.alive else "bold yellow"),)]
     if line.get("open") is False and live.line_error is None:
         lines.append((("the port is not open", "bold red"),))
     if live.line_error is not None:
         lines.append(((escape(live.line_error), "bold red"),))
     return [piece for whole in lines for piece in _wrapped(whole, width)]
+
+
+def _said(line: Mapping[str, object], key: str) -> str:
+    return escape(str(line.get(key, "?"))[:LONGEST_WORD])
 
 
 def _wrapped(line: Line, width: int) -> Iterable[Line]:

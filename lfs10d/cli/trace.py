@@ -118,14 +118,14 @@ async def _show(visitor: Visitor, frames: deque[Any], duration: float, *, as_jso
     loop = asyncio.get_running_loop()
     deadline = loop.time() + duration + LAST_FRAMES
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else ONE_LINE
-    while await visitor.until(lambda: bool(frames) or not visitor.daemon_online, max(0.0, deadline - loop.time())):
+    while await visitor.until(lambda: bool(frames) or visitor.daemon_gone, max(0.0, deadline - loop.time())):
         while frames:
             frame = frames.popleft()
             if not isinstance(frame, dict):
                 continue
             for text in [json.dumps(frame, ensure_ascii=False)] if as_json else lines(frame, width):
                 click.echo(text)
-        if not visitor.daemon_online:
+        if visitor.daemon_gone:
             raise BrokerError(f"{visitor.place}: the daemon went away")
     return 0
 

@@ -72,9 +72,10 @@ class Visitor:
         """Our daemon says so, and we would hear if it did not."""
         return self.connected and self.availability == ONLINE
 
-    def start(self) -> None:
-        """Begin to connect, and again whenever the connection is lost."""
-        self._link.start()
+    @property
+    def daemon_gone(self) -> bool:
+        """Our daemon, or the broker for it, says that it is not there."""
+        return self.availability not in {None, ONLINE}
 
     async def enter(self, within: float = CONNECTS_WITHIN) -> None:
         """Connect and subscribe; raises BrokerError, FailedError where the broker does not let us hear."""
@@ -118,10 +119,10 @@ class Visitor:
         try:
             await self.until(lambda: mid in self._settled or self._answered, within)
             self._judge(self._settled.get(mid, (0,))[0], name)
-            await self.until(lambda: self._answered or self.availability != ONLINE, within)
+            await self.until(lambda: self._answered or self.daemon_gone, within)
         except BrokerError as error:
             raise BrokerError(f"{error}; whether {name} was obeyed is not known") from None
-        if not self._answered and self.availability != ONLINE:
+        if not self._answered and self.daemon_gone:
             raise BrokerError(f"{self.place}: the daemon went away before it answered {name}")
         return self._response
 

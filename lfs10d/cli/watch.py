@@ -94,12 +94,14 @@ class _Watch:
         self._line = visited.config.line.name
         self._files = files
         self._live = Live(self._line)
+        self._why = ""
+        """What was wrong with the broker, or the daemon there, at the beginning."""
         self._heard_at = 0.0
         """When anything came by MQTT last, epoch s."""
         self._status: _Status | None = None
         topics = visited.topics
-        once = [telemetry.DEVICES, telemetry.INFO, telemetry.LINE_STATE, telemetry.LINE_ERROR, telemetry.LINE_STATS]
-        leaves = (telemetry.STATE, telemetry.TELEMETRY, telemetry.AVAILABILITY, telemetry.ERROR, telemetry.STATS)
+        once = [telemetry.DEVICES, telemetry.LINE_STATE, telemetry.LINE_ERROR, telemetry.LINE_STATS]
+        leaves = (telemetry.STATE, telemetry.TELEMETRY, telemetry.AVAILABILITY, telemetry.STATS)
         filters = [*once, *(telemetry.device_topic("+", leaf) for leaf in leaves)]
         self._visitor = Visitor(
             visited, [Filter(topics.full(each), qos=0, retain_as_published=False) for each in filters], self._arrived
@@ -125,7 +127,6 @@ class _Watch:
 
     async def _begin(self) -> None:
         """Wait for the first thing to show."""
-        why = ""
         async with spinning("looking for the daemon ..."):
             try:
                 await self._visitor.enter(CONNECTS_WITHIN)
@@ -133,12 +134,12 @@ class _Watch:
                 await self._visitor.find_daemon()
                 await asyncio.sleep(SETTLES_WITHIN)
             except (BrokerError, FailedError) as error:
-                why = str(error)
+                self._why = str(error)
         self._read()
         if self._live.known or self._status is not None:
             return
         places = " or ".join(str(path) for path in self._files)
-        raise BrokerError(f"{why}; and no daemon on this machine has written its status to {places}")
+        raise BrokerError(f"{self._why}; and no daemon on this machine has written its status to {places}")
 
     async def _show(self, output: _Lines | _Screen, over: asyncio.Event) -> None:
         with output:
@@ -155,7 +156,7 @@ class _Watch:
         if visitor.daemon_online and self._live.known:
             return self._live, Source(f"live from {visitor.place}", alive=True)
         if not visitor.connected:
-            why = visitor.ended_by or f"{visitor.place}: not connected"
+            why = visitor.ended_by or self._why
         else:
             why = f"{visitor.place}: the daemon is offline there"
         if status is not None:

@@ -1,0 +1,208 @@
+"""`lfs10d request`."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import subprocess
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.daemon.verbs.conftest import BASE, running, typed
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from tests.conftest import Mosquitto
+    from tests.daemon.conftest import Site
+    from tests.daemon.verbs.conftest import Shell
+
+
+def test_a_request_prints_what_came_of_it_for_people(site: Site, mosquitto: Mosquitto) -> None:
+    del mosquitto
+    running(site)
+    done = typed(site, "request", "device/read", "device=mast-top")
+    assert (done.returncode, done.stderr) == (0, "")
+    first, second = done.stdout.splitlines()
+    assert re.fullmatch(r"device/read: ok, \d+ ms", first)
+    assert re.fullmatch(r"mast-top: wind_speed [\d.]+ m/s, good, answered in [\d.]+ ms, at \S+Z", second)
+
+
+def test_a_request_prints_the_whole_response_for_programs(site: Site, mosquitto: Mosquitto) -> None:
+    del mosquitto
+    running(site)
+    done = typed(site, "request", "device/read", "device=mast-top", "id=a1", "--json")
+    response = json.loads(done.stdout)
+    assert (done.returncode, response["id"], response["status"]) == (0, "a1", "ok")
+    assert response["data"]["device"] == "mast-top"
+    refused = typed(site, "request", "device/read", "device=nobody", "--json")
+    assert (refused.returncode, refused.stderr) == (1, "")
+    assert json.loads(refused.stdout)["error"]["code"] == "unknown_device"
+
+
+def test_a_request_that_is_not_obeyed_says_why_and_ends_with_1(site: Site, mosquitto: Mosquitto) -> None:
+    del mosquitto
+    running(site)
+    for arguments, words in (
+        (("device/read", "device=nobody"), "device/read: rejected: unknown_device: there is no device nobody"),
+        (("device/read", "devcie=mast-top"), "invalid_param: devcie: is no parameter of this request; it takes device"),
+        (("line/trace", "for=11m"), "invalid_param: for: must be a duration"),
+        (("no/such",), "rejected: unknown_request: no such request; known are: config/get"),
+    ):
+        done = typed(site, "request", *arguments)
+        assert (done.returncode, done.stdout) == (1, "")
+        assert words in done.stderr
+
+
+def test_health_is_a_table(site: Site, mosquitto: Mosquitto) -> None:
+    del mosquitto
+    running(site)
+    done = typed(site, "request", "health")
+    assert done.returncode == 0
+    assert re.search(r"^  mast-top +2 +[\d.]+ m/s +good ", done.stdout, re.MULTILINE)
+    assert "broker connected" in done.stdout
+
+
+def test_by_3_1_1_a_request_is_answered_by_its_id(site: Site, mosquitto: Mosquitto) -> None:
+    del mosquitto
+    running(site, mqtt={"version": "3.1.1"})
+    for arguments in (("device/read", "device=mast-top"), ("device/read", "device=mast-top", "transaction=t")):
+        assert typed(site, "request", *arguments).returncode == 0
+    assert "unknown_request" in typed(site, "request", "no/such").stderr
+
+
+def test_a_visitor_by_5_understands_a_daemon_that_speaks_3_1_1(site: Site, mosquitto: Mosquitto) -> None:
+    del mosquitto
+    running(site, mqtt={"version": "3.1.1"})
+    site.write(slaves=[1, 2])
+    assert typed(site, "request", "republish").returncode == 0
+
+
+def test_without_a_broker_a_request_ends_with_69_and_says_what_to_check(site: Site) -> None:
+    site.write()
+    done = typed(site, "request", "health")
+    assert (done.returncode, done.stdout) == (69, "")
+    assert "connection refused: is the broker running" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_without_a_daemon_a_request_ends_with_69_at_once(site: Site, mosquitto: Mosquitto) -> None:
+    site.write()
+    done = typed(site, "request", "health")
+    assert done.returncode == 69
+    assert "no daemon has ever been seen at lfs10d/line0" in done.stderr
+    mosquitto.publish(f"{BASE}/availability", "offline", retain=True)
+    done = typed(site, "request", "health", "--timeout", "1h")
+    assert done.returncode == 69
+    assert "the daemon of lfs10d/line0 is offline" in done.stderr
+
+
+def test_a_request_nobody_answers_in_time_ends_with_1(site: Site, mosquitto: Mosquitto) -> None:
+    mosquitto.publish(f"{BASE}/availability", "online", retain=True)
+    mosquitto.subscribe(f"{BASE}/request/#")
+    site.write()
+    done = typed(site, "request", "health", "--timeout", "300ms")
+    assert done.returncode == 1
+    assert done.stderr == "lfs10d: no response to health within 300ms; whether it was obeyed is not known\n"
+
+
+def test_where_nobody_takes_requests_that_is_said_without_waiting(site: Site, mosquitto: Mosquitto) -> None:
+    mosquitto.publish(f"{BASE}/availability", "online", retain=True)
+    site.write()
+    done = typed(site, "request", "health", "--timeout", "1h")
+    assert done.returncode == 69
+    assert "nobody takes requests" in done.stderr
+
+
+def test_a_daemon_that_goes_away_before_it_answers_ends_a_request_with_69(
+    site: Site, mosquitto: Mosquitto, shell: Shell
+) -> None:
+    somebody = mosquitto.subscribe(f"{BASE}/request/#")
+    mosquitto.publish(f"{BASE}/availability", "online", retain=True)
+    site.write()
+    asking = shell.pipe("request", "health", "--timeout", "1h")
+    somebody.wait_for(f"{BASE}/request/health")
+    mosquitto.publish(f"{BASE}/availability", "offline", retain=True)
+    assert asking.ends() == 69
+    assert "went away before it answered" in asking.text
+
+
+def test_a_broker_that_goes_away_before_the_answer_ends_a_request_with_69(
+    site: Site, mosquitto: Mosquitto, shell: Shell
+) -> None:
+    somebody = mosquitto.subscribe(f"{BASE}/request/#")
+    mosquitto.publish(f"{BASE}/availability", "online", retain=True)
+    site.write()
+    asking = shell.pipe("request", "health", "--timeout", "1h")
+    somebody.wait_for(f"{BASE}/request/health")
+    mosquitto.kill()
+    assert asking.ends() == 69
+    assert "whether health was obeyed is not known" in asking.text
+
+
+def test_a_login_of_ones_own_comes_before_the_file_s(
+    site: Site, mosquitto: Mosquitto, program: Callable[[str], str], tmp_path: Path
+) -> None:
+    passwords = tmp_path / "passwords"
+    passwords.touch(0o600)
+    subprocess.run(
+        [program("mosquitto_passwd"), "-b", str(passwords), "operator", "secret"], check=True, capture_output=True
+    )
+    mosquitto.stop()
+    mosquitto.configuration = ["allow_anonymous false", f"password_file {passwords}"]
+    mosquitto.start()
+    secret = tmp_path / "secret"
+    secret.write_text("secret\n")
+    unreadable = {"username": "daemon", "password_file": str(tmp_path / "not-there")}
+    site.write(mqtt=unreadable)
+    login = ("--username", "operator", "--password-file", str(secret))
+    assert "no daemon has ever been seen" in typed(site, "request", "health", *login).stderr
+    wrong = typed(site, "request", "health", "--username", "operator")
+    assert wrong.returncode == 69
+    assert "wrong user name or password" in wrong.stderr or "not authorized" in wrong.stderr
+    assert typed(site, "request", "health").returncode == 78
+    missing = typed(site, "request", "health", "--username", "x", "--password-file", str(tmp_path / "not-there"))
+    assert (missing.returncode, "--password-file" in missing.stderr) == (2, True)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("device/read", "device"), "is no KEY=VALUE"),
+        (("device/read", "device=a", "device=b"), "device is given twice"),
+        (("device/+",), "no name of a request; known are: config/get"),
+        (("device//read",), "no name of a request"),
+        (("health", "--timeout", "soon"), "no duration"),
+        (("health", f"x={'y' * 4096}"), "more than the 4096 bytes"),
+    ],
+)
+def test_a_slip_on_the_command_line_is_an_error_of_usage(site: Site, arguments: tuple[str, ...], words: str) -> None:
+    site.write()
+    done = typed(site, "request", *arguments)
+    assert done.returncode == 2
+    assert words in done.stderr
+
+
+def test_on_a_terminal_something_turns_while_a_request_waits_and_is_gone_afterwards(
+    site: Site, mosquitto: Mosquitto, shell: Shell
+) -> None:
+    mosquitto.subscribe(f"{BASE}/request/#")
+    mosquitto.publish(f"{BASE}/availability", "online", retain=True)
+    site.write()
+    asking = shell.terminal("request", "health", "--timeout", "1500ms")
+    assert asking.ends() == 1
+    assert "health ... 1 s" in asking.text
+    assert asking.raw.rpartition(b"\x1b[K")[2].startswith(b"lfs10d: no response")
+
+
+def test_ctrl_c_ends_a_request_with_1_and_no_traceback(site: Site, mosquitto: Mosquitto, shell: Shell) -> None:
+    somebody = mosquitto.subscribe(f"{BASE}/request/#")
+    mosquitto.publish(f"{BASE}/availability", "online", retain=True)
+    site.write()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        asking = shell.pipe("request", "health", "--timeout", "1h")
+        somebody.wait_for(f"{BASE}/request/health", len([*shell.running]))
+        assert asking.ends(number) == 1
