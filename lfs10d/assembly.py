@@ -7,6 +7,7 @@ import json
 from typing import TYPE_CHECKING
 
 from lfs10d.facts import DeviceFacts, LineFacts
+from lfs10d.jobs.register import Target
 from lfs10d.modbus.bus import LineRules
 from lfs10d.modbus.frames import Checksum, Codec, Framing
 from lfs10d.modbus.settings import PortSettings, Rs485
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from lfs10d.config import Config, LineConfig, PollConfig, SlaveConfig, StoreConfig
+    from lfs10d.configfile import Loaded
     from lfs10d.profiles.schema import Profile
 
 
@@ -81,6 +83,15 @@ def _device_spec(slave: SlaveConfig, line: LineConfig, profile: Profile) -> Devi
         enabled=slave.enabled,
         response_timeout=slave.response_timeout,
     )
+
+
+def access_target(loaded: Loaded, slave: int, device: SlaveConfig | None) -> Target:
+    """Return how the registers of a configured device are accessed, or of a slave id where none is."""
+    config = loaded.config
+    if device is None:
+        return Target(slave, usual_codec(config.line), None, config.poll.response_timeout)
+    spec = _device_spec(device, config.line, loaded.profiles[device.profile])
+    return Target(slave, spec.codec, spec.profile, spec.response_timeout)
 
 
 def line_facts(line: LineConfig) -> LineFacts:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from lfs10d import assembly
 from lfs10d.inquiries import Inquiries, Inquiry, altered
 from lfs10d.jobs.knock import Knock
+from lfs10d.jobs.register import Access
+from lfs10d.modbus.exchange import Echo
 from lfs10d.reading import Exchanged, Reading
 from lfs10d.telemetry import event
 from lfs10d.tracing import Trace
@@ -17,10 +19,12 @@ if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterable
 
     from lfs10d.commands import Call
-    from lfs10d.config import Config
+    from lfs10d.config import Config, SlaveConfig
     from lfs10d.effective import Effective
     from lfs10d.facts import Instant
+    from lfs10d.jobs.job import Job
     from lfs10d.line import Line
+    from lfs10d.modbus.frames import Request as RegisterRequest
     from lfs10d.mqtt.uplink import Uplink
     from lfs10d.profiles.schema import Profile
     from lfs10d.reading import Event
@@ -28,6 +32,8 @@ if TYPE_CHECKING:
     from lfs10d.running import Edit, Running
     from lfs10d.station import Station
     from lfs10d.telemetry import Publication
+
+    J = TypeVar("J", bound=Job)
 
 
 class DaemonPowers:
@@ -119,19 +125,37 @@ class DaemonPowers:
 
     async def knock(self, slave: int, profile: Profile) -> Knock:
         """Ask one slave id whether anybody is there."""
-        loop = asyncio.get_running_loop()
-        over: asyncio.Future[Knock] = loop.create_future()
-
-        def settle(job: Knock) -> None:
-            if not over.done():
-                over.set_result(job)
-
-        def tell(job: Knock) -> None:
-            with contextlib.suppress(RuntimeError):  # the loop is closed: nobody waits any more
-                loop.call_soon_threadsafe(settle, job)
-
         codec = assembly.profile_codec(self._running.now.config.line, profile)
-        self._line().submit(Knock(slave, profile, codec, tell))
+        return await self._carry_out(lambda over: Knock(slave, profile, codec, over))
+
+    async def access(self, what: RegisterRequest, device: SlaveConfig | None) -> Access:
+        """Read or write registers."""
+        target = assembly.access_target(self._running.now.loaded, what.slave, device)
+        poller = self._line().poller
+        return await self._carry_out(
+            lambda over: Access(
+                target,
+                what,
+                unanswered=poller.schedule.unanswered,
+                echo_known=lambda: poller.bus.echo is not Echo.UNKNOWN,
+                over=over,
+            )
+        )
+
+    async def _carry_out(self, job: Callable[[Callable[[J], None]], J]) -> J:
+        """Have a job done that tells when it is over, in the line's thread; return it then."""
+        loop = asyncio.get_running_loop()
+        over: asyncio.Future[J] = loop.create_future()
+
+        def settle(done: J) -> None:
+            if not over.done():
+                over.set_result(done)
+
+        def tell(done: J) -> None:
+            with contextlib.suppress(RuntimeError):  # the loop is closed: nobody waits any more
+                loop.call_soon_threadsafe(settle, done)
+
+        self._line().submit(job(tell))
         return await over
 
     # -- what they need to know of the line

@@ -11,9 +11,12 @@ if TYPE_CHECKING:
     from lfs10d.admission import Form
     from lfs10d.changes import Changes
     from lfs10d.commands import Answer, Call
+    from lfs10d.config import SlaveConfig
     from lfs10d.effective import Effective
     from lfs10d.inquiries import Inquiry
     from lfs10d.jobs.knock import Knock
+    from lfs10d.jobs.register import Access
+    from lfs10d.modbus.frames import Request as RegisterRequest
     from lfs10d.profiles.schema import Profile
 
 Edit: TypeAlias = "Callable[[Effective], Changes]"
@@ -76,6 +79,10 @@ class Powers(Protocol):
 
     async def knock(self, slave: int, profile: Profile) -> Knock:
         """Ask a slave id that nobody polls whether anybody is there; return the job that is over."""
+        ...
+
+    async def access(self, what: RegisterRequest, device: SlaveConfig | None) -> Access:
+        """Read or write registers of a configured device, or of a slave that is not; return the job that is over."""
         ...
 
     async def reload(self) -> dict[str, list[str]]:

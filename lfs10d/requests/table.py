@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from lfs10d.requests import config, device, general, line
+from lfs10d.requests import config, device, general, line, register
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -16,4 +16,5 @@ REQUESTS: Mapping[str, Request] = {
     **config.REQUESTS,
     **device.REQUESTS,
     **line.REQUESTS,
+    **register.REQUESTS,
 }

@@ -15,14 +15,18 @@ from lfs10d.configfile import load
 from lfs10d.disk import Disk
 from lfs10d.forgetful import ForgetfulFiles
 from lfs10d.jobs.knock import Knock
+from lfs10d.jobs.register import Access, Target
 from lfs10d.modbus.frames import Codec, Framing
+from lfs10d.modbus.unanswered import Unanswered
 from lfs10d.requests.table import REQUESTS
 from lfs10d.running import Running
 
 if TYPE_CHECKING:
     from lfs10d.commands import Answer, Call
+    from lfs10d.config import SlaveConfig
     from lfs10d.effective import Effective
     from lfs10d.inquiries import Inquiry
+    from lfs10d.modbus.frames import Request as RegisterRequest
     from lfs10d.profiles.schema import Profile
     from lfs10d.reading import Fault
     from lfs10d.reload import Plan
@@ -48,6 +52,8 @@ class FakePowers:
         self.broken: Exception | None = None
         self.at: set[int] = set()
         self.silence: Fault | None = None
+        self.came: dict[str, object] = {}
+        """What came of an access: its attributes."""
         self.told: list[dict[str, object]] = []
         self.disk = ForgetfulFiles()
         self.file = file
@@ -95,6 +101,14 @@ class FakePowers:
         knock.answered = slave in self.at
         knock.fault = None if knock.answered else self.silence
         return knock
+
+    async def access(self, what: RegisterRequest, device: SlaveConfig | None) -> Access:
+        self.done.append((device and device.name, what))
+        never = Unanswered()
+        access = Access(Target(1, Codec(Framing.RTU)), what, unanswered=never, echo_known=bool, over=lambda _: None)
+        for name, what_came in self.came.items():
+            setattr(access, name, what_came)
+        return access
 
     async def read(self, device: str) -> Inquiry | None:
         self.done.append(f"read {device}")

@@ -19,6 +19,8 @@ CLASSES = {
     "device/read": "polling",
     "line/trace": "sensors",
     "line/cancel": "sensors",
+    "register/read": "registers",
+    "register/write": "registers",
 }
 
 
