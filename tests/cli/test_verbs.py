@@ -69,7 +69,9 @@ def test_a_shell_can_complete_verbs_and_options(lfs10d: Lfs10d) -> None:
     assert words.stdout == "plain,check\n"
 
 
-@pytest.mark.parametrize("verb", [verb for verb in ("check", "config", "run") if verb in BUILT])
+@pytest.mark.parametrize(
+    "verb", [verb for verb in ("check", "config", "run", "request", "watch", "trace") if verb in BUILT]
+)
 def test_a_verb_that_draws_nothing_imports_nothing_to_draw_with(verb: str) -> None:
     program = f"import json, sys, lfs10d.__main__, lfs10d.cli.{verb}; print(json.dumps(sorted(sys.modules)))"
     result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)

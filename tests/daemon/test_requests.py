@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
+import time
 from dataclasses import dataclass
 from itertools import count
 from typing import TYPE_CHECKING, Any
@@ -187,11 +188,12 @@ def test_a_repeat_gets_the_first_response_again_to_its_own_place_and_nothing_is_
 
 
 def test_a_burst_beyond_64_is_rate_limited_and_every_request_of_it_is_answered(operator: Operator) -> None:
+    begun = time.monotonic()
     for number in range(100):
         operator.listener._client.publish(f"{BASE}/request/republish", json.dumps({"id": number}), 1)
     eventually(lambda: len(operator.responses) == 100, "100 answers")
     told = codes(operator.responses)
-    assert 64 <= told.count(None) < 90
+    assert 64 <= told.count(None) <= 64 + 20 * (time.monotonic() - begun)
     assert told.count(None) + told.count("rate_limited") == 100
     assert sorted(str(_id(each)) for each in operator.responses) == sorted(str(number) for number in range(100))
 
