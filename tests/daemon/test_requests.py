@@ -104,7 +104,7 @@ def test_every_kind_of_wrong_request_has_its_one_answer_where_it_belongs(operato
         ("health", b'{"id":"big",' + b" " * 4096 + b"}", "too_large", "health"),
         ("no/such/thing", {"id": 1}, "unknown_request", "unknown"),
         ("", {"id": 2}, "unknown_request", "unknown"),
-        ("register/read", {"id": 3}, "unknown_request", "unknown"),
+        ("register/peek", {"id": 3}, "unknown_request", "unknown"),
         ("health", {"id": 4, "verbose": True}, "invalid_param", "health"),
         ("device/read", {"id": 5}, "invalid_param", "device/read"),
         ("device/read", {"id": 6, "device": 1}, "invalid_param", "device/read"),
