@@ -171,6 +171,21 @@ class Admission(Generic[W]):
             del self._seen[key]
         self._seen[name, call.key] = memory
 
+    def recall(self, name: str, call: Call, answer: Answer | None, forget_at: float) -> list[tuple[Call, W]]:
+        """Remember a request of an earlier life of the daemon, None while its answer is still to come.
+
+        Returns the repeats that waited for the answer, with their `whence`.
+        """
+        key = call.key
+        if key is None:
+            return []
+        memory = self._seen.setdefault((name, key), _Memory[W](call.fingerprint))
+        memory.answer, memory.forget_at = answer, forget_at
+        if answer is None:
+            return []
+        repeats, memory.repeats = memory.repeats, []
+        return repeats
+
     def done(self, ticket: Ticket[W], answer: Answer, now: float) -> list[tuple[Call, W]]:
         """Note how it ended; return the repeats that wait for it, with their `whence`."""
         memory = ticket.memory

@@ -117,6 +117,16 @@ class Changes:
         """Return the changes without this device, be it the file's or one that was added."""
         return self.with_device(name, DeviceChange(removed=said.slaves.get(name), verified=self.of(name).verified))
 
+    def moving(self, name: str, place: Place, said: Said) -> Changes:
+        """Return the changes with another place for a device that is there now: there it was verified."""
+        change = self.of(name)
+        if change.added is not None:
+            moved = replace(change, added={**change.added, "id": place.id}, added_at=place)
+            return self.with_device(name, moved)
+        filed = said.slaves[name]["id"]
+        verified = None if place == Place(filed) else Verified(place, file=filed)
+        return self.with_device(name, replace(change, verified=verified))
+
     def setting(self, name: str, options: Saying, said: Said) -> Changes:
         """Return the changes with other options of a device that is there now.
 

@@ -106,6 +106,8 @@ def failed(code: ErrorCode, message: str, *, data: object = None, **facts: objec
 class Call:
     """What could be read of a request: its ids, what it asks in its own words, and the same as one text.
 
+    `topic` (under B) and `correlation` are where its answer goes, once it is being performed.
+
     Equal fingerprints are equal parameters as JSON sees them: in any order, but 1 is neither true nor 1.0.
     """
 
@@ -113,6 +115,8 @@ class Call:
     transaction: Identifier | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
     fingerprint: str = ""
+    topic: str | None = None
+    correlation: bytes | None = None
 
     @property
     def key(self) -> Identifier | None:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from lfs10d import assembly
 from lfs10d.linethread import LineThread
 from lfs10d.modbus.bus import Bus
+from lfs10d.modbus.exchange import Echo
 from lfs10d.modbus.port import SerialPort
 from lfs10d.modbus.realtime import sharpen_timers, take_precedence, yield_precedence
 from lfs10d.poller import Poller
@@ -24,7 +25,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from lfs10d.config import Config
+    from lfs10d.jobs.course import Course
     from lfs10d.jobs.job import Job
+    from lfs10d.modbus.unanswered import Unanswered
     from lfs10d.profiles.schema import Profile
     from lfs10d.reading import Event
 
@@ -87,6 +90,25 @@ class Line:
         """Have a job done; what it calls, it calls in the line's thread."""
         self.poller.submit(job)
         self.wake()
+
+    def go_on(self, course: Course, answer: object) -> None:
+        """Tell a course what came of what it had done aside."""
+
+        def tell(now: float) -> None:
+            course.go_on(answer)
+            self.poller.schedule.wake(course, now)
+
+        self.poller.post(tell)
+        self.wake()
+
+    @property
+    def unanswered(self) -> Unanswered:
+        """Which requests may still be answered; for jobs, in the line's thread."""
+        return self.poller.schedule.unanswered
+
+    def echo_known(self) -> bool:
+        """Whether it is known how the adapter echoes: before that nothing is written."""
+        return self.poller.bus.echo is not Echo.UNKNOWN
 
     def take(self, config: Config, profiles: Mapping[str, Profile], *, line: bool, realtime: bool) -> None:
         """Poll by another configuration from now on; `line` and `realtime` tell whether those changed."""

@@ -55,6 +55,10 @@ class Poller:
         """Have `job` done on the line."""
         self.post(lambda now: self._events.extend(self.schedule.submit(job, now)))
 
+    def wake(self, job: Job) -> None:
+        """End the rest of `job`."""
+        self.post(lambda now: self.schedule.wake(job, now))
+
     def read(self, device: str, request: int) -> None:
         """Have a device polled now for a request, whose number comes back with the reading; none for an unknown one."""
         self.post(lambda now: self._read(device, request, now))

@@ -7,6 +7,7 @@ import contextlib
 from typing import TYPE_CHECKING, TypeVar
 
 from lfs10d import assembly
+from lfs10d.commands import rejected
 from lfs10d.inquiries import Inquiries, Inquiry, altered
 from lfs10d.jobs.knock import Knock
 from lfs10d.jobs.register import Access
@@ -16,9 +17,9 @@ from lfs10d.telemetry import event
 from lfs10d.tracing import Trace
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Iterable
+    from collections.abc import Awaitable, Callable, Iterable, Mapping
 
-    from lfs10d.commands import Call
+    from lfs10d.commands import Answer, Call
     from lfs10d.config import Config, SlaveConfig
     from lfs10d.effective import Effective
     from lfs10d.facts import Instant
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from lfs10d.line import Line
     from lfs10d.modbus.frames import Request as RegisterRequest
     from lfs10d.mqtt.uplink import Uplink
+    from lfs10d.physical import Physical
     from lfs10d.profiles.schema import Profile
     from lfs10d.reading import Event
     from lfs10d.reload import Plan
@@ -63,6 +65,8 @@ class DaemonPowers:
         self._change = change
         self._line = line
         self._publish = publish
+        self.physical: Physical | None = None
+        """What changes sensors; given later, for it needs us."""
         self._inquiries = Inquiries(lambda device, request: line().read(device, request))
         self._trace: Trace | None = None
 
@@ -123,6 +127,10 @@ class DaemonPowers:
         """Tell on `event` what a request changed."""
         self._publish([event("change_applied", self._now().ts(), request=request, id=call.key, **facts)])
 
+    def tell(self, kind: str, facts: Mapping[str, object]) -> None:
+        """Tell everybody on `event`."""
+        self._publish([event(kind, self._now().ts(), **facts)])
+
     async def knock(self, slave: int, profile: Profile) -> Knock:
         """Ask one slave id whether anybody is there."""
         codec = assembly.profile_codec(self._running.now.config.line, profile)
@@ -157,6 +165,16 @@ class DaemonPowers:
 
         self._line().submit(job(tell))
         return await over
+
+    def reserved(self) -> Mapping[int, str]:
+        """Return the slave ids that no device may be given now, with the reason."""
+        return {} if self.physical is None else self.physical.reserved()
+
+    async def readdress(self, device: str, to: int, *, dry_run: bool, call: Call) -> Answer:
+        """Give a sensor another slave id."""
+        if self.physical is None:
+            return rejected("busy", "the daemon is starting")
+        return await self.physical.readdress(device, to, dry_run=dry_run, call=call)
 
     # -- what they need to know of the line
 

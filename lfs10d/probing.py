@@ -26,6 +26,27 @@ PROBE_SPACING = 1.0
 """While no device answers each is probed at most so often, in s."""
 
 
+class ProbeAccount:
+    """The share that all probes have together; it binds only while any device answers."""
+
+    def __init__(self, probing: Probing, share: Share) -> None:
+        self._probing = probing
+        self._share = share
+
+    def allows(self, now: float) -> bool:
+        """Whether the line may be used now."""
+        return not self._probing.anyone_online or self._share.allows(now)
+
+    def ready_at(self, now: float) -> float:
+        """When the line may be used next; not before `now`."""
+        return self._share.ready_at(now) if self._probing.anyone_online else now
+
+    def spend(self, taken: float, now: float) -> None:
+        """Note that `taken` s of the line were used."""
+        if self._probing.anyone_online:
+            self._share.spend(taken, now)
+
+
 class Probing:
     """The offline devices of one line; `now` is the line's clock at the beginning."""
 
@@ -70,6 +91,11 @@ class Probing:
             return None
         self.next_at = self._allowed_at(device, ready)
         return device if self.next_at <= now else None
+
+    @property
+    def account(self) -> ProbeAccount:
+        """The share of probes, for jobs that probe too."""
+        return ProbeAccount(self, self._share)
 
     def spend(self, device: Device, taken: float, now: float) -> None:
         """Note that a probe of `device` took `taken` s of the line."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -88,7 +88,8 @@ class Service:
         if self._ending:
             self._end(ticket, whence, rejected("cancelled", "the daemon is ending"))
             return
-        perform = self._requests[ticket.name].perform(ticket.parameters, self._powers, ticket.call)
+        call = replace(ticket.call, topic=whence.topic, correlation=whence.correlation)
+        perform = self._requests[ticket.name].perform(ticket.parameters, self._powers, call)
         task = asyncio.create_task(perform, name=f"request {ticket.name}")
         self._running.add(task)
         task.add_done_callback(partial(self._performed, ticket, whence))
@@ -112,6 +113,20 @@ class Service:
         log.log(level, "request %s: %s", ticket.name, _in_short(answer))
         for call, where in ((ticket.call, whence), *repeats):
             self._tell(where, call, answer, ticket.memory.took)
+
+    def recall(self, name: str, call: Call, answer: Answer | None, *, forget_in: float, tell: bool = False) -> None:
+        """Remember a request of an earlier life of the daemon for its repeats, for `forget_in` s.
+
+        Without an answer they wait for it. `tell`: the request itself is answered too, where `call` says.
+        """
+        repeats = self._admission.recall(name, call, answer, asyncio.get_running_loop().time() + forget_in)
+        if answer is None:
+            return
+        if tell:
+            topic = call.topic or f"response/{name}"
+            self._tell(_Whence(topic, call.correlation, name), call, answer, 0.0)
+        for again, where in repeats:
+            self._tell(where, again, answer, 0.0)
 
     def _log_answered(self, name: str, answer: Answer, now: float) -> None:
         """Log a request that was answered at once; of a flood only that there is one."""

@@ -60,6 +60,22 @@ class Again:
 Next: TypeAlias = Later | Again | Done
 
 
+class Account(Protocol):
+    """What holds a job to its part of the line's time; see `lfs10d.share.Share`."""
+
+    def allows(self, now: float) -> bool:
+        """Whether the line may be used now."""
+        ...
+
+    def ready_at(self, now: float) -> float:
+        """When the line may be used next; not before `now`."""
+        ...
+
+    def spend(self, taken: float, now: float) -> None:
+        """Note that `taken` s of the line were used."""
+        ...
+
+
 class Job(Protocol):
     """One thing done on the line.
 

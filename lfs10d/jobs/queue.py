@@ -14,7 +14,7 @@ from lfs10d.share import Share
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from lfs10d.jobs.job import Hold, Job
+    from lfs10d.jobs.job import Account, Hold, Job
 
 
 JOB_CREDIT = 0.1
@@ -28,13 +28,15 @@ class JobQueue:
         self.excluded: frozenset[int] = frozenset()
         self._waiting: list[Job] = []
         self._held: list[tuple[float, Job]] = []
-        self._shares: dict[Job, Share] = {}
+        self._shares: dict[Job, Account] = {}
         self._excluding: list[Job] = []
         self._slice: Job | None = None
 
-    def submit(self, job: Job, now: float) -> None:
-        """Take a new job."""
-        if job.share < 1:
+    def submit(self, job: Job, now: float, account: Account | None = None) -> None:
+        """Take a new job; with an account the line time it takes goes there, else to a share of its own."""
+        if account is not None:
+            self._shares[job] = account
+        elif job.share < 1:
             self._shares[job] = Share(job.share, credit=JOB_CREDIT, now=now)
         if job.excludes:
             self._excluding.append(job)

@@ -81,12 +81,12 @@ async def add(parameters: NewDevice, powers: Powers, call: Call) -> Answer:
     """Poll one more slave; with `probe` only if it answers."""
     try:
         profile = await _profile(parameters.profile, powers.effective())
-        _check_new(parameters, profile, powers.effective())
+        _check_new(parameters, profile, powers.effective(), powers.reserved())
         if parameters.probe:
             await _knock(parameters.slave, profile, powers)
 
         def edit(now: Effective) -> Changes:
-            _check_new(parameters, profile, now)
+            _check_new(parameters, profile, now, powers.reserved())
             place = Place(parameters.slave) if parameters.probe else None
             return now.changes.adding(parameters.device, parameters.entry, place)
 
@@ -116,7 +116,7 @@ async def _profile(word: str, now: Effective) -> Profile:
     raise refuse("invalid_param", message, param="profile")
 
 
-def _check_new(wanted: NewDevice, profile: Profile, now: Effective) -> None:
+def _check_new(wanted: NewDevice, profile: Profile, now: Effective, reserved: Mapping[int, str]) -> None:
     """Raise RefusedError if there cannot be such a device."""
     config = now.config
     slave = inherited(SlaveConfig.model_construct(name=wanted.device, **wanted.entry), config.poll)
@@ -127,6 +127,8 @@ def _check_new(wanted: NewDevice, profile: Profile, now: Effective) -> None:
     for other in config.slaves:
         if any(wanted.slave == place.id for place in (Place(other.id), *now.places[other.name])):
             raise refuse("address_in_use", f"slave id {wanted.slave} is that of {other.name}", param="slave")
+    if wanted.slave in reserved:
+        raise refuse("address_in_use", f"slave id {wanted.slave} {reserved[wanted.slave]}", param="slave")
     if now.slave(wanted.device) is not None or now.changes.of(wanted.device).added is not None:
         default = "" if wanted.name else "the default "
         message = f"name: {default}{wanted.device} is taken; give it another name"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine
+    from collections.abc import Callable, Coroutine, Mapping
 
     from lfs10d.admission import Form
     from lfs10d.changes import Changes
@@ -83,6 +83,14 @@ class Powers(Protocol):
 
     async def access(self, what: RegisterRequest, device: SlaveConfig | None) -> Access:
         """Read or write registers of a configured device, or of a slave that is not; return the job that is over."""
+        ...
+
+    def reserved(self) -> Mapping[int, str]:
+        """Return the slave ids that no device may be given now, with the reason: `is reserved by ...`."""
+        ...
+
+    async def readdress(self, device: str, to: int, *, dry_run: bool, call: Call) -> Answer:
+        """Give a sensor another slave id, verified on the line; with `dry_run` only find out whether it could be."""
         ...
 
     async def reload(self) -> dict[str, list[str]]:

@@ -11,6 +11,7 @@ import pytest
 
 from lfs10d.admission import Admission, Answered, Ticket
 from lfs10d.changefile import ChangeFile
+from lfs10d.commands import ok
 from lfs10d.configfile import load
 from lfs10d.disk import Disk
 from lfs10d.forgetful import ForgetfulFiles
@@ -58,6 +59,13 @@ class FakePowers:
         self.disk = ForgetfulFiles()
         self.file = file
         self.start()
+
+    def reserved(self) -> dict[int, str]:
+        return {77: "is reserved by the open change of slave-3"}
+
+    async def readdress(self, device: str, to: int, *, dry_run: bool, call: Call) -> Answer:
+        self.done.append(("readdress", device, to, dry_run, call.id))
+        return ok({"device": device})
 
     def start(self) -> None:
         """Begin anew, as a daemon does."""

@@ -1,0 +1,217 @@
+"""The journal of physical changes: what is about to be written to a sensor is on the disk before its first byte is.
+
+One small file, replaced as a whole at each step. A change stays in it until every sensor it touched was found again
+and the configuration says where. With it lie the answers to physical changes, so that a request which is repeated
+after a restart is answered and not carried out once more.
+
+A file that cannot be understood (damaged, of a newer lfs10d) is put aside and reported.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from lfs10d.errors import StateError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from lfs10d.disk import Disk
+
+FILE_NAME = "journal.json"
+ASIDE = "journal.json.unreadable"
+"""Where a file that cannot be understood is put; the last one is kept."""
+VERSION: Literal[1] = 1
+REMEMBERED = 256
+"""Answers that are kept, the newest."""
+REMEMBERED_FOR_MS = 24 * 3600 * 1000
+"""How long an answer is kept."""
+
+Kind: TypeAlias = Literal["readdress", "baudrate", "adopt"]
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+
+class Spot(_Record):
+    """Where a sensor answers: by this slave id, at this rate in baud."""
+
+    slave: int
+    baudrate: int
+
+
+class Move(_Record):
+    """One sensor that is to answer elsewhere; `register` is what its id register said before (None: not asked)."""
+
+    device: str
+    old: Spot
+    new: Spot
+    register_before: int | None = None
+
+
+class Asked(_Record):
+    """The request a change was asked by: its name, id and content, and where its answer goes (correlation in hex)."""
+
+    name: str
+    id: str | int | None = None
+    transaction: str | int | None = None
+    fingerprint: str = ""
+    topic: str | None = None
+    correlation: str | None = None
+
+    @property
+    def key(self) -> str | int | None:
+        """What tells a repeat."""
+        return self.transaction if self.id is None else self.id
+
+
+class OpenChange(_Record):
+    """A change that may have been written. `begun` is in epoch milliseconds.
+
+    `answered`: its request has its answer, and the sensors are followed until they are found. `facts` is what the
+    kind of change needs besides to be finished.
+    """
+
+    number: int
+    kind: Kind
+    moves: tuple[Move, ...]
+    begun: int
+    asked: Asked | None = None
+    answered: bool = False
+    facts: dict[str, Any] = {}
+
+    @property
+    def slaves(self) -> frozenset[int]:
+        """Every slave id that one of its sensors may have."""
+        return frozenset(spot.slave for move in self.moves for spot in (move.old, move.new))
+
+    @property
+    def devices(self) -> frozenset[str]:
+        """The names of its sensors."""
+        return frozenset(move.device for move in self.moves)
+
+
+class Told(_Record):
+    """An answer that was given: `status`, `data` and `error` as in the response, at `at` in epoch milliseconds."""
+
+    asked: Asked
+    status: Literal["ok", "rejected", "failed"]
+    data: Any = None
+    error: dict[str, Any] | None = None
+    at: int
+    took_ms: float = 0.0
+
+
+class _Content(_Record):
+    version: Literal[1] = VERSION
+    last_number: int = 0
+    changes: tuple[OpenChange, ...] = ()
+    answers: tuple[Told, ...] = ()
+
+
+class Journal:
+    """The journal in one state directory. Used by one caller at a time; every step is on the disk when it returns.
+
+    A step that cannot be put on the disk raises StateError, and nothing has happened then.
+    """
+
+    def __init__(self, directory: Path, disk: Disk) -> None:
+        self.path = directory / FILE_NAME
+        self._disk = disk
+        self._content = _Content()
+        self._unread: str | None = None
+
+    def take(self) -> str | None:
+        """Read it, once, at the start; return what is wrong with it, in words. Never fails."""
+        try:
+            content = self._disk.read(self.path)
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            self._unread = f"{self.path} cannot be read: {error.strerror}"
+            return f"{self._unread}; whether a sensor was being moved is not known"
+        try:
+            self._content = _Content.model_validate_json(content)
+        except ValidationError:
+            aside = self.path.with_name(ASIDE)
+            trouble = f"{self.path} is damaged, or a newer lfs10d wrote it"
+            with contextlib.suppress(OSError):
+                self._disk.put_aside(self.path, aside)
+                return f"{trouble}; it is now {aside}. If a sensor is missing, look for it: lfs10d scan PORT"
+            self._unread = trouble
+            return trouble
+        return None
+
+    @property
+    def open(self) -> tuple[OpenChange, ...]:
+        """The changes that are neither finished nor undone, the oldest first."""
+        return self._content.changes
+
+    @property
+    def answers(self) -> tuple[Told, ...]:
+        """The answers that were given, the oldest first."""
+        return self._content.answers
+
+    def reserved(self) -> frozenset[int]:
+        """Return every slave id at which a sensor of an open change may appear."""
+        return frozenset().union(*(change.slaves for change in self.open))
+
+    def intend(
+        self, kind: Kind, moves: tuple[Move, ...], begun: int, asked: Asked | None, **facts: object
+    ) -> OpenChange:
+        """Note that these sensors are about to be moved; when this returns the first byte may be sent."""
+        number = self._content.last_number + 1
+        change = OpenChange(number=number, kind=kind, moves=moves, begun=begun, asked=asked, facts=facts)
+        self._save(last_number=number, changes=(*self.open, change))
+        return change
+
+    def amend(self, number: int, moves: tuple[Move, ...], **facts: object) -> None:
+        """Note which sensors of a change are still to be found, and what else there is to know."""
+
+        def amended(change: OpenChange) -> OpenChange:
+            return change.model_copy(update={"moves": moves, "facts": {**change.facts, **facts}})
+
+        self._save(changes=self._with(number, amended))
+
+    def keep(self, number: int, told: Told | None) -> None:
+        """Note that a change stays open, and the answer its request was given."""
+        changes = self._with(number, lambda change: change.model_copy(update={"answered": True}))
+        self._save(changes=changes, answers=self._answers(told))
+
+    def close(self, numbers: frozenset[int], told: Told | None = None) -> None:
+        """Note that these changes are finished or undone, and the answer that is given with that."""
+        changes = tuple(change for change in self.open if change.number not in numbers)
+        answers = self._answers(told)
+        if (changes, answers) != (self.open, self.answers):
+            self._save(changes=changes, answers=answers)
+
+    def _with(self, number: int, amended: Callable[[OpenChange], OpenChange]) -> tuple[OpenChange, ...]:
+        return tuple(amended(change) if change.number == number else change for change in self.open)
+
+    def _answers(self, told: Told | None) -> tuple[Told, ...]:
+        if told is None or told.asked.key is None:
+            return self.answers
+        kept = [each for each in self.answers if each.at > told.at - REMEMBERED_FOR_MS]
+        return (*kept[-REMEMBERED + 1 :], told)
+
+    def _save(self, **changed: object) -> None:
+        if self._unread is not None:
+            raise StateError(self._unread)
+        content = self._content.model_copy(update=changed)
+        try:
+            self._disk.replace(self.path, content.model_dump_json(indent=1).encode())
+        except OSError as error:
+            self._restore(content)
+            raise StateError(f"{self.path} cannot be written: {error.strerror}") from None
+        self._content = content
+
+    def _restore(self, refused: _Content) -> None:
+        """Take back what was written but, for all we know, not synced: an intent must not outlive its refusal."""
+        with contextlib.suppress(OSError):
+            if self._disk.read(self.path) == refused.model_dump_json(indent=1).encode():
+                self._disk.replace(self.path, self._content.model_dump_json(indent=1).encode())

@@ -1,0 +1,471 @@
+"""Physical changes: from the request to the journal, the line, the configuration and the answer. One at a time.
+
+The order of steps, each on the disk before the next begins: intent in the journal, write, verification, the fact in
+`changes.yaml`, the journal closed, the answer. A change that the daemon did not live to finish is followed at the
+next start until its sensor is found; its request is answered then.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from dataclasses import dataclass, field
+from functools import partial
+from math import inf
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+
+from lfs10d import assembly, findings
+from lfs10d.aside import aside
+from lfs10d.changes import Place
+from lfs10d.commands import Answer, Call, failed, rejected
+from lfs10d.errors import StateError
+from lfs10d.jobs.asking import Asking
+from lfs10d.jobs.course import Course, Now, Over, Steps
+from lfs10d.jobs.follow import follow
+from lfs10d.jobs.readdress import NOTHING_WRITTEN, Ending, Verdict, Wish, Write, readdress
+from lfs10d.journal import REMEMBERED_FOR_MS, Asked, Journal, Move, OpenChange, Spot, Told
+from lfs10d.reading import Errand
+
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable, Iterable, Mapping
+
+    from lfs10d.changes import Changes
+    from lfs10d.config import Config, SlaveConfig
+    from lfs10d.effective import Effective
+    from lfs10d.facts import Instant
+    from lfs10d.jobs.job import Job
+    from lfs10d.modbus.unanswered import Unanswered
+    from lfs10d.profiles.schema import Profile
+    from lfs10d.requests.request import Edit
+
+log = logging.getLogger(__name__)
+T = TypeVar("T")
+
+KEPT_PAUSE = 30.0
+"""After so many s a fact that could not be put on the disk is tried again."""
+
+
+class Wire(Protocol):
+    """What physical changes need of the line; see `lfs10d.line.Line`."""
+
+    @property
+    def unanswered(self) -> Unanswered:
+        """Which requests may still be answered."""
+        ...
+
+    def echo_known(self) -> bool:
+        """Whether it is known how the adapter echoes."""
+        ...
+
+    def submit(self, job: Job) -> None:
+        """Have a job done; what it calls, it calls in the line's thread."""
+        ...
+
+    def go_on(self, course: Course, answer: object) -> None:
+        """Tell a course what came of what it had done aside."""
+        ...
+
+
+class Recall(Protocol):
+    """Remembers a request of an earlier life; see `lfs10d.service.Service.recall`."""
+
+    def __call__(self, name: str, call: Call, answer: Answer | None, *, forget_in: float, tell: bool = False) -> None:
+        """Remember it for `forget_in` s; with `tell` answer it too."""
+
+
+class Talk:
+    """One course as seen from the asyncio loop: what it wants done aside, in turn."""
+
+    def __init__(self, wire: Wire) -> None:
+        self._wire = wire
+        self._loop = asyncio.get_running_loop()
+        self._wanted: asyncio.Queue[object] = asyncio.Queue()
+        self._course: Course | None = None
+
+    def begin(self, steps: Steps, clock: Now, **sides: Any) -> None:  # noqa: ANN401 - the sides of a course
+        """Have a course done on the line."""
+        self._course = Course(steps, clock, self._aside, **sides)
+        self._wire.submit(self._course)
+
+    def _aside(self, _: Course, what: object) -> None:
+        """Take over what is wanted, from the line's thread."""
+        with contextlib.suppress(RuntimeError):  # the loop is closed: we are ending
+            self._loop.call_soon_threadsafe(self._wanted.put_nowait, what)
+
+    async def wanted(self) -> object:
+        """Wait for what is wanted next, `Over` in the end."""
+        return await self._wanted.get()
+
+    def go_on(self, answer: object = None) -> None:
+        """Answer what was wanted."""
+        if self._course is not None:
+            self._wire.go_on(self._course, answer)
+
+    def halt(self) -> None:
+        """Send no new frame."""
+        if self._course is not None:
+            self._course.halt()
+
+
+@dataclass(slots=True)
+class Underway:
+    """The change that is being carried out: what is told as busy, and the slave ids it may bring into use."""
+
+    request: str
+    slaves: frozenset[int] = field(default_factory=frozenset)
+
+
+class Physical:
+    """Physical changes of one line. Used in the thread of the asyncio loop.
+
+    `running()` is the configuration that holds, `change` puts another into force; `wire()` is the line, `tell`
+    publishes an event, `recall` has a request of an earlier life of the daemon remembered, or answered.
+    """
+
+    def __init__(
+        self,
+        journal: Journal,
+        *,
+        running: Callable[[], Effective],
+        change: Callable[[Edit], Awaitable[object]],
+        wire: Callable[[], Wire],
+        tell: Callable[[str, Mapping[str, object]], None],
+        recall: Recall,
+        now: Callable[[], Instant],
+    ) -> None:
+        self._journal = journal
+        self._running = running
+        self._change = change
+        self._wire = wire
+        self._tell = tell
+        self._recall = recall
+        self._now = now
+        self._ending = False
+        self._underway: Underway | None = None
+        self._followed: dict[int, tuple[Talk, asyncio.Task[None]]] = {}
+        self._writing: asyncio.Future[Any] | None = None
+        trouble = journal.take()
+        if trouble is not None:
+            log.error("%s", trouble)
+        self._reserve()
+
+    def recall(self) -> None:
+        """Have the requests of earlier lives remembered for their repeats, and those that have no answer yet."""
+        ts = self._now().ts()
+        for told in self._journal.answers:
+            self._respond(told, max(0.0, (told.at + REMEMBERED_FOR_MS - ts) / 1000), tell=False)
+        for change in self._journal.open:
+            if change.asked is not None and not change.answered:
+                self._recall(change.asked.name, _call(change.asked), None, forget_in=inf)
+
+    def _respond(self, told: Told, forget_in: float = REMEMBERED_FOR_MS / 1000, *, tell: bool = True) -> None:
+        error = dict(told.error or {})
+        code, message = error.pop("code", None), error.pop("message", "")
+        answer = Answer(told.status, told.data, code, message, error)
+        self._recall(told.asked.name, _call(told.asked), answer, forget_in=forget_in, tell=tell)
+
+    @property
+    def underway(self) -> str | None:
+        """The name of the request that is being carried out, None if there is none."""
+        return None if self._underway is None else self._underway.request
+
+    def reserved(self) -> Mapping[int, str]:
+        """Return the slave ids that nobody may be given now, with the reason."""
+        return self._reserved
+
+    def _reserve(self) -> None:
+        reserved: dict[int, str] = {}
+        for change in self._journal.open:
+            whose = ", ".join(sorted(change.devices))
+            reserved |= dict.fromkeys(change.slaves, f"is reserved by the open change of {whose}")
+        if self._underway is not None:
+            reserved |= dict.fromkeys(self._underway.slaves, f"is about to be used by {self._underway.request}")
+        self._reserved = reserved
+
+    # -- the disk
+
+    async def _put(self, step: Callable[[], T]) -> T:
+        """Have a step of the journal done aside, after the one before it; it is not cut short."""
+        if self._writing is not None:
+            await asyncio.wait([self._writing])
+        self._writing = asyncio.ensure_future(aside(step, "journal"))
+        try:
+            return await asyncio.shield(self._writing)
+        finally:
+            self._reserve()
+
+    def _told(self, call: Asked | None, answer: Answer) -> Told | None:
+        if call is None:
+            return None
+        return Told(asked=call, status=answer.status, data=answer.data, error=answer.error(), at=self._now().ts())
+
+    # -- device/readdress
+
+    async def readdress(self, device: str, to: int, *, dry_run: bool, call: Call) -> Answer:
+        """Give a sensor another slave id, verified; see `lfs10d.jobs.readdress`."""
+        now = self._running()
+        slave = now.slave(device)
+        if slave is None:
+            names = ", ".join(other.name for other in now.config.slaves) or "none"
+            return rejected("unknown_device", f"there is no device {device}; configured are: {names}", param="device")
+        refusal = self._unfit(device, slave, to, now)
+        if refusal is not None:
+            return refusal
+        if self._underway is not None:
+            return rejected("busy", f"{self._underway.request} is being carried out; try again when it is over")
+        asked = _asked("device/readdress", call)
+        self._underway = Underway("device/readdress", frozenset({slave.id, to}))
+        self._reserve()
+        try:
+            return await self._readdress(slave, to, asked, dry_run=dry_run)
+        finally:
+            self._underway = None
+            self._reserve()
+            self.follow()
+
+    def _unfit(self, device: str, slave: SlaveConfig, to: int, now: Effective) -> Answer | None:
+        """Return why the line need not even be asked; None if it must be."""
+        profile = now.loaded.profiles[slave.profile]
+        first, last = profile.ids
+        if profile.slave_id is None:
+            return rejected("not_allowed", f"{device}: profile {profile.name} does not say how its slave id is set")
+        if not first <= to <= last:
+            return rejected("invalid_param", f"to: must be {first} to {last} for {profile.name}", param="to")
+        if device in now.conflicts:
+            return rejected("not_allowed", f"{device}: {now.conflicts[device]}")
+        for other in now.config.slaves:
+            if to in {other.id, *(place.id for place in now.places[other.name])}:
+                return rejected("address_in_use", f"slave id {to} is that of {other.name}", param="to")
+        own = frozenset().union(*(each.slaves for each in self._journal.open if device in each.devices))
+        if to in self._reserved and to not in own:
+            return rejected("address_in_use", f"slave id {to} {self._reserved[to]}", param="to")
+        return None
+
+    def _asking(self, slave: SlaveConfig, clock: Now) -> Asking:
+        now = self._running()
+        alone = now.config.model_copy(update={"slaves": (slave,)})
+        (spec,) = assembly.device_specs(alone, now.loaded.profiles)
+        return Asking(spec.profile, spec.codec, self._wire().unanswered, clock, line_rate=now.config.line.baudrate)
+
+    async def _readdress(self, slave: SlaveConfig, to: int, asked: Asked, *, dry_run: bool) -> Answer:
+        now = self._running()
+        profile, rate = now.loaded.profiles[slave.profile], now.config.line.baudrate
+        rates = tuple(profile.baudrate.codes) if profile.baudrate else ()
+        wish = Wish(Spot(slave=slave.id, baudrate=rate), to, rates, dry_run)
+        await self._leave(slave.name)
+        clock = Now()
+        talk = Talk(self._wire())
+        steps = readdress(wish, self._asking(slave, clock), self._wire().echo_known)
+        change: OpenChange | None = None
+        try:
+            talk.begin(steps, clock, line_rate=rate, excludes=frozenset({slave.id, to}))
+            while not isinstance(what := await talk.wanted(), Over):
+                if isinstance(what, Write):
+                    why = None
+                    try:
+                        change = await self._put(partial(self._intend, slave.name, what, asked))
+                    except StateError as error:
+                        why = str(error)
+                    talk.go_on(why)
+            verdict = what.result or Verdict(Ending.LOST_BEFORE)
+            return await self._conclude(slave.name, wish, verdict, change, asked, profile)
+        except asyncio.CancelledError:
+            talk.halt()
+            return await self._cut_short(asked)
+        finally:
+            talk.go_on()
+
+    def _intend(self, device: str, write: Write, asked: Asked) -> OpenChange:
+        move = Move(device=device, old=write.old, new=write.new, register_before=write.register_before)
+        return self._journal.intend("readdress", (move,), self._now().ts(), asked)
+
+    async def _conclude(
+        self, device: str, wish: Wish, verdict: Verdict, change: OpenChange | None, asked: Asked, profile: Profile
+    ) -> Answer:
+        """Put on the disk what came of it; return the answer."""
+        answer = findings.readdressed(device, wish, verdict, profile)
+        told = self._told(asked, answer)
+        if change is None or verdict.ending in NOTHING_WRITTEN:
+            with contextlib.suppress(StateError):  # nothing changed: a repeat may be judged anew
+                await self._put(partial(self._journal.close, frozenset(), told))
+            return answer
+        try:
+            if verdict.ending is Ending.MOVED:
+                await self._record(device, wish.new)
+                await self._put(partial(self._journal.close, self._changes_of(device), told))
+                self._tell_moved(device, wish.old, wish.new)
+            elif verdict.stays_open:
+                if verdict.ending is Ending.PENDING:
+                    await self._put(partial(self._journal.close, self._changes_of(device) - {change.number}, None))
+                await self._put(partial(self._journal.keep, change.number, told))
+            else:
+                await self._put(partial(self._journal.close, frozenset({change.number}), told))
+        except StateError as error:
+            if verdict.ending is Ending.MOVED:
+                message = f"{device} answers at slave id {wish.to} now, but that cannot be kept: {error}"
+                return failed("storage_full", message, data=answer.data)
+            log.warning("%s", error)
+        if verdict.ending in (Ending.BOTH, Ending.GARBAGE):
+            self._tell("duplicate_id", {"device": device, "slave": wish.to, "from": wish.old.slave})
+        return answer
+
+    def _changes_of(self, device: str) -> frozenset[int]:
+        return frozenset(change.number for change in self._journal.open if device in change.devices)
+
+    async def _record(self, device: str, spot: Spot) -> None:
+        """Have the device polled where it was found, on the disk first."""
+
+        def edit(now: Effective) -> Changes:
+            if now.slave(device) is None:
+                return now.changes
+            return now.changes.moving(device, Place(spot.slave), now.said)
+
+        await self._change(edit)
+
+    def _tell_moved(self, device: str, old: Spot, new: Spot) -> None:
+        log.info("%s answers at slave id %d now, not at %d any more", device, new.slave, old.slave)
+        self._tell("readdressed", {"device": device, "from": old.slave, "to": new.slave})
+
+    async def _cut_short(self, asked: Asked) -> Answer:
+        """Answer a request that the daemon's end cuts short; what it began is settled at the next start."""
+        if self._writing is not None:
+            await asyncio.wait([self._writing])
+        mine = next((each for each in self._journal.open if each.asked == asked and not each.answered), None)
+        if mine is None:
+            return rejected("cancelled", "the daemon is ending; nothing was written")
+        answer = failed("cancelled", "the daemon is ending; at its next start it looks where the sensor is")
+        with contextlib.suppress(StateError):
+            await self._put(partial(self._journal.keep, mine.number, self._told(asked, answer)))
+        return answer
+
+    # -- changes that are open
+
+    def follow(self) -> None:
+        """Look for the sensors of every open change that nobody looks for now."""
+        if self._ending:
+            return
+        busy = frozenset() if self._underway is None else self._underway.slaves
+        for change in self._journal.open:
+            if change.number not in self._followed and not change.slaves & busy:
+                talk = Talk(self._wire())
+                task = asyncio.create_task(self._follow(change, talk), name=f"follow {change.number}")
+                task.add_done_callback(partial(self._left, change.number))
+                self._followed[change.number] = talk, task
+
+    def _left(self, number: int, task: asyncio.Task[None]) -> None:
+        if self._followed.get(number, (None, None))[1] is task:
+            del self._followed[number]
+        if not task.cancelled() and (mistake := task.exception()) is not None:
+            log.error("an open change could not be followed, by a mistake of ours", exc_info=mistake)
+
+    async def _leave(self, device: str) -> None:
+        """Stop looking for a sensor of which more is to be written."""
+        for number in self._changes_of(device) & set(self._followed):
+            talk, task = self._followed.pop(number)
+            talk.halt()
+            talk.go_on()
+            task.cancel()
+
+    async def _follow(self, change: OpenChange, talk: Talk) -> None:
+        (move,) = change.moves
+        slave = self._running().slave(move.device)
+        if slave is None:
+            await self._drop(change, f"{move.device} is no longer configured")
+            return
+        now = self._running()
+        clock = Now()
+        steps = follow(move.old, move.new, self._asking(slave, clock), longest_pause=now.config.poll.probe_interval_max)
+        talk.begin(steps, clock, line_rate=now.config.line.baudrate, share=1.0, errand=Errand.PROBE)
+        try:
+            while not isinstance(what := await talk.wanted(), Over):
+                if isinstance(what, Verdict):
+                    change = await self._seen(change, move, what, now.loaded.profiles[slave.profile])
+                talk.go_on()
+            if what.result is not None:
+                await self._found(change, move, what.result, now.loaded.profiles[slave.profile])
+        except StateError as error:
+            log.warning("%s", error)
+            await asyncio.sleep(KEPT_PAUSE)
+            asyncio.get_running_loop().call_soon(self.follow)
+        finally:
+            talk.go_on()
+
+    async def _seen(self, change: OpenChange, move: Move, verdict: Verdict, profile: Profile) -> OpenChange:
+        """Answer the request of a change that is not settled by the first look."""
+        if verdict.ending in (Ending.BOTH, Ending.GARBAGE):
+            self._tell("duplicate_id", {"device": move.device, "slave": move.new.slave, "from": move.old.slave})
+        if change.answered:
+            return change
+        told = self._told(change.asked, findings.readdressed(move.device, _wish(move), verdict, profile))
+        await self._put(partial(self._journal.keep, change.number, told))
+        if told is not None:
+            self._respond(told)
+        return change.model_copy(update={"answered": True})
+
+    async def _found(self, change: OpenChange, move: Move, verdict: Verdict, profile: Profile) -> None:
+        """Finish a change whose sensor was found."""
+        if verdict.ending is Ending.MOVED:
+            answer = findings.readdressed(move.device, _wish(move), verdict, profile)
+            await self._record(move.device, move.new)
+            await self._close(self._changes_of(move.device), change, answer)
+            self._tell_moved(move.device, move.old, move.new)
+        else:
+            why = f"{move.device} answers at slave id {move.old.slave}, and its register does not say {move.new.slave}"
+            await self._drop(change, why)
+
+    async def _drop(self, change: OpenChange, why: str) -> None:
+        """Undo a change that did not take effect."""
+        message = f"{why}: the change is dropped"
+        await self._close(frozenset({change.number}), change, failed("cancelled", f"the daemon ended; {message}"))
+        log.warning("%s", message)
+        for move in change.moves:
+            facts = {"device": move.device, "from": move.old.slave, "to": move.new.slave}
+            self._tell("change_dropped", {"key": f"slaves.{move.device}.id", **facts, "message": message})
+
+    async def _close(self, numbers: Iterable[int], change: OpenChange, answer: Answer) -> None:
+        told = None if change.answered else self._told(change.asked, answer)
+        await self._put(partial(self._journal.close, frozenset(numbers), told))
+        if told is not None:
+            self._respond(told)
+
+    # -- what else happens
+
+    async def reconfigured(self, before: Config, after: Config) -> None:
+        """Take note of another configuration: the open changes of devices that are no more are closed."""
+        devices = {slave.name for slave in before.slaves} - {slave.name for slave in after.slaves}
+        for change in self._journal.open:
+            if change.devices <= devices:
+                for device in change.devices:
+                    await self._leave(device)
+                with contextlib.suppress(StateError):
+                    await self._drop(change, f"{', '.join(sorted(change.devices))} was removed")
+
+    async def stop(self) -> None:
+        """Send no new frame of any change."""
+        self._ending = True
+        for talk, task in self._followed.values():
+            talk.halt()
+            task.cancel()
+        if self._writing is not None:
+            await asyncio.wait([self._writing])
+
+
+def _asked(name: str, call: Call) -> Asked:
+    return Asked(
+        name=name,
+        id=call.id,
+        transaction=call.transaction,
+        fingerprint=call.fingerprint,
+        topic=call.topic,
+        correlation=None if call.correlation is None else call.correlation.hex(),
+    )
+
+
+def _call(asked: Asked) -> Call:
+    correlation = None if asked.correlation is None else bytes.fromhex(asked.correlation)
+    return Call(asked.id, asked.transaction, fingerprint=asked.fingerprint, topic=asked.topic, correlation=correlation)
+
+
+def _wish(move: Move) -> Wish:
+    return Wish(move.old, move.new.slave, ())

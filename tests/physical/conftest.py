@@ -1,0 +1,245 @@
+"""A daemon's inside in virtual time: a simulated line, the poller, the configuration, the journal; and power cuts.
+
+The disk forgets what was not synced. A life ends with `cut`, at any step on the disk and between any two exchanges; the
+next one begins with what is on the disk. What blocks is called at once, so that a run can be repeated exactly.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import pytest
+
+from lfs10d import assembly
+from lfs10d.changefile import ChangeFile
+from lfs10d.commands import Answer, Call
+from lfs10d.configfile import load
+from lfs10d.disk import Disk
+from lfs10d.facts import Instant
+from lfs10d.forgetful import ForgetfulFiles, PowerCutError
+from lfs10d.journal import Journal
+from lfs10d.modbus.bus import Bus, Wait
+from lfs10d.modbus.exchange import Echo
+from lfs10d.modbus.settings import PortSettings
+from lfs10d.physical import Physical
+from lfs10d.poller import Poller
+from lfs10d.reading import Event, PortChanged, Reading
+from lfs10d.running import Running
+from lfs10d.schedule import Schedule
+from lfs10d.simulator.line import SimulatedLine
+from lfs10d.simulator.port import SimulatedPort, VirtualClock, run
+from lfs10d.simulator.sensor import Sensor
+from lfs10d.simulator.wire import Format
+
+if TYPE_CHECKING:
+    from collections.abc import Awaitable, Callable, Iterator, Mapping
+
+    from lfs10d.effective import Effective
+    from lfs10d.jobs.course import Course
+    from lfs10d.jobs.job import Job
+    from lfs10d.modbus.unanswered import Unanswered
+    from lfs10d.reload import Plan
+    from lfs10d.running import Edit
+
+T = TypeVar("T")
+STATE = Path("/state")
+STEP = 0.05
+"""The line goes on by so much at a time, in s."""
+EPOCH = 1_700_000_000.0
+
+
+class Wire:
+    """The line as physical changes see it, called in turns."""
+
+    def __init__(self, poller: Poller) -> None:
+        self.poller = poller
+
+    @property
+    def unanswered(self) -> Unanswered:
+        return self.poller.schedule.unanswered
+
+    def echo_known(self) -> bool:
+        return self.poller.bus.echo is not Echo.UNKNOWN
+
+    def submit(self, job: Job) -> None:
+        self.poller.submit(job)
+
+    def go_on(self, course: Course, answer: object) -> None:
+        def tell(now: float) -> None:
+            course.go_on(answer)
+            self.poller.schedule.wake(course, now)
+
+        self.poller.post(tell)
+
+
+@dataclass
+class Life:
+    """One life of the daemon."""
+
+    bench: Bench
+    running: Running = field(init=False)
+    poller: Poller = field(init=False)
+    physical: Physical = field(init=False)
+    events: list[tuple[str, Mapping[str, object]]] = field(default_factory=list)
+    readings: list[Reading] = field(default_factory=list)
+    answers: list[Answer] = field(default_factory=list)
+    """Told to requests of an earlier life."""
+
+    def __post_init__(self) -> None:
+        bench = self.bench
+        disk = Disk(bench.files)
+        self.running = Running(load(bench.file), ChangeFile(STATE, disk), self._take)
+        config, profiles = self.running.now.polled, self.running.loaded.profiles
+        bench.port = SimulatedPort(bench.line, bench.clock, assembly.port_settings(config.line), echo=bench.echo)
+        bus = Bus(bench.port, assembly.line_rules(config.line), bench.clock)
+        schedule = Schedule(assembly.line_timing(config.line), bench.clock.now)
+        schedule.replace(
+            assembly.device_specs(config, profiles), assembly.poll_rules(config.poll), bench.clock.now
+        )  # fmt: skip
+        self.poller = Poller(bus, schedule, self._heard, bench.clock)
+        self.physical = Physical(
+            Journal(STATE, disk),
+            running=lambda: self.running.now,
+            change=self._change,
+            wire=lambda: Wire(self.poller),
+            tell=lambda kind, facts: self.events.append((kind, facts)),
+            recall=self._recall,
+            now=lambda: Instant(bench.clock.now, EPOCH + bench.clock.now, "synced"),
+        )
+        self.physical.recall()
+
+    def _recall(self, _: str, __: Call, answer: Answer | None, *, forget_in: float, tell: bool = False) -> None:
+        del forget_in
+        if tell and answer is not None:
+            self.answers.append(answer)
+
+    async def _take(self, plan: Plan, before: Effective) -> None:
+        now = self.running.now
+        if plan.line:
+            self.poller.reconfigure(assembly.port_settings(now.config.line), assembly.line_rules(now.config.line))
+        self.poller.replace(
+            assembly.device_specs(now.polled, now.loaded.profiles), assembly.poll_rules(now.config.poll)
+        )  # fmt: skip
+        await self.physical.reconfigured(before.config, now.config)
+
+    async def _change(self, edit: Edit) -> object:
+        return await self.running.change(edit)
+
+    def _heard(self, events: list[Event]) -> None:
+        self.readings += [event for event in events if isinstance(event, Reading)]
+        if any(isinstance(event, PortChanged) and event.fault is None for event in events):
+            self.bench.loop.call_soon(self.physical.follow)
+
+    def place(self, device: str) -> int:
+        """Return where the configuration has a device."""
+        slave = self.running.now.slave(device)
+        assert slave is not None
+        return slave.id
+
+    def told(self, kind: str) -> list[Mapping[str, object]]:
+        """Return the events of a kind."""
+        return [facts for each, facts in self.events if each == kind]
+
+
+class Bench:
+    """A line with sensors, a file, a disk; one daemon after the other."""
+
+    def __init__(self, folder: Path, loop: asyncio.AbstractEventLoop) -> None:
+        self.loop = loop
+        self.clock = VirtualClock()
+        self.files = ForgetfulFiles()
+        self.file = folder / "lfs10d.yaml"
+        self.line = SimulatedLine()
+        self.port = SimulatedPort(self.line, self.clock, PortSettings("/dev/simulated", 9600))
+        self.echo = False
+        self._tasks: set[asyncio.Task[Any]] = set()
+
+    def sensors(
+        self, *slaves: int, names: bool = True, baudrate: int = 9600, poll: str = "{interval: 1s}", echo: bool = False
+    ) -> Life:
+        """Put sensors on the line, configure them as `s<id>`, and begin a life."""
+        self.echo = echo
+        self.line = SimulatedLine([Sensor(slave, format=Format(baudrate)) for slave in slaves], format=Format(baudrate))
+        entries = ", ".join(f"{{id: {slave}, name: s{slave}}}" for slave in slaves) if names else ""
+        self.file.write_text(
+            f"line: {{port: /dev/simulated, baudrate: {baudrate}}}\npoll: {poll}\nslaves: [{entries}]\n"
+            "mqtt: {host: localhost}\n"
+        )
+        return self.begin()
+
+    def begin(self) -> Life:
+        """Begin a life with what is on the disk."""
+
+        async def born() -> Life:
+            return Life(self)
+
+        return self.loop.run_until_complete(born())
+
+    def go(self, life: Life, seconds: float) -> None:
+        """Let the line and the loop go on, in turns."""
+        until = self.clock.now + seconds
+        while self.clock.now < until:
+            self.turn(life)
+
+    def turn(self, life: Life) -> None:
+        """Let the line go on a little, and then the loop."""
+        self.port.line = self.line
+        run(life.poller.turn, self.port, self.clock, self.clock.now + STEP)
+        self.pump()
+
+    def pump(self) -> None:
+        """Let the loop do what can be done now; raises what ended a task by mistake."""
+
+        async def turns() -> None:
+            for _ in range(12):
+                await asyncio.sleep(0)
+
+        self.loop.run_until_complete(turns())
+
+    def ask(self, life: Life, coroutine: Awaitable[Answer], *, within: float = 120.0) -> Answer:
+        """Let everything go on until a request is answered."""
+        task = asyncio.ensure_future(coroutine, loop=self.loop)
+        until = self.clock.now + within
+        while not task.done():
+            assert self.clock.now < until, f"no answer within {within} s"
+            self.turn(life)
+        return task.result()
+
+    def readdress(self, life: Life, device: str, to: int, *, dry_run: bool = False, id: str = "a1") -> Answer:  # noqa: A002
+        """Ask for another slave id and wait for the answer."""
+        return self.ask(life, life.physical.readdress(device, to, dry_run=dry_run, call=Call(id)))
+
+    def cut(self, *surviving: Path) -> None:
+        """Cut the gateway's power: everything that ran is gone, and of the files what was not synced."""
+        for task in asyncio.all_tasks(self.loop):
+            task.cancel()
+        self.files.steps_left = 0  # nothing more comes onto this disk
+        self.pump()
+        self.files.power_cut(surviving)
+        self.port.close()
+
+
+@pytest.fixture
+def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
+    async def at_once(call: Callable[[], T], name: str) -> T:
+        del name
+        return call()
+
+    for module in ("physical", "running"):
+        monkeypatch.setattr(f"lfs10d.{module}.aside", at_once)
+    loop = asyncio.new_event_loop()
+    loop.set_exception_handler(_mistake)
+    made = Bench(tmp_path, loop)
+    yield made
+    for task in asyncio.all_tasks(loop):
+        task.cancel()
+    made.pump()
+    loop.close()
+
+
+def _mistake(_: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    if not isinstance(context.get("exception"), PowerCutError):
+        raise AssertionError(context)

@@ -1,0 +1,62 @@
+"""`device/readdress` on a whole line in virtual time: every way a sensor can take it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+if TYPE_CHECKING:
+    from tests.physical.conftest import Bench
+
+
+@pytest.mark.parametrize("echo", [False, True])
+@pytest.mark.parametrize("manner", [None, "at_once", "echo_losing", "slow_flash", "late"])
+def test_a_sensor_that_obeys_is_moved_and_polled_at_its_new_id(bench: Bench, manner: str | None, echo: bool) -> None:  # noqa: FBT001
+    life = bench.sensors(3, 4, echo=echo)
+    bench.go(life, 5.0)
+    if manner:
+        bench.line.sensor(3).ail(manner)
+    answer = bench.readdress(life, "s3", 9)
+    assert (answer.status, answer.code, answer.data) == ("ok", None, {"device": "s3", "from": 3, "to": 9})
+    assert {sensor.slave for sensor in bench.line.sensors} == {9, 4}
+    assert life.place("s3") == 9
+    assert life.told("readdressed") == [{"device": "s3", "from": 3, "to": 9}]
+    assert not life.physical.reserved()
+    bench.line.sensor(9).heal()
+    before = len(life.readings)
+    bench.go(life, 10.0)
+    after = [reading for reading in life.readings[before:] if reading.device == "s3"]
+    assert len([reading for reading in after if reading.values]) >= 8
+    bench.cut()
+    assert bench.begin().place("s3") == 9
+
+
+@pytest.mark.parametrize(
+    ("ailment", "particulars", "code"),
+    [
+        ("dip_locked", {"answer": "echo", "reads": "old"}, "dip_switch"),
+        ("dip_locked", {"answer": "echo", "reads": "new"}, "power_cycle_needed"),
+        ("dip_locked", {"answer": "exception", "reads": "old", "code": 3}, "refused"),
+        ("dip_locked", {"answer": "exception", "reads": "new", "code": 3}, "refused"),
+        ("stores_but_ignores", {}, "power_cycle_needed"),
+        ("power_cycle", {}, "power_cycle_needed"),
+    ],
+)
+def test_one_that_does_not_obey_stays_and_the_answer_says_why(
+    bench: Bench, ailment: str, particulars: dict[str, Any], code: str
+) -> None:
+    life = bench.sensors(3, 4)
+    bench.line.sensor(3).ail(ailment, **particulars)
+    bench.go(life, 5.0)
+    answer = bench.readdress(life, "s3", 9)
+    assert (answer.status, answer.code) == ("failed", code)
+    error = answer.error()
+    assert error is not None
+    assert error.get("exception_code") == particulars.get("code")
+    assert life.place("s3") == 3
+    reads_new = bench.line.sensor(3).words[5] == 9
+    assert set(life.physical.reserved()) == ({3, 9} if reads_new else set())
+    before = len(life.readings)
+    bench.go(life, 10.0)
+    assert len([r for r in life.readings[before:] if r.device == "s3" and r.values]) >= 8
