@@ -79,7 +79,7 @@ def _device_spec(slave: SlaveConfig, line: LineConfig, profile: Profile) -> Devi
         slave=slave.id,
         profile=profile,
         codec=Codec(Framing(line.framing), Checksum(slave.checksum or profile.checksum)),
-        interval=slave.interval,
+        interval=max(slave.interval, profile.min_interval),  # 0 is as fast as the line allows, and the device
         enabled=slave.enabled,
         response_timeout=slave.response_timeout,
     )

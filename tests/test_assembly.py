@@ -82,3 +82,27 @@ def test_the_hash_tells_configurations_apart(loaded: Loaded, tmp_path: Path) -> 
     assert assembly.config_hash(load(same).config) == assembly.config_hash(loaded.config)
     assert assembly.config_hash(load(other).config) != assembly.config_hash(loaded.config)
     assert len(assembly.config_hash(loaded.config)) == 12
+
+
+@pytest.mark.parametrize(("asked", "polled"), [(0, 2.0), (2, 2.0), (3, 3.0)])
+def test_as_fast_as_the_line_allows_is_no_faster_than_the_device_does(
+    tmp_path: Path, asked: float, polled: float
+) -> None:
+    (tmp_path / "slow.yaml").write_text(
+        "{name: slow, title: Slow, min_interval: 2s, values: [{name: a, register: 1, type: uint16, unit: m}]}"
+    )
+    file = tmp_path / "lfs10d.yaml"
+    slave = f"{{id: 3, profile: slow.yaml, interval: {asked}}}"
+    file.write_text(f"line: {{port: tty}}\nslaves: [{slave}]\nmqtt: {{host: localhost}}\n")
+    config = load(file)
+    (spec,) = assembly.device_specs(config.config, config.profiles)
+    assert spec.interval == polled
+
+
+def test_registers_are_accessed_as_the_device_is_polled_or_as_the_line_usually_speaks(loaded: Loaded) -> None:
+    mast, other = loaded.config.slaves
+    known = assembly.access_target(loaded, 4, other)
+    assert (known.slave, known.codec.checksum, known.profile) == (4, Checksum.SUM, loaded.profiles["eh600"])
+    assert assembly.access_target(loaded, 3, mast).response_timeout == 0.3
+    stranger = assembly.access_target(loaded, 9, None)
+    assert (stranger.slave, stranger.codec, stranger.profile) == (9, assembly.usual_codec(loaded.config.line), None)

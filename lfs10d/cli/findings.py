@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import os
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +12,7 @@ from lfs10d.modbus.frames import EXCEPTION_NAMES, Framing
 from lfs10d.quantities import duration_text
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from lfs10d.cli.lineoptions import LineOptions
     from lfs10d.jobs.interview import Finding
@@ -70,7 +72,20 @@ def remarks(finding: Finding) -> Iterator[str]:
         yield "the factory id"
 
 
-def snippet(findings: Sequence[Finding], options: LineOptions, by_id: Path = BY_ID) -> Iterator[str]:
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """How the line was scanned: with which check, and in which files the user's own profiles lie, by their names."""
+
+    checksum: str = "crc"
+    files: Mapping[str, str] = field(default_factory=dict)
+
+
+AS_USUAL = Asked()
+
+
+def snippet(
+    findings: Sequence[Finding], options: LineOptions, by_id: Path = BY_ID, asked: Asked = AS_USUAL
+) -> Iterator[str]:
     """Yield a configuration file that polls what was found; what cannot be polled as it is stands in comments."""
     baudrate = usual_rate(findings)
     yield "line:"
@@ -89,7 +104,7 @@ def snippet(findings: Sequence[Finding], options: LineOptions, by_id: Path = BY_
     yield "slaves:" if usable else "slaves: []"
     for finding in findings:
         obstacle = _obstacle(finding, baudrate)
-        entry = _entry(finding, options)
+        entry = _entry(finding, options, asked)
         yield f"  - {entry}" if obstacle is None else f"  # - {entry}    {obstacle}"
     yield "mqtt: {host: localhost}"
 
@@ -109,10 +124,14 @@ def lasting_name(port: str, by_id: Path = BY_ID) -> str:
     return next((str(link) for link in links if os.path.realpath(link) == os.path.realpath(port)), port)
 
 
-def _entry(finding: Finding, options: LineOptions) -> str:
+def _entry(finding: Finding, options: LineOptions, asked: Asked) -> str:
     fields = [f"id: {finding.slave}"]
-    if finding.profile is not None and finding.profile.name != DEFAULT_PROFILE:
-        fields.append(f"profile: {finding.profile.name}")
+    profile = finding.profile
+    if profile is not None and profile.name != DEFAULT_PROFILE:
+        file = asked.files.get(profile.name)
+        fields.append(f"profile: {profile.name if file is None else json.dumps(file)}")  # JSON's text is YAML's too
+    if profile is not None and options.framing is Framing.RTU and asked.checksum != profile.checksum:
+        fields.append(f"checksum: {asked.checksum}")
     if options.timeout is not None:
         fields.append(f"response_timeout: {duration_text(options.timeout)}")
     return str(finding.slave) if len(fields) == 1 else f"{{{', '.join(fields)}}}"

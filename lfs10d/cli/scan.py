@@ -19,14 +19,12 @@ from lfs10d.cli.scanview import view
 from lfs10d.errors import PortBusyError, PortError
 from lfs10d.jobs.scan import Scan
 from lfs10d.jobs.search import FIRST_TIMEOUT, Search, ids_of
-from lfs10d.modbus.frames import Codec, Framing
+from lfs10d.modbus.frames import Checksum, Codec, Framing
 from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.reading import FaultCode
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-    from lfs10d.profiles.schema import Profile
 
 LOOK_EVERY = 0.1
 """How often the progress is drawn, in s."""
@@ -64,27 +62,34 @@ def _rates(context: click.Context, parameter: click.Parameter, value: str) -> tu
     help="Rates to try.",
 )
 @click.option("--profile", "profiles", multiple=True, metavar="FILE", help="A profile of your own to recognise.")
+@click.option(
+    "--checksum", type=click.Choice(["crc", "sum"]), default="crc", show_default=True, help="Of the rtu frames sent."
+)
 @line_options
 @json_option
 def command(ids: tuple[int, ...], rates: tuple[int, ...], profiles: tuple[str, ...], **options: Any) -> int:  # noqa: ANN401  # `take` types them
     """Find out who is on the line at PORT.
 
-    Asks every id at every rate; nothing is ever written to a device. The port must be free. Exit code 1 if nobody
-    answers.
+    Asks every id at every rate; nothing is ever written to a device. Devices set to the other checksum hear nothing:
+    scan once with each. The port must be free. Exit code 1 if nobody answers.
     """
-    as_json = options.pop("as_json")
+    as_json, checksum = options.pop("as_json"), options.pop("checksum")
     line = take(options)
-    known = (*(load_profile(each, relative_to=Path()) for each in profiles), *_builtin(line.framing))
+    if line.framing is Framing.ASCII and checksum != "crc":
+        raise click.UsageError("ascii frames always carry an LRC; leave --checksum out")
+    own = {file: load_profile(file, relative_to=Path()) for file in profiles}
+    known = (*own.values(), *(load_profile(name, relative_to=Path()) for name in builtin_names()))
     search = Search(
         ids,
         tuple(line.timing(rate) for rate in rates),
-        Codec(line.framing),
-        tuple(profile for profile in known if line.framing.value in profile.framings),
+        Codec(line.framing, Checksum(checksum)),
+        tuple(each for each in known if line.framing.value in each.framings and checksum in each.checksums),
         timeout=line.timeout or FIRST_TIMEOUT,
     )
     if not search.profiles:
         raise click.UsageError(f"none of these profiles speaks {line.framing.value}")
-    result = _Result(Scan(search), line)
+    asked = findings.Asked(checksum, {profile.name: file for file, profile in own.items()})
+    result = _Result(Scan(search), line, asked)
     code = _scan(result, as_json=as_json)
     if not result.opened:
         return code
@@ -95,17 +100,11 @@ def command(ids: tuple[int, ...], rates: tuple[int, ...], profiles: tuple[str, .
     return code
 
 
-def _builtin(framing: Framing) -> Iterator[Profile]:
-    for name in builtin_names():
-        profile = load_profile(name, relative_to=Path())
-        if framing.value in profile.framings:
-            yield profile
-
-
 @dataclass(slots=True)
 class _Result:
     scan: Scan
     line: LineOptions
+    asked: findings.Asked
     framing_errors: int | None = None
     opened: bool = False
 
@@ -130,7 +129,7 @@ class _Result:
             _show_table([findings.row(finding) for finding in found])
             click.echo()
             click.echo("# To poll them, save this as lfs10d.yaml, then: lfs10d run -c lfs10d.yaml")
-            for text in findings.snippet(found, self.line):
+            for text in findings.snippet(found, self.line, asked=self.asked):
                 click.echo(text)
         if found and not self.scan.noise.ids:
             return

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from lfs10d.profiles.schema import Profile
     from lfs10d.profiles.values import Setting
-    from lfs10d.simulator.wire import Check
+    from lfs10d.simulator.wire import Check, Framing
 
 Type: TypeAlias = Literal["float32", "uint16", "int16", "uint32", "int32"]
 
@@ -84,11 +84,19 @@ class Blueprint:
     """What may be written where; another value is exception 03, another register exception 02."""
     functions: frozenset[int] = frozenset({READ_HOLDING, WRITE_SINGLE})
     max_words: int = 125
+    ascii_max_data: int | None = None
+    """Data bytes of the longest ASCII answer, the byte count among them (Fuling DZB manual, appendix B)."""
     check: Check = "crc"
     id_register: int | None = None
     rate_register: int | None = None
     rate_codes: Mapping[int, int] = field(default_factory=dict)
     """Content of the rate register by baud rate."""
+
+    def most_words(self, framing: Framing) -> int:
+        """Return how many registers one read may ask for."""
+        if framing == "rtu" or self.ascii_max_data is None:
+            return self.max_words
+        return min(self.max_words, (self.ascii_max_data - 1) // _WORD)
 
 
 LFS10: Final = Blueprint(
@@ -157,6 +165,7 @@ def blueprint_of(profile: Profile) -> Blueprint:
         writable=writable,
         functions=frozenset(functions | ({WRITE_SINGLE} if writable else set())),
         max_words=profile.max_words,
+        ascii_max_data=profile.ascii_max_data,
         check=profile.checksum,
         id_register=profile.slave_id.register if profile.slave_id else None,
         rate_register=profile.baudrate.register if profile.baudrate else None,

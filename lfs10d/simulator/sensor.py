@@ -229,7 +229,7 @@ class Sensor:
     def _read(
         self, body: bytes, address: int, count: int, now: int, struck: Mapping[Kind, Ailment]
     ) -> tuple[bytes, tuple[float, ...]]:
-        if not 1 <= count <= self.blueprint.max_words:
+        if not 1 <= count <= self.blueprint.most_words(self.framing):
             return self._refuse(body, ILLEGAL_VALUE)
         values: list[float] = []
         for signal in self.blueprint.signals:

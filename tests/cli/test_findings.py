@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from lfs10d.cli.findings import lasting_name, plain, remarks, row, snippet, usual_rate, what
+from lfs10d.cli.findings import Asked, lasting_name, plain, remarks, row, snippet, usual_rate, what
 from lfs10d.cli.lineoptions import LineOptions
 from lfs10d.configfile import load
 from lfs10d.jobs.interview import Finding
@@ -97,6 +97,14 @@ def test_the_snippet_is_a_valid_file_that_polls_what_can_be_polled(tmp_path: Pat
     assert (config.line.baudrate, config.line.parity, config.line.databits) == (19200, "even", 7)
     assert (config.line.stopbits, config.line.framing) == (2, "ascii")
     assert [(slave.id, slave.profile, slave.response_timeout) for slave in config.slaves] == [(4, "ld-e", 0.5)]
+
+
+def test_a_profile_of_ones_own_is_named_by_its_file_and_another_check_by_its_key() -> None:
+    eh600 = load_profile("eh600", relative_to=Path())
+    found = [Finding(4, 9600, answers=True, profile=eh600), Finding(5, 9600, answers=True, profile=LD_E)]
+    lines = list(snippet(found, RTU, Path("/nowhere"), Asked("sum", {"ld-e": "my, laser.yaml"})))
+    assert "  - {id: 4, profile: eh600, checksum: sum}" in lines
+    assert '  - {id: 5, profile: "my, laser.yaml", checksum: sum}' in lines
 
 
 def test_what_cannot_be_polled_as_it_is_stands_in_comments() -> None:

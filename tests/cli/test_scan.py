@@ -132,7 +132,7 @@ def test_a_profile_of_ones_own_is_recognised(lfs10d: Lfs10d, sensors: PtyLine, t
     profile.write_text("name: rate\ntitle: Rate teller\nvalues: [{name: code, register: 4, type: uint16, unit: '1'}]\n")
     done = lfs10d("scan", sensors.path, "--ids", "2", "--baudrate", "9600", "--profile", str(profile))
     assert "Rate teller, 1" in done.stdout
-    assert "{id: 2, profile: rate}" in done.stdout
+    assert f'{{id: 2, profile: "{profile}"}}' in done.stdout
 
 
 def test_ascii_is_spoken_where_it_is_asked_for(lfs10d: Lfs10d, sensors: PtyLine) -> None:

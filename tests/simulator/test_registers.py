@@ -102,3 +102,14 @@ def test_a_writable_setting_takes_what_the_profile_allows() -> None:
 
 def test_the_register_of_the_barrier_exists() -> None:
     assert vane(barrier={"function": 3, "register": 30, "count": 2}).words == {30: 0, 31: 0}
+
+
+@pytest.mark.parametrize(
+    ("limits", "rtu", "in_ascii"),
+    [({}, 125, 125), ({"ascii_max_data": 16}, 125, 7), ({"ascii_max_data": 16, "max_words": 5}, 5, 5)],
+)
+def test_a_read_in_ascii_is_bounded_by_the_data_bytes_of_its_answer(
+    limits: dict[str, int], rtu: int, in_ascii: int
+) -> None:
+    device = vane(**limits)
+    assert (device.most_words("rtu"), device.most_words("ascii")) == (rtu, in_ascii)
