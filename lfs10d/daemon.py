@@ -9,32 +9,34 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
-import signal
 import socket
 import sys
-import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from lfs10d import __version__, assembly, clock, logs, telemetry
-from lfs10d.aside import aside
+from lfs10d import __version__, assembly, logs, signals
 from lfs10d.changefile import ChangeFile
 from lfs10d.disk import Disk
-from lfs10d.errors import ConfigError, StateError
-from lfs10d.facts import DaemonFacts, Instant
+from lfs10d.errors import StateError
+from lfs10d.facts import DaemonFacts
 from lfs10d.firstburst import FirstBurst
+from lfs10d.journal import Journal
 from lfs10d.line import Line
 from lfs10d.logbook import Logbook
+from lfs10d.moments import Moments
 from lfs10d.mqtt.settings import BrokerSettings
 from lfs10d.mqtt.uplink import Uplink
+from lfs10d.physical import Physical
 from lfs10d.powers import DaemonPowers
 from lfs10d.reading import Exchanged, Fault, FaultCode, PortChanged
 from lfs10d.requests.table import REQUESTS
 from lfs10d.running import Running
 from lfs10d.service import Service
-from lfs10d.statedir import prepare, status_file
+from lfs10d.signals import Signals
+from lfs10d.statedir import status_file
 from lfs10d.station import Station
 from lfs10d.statusfile import StatusFile
+from lfs10d.storage import Storage
 from lfs10d.store.backlog import Store
 from lfs10d.supervision import Supervision
 from lfs10d.systemd import Notifier
@@ -60,7 +62,6 @@ SWITCH_INTERVAL = 1e-4
 LINE_STOPS_WITHIN = 0.4
 """How long the line thread is waited for at the end, in s; with the uplink's 1.3 s it is over within 2 s."""
 FEATURES = ("history",)
-SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 
 
 class Daemon:
@@ -69,17 +70,14 @@ class Daemon:
     def __init__(self, loaded: Loaded, boot: Boot, state_directory: Path, notifier: Notifier) -> None:
         self._running = Running(loaded, ChangeFile(state_directory, Disk()), self._hold)
         loaded, config = self._running.loaded, self._running.now.config
-        self._state_directory = state_directory
         self._notifier = notifier
         self._loop = asyncio.get_running_loop()
         self._over = asyncio.Event()
         self._failed = False
-        self._clock: clock.ClockState = "unknown"
-        self._store_trouble: str | None = None
-        """Why the backlog cannot be kept on disk."""
-        self._storage_trouble: str | None = None
-        """What was last told of it, or of the whole state directory."""
-        self._ready = False
+        self._moments = Moments(lambda: self._uplink.synchronised())  # noqa: PLW0108 - built below
+        self._now = self._moments.now
+        self._storage = Storage(state_directory, self._storage_told)
+        self._signals = Signals(notifier, end=self._over.set, reload=self._reload, summary=self._summary)
         self._ticking: asyncio.TimerHandle | None = None
         self._logbook = Logbook()
         self._facts = DaemonFacts(
@@ -110,7 +108,7 @@ class Daemon:
             announced=self._announced,
         )
         store = Store(state_directory, boot=boot.id, limits=assembly.store_limits(config.store))
-        self._uplink.keep_in(store, self._store_troubled)
+        self._uplink.keep_in(store, self._storage.backlog_failed)
         self._first_burst = FirstBurst(self._station.burst(self._now()))
         self._powers = DaemonPowers(
             self._station,
@@ -130,6 +128,15 @@ class Daemon:
             clear=self._uplink.clear_retained,
         )
         self._line = Line(self._running.now.polled, loaded.profiles, heard=self._heard, failed=self._line_failed)
+        self._powers.physical = self._physical = Physical(
+            Journal(state_directory, Disk()),
+            running=lambda: self._running.now,
+            change=self._change,
+            wire=lambda: self._line,
+            tell=self._powers.tell,
+            recall=self._service.recall,
+            now=self._now,
+        )
         file = status_file(config.line.name, os.environ)
         self._supervision = Supervision(
             notifier,
@@ -146,14 +153,9 @@ class Daemon:
     def _password(self) -> Secret | None:
         return self._running.loaded.password()
 
-    def _now(self) -> Instant:
-        return Instant(time.monotonic(), time.time(), self._clock)
-
     async def run(self) -> int:
         """Measure and publish until SIGTERM or SIGINT; return the exit code."""
-        for number in (signal.SIGTERM, signal.SIGINT):
-            self._loop.add_signal_handler(number, self._over.set)
-        self._loop.add_signal_handler(signal.SIGHUP, self._hang_up)
+        self._signals.obey()
         sys.setswitchinterval(SWITCH_INTERVAL)
         config = self._running.now.config
         log.info(
@@ -161,20 +163,22 @@ class Daemon:
             __version__, self._facts.boot, config.line.name, config.line.port, config.line.baudrate,
             len(config.slaves), config.mqtt.host, config.mqtt.port,
         )  # fmt: skip
-        self._look_at_storage()
-        tasks = [self._begin("clock", self._watch_clock()), self._begin("supervision", self._supervision.run())]
+        self._storage.look()
+        tasks = [self._begin("clock", self._moments.watch()), self._begin("supervision", self._supervision.run())]
         try:
+            self._physical.recall()
             self._line.start()
             await self._uplink.start()
             self._tick()
             self._tell_news()
             if not any(slave.enabled for slave in self._running.now.polled.slaves):
-                self._tell_ready()
+                self._signals.ready()
             await self._over.wait()
         finally:
             self._notifier.stopping("stopping")
             for task in tasks:
                 task.cancel()
+            await self._physical.stop()
             await self._service.stop()
             await self._line.stop(LINE_STOPS_WITHIN)
             await self._uplink.stop()
@@ -193,10 +197,11 @@ class Daemon:
             self._enter(self._logbook.published(known))
             published += [*known, *self._powers.heard(event, known, now)]
             if isinstance(event, Exchanged) or (isinstance(event, PortChanged) and event.fault is not None):
-                self._tell_ready()
+                self._signals.ready()
         self._publish(published)
         if any(isinstance(event, PortChanged) and event.fault is None for event in events):
             self._yield(self._running.now.conflicts)
+            self._physical.follow()
 
     def _publish(self, publications: Iterable[Publication]) -> None:
         self._uplink.publish(self._first_burst.passing(publications))
@@ -234,65 +239,11 @@ class Daemon:
         self._uplink.publish(self._first_burst.passing(self._station.tick(self._now())))
         self._ticking = self._loop.call_at(self._station.due(), self._tick)
 
-    async def _watch_clock(self) -> None:
-        while True:
-            before, self._clock = self._clock, await aside(clock.look, "clock")
-            if self._clock == "synced" != before:
-                self._uplink.synchronised()
-            await asyncio.sleep(clock.LOOK_AGAIN[self._clock])
-
-    # -- the service manager
-
-    def _tell_ready(self) -> None:
-        if not self._ready:
-            self._ready = True
-            self._notifier.ready(self._summary())
-
     def _summary(self) -> str:
         broker = "connected" if self._uplink.connected else "away"
         return f"{self._station.summary(self._now())}, broker {broker}"
 
     # -- the files
-
-    def _look_at_storage(self) -> None:
-        """Raise or clear the error of a state directory that cannot be written, or of a backlog in it that cannot."""
-        trouble = self._store_trouble
-        try:
-            prepare(self._state_directory)
-        except StateError as error:
-            trouble = str(error)
-        before, self._storage_trouble = self._storage_trouble, trouble
-        if trouble is None:
-            self._publish(self._station.line_recovered(FaultCode.STORAGE_FULL, self._now()))
-        elif trouble != before:
-            self._storage_failed(trouble)
-
-    def _store_troubled(self, trouble: str | None) -> None:
-        self._store_trouble = trouble
-        self._look_at_storage()
-
-    def _hang_up(self) -> None:
-        self._notifier.reloading()
-        task = self._loop.create_task(self._reload_by_signal(), name="reload")
-        task.add_done_callback(self._reloaded)
-
-    def _reloaded(self, task: asyncio.Task[None]) -> None:
-        if not task.cancelled() and (mistake := task.exception()) is not None:
-            log.error("the reload failed by a mistake of ours", exc_info=mistake)
-        if self._ready:
-            self._notifier.ready(self._summary())
-
-    async def _reload_by_signal(self) -> None:
-        try:
-            plan = await self._reload()
-        except ConfigError as error:
-            for problem in error.problems:
-                log.error("%s", problem)  # noqa: TRY400 - for a person; where in our code says nothing
-            log.error("the configuration is not reloaded: the running one stays")  # noqa: TRY400
-        else:
-            log.info("reloaded: %s", ", ".join(plan.applied) or "nothing changed")
-            if plan.restart_required:
-                log.warning("takes effect at the next restart only: %s", ", ".join(plan.restart_required))
 
     async def _reload(self) -> Plan:
         """Read the files again and apply what changed; raises ConfigError and changes nothing if one is wrong."""
@@ -305,7 +256,7 @@ class Daemon:
         try:
             return await self._running.change(edit)
         except StateError as error:
-            self._storage_failed(str(error))
+            self._storage.failed(str(error))
             raise
         finally:
             self._tell_news()
@@ -313,23 +264,17 @@ class Daemon:
     def _tell_news(self) -> None:
         """Tell what became of changes that a person overruled, or that cannot hold."""
         news = self._running.news()
-        for dropped in news.dropped:
-            log.warning("%s: %s: what a request changed there is dropped", dropped.key, dropped.message)
-        for warning in news.warnings:
+        for warning in news.sayings:
             log.warning("%s", warning)
         if news.storage is not None:
-            self._storage_failed(news.storage)
-        ts = self._now().ts()
-        self._publish(
-            telemetry.event(
-                "change_dropped", ts, key=lost.key, device=lost.device, lost=lost.lost, message=lost.message
-            )
-            for lost in news.dropped
-        )
+            self._storage.failed(news.storage)
+        self._publish(news.events(self._now().ts()))
 
-    def _storage_failed(self, message: str) -> None:
-        log.warning("%s", message)
-        self._publish(self._station.line_failed(Fault(FaultCode.STORAGE_FULL, message), self._now()))
+    def _storage_told(self, trouble: str | None) -> None:
+        if trouble is None:
+            self._publish(self._station.line_recovered(FaultCode.STORAGE_FULL, self._now()))
+        else:
+            self._publish(self._station.line_failed(Fault(FaultCode.STORAGE_FULL, trouble), self._now()))
 
     async def _hold(self, plan: Plan, before: Effective) -> None:
         """Put into force what holds from now on."""
@@ -343,10 +288,11 @@ class Daemon:
             self._publish(self._station.configure(assembly.line_facts(config.line), devices, self._now()))
             self._yield({name: why for name, why in now.conflicts.items() if name not in before.conflicts})
         self._service.allow(frozenset(config.commands))
-        self._look_at_storage()
+        self._storage.look()
         self._facts = replace(self._facts, config_hash=assembly.config_hash(config), changes=now.changes.count)
         self._publish(self._station.introduce(self._facts, self._now()))
         self._powers.reconfigured(before.config, config)
+        await self._physical.reconfigured(before.config, config)
         self._uplink.limit(assembly.store_limits(config.store))
         await self._uplink.reload(self._broker_settings() if plan.broker else None)
 
@@ -382,8 +328,4 @@ async def run(loaded: Loaded, boot: Boot, state_directory: Path) -> int:
         return await Daemon(loaded, boot, state_directory, notifier).run()
     finally:
         notifier.close()
-        loop = asyncio.get_running_loop()
-        for number in SIGNALS:
-            # Asked to end once more while ending: that is under way, and it ends in order.
-            loop.remove_signal_handler(number)
-            signal.signal(number, signal.SIG_IGN)
+        signals.ignore()

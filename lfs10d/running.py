@@ -15,6 +15,7 @@ from lfs10d.changefile import FILE_NAME
 from lfs10d.effective import Effective, effective
 from lfs10d.errors import StateError
 from lfs10d.reload import Files, Plan, imprint, plan, read
+from lfs10d.telemetry import event
 from lfs10d.threeway import Dropped
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from lfs10d.changefile import ChangeFile
     from lfs10d.changes import Changes
     from lfs10d.configfile import Loaded
+    from lfs10d.telemetry import Publication
 
 Edit: TypeAlias = "Callable[[Effective], Changes]"
 """What a request makes of the changes, given what holds; raises what refuses the request. Called in any thread."""
@@ -35,6 +37,19 @@ class News:
     dropped: list[Dropped] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     storage: str | None = None
+
+    @property
+    def sayings(self) -> list[str]:
+        """All of it in words, but for the disk."""
+        lost = (f"{each.key}: {each.message}: what a request changed there is dropped" for each in self.dropped)
+        return [*lost, *self.warnings]
+
+    def events(self, ts: int) -> list[Publication]:
+        """Return what the broker is told of it at `ts`, epoch ms."""
+        return [
+            event("change_dropped", ts, key=lost.key, device=lost.device, lost=lost.lost, message=lost.message)
+            for lost in self.dropped
+        ]
 
 
 class Running:

@@ -1,0 +1,49 @@
+"""Whether what must be kept can be kept: the state directory, the backlog in it, what requests changed."""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING
+
+from lfs10d.errors import StateError
+from lfs10d.statedir import prepare
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+log = logging.getLogger(__name__)
+
+
+class Storage:
+    """`tell(trouble)` is called when it begins, is another, or (None) is over; it is logged here."""
+
+    def __init__(self, directory: Path, tell: Callable[[str | None], None]) -> None:
+        self._directory = directory
+        self._tell = tell
+        self._backlog: str | None = None
+        """Why the backlog cannot be kept."""
+        self._told: str | None = None
+
+    def look(self) -> None:
+        """See whether files can be written."""
+        trouble = self._backlog
+        try:
+            prepare(self._directory)
+        except StateError as error:
+            trouble = str(error)
+        before, self._told = self._told, trouble
+        if trouble is None:
+            self._tell(None)
+        elif trouble != before:
+            self.failed(trouble)
+
+    def backlog_failed(self, trouble: str | None) -> None:
+        """Take that the backlog cannot be kept, or (None) can again."""
+        self._backlog = trouble
+        self.look()
+
+    def failed(self, trouble: str) -> None:
+        """Take that something could not be written."""
+        log.warning("%s", trouble)
+        self._tell(trouble)
