@@ -106,3 +106,18 @@ def test_a_folder_that_is_not_there_is_an_error_of_the_system(tmp_path: Path) ->
         Disk().replace(tmp_path / "none" / "file", b"x")
     with pytest.raises(FileNotFoundError):
         Disk().append(tmp_path / "none" / "file", b"x")
+
+
+@pytest.mark.parametrize("cut", range(3))
+def test_a_file_put_aside_is_under_one_of_its_names_whenever_the_power_fails(cut: int) -> None:
+    files, disk = begun()
+    aside = FILE.with_name("aside")
+    files.steps_left = files.steps + cut
+    if cut < 2:
+        with pytest.raises(PowerCutError):
+            disk.put_aside(FILE, aside)
+    else:
+        disk.put_aside(FILE, aside)
+    files.power_cut()
+    assert files.read(aside if cut == 2 else FILE) == b"old"
+    assert files.exists(aside) is not files.exists(FILE)
