@@ -49,10 +49,10 @@ _ONLINE = telemetry.retained(telemetry.AVAILABILITY, ONLINE)
 class Uplink:
     """Built and called in the thread of the asyncio loop, while it runs.
 
-    `base` is `B`, whose last level is the line's name. `burst()` returns every retained topic but `availability`; `stands_behind()` the retained
-    topics under `B` that are ours; `requested` takes each request; `changed` is told of every connect, loss,
-    takeover and subscription, whose state is then in the properties; `announced` of every burst after a connect
-    that the broker has whole; `epoch_ms()` is the wall clock.
+    `base` is `B`, whose last level is the line's name. `burst()` returns every retained topic but `availability`;
+    `stands_behind()` the retained topics under `B` that are ours; `requested` takes each request; `changed` is told
+    of every connect, loss, takeover and subscription, whose state is then in the properties; `announced` of every
+    burst after a connect that the broker has whole; `epoch_ms()` is the wall clock.
     """
 
     def __init__(
