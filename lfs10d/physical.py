@@ -170,6 +170,11 @@ class Physical:
         """The name of the request that is being carried out, None if there is none."""
         return None if self._underway is None else self._underway.request
 
+    @property
+    def open(self) -> tuple[OpenChange, ...]:
+        """The changes whose sensors are still to be found."""
+        return self._journal.open
+
     def reserved(self) -> Mapping[int, str]:
         """Return the slave ids that nobody may be given now, with the reason."""
         return self._reserved

@@ -21,7 +21,7 @@ from lfs10d.disk import Disk
 from lfs10d.facts import Instant
 from lfs10d.forgetful import ForgetfulFiles, PowerCutError
 from lfs10d.journal import Journal
-from lfs10d.modbus.bus import Bus, Wait
+from lfs10d.modbus.bus import Bus
 from lfs10d.modbus.exchange import Echo
 from lfs10d.modbus.settings import PortSettings
 from lfs10d.physical import Physical
@@ -111,8 +111,8 @@ class Life:
         )
         self.physical.recall()
 
-    def _recall(self, _: str, __: Call, answer: Answer | None, *, forget_in: float, tell: bool = False) -> None:
-        del forget_in
+    def _recall(self, name: str, call: Call, answer: Answer | None, *, forget_in: float, tell: bool = False) -> None:
+        del name, call, forget_in
         if tell and answer is not None:
             self.answers.append(answer)
 
@@ -149,13 +149,19 @@ class Bench:
 
     def __init__(self, folder: Path, loop: asyncio.AbstractEventLoop) -> None:
         self.loop = loop
+        self.file = folder / "lfs10d.yaml"
+        self.renew()
+
+    def renew(self) -> None:
+        """Begin with a new line and an empty disk."""
+        for task in asyncio.all_tasks(self.loop):
+            task.cancel()
+        self.pump()
         self.clock = VirtualClock()
         self.files = ForgetfulFiles()
-        self.file = folder / "lfs10d.yaml"
         self.line = SimulatedLine()
         self.port = SimulatedPort(self.line, self.clock, PortSettings("/dev/simulated", 9600))
         self.echo = False
-        self._tasks: set[asyncio.Task[Any]] = set()
 
     def sensors(
         self, *slaves: int, names: bool = True, baudrate: int = 9600, poll: str = "{interval: 1s}", echo: bool = False
@@ -241,5 +247,4 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
 
 
 def _mistake(_: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-    if not isinstance(context.get("exception"), PowerCutError):
-        raise AssertionError(context)
+    assert isinstance(context.get("exception"), PowerCutError), context

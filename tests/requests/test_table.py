@@ -22,6 +22,7 @@ CLASSES = {
     "device/options": "polling",
     "device/read": "polling",
     "line/trace": "sensors",
+    "device/readdress": "sensors",
     "line/cancel": "sensors",
     "register/read": "registers",
     "register/write": "registers",

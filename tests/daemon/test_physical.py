@@ -1,0 +1,139 @@
+"""Physical changes from outside: a pseudo terminal, a real broker, `mosquitto_pub` and `lfs10d request`, SIGKILL."""
+
+from __future__ import annotations
+
+import json
+import random
+import re
+import subprocess
+import sys
+import time
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from tests.daemon.conftest import eventually, good, tell
+
+if TYPE_CHECKING:
+    from lfs10d.simulator.pty import PtyLine
+    from tests.conftest import Mosquitto
+    from tests.daemon.conftest import Site, View
+
+BASE = "lfs10d/line0"
+
+
+def places(served: PtyLine) -> list[int]:
+    """Return where the sensors are, asked in the line's own thread."""
+    found: list[int] = []
+    tell(served, lambda line: found.extend(sensor.slave for sensor in line.sensors))
+    return sorted(found)
+
+
+def asked(site: Site, name: str, *parameters: str) -> subprocess.CompletedProcess[str]:
+    """Send a request as a person does."""
+    command = [sys.executable, "-m", "lfs10d", "request", name, *parameters, "-c", str(site.file)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+
+def published(view: View, mosquitto: Mosquitto, name: str, payload: dict[str, Any]) -> dict[str, Any]:
+    """Send a request by mosquitto_pub and return its one response."""
+    topic = f"response/{name}"
+    before = len(view.history_of(topic))
+    subprocess.run(
+        ["mosquitto_pub", "-h", "127.0.0.1", "-p", str(mosquitto.port), "-t", f"{BASE}/request/{name}"]
+        + ["-m", json.dumps(payload)],
+        check=True,
+    )
+    eventually(lambda: len(view.history_of(topic)) > before, f"a response to {name}", within=60.0)
+    (response,) = view.history_of(topic)[before:]
+    return dict(response)
+
+
+@pytest.mark.needs("mosquitto_pub")
+def test_a_sensor_gets_another_id_by_either_way(site: Site, mosquitto: Mosquitto, view: View) -> None:
+    served = site.line((1, 2))
+    site.write()
+    run = site.run()
+    view.wait("device/slave-2/state", good)
+    request = {"id": "m1", "device": "slave-2", "to": 9, "dry_run": True}
+    answer = published(view, mosquitto, "device/readdress", request)
+    assert answer["data"] == {"device": "slave-2", "from": 2, "to": 9, "dry_run": True}
+    assert places(served) == [1, 2]
+    request = {"id": "m2", "device": "slave-2", "to": 9}
+    answer = published(view, mosquitto, "device/readdress", request)
+    assert (answer["status"], answer["id"], answer["error"]) == ("ok", "m2", None)
+    assert places(served) == [1, 9]
+    view.wait("device/slave-2/config", lambda config: config["slave"] == 9)
+    before = view.samples("slave-2")[-1]["seq"]
+    view.wait_samples("slave-2", 3, lambda sample: sample["seq"] > before and good(sample))
+    assert [each["type"] for each in view.history_of("event") if each["type"] == "readdressed"] == ["readdressed"]
+
+    done = asked(site, "device/readdress", "device=slave-2", "to=11", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["data"]["to"] == 11
+    assert places(served) == [1, 11]
+    refused = asked(site, "device/readdress", "device=slave-2", "to=1")
+    assert refused.returncode == 1
+    assert "slave id 1 is that of slave-1" in refused.stdout + refused.stderr
+
+    run.ends(15)
+    view.clear()
+    site.run()
+    view.wait("device/slave-2/state", good)
+    again = published(view, mosquitto, "device/readdress", {"id": "m2", "device": "slave-2", "to": 9})
+    assert again["data"] == {"device": "slave-2", "from": 2, "to": 9}, "the first answer, though it moved since"
+    assert places(served) == [1, 11]
+
+
+@pytest.mark.needs("strace")
+def test_the_intent_is_on_the_disk_before_the_first_byte_of_the_write(
+    site: Site, mosquitto: Mosquitto, view: View
+) -> None:
+    site.line((1, 2))
+    site.write()
+    trace = site.folder / "trace"
+    run = site.run(program=("-m", "lfs10d"))
+    view.wait("device/slave-2/state", good)
+    tracer = subprocess.Popen(
+        ["strace", "-f", "-y", "-xx", "-e", "trace=write,fsync,rename,renameat", "-o", str(trace)]
+        + ["-p", str(run.process.pid)],
+        stderr=subprocess.DEVNULL,
+    )
+    eventually(lambda: trace.exists() and trace.stat().st_size > 0, "strace follows")
+    assert published(view, mosquitto, "device/readdress", {"device": "slave-2", "to": 9})["status"] == "ok"
+    tracer.terminate()
+    tracer.wait()
+    calls = [re.sub(r"\\x([0-9a-f]{2})", lambda m: chr(int(m[1], 16)), line) for line in trace.read_text().splitlines()]
+    raw = trace.read_text().splitlines()
+    written = next(n for n, line in enumerate(raw) if r'"\x02\x06\x00\x05\x00\x09' in line)
+    journal = [n for n, line in enumerate(calls) if "fsync" in line and "journal.json" in line]
+    renamed = [n for n, line in enumerate(calls) if "rename" in line and "journal.json" in line]
+    folder = [
+        n for n, line in enumerate(calls) if "fsync" in line and line.rstrip().endswith("= 0") and "/state>" in line
+    ]
+    assert journal[0] < renamed[0] < min(n for n in folder if n > renamed[0]) < written
+
+
+def test_a_daemon_killed_at_any_moment_finds_every_sensor_again(site: Site, mosquitto: Mosquitto, view: View) -> None:
+    served = site.line((1, 2))
+    site.write()
+    rng = random.Random(7)  # noqa: S311 - moments, no secrets
+    place = 2
+    for number in range(12):
+        run = site.run()
+        view.clear()
+        view.wait("device/slave-2/state", good)
+        to = 20 + number
+        mosquitto_pub = ["mosquitto_pub", "-h", "127.0.0.1", "-p", str(mosquitto.port)]
+        payload = json.dumps({"id": number, "device": "slave-2", "to": to})
+        subprocess.run([*mosquitto_pub, "-t", f"{BASE}/request/device/readdress", "-m", payload], check=True)
+        time.sleep(rng.uniform(0.5, 9.0))
+        run.process.kill()
+        run.process.wait()
+        assert places(served)[0] == 1
+        place = places(served)[1]
+        assert place in range(2, to + 1)
+    view.clear()
+    site.run()
+    view.wait("device/slave-2/config", lambda config: config["slave"] == place)
+    view.wait_samples("slave-2", 3, good)
