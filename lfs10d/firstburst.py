@@ -36,12 +36,13 @@ class FirstBurst:
         return [each for each in publications if self.settled or each.payload is None or not _held(each)]
 
     def settle(self, publications: Iterable[Publication]) -> list[Publication]:
-        """Take that the broker has the first burst; return of a new one what was held back."""
+        """Take that the broker has the first burst; return of a new one what was held back, availability first."""
         if self.settled:
             return []
         self.settled = True
-        held = [each for each in publications if _held(each)]
-        return [each for each in held if self._unknown.get(each.topic) != each]
+        news = [each for each in publications if _held(each) and self._unknown.get(each.topic) != each]
+        # A value is shown of a device that is online.
+        return sorted(news, key=lambda each: device_of(each.topic, AVAILABILITY) is None)
 
 
 def _held(publication: Publication) -> bool:

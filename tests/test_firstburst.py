@@ -30,7 +30,7 @@ def test_it_says_of_the_devices_what_was_known_before_the_first_reading() -> Non
 def test_what_is_known_by_then_follows_once_it_is_settled() -> None:
     first = FirstBurst(UNKNOWN)
 
-    assert first.settle(KNOWN) == KNOWN[1:3]
+    assert first.settle(KNOWN) == [KNOWN[2], KNOWN[1]]  # a value is shown of a device that is online
     assert first.burst(KNOWN) == KNOWN
     assert first.passing(KNOWN) == KNOWN
     assert first.settle(KNOWN) == []
