@@ -124,10 +124,10 @@ class Live:
             return  # the state of a sample that telemetry has told, or none
         if not device.enabled and sample.get("error") != "disabled":
             return  # polled for a request alone
+        values = {name: value for name, value in sample.items() if name not in BESIDES}
         units = sample.get("units")
         if not isinstance(units, dict):
-            units = dict.fromkeys(sample, sample.get("unit") or "")
-        values = {name: value for name, value in sample.items() if name not in BESIDES}
+            units = dict.fromkeys(values, sample.get("unit") or "")
         if not old:
             self._ahead = wall - ts / 1000
         device.seq, device.boot = seq, boot

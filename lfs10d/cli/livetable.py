@@ -76,14 +76,20 @@ def rows(live: Live, source: Source, *, now: float, wall: float) -> list[Row]:
     ]
 
 
+def _with_unit(device: Device, name: str, value: float) -> str:
+    """Return a value with its unit; a bare number among others with its name."""
+    unit = device.units.get(name, "")
+    if unit != "1":
+        return f"{_number(value)} {escape(unit)}".rstrip()
+    return _number(value) if len(device.values) == 1 else f"{escape(name)} {_number(value)}"
+
+
 def _row(live: Live, device: Device, source: Source, *, now: float, wall: float, moved: bool) -> Row:
     stale = not source.alive or (device.good and live.late(device, wall))
     just = "moved" if moved else ""
     if source.alive and device.turned is not None and now - device.turned[0] < JUST:
         just = "came" if device.turned[1] else "went"
-    values = [
-        f"{_number(value)} {escape(device.units.get(name, ''))}".rstrip() for name, value in device.values.items()
-    ]
+    values = [_with_unit(device, name, value) for name, value in device.values.items()]
     age = live.age(device, wall) if device.enabled else None
     return Row(
         name=escape(device.name),

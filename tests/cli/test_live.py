@@ -96,6 +96,7 @@ def test_a_good_sample_shows_its_value_unit_and_time_of_answer() -> None:
     heard.sample("a", 12.5)
     device = heard.device("a")
     assert (device.good, device.value, device.unit, device.rtt_ms, device.error) == (True, 12.5, "m/s", 18.2, None)
+    assert device.units == {"wind_speed": "m/s"}
 
 
 def test_of_several_values_each_has_its_unit_and_the_first_counts() -> None:

@@ -141,6 +141,15 @@ def test_several_values_stand_beside_each_other() -> None:
 
 
 @pytest.mark.parametrize(
+    ("values", "words"), [({"count": 53493}, "53493"), ({"speed": 1450, "fault": 0}, "1450 rpm, fault 0")]
+)
+def test_a_bare_number_has_no_unit_but_among_others_its_name(values: dict[str, int], words: str) -> None:
+    units = {"speed": "rpm", "count": "1", "fault": "1"}
+    (row,) = rows(live(entry("a", 2, values=values, units=units)), HERE, now=0.0, wall=WALL)
+    assert row.value == words
+
+
+@pytest.mark.parametrize(
     ("seconds", "words"),
     [(0.0, "0.0s"), (0.44, "0.4s"), (9.94, "9.9s"), (9.95, "10s"), (99.4, "99s"), (100, "2m"), (5_940, "99m"),
      (6_000, "2h"), (359_000, "100h"), (360_000, "4d"), (8_640_000, "100d")],
