@@ -135,6 +135,7 @@ class Daemon:
             wire=lambda: self._line,
             tell=self._powers.tell,
             recall=self._service.recall,
+            act=self._powers.act,
             now=self._now,
         )
         file = status_file(config.line.name, os.environ)

@@ -15,7 +15,7 @@ from functools import partial
 from math import inf
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
-from lfs10d import assembly, findings
+from lfs10d import assembly, findings, ratechange
 from lfs10d.aside import aside
 from lfs10d.changes import Place
 from lfs10d.commands import Answer, Call, failed, rejected
@@ -25,10 +25,12 @@ from lfs10d.jobs.course import Course, Now, Over, Steps
 from lfs10d.jobs.follow import follow
 from lfs10d.jobs.readdress import NOTHING_WRITTEN, Ending, Verdict, Wish, Write, readdress
 from lfs10d.journal import REMEMBERED_FOR_MS, Asked, Journal, Move, OpenChange, Spot, Told
+from lfs10d.ratechange import RateChange
 from lfs10d.reading import Errand
+from lfs10d.requests.request import RefusedError
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Iterable, Mapping
+    from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping
 
     from lfs10d.changes import Changes
     from lfs10d.config import Config, SlaveConfig
@@ -78,7 +80,7 @@ class Talk:
     """One course as seen from the asyncio loop: what it wants done aside, in turn."""
 
     def __init__(self, wire: Wire) -> None:
-        self._wire = wire
+        self.wire = wire
         self._loop = asyncio.get_running_loop()
         self._wanted: asyncio.Queue[object] = asyncio.Queue()
         self._course: Course | None = None
@@ -86,7 +88,7 @@ class Talk:
     def begin(self, steps: Steps, clock: Now, **sides: Any) -> None:  # noqa: ANN401 - the sides of a course
         """Have a course done on the line."""
         self._course = Course(steps, clock, self._aside, **sides)
-        self._wire.submit(self._course)
+        self.wire.submit(self._course)
 
     def _aside(self, _: Course, what: object) -> None:
         """Take over what is wanted, from the line's thread."""
@@ -100,7 +102,7 @@ class Talk:
     def go_on(self, answer: object = None) -> None:
         """Answer what was wanted."""
         if self._course is not None:
-            self._wire.go_on(self._course, answer)
+            self.wire.go_on(self._course, answer)
 
     def halt(self) -> None:
         """Send no new frame."""
@@ -119,8 +121,9 @@ class Underway:
 class Physical:
     """Physical changes of one line. Used in the thread of the asyncio loop.
 
-    `running()` is the configuration that holds, `change` puts another into force; `wire()` is the line, `tell`
-    publishes an event, `recall` has a request of an earlier life of the daemon remembered, or answered.
+    `running()` is the configuration that holds, `change` puts another into force; `wire()` is the line. `tell`
+    publishes an event, `act` what the line is busy with (None: as usual); `recall` has a request of an earlier life
+    of the daemon remembered, or answered.
     """
 
     def __init__(
@@ -133,18 +136,21 @@ class Physical:
         tell: Callable[[str, Mapping[str, object]], None],
         recall: Recall,
         now: Callable[[], Instant],
+        act: Callable[[str | None], None],
     ) -> None:
-        self._journal = journal
-        self._running = running
-        self._change = change
-        self._wire = wire
-        self._tell = tell
+        self.journal = journal
+        self.running = running
+        self.change = change
+        self.wire = wire
+        self.tell = tell
         self._recall = recall
-        self._now = now
-        self._ending = False
+        self.now = now
+        self.ending = False
         self._underway: Underway | None = None
         self._followed: dict[int, tuple[Talk, asyncio.Task[None]]] = {}
         self._writing: asyncio.Future[Any] | None = None
+        self._act = act
+        self._rates = RateChange(self)
         trouble = journal.take()
         if trouble is not None:
             log.error("%s", trouble)
@@ -152,14 +158,15 @@ class Physical:
 
     def recall(self) -> None:
         """Have the requests of earlier lives remembered for their repeats, and those that have no answer yet."""
-        ts = self._now().ts()
-        for told in self._journal.answers:
-            self._respond(told, max(0.0, (told.at + REMEMBERED_FOR_MS - ts) / 1000), tell=False)
-        for change in self._journal.open:
+        ts = self.now().ts()
+        for told in self.journal.answers:
+            self.respond(told, max(0.0, (told.at + REMEMBERED_FOR_MS - ts) / 1000), tell=False)
+        for change in self.journal.open:
             if change.asked is not None and not change.answered:
                 self._recall(change.asked.name, _call(change.asked), None, forget_in=inf)
 
-    def _respond(self, told: Told, forget_in: float = REMEMBERED_FOR_MS / 1000, *, tell: bool = True) -> None:
+    def respond(self, told: Told, forget_in: float = REMEMBERED_FOR_MS / 1000, *, tell: bool = True) -> None:
+        """Answer a request of an earlier life, with `tell`, and its repeats."""
         error = dict(told.error or {})
         code, message = error.pop("code", None), error.pop("message", "")
         answer = Answer(told.status, told.data, code, message, error)
@@ -173,7 +180,31 @@ class Physical:
     @property
     def open(self) -> tuple[OpenChange, ...]:
         """The changes whose sensors are still to be found."""
-        return self._journal.open
+        return self.journal.open
+
+    @property
+    def busy(self) -> Answer | None:
+        """The rejection of whatever must wait until a scan or a physical change is over, None if nothing must."""
+        if self._underway is None:
+            return None
+        return rejected("busy", f"{self._underway.request} is being carried out; try again when it is over")
+
+    @contextlib.contextmanager
+    def place(self, request: str, slaves: frozenset[int] = frozenset()) -> Iterator[None]:
+        """Hold the one place that scans and physical changes share; raises RefusedError where it is taken.
+
+        `slaves` are the ids that it may bring into use.
+        """
+        if (busy := self.busy) is not None:
+            raise RefusedError(busy)
+        self._underway = Underway(request, slaves)
+        self._reserve()
+        try:
+            yield
+        finally:
+            self._underway = None
+            self._reserve()
+            self.follow()
 
     def reserved(self) -> Mapping[int, str]:
         """Return the slave ids that nobody may be given now, with the reason."""
@@ -181,7 +212,7 @@ class Physical:
 
     def _reserve(self) -> None:
         reserved: dict[int, str] = {}
-        for change in self._journal.open:
+        for change in self.journal.open:
             whose = ", ".join(sorted(change.devices))
             reserved |= dict.fromkeys(change.slaves, f"is reserved by the open change of {whose}")
         if self._underway is not None:
@@ -190,7 +221,7 @@ class Physical:
 
     # -- the disk
 
-    async def _put(self, step: Callable[[], T]) -> T:
+    async def put(self, step: Callable[[], T]) -> T:
         """Have a step of the journal done aside, after the one before it; it is not cut short."""
         if self._writing is not None:
             await asyncio.wait([self._writing])
@@ -200,16 +231,35 @@ class Physical:
         finally:
             self._reserve()
 
-    def _told(self, call: Asked | None, answer: Answer) -> Told | None:
+    def told(self, call: Asked | None, answer: Answer) -> Told | None:
+        """Return an answer as the journal keeps it; None if nobody asked."""
         if call is None:
             return None
-        return Told(asked=call, status=answer.status, data=answer.data, error=answer.error(), at=self._now().ts())
+        return Told(asked=call, status=answer.status, data=answer.data, error=answer.error(), at=self.now().ts())
+
+    def talk(self) -> Talk:
+        """Return what a course on the line is talked with by."""
+        return Talk(self.wire())
+
+    # -- line/baudrate
+
+    async def baudrate(self, to: int, *, power_cycle: bool, dry_run: bool, call: Call) -> Answer:
+        """Move every sensor and the port to another rate, verified, or back."""
+        if (busy := self.busy) is not None:
+            return busy
+        asked = asked_by(ratechange.NAME, call)
+        with self.place(ratechange.NAME):
+            self._act(ratechange.ACTIVITY)
+            try:
+                return await self._rates.perform(to, power_cycle=power_cycle, dry_run=dry_run, asked=asked)
+            finally:
+                self._act(None)
 
     # -- device/readdress
 
     async def readdress(self, device: str, to: int, *, dry_run: bool, call: Call) -> Answer:
         """Give a sensor another slave id, verified; see `lfs10d.jobs.readdress`."""
-        now = self._running()
+        now = self.running()
         slave = now.slave(device)
         if slave is None:
             names = ", ".join(other.name for other in now.config.slaves) or "none"
@@ -217,17 +267,11 @@ class Physical:
         refusal = self._unfit(device, slave, to, now)
         if refusal is not None:
             return refusal
-        if self._underway is not None:
-            return rejected("busy", f"{self._underway.request} is being carried out; try again when it is over")
-        asked = _asked("device/readdress", call)
-        self._underway = Underway("device/readdress", frozenset({slave.id, to}))
-        self._reserve()
-        try:
+        if (busy := self.busy) is not None:
+            return busy
+        asked = asked_by("device/readdress", call)
+        with self.place("device/readdress", frozenset({slave.id, to})):
             return await self._readdress(slave, to, asked, dry_run=dry_run)
-        finally:
-            self._underway = None
-            self._reserve()
-            self.follow()
 
     def _unfit(self, device: str, slave: SlaveConfig, to: int, now: Effective) -> Answer | None:
         """Return why the line need not even be asked; None if it must be."""
@@ -242,26 +286,28 @@ class Physical:
         for other in now.config.slaves:
             if to in {other.id, *(place.id for place in now.places[other.name])}:
                 return rejected("address_in_use", f"slave id {to} is that of {other.name}", param="to")
-        own = frozenset().union(*(each.slaves for each in self._journal.open if device in each.devices))
+        own = frozenset().union(*(each.slaves for each in self.journal.open if device in each.devices))
         if to in self._reserved and to not in own:
             return rejected("address_in_use", f"slave id {to} {self._reserved[to]}", param="to")
         return None
 
-    def _asking(self, slave: SlaveConfig, clock: Now) -> Asking:
-        now = self._running()
+    def asking(self, slave: SlaveConfig, clock: Now, line_rate: int | None = None) -> Asking:
+        """Return how a device is asked; with a `line_rate` that no line has, its rate is told each time."""
+        now = self.running()
         alone = now.config.model_copy(update={"slaves": (slave,)})
         (spec,) = assembly.device_specs(alone, now.loaded.profiles)
-        return Asking(spec.profile, spec.codec, self._wire().unanswered, clock, line_rate=now.config.line.baudrate)
+        rate = now.config.line.baudrate if line_rate is None else line_rate
+        return Asking(spec.profile, spec.codec, self.wire().unanswered, clock, line_rate=rate)
 
     async def _readdress(self, slave: SlaveConfig, to: int, asked: Asked, *, dry_run: bool) -> Answer:
-        now = self._running()
+        now = self.running()
         profile, rate = now.loaded.profiles[slave.profile], now.config.line.baudrate
         rates = tuple(profile.baudrate.codes) if profile.baudrate else ()
         wish = Wish(Spot(slave=slave.id, baudrate=rate), to, rates, dry_run)
-        await self._leave(slave.name)
+        await self.leave(self._changes_of(slave.name))
         clock = Now()
-        talk = Talk(self._wire())
-        steps = readdress(wish, self._asking(slave, clock), self._wire().echo_known)
+        talk = Talk(self.wire())
+        steps = readdress(wish, self.asking(slave, clock), self.wire().echo_known)
         change: OpenChange | None = None
         try:
             talk.begin(steps, clock, line_rate=rate, excludes=frozenset({slave.id, to}))
@@ -269,7 +315,7 @@ class Physical:
                 if isinstance(what, Write):
                     why = None
                     try:
-                        change = await self._put(partial(self._intend, slave.name, what, asked))
+                        change = await self.put(partial(self._intend, slave.name, what, asked))
                     except StateError as error:
                         why = str(error)
                     talk.go_on(why)
@@ -277,46 +323,46 @@ class Physical:
             return await self._conclude(slave.name, wish, verdict, change, asked, profile)
         except asyncio.CancelledError:
             talk.halt()
-            return await self._cut_short(asked)
+            return await self.cut_short(asked)
         finally:
             talk.go_on()
 
     def _intend(self, device: str, write: Write, asked: Asked) -> OpenChange:
         move = Move(device=device, old=write.old, new=write.new, register_before=write.register_before)
-        return self._journal.intend("readdress", (move,), self._now().ts(), asked)
+        return self.journal.intend("readdress", (move,), self.now().ts(), asked)
 
     async def _conclude(
         self, device: str, wish: Wish, verdict: Verdict, change: OpenChange | None, asked: Asked, profile: Profile
     ) -> Answer:
         """Put on the disk what came of it; return the answer."""
         answer = findings.readdressed(device, wish, verdict, profile)
-        told = self._told(asked, answer)
+        told = self.told(asked, answer)
         if change is None or verdict.ending in NOTHING_WRITTEN:
             with contextlib.suppress(StateError):  # nothing changed: a repeat may be judged anew
-                await self._put(partial(self._journal.close, frozenset(), told))
+                await self.put(partial(self.journal.close, frozenset(), told))
             return answer
         try:
             if verdict.ending is Ending.MOVED:
                 await self._record(device, wish.new)
-                await self._put(partial(self._journal.close, self._changes_of(device), told))
+                await self.put(partial(self.journal.close, self._changes_of(device), told))
                 self._tell_moved(device, wish.old, wish.new)
             elif verdict.stays_open:
                 if verdict.ending is Ending.PENDING:
-                    await self._put(partial(self._journal.close, self._changes_of(device) - {change.number}, None))
-                await self._put(partial(self._journal.keep, change.number, told))
+                    await self.put(partial(self.journal.close, self._changes_of(device) - {change.number}, None))
+                await self.put(partial(self.journal.keep, change.number, told))
             else:
-                await self._put(partial(self._journal.close, frozenset({change.number}), told))
+                await self.put(partial(self.journal.close, frozenset({change.number}), told))
         except StateError as error:
             if verdict.ending is Ending.MOVED:
                 message = f"{device} answers at slave id {wish.to} now, but that cannot be kept: {error}"
                 return failed("storage_full", message, data=answer.data)
             log.warning("%s", error)
         if verdict.ending in (Ending.BOTH, Ending.GARBAGE):
-            self._tell("duplicate_id", {"device": device, "slave": wish.to, "from": wish.old.slave})
+            self.tell("duplicate_id", {"device": device, "slave": wish.to, "from": wish.old.slave})
         return answer
 
     def _changes_of(self, device: str) -> frozenset[int]:
-        return frozenset(change.number for change in self._journal.open if device in change.devices)
+        return frozenset(change.number for change in self.journal.open if device in change.devices)
 
     async def _record(self, device: str, spot: Spot) -> None:
         """Have the device polled where it was found, on the disk first."""
@@ -326,34 +372,34 @@ class Physical:
                 return now.changes
             return now.changes.moving(device, Place(spot.slave), now.said)
 
-        await self._change(edit)
+        await self.change(edit)
 
     def _tell_moved(self, device: str, old: Spot, new: Spot) -> None:
         log.info("%s answers at slave id %d now, not at %d any more", device, new.slave, old.slave)
-        self._tell("readdressed", {"device": device, "from": old.slave, "to": new.slave})
+        self.tell("readdressed", {"device": device, "from": old.slave, "to": new.slave})
 
-    async def _cut_short(self, asked: Asked) -> Answer:
+    async def cut_short(self, asked: Asked) -> Answer:
         """Answer a request that the daemon's end cuts short; what it began is settled at the next start."""
         if self._writing is not None:
             await asyncio.wait([self._writing])
-        mine = next((each for each in self._journal.open if each.asked == asked and not each.answered), None)
+        mine = next((each for each in self.journal.open if each.asked == asked and not each.answered), None)
         if mine is None:
             return rejected("cancelled", "the daemon is ending; nothing was written")
         answer = failed("cancelled", "the daemon is ending; at its next start it looks where the sensor is")
         with contextlib.suppress(StateError):
-            await self._put(partial(self._journal.keep, mine.number, self._told(asked, answer)))
+            await self.put(partial(self.journal.keep, mine.number, self.told(asked, answer)))
         return answer
 
     # -- changes that are open
 
     def follow(self) -> None:
         """Look for the sensors of every open change that nobody looks for now."""
-        if self._ending:
+        if self.ending:
             return
         busy = frozenset() if self._underway is None else self._underway.slaves
-        for change in self._journal.open:
+        for change in self.journal.open:
             if change.number not in self._followed and not change.slaves & busy:
-                talk = Talk(self._wire())
+                talk = Talk(self.wire())
                 task = asyncio.create_task(self._follow(change, talk), name=f"follow {change.number}")
                 task.add_done_callback(partial(self._left, change.number))
                 self._followed[change.number] = talk, task
@@ -364,31 +410,17 @@ class Physical:
         if not task.cancelled() and (mistake := task.exception()) is not None:
             log.error("an open change could not be followed, by a mistake of ours", exc_info=mistake)
 
-    async def _leave(self, device: str) -> None:
-        """Stop looking for a sensor of which more is to be written."""
-        for number in self._changes_of(device) & set(self._followed):
+    async def leave(self, changes: frozenset[int]) -> None:
+        """Stop looking for the sensors of these changes: more is to be written to them."""
+        for number in changes & set(self._followed):
             talk, task = self._followed.pop(number)
             talk.halt()
             talk.go_on()
             task.cancel()
 
     async def _follow(self, change: OpenChange, talk: Talk) -> None:
-        (move,) = change.moves
-        slave = self._running().slave(move.device)
-        if slave is None:
-            await self._drop(change, f"{move.device} is no longer configured")
-            return
-        now = self._running()
-        clock = Now()
-        steps = follow(move.old, move.new, self._asking(slave, clock), longest_pause=now.config.poll.probe_interval_max)
-        talk.begin(steps, clock, line_rate=now.config.line.baudrate, share=1.0, errand=Errand.PROBE)
         try:
-            while not isinstance(what := await talk.wanted(), Over):
-                if isinstance(what, Verdict):
-                    change = await self._seen(change, move, what, now.loaded.profiles[slave.profile])
-                talk.go_on()
-            if what.result is not None:
-                await self._found(change, move, what.result, now.loaded.profiles[slave.profile])
+            await (self._rates.follow if change.kind == "baudrate" else self._follow_move)(change, talk)
         except StateError as error:
             log.warning("%s", error)
             await asyncio.sleep(KEPT_PAUSE)
@@ -396,16 +428,33 @@ class Physical:
         finally:
             talk.go_on()
 
+    async def _follow_move(self, change: OpenChange, talk: Talk) -> None:
+        (move,) = change.moves
+        slave = self.running().slave(move.device)
+        if slave is None:
+            await self.drop(change, f"{move.device} is no longer configured")
+            return
+        now = self.running()
+        clock = Now()
+        steps = follow(move.old, move.new, self.asking(slave, clock), longest_pause=now.config.poll.probe_interval_max)
+        talk.begin(steps, clock, line_rate=now.config.line.baudrate, share=1.0, errand=Errand.PROBE)
+        while not isinstance(what := await talk.wanted(), Over):
+            if isinstance(what, Verdict):
+                change = await self._seen(change, move, what, now.loaded.profiles[slave.profile])
+            talk.go_on()
+        if what.result is not None:
+            await self._found(change, move, what.result, now.loaded.profiles[slave.profile])
+
     async def _seen(self, change: OpenChange, move: Move, verdict: Verdict, profile: Profile) -> OpenChange:
         """Answer the request of a change that is not settled by the first look."""
         if verdict.ending in (Ending.BOTH, Ending.GARBAGE):
-            self._tell("duplicate_id", {"device": move.device, "slave": move.new.slave, "from": move.old.slave})
+            self.tell("duplicate_id", {"device": move.device, "slave": move.new.slave, "from": move.old.slave})
         if change.answered:
             return change
-        told = self._told(change.asked, findings.readdressed(move.device, _wish(move), verdict, profile))
-        await self._put(partial(self._journal.keep, change.number, told))
+        told = self.told(change.asked, findings.readdressed(move.device, _wish(move), verdict, profile))
+        await self.put(partial(self.journal.keep, change.number, told))
         if told is not None:
-            self._respond(told)
+            self.respond(told)
         return change.model_copy(update={"answered": True})
 
     async def _found(self, change: OpenChange, move: Move, verdict: Verdict, profile: Profile) -> None:
@@ -413,42 +462,42 @@ class Physical:
         if verdict.ending is Ending.MOVED:
             answer = findings.readdressed(move.device, _wish(move), verdict, profile)
             await self._record(move.device, move.new)
-            await self._close(self._changes_of(move.device), change, answer)
+            await self.close(self._changes_of(move.device), change, answer)
             self._tell_moved(move.device, move.old, move.new)
         else:
             why = f"{move.device} answers at slave id {move.old.slave}, and its register does not say {move.new.slave}"
-            await self._drop(change, why)
+            await self.drop(change, why)
 
-    async def _drop(self, change: OpenChange, why: str) -> None:
+    async def drop(self, change: OpenChange, why: str) -> None:
         """Undo a change that did not take effect."""
         message = f"{why}: the change is dropped"
-        await self._close(frozenset({change.number}), change, failed("cancelled", f"the daemon ended; {message}"))
+        await self.close(frozenset({change.number}), change, failed("cancelled", f"the daemon ended; {message}"))
         log.warning("%s", message)
         for move in change.moves:
             facts = {"device": move.device, "from": move.old.slave, "to": move.new.slave}
-            self._tell("change_dropped", {"key": f"slaves.{move.device}.id", **facts, "message": message})
+            self.tell("change_dropped", {"key": f"slaves.{move.device}.id", **facts, "message": message})
 
-    async def _close(self, numbers: Iterable[int], change: OpenChange, answer: Answer) -> None:
-        told = None if change.answered else self._told(change.asked, answer)
-        await self._put(partial(self._journal.close, frozenset(numbers), told))
+    async def close(self, numbers: Iterable[int], change: OpenChange, answer: Answer) -> None:
+        """Close changes; the request of `change` is answered if it is not yet."""
+        told = None if change.answered else self.told(change.asked, answer)
+        await self.put(partial(self.journal.close, frozenset(numbers), told))
         if told is not None:
-            self._respond(told)
+            self.respond(told)
 
     # -- what else happens
 
     async def reconfigured(self, before: Config, after: Config) -> None:
         """Take note of another configuration: the open changes of devices that are no more are closed."""
         devices = {slave.name for slave in before.slaves} - {slave.name for slave in after.slaves}
-        for change in self._journal.open:
+        for change in self.journal.open:
             if change.devices <= devices:
-                for device in change.devices:
-                    await self._leave(device)
+                await self.leave(frozenset({change.number}))
                 with contextlib.suppress(StateError):
-                    await self._drop(change, f"{', '.join(sorted(change.devices))} was removed")
+                    await self.drop(change, f"{', '.join(sorted(change.devices))} was removed")
 
     async def stop(self) -> None:
         """Send no new frame of any change."""
-        self._ending = True
+        self.ending = True
         for talk, task in self._followed.values():
             talk.halt()
             task.cancel()
@@ -456,7 +505,8 @@ class Physical:
             await asyncio.wait([self._writing])
 
 
-def _asked(name: str, call: Call) -> Asked:
+def asked_by(name: str, call: Call) -> Asked:
+    """Return a request as the journal keeps it."""
     return Asked(
         name=name,
         id=call.id,

@@ -13,6 +13,7 @@ from lfs10d.jobs.knock import Knock
 from lfs10d.jobs.register import Access
 from lfs10d.modbus.exchange import Echo
 from lfs10d.reading import Exchanged, Reading
+from lfs10d.station import POLLING
 from lfs10d.telemetry import event
 from lfs10d.tracing import Trace
 
@@ -130,6 +131,16 @@ class DaemonPowers:
     def tell(self, kind: str, facts: Mapping[str, object]) -> None:
         """Tell everybody on `event`."""
         self._publish([event(kind, self._now().ts(), **facts)])
+
+    def act(self, activity: str | None) -> None:
+        """Tell everybody what the line is busy with; None: with polling."""
+        self._publish(self._station.acting(activity or POLLING, self._now()))
+
+    async def baudrate(self, to: int, *, power_cycle: bool, dry_run: bool, call: Call) -> Answer:
+        """Move every sensor and the port to another rate."""
+        if self.physical is None:
+            return rejected("busy", "the daemon is starting")
+        return await self.physical.baudrate(to, power_cycle=power_cycle, dry_run=dry_run, call=call)
 
     async def knock(self, slave: int, profile: Profile) -> Knock:
         """Ask one slave id whether anybody is there."""

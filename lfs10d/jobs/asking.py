@@ -72,9 +72,11 @@ class Asking:
         self._unanswered = unanswered
         self.line_rate = line_rate
 
-    def who(self, spot: Spot, timeout: float | None = None) -> Generator[Step, Outcome, Reply]:
-        """Ask a place for its id register."""
-        identity = ReadRegisters(spot.slave, self.id_register, 1)
+    def who(
+        self, spot: Spot, timeout: float | None = None, *, register: int | None = None
+    ) -> Generator[Step, Outcome, Reply]:
+        """Ask a place for its id register, or for another one."""
+        identity = ReadRegisters(spot.slave, self.id_register if register is None else register, 1)
         allowed = yield from self._allowed(identity, spot, timeout)
         if allowed is not None:
             return allowed

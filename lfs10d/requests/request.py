@@ -93,6 +93,10 @@ class Powers(Protocol):
         """Give a sensor another slave id, verified on the line; with `dry_run` only find out whether it could be."""
         ...
 
+    async def baudrate(self, to: int, *, power_cycle: bool, dry_run: bool, call: Call) -> Answer:
+        """Move every sensor and the port to another rate, verified, or back."""
+        ...
+
     async def reload(self) -> dict[str, list[str]]:
         """Read the files again and apply what changed; return `applied` and `restart_required`.
 

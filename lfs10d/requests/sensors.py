@@ -1,4 +1,4 @@
-"""`device/readdress`: what physically changes a sensor."""
+"""`device/readdress` and `line/baudrate`: what physically changes a sensor."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from lfs10d.admission import Form
 from lfs10d.commands import Answer, Parameters
-from lfs10d.kinds import Flag, Name, Whole
+from lfs10d.kinds import Choice, Flag, Name, Whole
 from lfs10d.requests.request import Powers, Request
 
 if TYPE_CHECKING:
@@ -31,6 +31,22 @@ async def readdress(parameters: Readdress, powers: Powers, call: Call) -> Answer
     return await powers.readdress(parameters.device, parameters.to, dry_run=parameters.dry_run, call=call)
 
 
+class Baudrate(Parameters):
+    """Which rate; with `power_cycle` the sensors obey when their power is switched off and on."""
+
+    to: Annotated[int, Choice((9600, 19200, 1200, 2400, 4800, 38400, 57600, 115200))]
+    power_cycle: Annotated[bool, Flag()] = False
+    dry_run: Annotated[bool, Flag()] = False
+
+
+async def baudrate(parameters: Baudrate, powers: Powers, call: Call) -> Answer:
+    """Move every sensor and the port to another rate."""
+    return await powers.baudrate(
+        parameters.to, power_cycle=parameters.power_cycle, dry_run=parameters.dry_run, call=call
+    )
+
+
 REQUESTS: Mapping[str, Request] = {
     "device/readdress": Request(Form("sensors", Readdress, REMEMBERED_FOR), readdress),
+    "line/baudrate": Request(Form("sensors", Baudrate, REMEMBERED_FOR), baudrate),
 }

@@ -107,6 +107,7 @@ class Life:
             wire=lambda: Wire(self.poller),
             tell=lambda kind, facts: self.events.append((kind, facts)),
             recall=self._recall,
+            act=lambda activity: self.events.append(("acting", {"activity": activity})),
             now=lambda: Instant(bench.clock.now, EPOCH + bench.clock.now, "synced"),
         )
         self.physical.recall()

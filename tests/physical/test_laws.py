@@ -1,4 +1,4 @@
-"""What holds whatever the sensors are like, whoever dies when: nobody is stranded, no two get one id, all is answered."""
+"""What holds whatever the sensors are like, whoever dies when: nobody is stranded, no id is shared, all is answered."""
 
 from __future__ import annotations
 

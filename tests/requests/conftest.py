@@ -11,14 +11,19 @@ import pytest
 
 from lfs10d.admission import Admission, Answered, Ticket
 from lfs10d.changefile import ChangeFile
-from lfs10d.commands import ok
+from lfs10d.commands import ok, rejected
 from lfs10d.configfile import load
 from lfs10d.disk import Disk
 from lfs10d.forgetful import ForgetfulFiles
 from lfs10d.jobs.knock import Knock
 from lfs10d.jobs.register import Access, Target
+from lfs10d.jobs.scan import Scan
+from lfs10d.jobs.search import Search
 from lfs10d.modbus.frames import Codec, Framing
+from lfs10d.modbus.timing import LineTiming
 from lfs10d.modbus.unanswered import Unanswered
+from lfs10d.profiles.library import load_profile
+from lfs10d.requests.request import RefusedError
 from lfs10d.requests.table import REQUESTS
 from lfs10d.running import Running
 
@@ -27,6 +32,7 @@ if TYPE_CHECKING:
     from lfs10d.config import SlaveConfig
     from lfs10d.effective import Effective
     from lfs10d.inquiries import Inquiry
+    from lfs10d.jobs.interview import Finding
     from lfs10d.modbus.frames import Request as RegisterRequest
     from lfs10d.profiles.schema import Profile
     from lfs10d.reading import Fault
@@ -50,6 +56,10 @@ class FakePowers:
         self.done: list[object] = []
         self.inquiry: Inquiry | None = None
         self.running: tuple[str, ...] = ()
+        self.busy = False
+        self.findings: tuple[Finding, ...] = ()
+        self.scanned = True, False
+        """Whether a scan is complete, and whether its port was lost."""
         self.broken: Exception | None = None
         self.at: set[int] = set()
         self.silence: Fault | None = None
@@ -66,6 +76,10 @@ class FakePowers:
     async def readdress(self, device: str, to: int, *, dry_run: bool, call: Call) -> Answer:
         self.done.append(("readdress", device, to, dry_run, call.id))
         return ok({"device": device})
+
+    async def baudrate(self, to: int, *, power_cycle: bool, dry_run: bool, call: Call) -> Answer:
+        self.done.append(("baudrate", to, power_cycle, dry_run, call.id))
+        return ok({"to": to})
 
     def start(self) -> None:
         """Begin anew, as a daemon does."""
@@ -124,6 +138,23 @@ class FakePowers:
 
     def trace(self, duration: float) -> None:
         self.done.append(duration)
+
+    async def scan(self, ids: tuple[int, ...], rates: tuple[int, ...], share: float) -> Scan:
+        self._begin()
+        self.done.append((ids, rates, share))
+        timings = tuple(LineTiming.of(rate) for rate in rates or (9600, 19200))
+        scan = Scan(Search(ids, timings, Codec(Framing.RTU), (load_profile("lfs10", relative_to=self.file),)))
+        scan.complete, scan.lost = self.scanned
+        scan._found = {(each.slave, each.baudrate): each for each in self.findings}
+        return scan
+
+    async def pause(self, duration: float) -> None:
+        self._begin()
+        self.done.append(duration)
+
+    def _begin(self) -> None:
+        if self.busy:
+            raise RefusedError(rejected("busy", "device/readdress is being carried out"))
 
     def cancel(self) -> tuple[str, ...]:
         running, self.running = self.running, ()

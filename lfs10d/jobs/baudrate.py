@@ -1,0 +1,282 @@
+"""Moving every sensor of a line to another rate, one after the other, or back. Pure.
+
+Rules
+-----
+1. Before anything is written every sensor answers, disabled ones too, and how the adapter echoes is known. The intent
+   is on the disk before the first write. Only the register of the rate is written, and only to one slave at a time.
+2. The first sensor is the canary: if it answers only at the old rate its register is written back, and nothing else
+   is touched. Each next one is written when the one before answers at the new rate.
+3. If a later one fails, those already moved are moved back, for up to `ROLL_BACK`.
+4. With `power_cycle` all are written and none is expected at the new rate yet; each register must say the new rate.
+5. A sensor that is found nowhere is asked at both rates until it is found, and brought to the line's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
+
+from lfs10d.jobs.asking import PATIENT
+from lfs10d.jobs.course import Aside, LineLostError
+from lfs10d.jobs.job import Hold
+from lfs10d.jobs.readdress import ECHO_READS, TRIES, present, verified, written
+from lfs10d.journal import Spot
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator, Mapping, Sequence
+
+    from lfs10d.jobs.asking import Asking
+    from lfs10d.jobs.course import Step
+
+ROLL_BACK = 60.0
+"""How long sensors are moved back, in s."""
+FIRST_PAUSE = 1.0
+"""Between two rounds of questions to missing sensors, in s; doubled after each."""
+
+
+class Ended(StrEnum):
+    """What came of it. All before `MOVED` mean that nothing was written."""
+
+    ABSENT = "absent"
+    DEAF = "deaf"
+    LOST_BEFORE = "lost_before"
+    UNWRITTEN = "unwritten"
+    FREE = "free"
+    MOVED = "moved"
+    PENDING = "pending"
+    REFUSED = "refused"
+    CANARY = "canary"
+    ROLLED_BACK = "rolled_back"
+    UNVERIFIED = "unverified"
+
+
+UNTOUCHED = frozenset({Ended.ABSENT, Ended.DEAF, Ended.LOST_BEFORE, Ended.UNWRITTEN, Ended.FREE})
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """One sensor: its name, its slave id, and how it is asked."""
+
+    name: str
+    slave: int
+    asking: Asking
+
+    def at(self, baudrate: int) -> Spot:
+        """Return the place at a rate."""
+        return Spot(slave=self.slave, baudrate=baudrate)
+
+    def code(self, baudrate: int) -> int:
+        """Return what its register says for a rate."""
+        register = self.asking.profile.baudrate
+        return -1 if register is None else register.codes[baudrate]
+
+    @property
+    def register(self) -> int:
+        """Where its rate is set."""
+        register = self.asking.profile.baudrate
+        return -1 if register is None else register.register
+
+
+@dataclass(frozen=True, slots=True)
+class RateWish:
+    """What is wanted."""
+
+    sensors: tuple[Sensor, ...]
+    old: int
+    to: int
+    power_cycle: bool = False
+    dry_run: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class RateVerdict:
+    """How it ended: `where` is the rate at which each sensor was found last, None for one that was not.
+
+    `names` are the sensors it is about, `why` what kept the intent from the disk.
+    """
+
+    ended: Ended
+    where: Mapping[str, int | None] = field(default_factory=dict)
+    names: tuple[str, ...] = ()
+    exception: int | None = None
+    why: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class WriteRates:
+    """The sensors are about to be written; answered with None when that is on the disk, else with why it is not."""
+
+
+@dataclass(frozen=True, slots=True)
+class CameUp:
+    """A sensor answers at the new rate."""
+
+    name: str
+
+
+def change_rate(wish: RateWish, echo_known: Callable[[], bool]) -> Generator[Step, Any, RateVerdict]:
+    """Carry it out; see the rules."""
+    try:
+        refusal = yield from _looked_before(wish, echo_known)
+        if refusal is not None:
+            return refusal
+        why = yield Aside(WriteRates())
+        if why is not None:
+            return RateVerdict(Ended.UNWRITTEN, why=str(why))
+    except LineLostError:
+        return RateVerdict(Ended.LOST_BEFORE)
+    where: dict[str, int | None] = {sensor.name: wish.old for sensor in wish.sensors}
+    try:
+        if wish.power_cycle:
+            return (yield from _all_written(wish, where))
+        return (yield from _one_by_one(wish, where))
+    except LineLostError:
+        return RateVerdict(Ended.UNVERIFIED, dict.fromkeys(where))
+
+
+def _looked_before(wish: RateWish, echo_known: Callable[[], bool]) -> Generator[Step, Any, RateVerdict | None]:
+    absent = []
+    for sensor in wish.sensors:
+        reply = yield from present(sensor.at(wish.old), sensor.asking)
+        if reply.register is None or not (yield from sensor.asking.settle(sensor.at(wish.old))):
+            absent.append(sensor.name)
+    if absent:
+        return RateVerdict(Ended.ABSENT, names=tuple(absent))
+    for n in range(ECHO_READS):
+        if echo_known() or not wish.sensors:
+            break
+        sensor = wish.sensors[n % len(wish.sensors)]
+        yield from sensor.asking.who(sensor.at(wish.old))
+    if wish.sensors and not echo_known():
+        return RateVerdict(Ended.DEAF)
+    return RateVerdict(Ended.FREE) if wish.dry_run else None
+
+
+def _one_by_one(wish: RateWish, where: dict[str, int | None]) -> Generator[Step, Any, RateVerdict]:
+    for n, sensor in enumerate(wish.sensors):
+        exception, rate = yield from shifted(sensor, wish.old, wish.to)
+        where[sensor.name] = rate
+        if rate == wish.to:
+            continue
+        if n == 0 and rate == wish.old:
+            back = yield from restored(sensor, wish.old, wish.to)
+            where[sensor.name] = back
+            if back != wish.old:
+                return RateVerdict(Ended.UNVERIFIED, where, (sensor.name,), exception)
+            ended = Ended.CANARY if exception is None else Ended.REFUSED
+            return RateVerdict(ended, where, (sensor.name,), exception)
+        return (yield from rolled_back(wish.sensors[: n + 1], wish.old, wish.to, where))
+    return RateVerdict(Ended.MOVED, where)
+
+
+def _all_written(wish: RateWish, where: dict[str, int | None]) -> Generator[Step, Any, RateVerdict]:
+    for n, sensor in enumerate(wish.sensors):
+        exception = yield from written(sensor.at(wish.old), sensor.register, sensor.code(wish.to), sensor.asking)
+        says, rate = yield from _found(sensor, (wish.to, wish.old))
+        where[sensor.name] = rate
+        if exception is not None or rate is None or says != sensor.code(wish.to):
+            return (yield from rolled_back(wish.sensors[: n + 1], wish.old, wish.to, where))
+    pending = tuple(name for name, rate in where.items() if rate != wish.to)
+    return RateVerdict(Ended.PENDING if pending else Ended.MOVED, where, pending)
+
+
+def shifted(sensor: Sensor, old: int, to: int) -> Generator[Step, Any, tuple[int | None, int | None]]:
+    """Write another rate to a sensor; return the code of an exception, and the rate at which it answers then."""
+    exception = yield from written(sensor.at(old), sensor.register, sensor.code(to), sensor.asking)
+    found = yield from verified(sensor.at(old), sensor.at(to), sensor.asking)
+    if found.new.answers:
+        return exception, to
+    return exception, old if found.old.answers else None
+
+
+def _found(sensor: Sensor, rates: Sequence[int]) -> Generator[Step, Any, tuple[int | None, int | None]]:
+    """Look for a sensor at these rates; return what its register of the rate says, and the rate it answers at."""
+    for _ in range(TRIES):
+        for rate in rates:
+            reply = yield from sensor.asking.who(sensor.at(rate), register=sensor.register)
+            if reply.answers:
+                return reply.register, rate
+    return None, None
+
+
+def restored(sensor: Sensor, rate: int, other: int) -> Generator[Step, Any, int | None]:
+    """Bring one sensor to `rate`, and its register; return the rate it answers at, None if it is not found."""
+    says, at = yield from _found(sensor, (rate, other))
+    if at is None or (at == rate and says == sensor.code(rate)):
+        return at
+    if at == other:
+        _, at = yield from shifted(sensor, other, rate)
+        return at
+    yield from written(sensor.at(rate), sensor.register, sensor.code(rate), sensor.asking)
+    for _ in range(TRIES):
+        reply = yield from sensor.asking.who(sensor.at(rate), PATIENT, register=sensor.register)
+        if reply.register == sensor.code(rate):
+            return rate
+    return None
+
+
+def rolled_back(
+    sensors: Sequence[Sensor], rate: int, other: int, where: dict[str, int | None]
+) -> Generator[Step, Any, RateVerdict]:
+    """Bring these sensors to `rate`, for up to `ROLL_BACK`; `where` learns where they are."""
+    until: float | None = None
+    missing = list(sensors)
+    while missing:
+        for sensor in tuple(missing):
+            where[sensor.name] = yield from restored(sensor, rate, other)
+            if where[sensor.name] == rate:
+                missing.remove(sensor)
+            now = sensor.asking.clock.now
+            until = now + ROLL_BACK if until is None else until
+            if now > until:
+                return RateVerdict(Ended.UNVERIFIED, where, tuple(each.name for each in missing))
+        if missing:
+            yield Hold(missing[0].asking.clock.now + FIRST_PAUSE)
+    return RateVerdict(Ended.ROLLED_BACK, where)
+
+
+def undo(
+    sensors: Sequence[Sensor], rate: int, other: int, *, longest_pause: float, finish: bool
+) -> Generator[Step, Any, RateVerdict]:
+    """Find every sensor after a change of rate that was cut short, and bring it to `rate`, however long it takes.
+
+    With `finish` they are left where they are if all of them answer at the `other` rate. What was not found in the
+    first look goes aside.
+    """
+    where: dict[str, int | None] = {}
+    if finish:
+        for sensor in sensors:
+            _, where[sensor.name] = yield from _found(sensor, (rate, other))
+            if where[sensor.name] == rate:
+                break
+        if len(where) == len(sensors) and all(at == other for at in where.values()):
+            return RateVerdict(Ended.MOVED, where)
+    verdict = yield from rolled_back(sensors, rate, other, where)
+    pause = min(FIRST_PAUSE, longest_pause)
+    while verdict.ended is not Ended.ROLLED_BACK:
+        yield Aside(verdict)
+        missing = [sensor for sensor in sensors if where[sensor.name] != rate]
+        yield Hold(missing[0].asking.clock.now + pause)
+        pause = min(2 * pause, longest_pause)
+        for sensor in missing:
+            where[sensor.name] = yield from restored(sensor, rate, other)
+        names = tuple(sensor.name for sensor in missing if where[sensor.name] != rate)
+        verdict = RateVerdict(Ended.UNVERIFIED if names else Ended.ROLLED_BACK, where, names)
+    return verdict
+
+
+def await_power(sensors: Sequence[Sensor], to: int, *, longest_pause: float) -> Generator[Step, Any, RateVerdict]:
+    """Ask sensors that want a power cycle at the new rate until all have come up there; each goes aside."""
+    missing = list(sensors)
+    pause = min(FIRST_PAUSE, longest_pause)
+    while missing:
+        for sensor in tuple(missing):
+            reply = yield from sensor.asking.who(sensor.at(to))
+            if reply.answers:
+                missing.remove(sensor)
+                yield Aside(CameUp(sensor.name))
+        if missing:
+            yield Hold(missing[0].asking.clock.now + pause)
+            pause = min(2 * pause, longest_pause)
+    return RateVerdict(Ended.MOVED, {sensor.name: to for sensor in sensors})

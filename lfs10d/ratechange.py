@@ -1,0 +1,257 @@
+"""`line/baudrate` from the request to the journal, the line, the configuration and the answer."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from lfs10d.changes import Changes, Rate
+from lfs10d.commands import Answer, failed, ok, rejected
+from lfs10d.errors import StateError
+from lfs10d.jobs.baudrate import (
+    UNTOUCHED,
+    CameUp,
+    Ended,
+    RateVerdict,
+    RateWish,
+    Sensor,
+    WriteRates,
+    await_power,
+    change_rate,
+    undo,
+)
+from lfs10d.jobs.course import Now, Over
+from lfs10d.journal import Move
+from lfs10d.reading import Errand
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from lfs10d.commands import ErrorCode
+    from lfs10d.effective import Effective
+    from lfs10d.journal import Asked, OpenChange
+    from lfs10d.physical import Physical, Talk
+
+log = logging.getLogger(__name__)
+
+NAME = "line/baudrate"
+ACTIVITY = "changing_baudrate"
+
+_WORDS: Mapping[Ended, tuple[ErrorCode, str]] = {
+    Ended.ABSENT: ("timeout", "nothing was written, for {names} does not answer; every sensor must, or would be lost"),
+    Ended.DEAF: (
+        "line_error",
+        (
+            "whether the adapter returns our own bytes is not clear yet, and nothing was written; "
+            "try again later, or set line.echo to on or off"
+        ),
+    ),
+    Ended.LOST_BEFORE: ("line_error", "the port was lost; nothing was written"),
+    Ended.UNWRITTEN: ("storage_full", "{why}; nothing was written"),
+    Ended.REFUSED: ("refused", "{names} refused the write{refusal}; everything is as it was, at {old} baud"),
+    Ended.CANARY: (
+        "power_cycle_needed",
+        (
+            "{names} took the rate but still answers at {old} baud, so the write was taken back and no other sensor "
+            "was touched. Ask again with power_cycle true, then switch the power of all off and on. Or its setting is "
+            "locked by a switch"
+        ),
+    ),
+    Ended.ROLLED_BACK: ("rolled_back", "not every sensor followed to {to} baud; all are at {old} again"),
+    Ended.UNVERIFIED: (
+        "not_verified",
+        "{names} is not found again; it was at {old} baud last, and is asked at {old} and {to} until it is",
+    ),
+}
+
+
+class RateChange:
+    """Changes of the line's rate; a part of `Physical`."""
+
+    def __init__(self, physical: Physical) -> None:
+        self._physical = physical
+
+    async def perform(self, to: int, *, power_cycle: bool, dry_run: bool, asked: Asked) -> Answer:
+        """Move every sensor and the port to another rate; see `lfs10d.jobs.baudrate`."""
+        physical = self._physical
+        now = physical.running()
+        old = now.config.line.baudrate
+        if to == old:
+            return ok({"from": old, "to": to, "pending": []})
+        refusal = self._unfit(to, now)
+        if refusal is not None:
+            return refusal
+        earlier = frozenset(change.number for change in physical.journal.open)
+        await physical.leave(earlier)
+        clock = Now()
+        sensors = self._sensors([slave.name for slave in now.config.slaves], clock)
+        wish = RateWish(sensors, old, to, power_cycle, dry_run)
+        talk = physical.talk()
+        change: OpenChange | None = None
+        try:
+            ids = frozenset(sensor.slave for sensor in sensors)
+            steps = change_rate(wish, physical.wire().echo_known)
+            talk.begin(steps, clock, line_rate=0, excludes=ids, share=1.0)
+            while not isinstance(what := await talk.wanted(), Over):
+                why = None
+                if isinstance(what, WriteRates):
+                    try:
+                        change = await physical.put(partial(self._intend, wish, asked))
+                    except StateError as error:
+                        why = str(error)
+                talk.go_on(why)
+            verdict: RateVerdict = what.result or RateVerdict(Ended.LOST_BEFORE)
+            return await self._conclude(wish, verdict, change, earlier, asked)
+        except asyncio.CancelledError:
+            talk.halt()
+            return await physical.cut_short(asked)
+        finally:
+            talk.go_on()
+
+    def _unfit(self, to: int, now: Effective) -> Answer | None:
+        """Return why the line need not even be asked; None if it must be."""
+        config, profiles = now.config, now.loaded.profiles
+        able = [slave for slave in config.slaves if to in _rates(profiles[slave.profile].baudrate)]
+        if config.slaves and not able:
+            return rejected("invalid_param", f"to: no sensor of this line can speak at {to} baud", param="to")
+        unable = [slave.name for slave in config.slaves if slave not in able]
+        if unable:
+            return rejected(
+                "not_allowed", f"{', '.join(unable)} could not follow to {to} baud: its profile has no such"
+            )
+        if now.conflicts:
+            return rejected("not_allowed", f"not every sensor can be asked: {next(iter(now.conflicts.values()))}")
+        lost = [change for change in self._physical.journal.open if change.kind != "baudrate" or not change.answered]
+        if lost:
+            names = ", ".join(sorted(lost[0].devices))
+            return rejected("busy", f"{names} is being looked for after an earlier change; it must be found first")
+        return None
+
+    def _sensors(self, names: Iterable[str], clock: Now) -> tuple[Sensor, ...]:
+        """Return the sensors of these names that are configured, each as it is asked."""
+        slaves = (self._physical.running().slave(name) for name in names)
+        return tuple(
+            Sensor(slave.name, slave.id, self._physical.asking(slave, clock, line_rate=0))
+            for slave in slaves
+            if slave is not None
+        )
+
+    def _intend(self, wish: RateWish, asked: Asked) -> OpenChange:
+        moves = tuple(
+            Move(device=sensor.name, old=sensor.at(wish.old), new=sensor.at(wish.to)) for sensor in wish.sensors
+        )
+        facts: dict[str, Any] = {"from": wish.old, "to": wish.to, "power_cycle": wish.power_cycle}
+        return self._physical.journal.intend("baudrate", moves, self._physical.now().ts(), asked, **facts)
+
+    async def _conclude(
+        self, wish: RateWish, verdict: RateVerdict, change: OpenChange | None, earlier: frozenset[int], asked: Asked
+    ) -> Answer:
+        physical = self._physical
+        answer = _answer(wish.old, wish.to, verdict, dry_run=wish.dry_run)
+        told = physical.told(asked, answer)
+        if change is None or verdict.ended in UNTOUCHED:
+            with contextlib.suppress(StateError):
+                await physical.put(partial(physical.journal.close, frozenset(), told))
+            return answer
+        try:
+            if verdict.ended is Ended.MOVED or (wish.to in verdict.where.values() and verdict.ended is Ended.PENDING):
+                await self._record(wish.old, wish.to)
+            if verdict.ended is Ended.PENDING:
+                await physical.put(partial(physical.journal.close, earlier, None))
+                await physical.put(partial(physical.journal.amend, change.number, change.moves, pending=verdict.names))
+                await physical.put(partial(physical.journal.keep, change.number, told))
+            elif verdict.ended is Ended.UNVERIFIED:
+                await physical.put(partial(physical.journal.keep, change.number, told))
+            else:
+                await physical.put(partial(physical.journal.close, earlier | {change.number}, told))
+        except StateError as error:
+            if verdict.ended is Ended.MOVED:
+                return failed("storage_full", f"all sensors are at {wish.to} baud, but that cannot be kept: {error}")
+            log.warning("%s", error)
+        return answer
+
+    async def _record(self, old: int, to: int) -> None:
+        """Have the line speak at the rate its sensors were found at, on the disk first."""
+
+        def edit(now: Effective) -> Changes:
+            filed = now.said.baudrate
+            return replace(now.changes, baudrate=None if to == filed else Rate(filed, to))
+
+        await self._physical.change(edit)
+        log.info("the line is at %d baud now", to)
+        self._physical.tell("baudrate_changed", {"from": old, "to": to})
+
+    # -- changes that are open
+
+    async def follow(self, change: OpenChange, talk: Talk) -> None:
+        """Look for the sensors of an open change; finish it, or undo what the daemon did not live to finish."""
+        physical = self._physical
+        old, to = int(change.facts["from"]), int(change.facts["to"])
+        clock = Now()
+        longest = physical.running().config.poll.probe_interval_max
+        waiting = change.answered and "pending" in change.facts
+        names = change.facts["pending"] if waiting else [move.device for move in change.moves]
+        sensors = self._sensors(names, clock)
+        if waiting:
+            steps = await_power(sensors, to, longest_pause=longest)
+        else:
+            steps = undo(sensors, old, to, longest_pause=longest, finish=not change.answered)
+        if change.answered:
+            talk.begin(steps, clock, line_rate=0, share=1.0, errand=Errand.PROBE)
+        else:
+            talk.begin(steps, clock, line_rate=0, excludes=frozenset(sensor.slave for sensor in sensors))
+        pending = list(names)
+        while not isinstance(what := await talk.wanted(), Over):
+            if isinstance(what, CameUp):
+                if physical.running().config.line.baudrate != to:
+                    await self._record(old, to)
+                pending.remove(what.name)
+                await physical.put(partial(physical.journal.amend, change.number, change.moves, pending=pending))
+            elif isinstance(what, RateVerdict) and not change.answered:
+                change = await self._answered(change, old, to, what)
+            talk.go_on()
+        if what.result is not None:
+            await self._settle(change, old, to, what.result)
+
+    async def _answered(self, change: OpenChange, old: int, to: int, verdict: RateVerdict) -> OpenChange:
+        physical = self._physical
+        told = physical.told(change.asked, _answer(old, to, verdict))
+        await physical.put(partial(physical.journal.keep, change.number, told))
+        if told is not None:
+            physical.respond(told)
+        return change.model_copy(update={"answered": True})
+
+    async def _settle(self, change: OpenChange, old: int, to: int, verdict: RateVerdict) -> None:
+        physical = self._physical
+        if verdict.ended is Ended.MOVED:
+            if physical.running().config.line.baudrate != to:
+                await self._record(old, to)
+        elif physical.running().config.line.baudrate != old:
+            await self._record(to, old)
+        await physical.close(frozenset({change.number}), change, _answer(old, to, verdict))
+        if verdict.ended is not Ended.MOVED:
+            message = f"every sensor is at {old} baud: the change to {to} is dropped"
+            log.warning("%s", message)
+            physical.tell("change_dropped", {"key": "line.baudrate", "from": old, "to": to, "message": message})
+
+
+def _rates(register: Any) -> Iterable[int]:  # noqa: ANN401 - a profile's, or None
+    return () if register is None else register.codes
+
+
+def _answer(old: int, to: int, verdict: RateVerdict, *, dry_run: bool = False) -> Answer:
+    if verdict.ended in (Ended.MOVED, Ended.PENDING):
+        return ok({"from": old, "to": to, "pending": list(verdict.names)})
+    if verdict.ended is Ended.FREE:
+        return ok({"from": old, "to": to, "dry_run": dry_run})
+    code, text = _WORDS[verdict.ended]
+    refusal = "" if verdict.exception is None else f" (exception {verdict.exception:02X})"
+    message = text.format(names=", ".join(verdict.names), old=old, to=to, why=verdict.why, refusal=refusal)
+    if verdict.ended in UNTOUCHED:
+        return rejected(code, message)
+    facts = {} if verdict.exception is None else {"exception_code": verdict.exception}
+    return failed(code, message, data={"where": dict(verdict.where)}, **facts)

@@ -1,0 +1,133 @@
+"""`line/baudrate` on a whole line in virtual time: every way sensors can take it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from lfs10d.commands import Answer, Call
+
+if TYPE_CHECKING:
+    from lfs10d.simulator.line import Request
+    from tests.physical.conftest import Bench, Life
+
+
+def change(bench: Bench, life: Life, to: int = 19200, *, power_cycle: bool = False, dry_run: bool = False) -> Answer:
+    request = life.physical.baudrate(to, power_cycle=power_cycle, dry_run=dry_run, call=Call("b1"))
+    return bench.ask(life, request, within=400.0)
+
+
+def rates(bench: Bench) -> list[int]:
+    return [sensor.format.baudrate for sensor in bench.line.sensors]
+
+
+def fresh(bench: Bench, life: Life, seconds: float = 10.0) -> dict[str, int]:
+    """Return how many good readings each device has from now on."""
+    before = len(life.readings)
+    bench.go(life, seconds)
+    good = [reading.device for reading in life.readings[before:] if reading.values]
+    return {name: good.count(name) for name in good}
+
+
+@pytest.mark.parametrize("echo", [False, True])
+@pytest.mark.parametrize("manner", [None, "at_once", "echo_losing", "slow_flash", "late"])
+def test_every_sensor_and_the_port_move(bench: Bench, manner: str | None, echo: bool) -> None:  # noqa: FBT001
+    life = bench.sensors(3, 4, 5, echo=echo)
+    bench.go(life, 5.0)
+    for sensor in bench.line.sensors:
+        if manner:
+            sensor.ail(manner)
+    answer = change(bench, life)
+    assert (answer.status, answer.data) == ("ok", {"from": 9600, "to": 19200, "pending": []})
+    assert rates(bench) == [19200] * 3
+    assert life.told("baudrate_changed") == [{"from": 9600, "to": 19200}]
+    for sensor in bench.line.sensors:
+        sensor.heal()
+    assert life.running.now.config.line.baudrate == 19200
+    assert min(fresh(bench, life).values()) >= 8
+    bench.cut()
+    assert bench.begin().running.now.config.line.baudrate == 19200
+
+
+def test_a_dry_run_writes_nothing(bench: Bench) -> None:
+    life = bench.sensors(3, 4)
+    bench.go(life, 3.0)
+    assert change(bench, life, dry_run=True).status == "ok"
+    assert not [request for request in bench.line.log if request.body[1:2] == b"\x06"]
+
+
+def test_nothing_is_written_unless_every_sensor_answers(bench: Bench) -> None:
+    life = bench.sensors(3, 4)
+    bench.line.sensor(4).ail("silent")
+    bench.go(life, 3.0)
+    answer = change(bench, life)
+    assert (answer.status, answer.code) == ("rejected", "timeout")
+    assert not [request for request in bench.line.log if request.body[1:2] == b"\x06"]
+
+
+@pytest.mark.parametrize("ailment", ["power_cycle", "stores_but_ignores"])
+def test_a_canary_that_wants_a_power_cycle_is_written_back_and_nobody_else_is_touched(
+    bench: Bench, ailment: str
+) -> None:
+    life = bench.sensors(3, 4)
+    for sensor in bench.line.sensors:
+        sensor.ail(ailment)
+    bench.go(life, 3.0)
+    answer = change(bench, life)
+    assert (answer.status, answer.code) == ("failed", "power_cycle_needed")
+    assert [sensor.words[4] for sensor in bench.line.sensors] == [1, 1]
+    assert not life.physical.open
+    for sensor in bench.line.sensors:
+        sensor.power_cycle()
+    assert rates(bench) == [9600, 9600]
+    assert min(fresh(bench, life).values()) >= 8
+
+
+@pytest.mark.parametrize(("ailment", "code"), [("silent", "not_verified"), ("power_cycle", "rolled_back")])
+def test_where_a_later_one_fails_the_others_are_moved_back(bench: Bench, ailment: str, code: str) -> None:
+    life = bench.sensors(3, 4, 5)
+    bench.go(life, 3.0)
+    second = bench.line.sensor(4)
+    if ailment == "silent":
+        struck: list[object] = []
+
+        def strike(request: Request) -> None:
+            if request.body[:2] == b"\x04\x06" and not struck:
+                struck.append(second.ail("silent"))
+
+        bench.line.after_each_request(strike)
+    else:
+        second.ail(ailment)
+    answer = change(bench, life)
+    assert (answer.status, answer.code) == ("failed", code)
+    where: dict[str, Any] = {"s3": 9600, "s4": None if code == "not_verified" else 9600, "s5": 9600}
+    assert answer.data == {"where": where}
+    second.heal()
+    second.power_cycle()
+    bench.go(life, 120.0)
+    assert rates(bench) == [9600] * 3
+    assert not life.physical.open
+    assert min(fresh(bench, life).values()) >= 8
+
+
+def test_with_power_cycle_all_are_written_and_followed_until_they_come_up(bench: Bench) -> None:
+    life = bench.sensors(3, 4)
+    for sensor in bench.line.sensors:
+        sensor.ail("power_cycle")
+    bench.go(life, 3.0)
+    answer = change(bench, life, power_cycle=True)
+    assert (answer.status, answer.data) == ("ok", {"from": 9600, "to": 19200, "pending": ["s3", "s4"]})
+    assert life.running.now.config.line.baudrate == 9600
+    assert min(fresh(bench, life).values()) >= 7
+    bench.line.sensor(3).power_cycle()
+    bench.go(life, 60.0)
+    assert life.running.now.config.line.baudrate == 19200
+    bench.cut()
+    life = bench.begin()
+    bench.go(life, 5.0)
+    assert life.physical.open
+    bench.line.sensor(4).power_cycle()
+    bench.go(life, 60.0)
+    assert not life.physical.open
+    assert min(fresh(bench, life).values()) >= 8
