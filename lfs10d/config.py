@@ -214,7 +214,9 @@ class MqttConfig(Section):
 class StoreConfig(Section):
     """The backlog on disk while the broker is away."""
 
-    max_size: Annotated[int, Size(0, 10**13)] = Field(512 * 10**6, description="Largest size on disk.")
+    max_size: Annotated[int, Size(0, 10**13)] = Field(
+        512 * 10**6, description="Largest size on disk; below 1MB memory alone."
+    )
     max_age: Annotated[float, Duration(1, 3650 * DAY)] = Field(7 * DAY, description="Older samples are dropped.")
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import TYPE_CHECKING
 
 from lfs10d.mqtt.history import History, Kept
@@ -26,6 +27,9 @@ AGAIN_WITHIN = 10.0
 
 RELEASE_EVERY = 5.0
 """Seconds between two deletions."""
+
+RELEASE_MOST = 2000
+"""Rows of one deletion: 10 ms of the store's thread."""
 
 
 @dataclass(slots=True)
@@ -110,6 +114,11 @@ class Stored:
         """Let go all that was acknowledged: we part from the broker in order."""
         self.forget(float("inf"))
 
+    @property
+    def letting_go(self) -> bool:
+        """There are rows to be deleted whatever the time is."""
+        return bool(self._released)
+
     def release_due(self) -> float | None:
         """Return when there is something to delete; None: nothing."""
         if self._released:
@@ -119,8 +128,9 @@ class Stored:
     def releasing(self, now: float) -> frozenset[int]:
         """Return what is to be deleted now; `deleted` is to follow."""
         self.forget(now - AGAIN_WITHIN)
-        self._release_at = now + RELEASE_EVERY
-        return frozenset(self._released)
+        rows = frozenset(islice(self._released, RELEASE_MOST))
+        self._release_at = now if len(rows) < len(self._released) else now + RELEASE_EVERY
+        return rows
 
     def deleted(self, rows: frozenset[int]) -> None:
         """Note that the store has let these go."""

@@ -160,9 +160,13 @@ class Stowage:
         return min(choices, key=lambda choice: choice[0])
 
     @property
+    def _losses_changed(self) -> bool:
+        return tuple(self._past.undeclared()) != self._store.losses
+
+    @property
     def _losses_due(self) -> float:
         """When the losses that are not declared yet are to be kept: they have changed for 5 s; inf: they have not."""
-        if tuple(self._past.undeclared()) == self._store.losses:
+        if not self._losses_changed:
             self._changed_at = None
         elif self._changed_at is None:
             self._changed_at = self._now() + SPILL_EVERY
@@ -275,7 +279,7 @@ class Stowage:
                 await self._open()
             while self._store.open_for_more and self._past.spill_at_last():
                 await self._spill()
-            if self._past.stored.release_due() is not None or tuple(self._past.undeclared()) != self._store.losses:
+            while self._past.stored.letting_go or self._losses_changed:
                 await self._release()
             await self._thread.call(self._store.close)
         except StoreError as error:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from lfs10d.mqtt.stored import AGAIN_WITHIN, RELEASE_EVERY, Stored
+from lfs10d.mqtt.stored import AGAIN_WITHIN, RELEASE_EVERY, RELEASE_MOST, Stored
 from lfs10d.store.samplefile import Row
 from lfs10d.telemetry import Sample
 
@@ -87,6 +87,17 @@ def test_nothing_is_read_again_where_the_store_is_empty() -> None:
     assert not stored.more
 
 
+def test_much_is_let_go_in_several_batches_without_a_pause() -> None:
+    stored = filled(RELEASE_MOST + 1)
+    stored.release(range(1, RELEASE_MOST + 2))
+    first = stored.releasing(0.0)
+    stored.deleted(first)
+    assert stored.release_due() == 0.0
+    last = stored.releasing(0.0)
+    stored.deleted(last)
+    assert (len(first), len(last), stored.release_due()) == (RELEASE_MOST, 1, None)
+
+
 def test_parting_in_order_lets_everything_go_that_was_acknowledged() -> None:
     stored = filled(3)
     stored.settled([1, 2], 100.0)
@@ -96,7 +107,9 @@ def test_parting_in_order_lets_everything_go_that_was_acknowledged() -> None:
 
 def test_what_never_will_be_delivered_is_let_go_too() -> None:
     stored = filled(3)
+    before = stored.letting_go
     stored.release([3])
+    assert (before, stored.letting_go) == (False, True)
     assert stored.depth == 2
     assert stored.releasing(0.0) == {3}
 

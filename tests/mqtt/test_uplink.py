@@ -13,10 +13,14 @@ from typing import TYPE_CHECKING
 from lfs10d import telemetry
 from lfs10d.mqtt.settings import BrokerSettings, Version
 from lfs10d.mqtt.uplink import Uplink
+from lfs10d.store.backlog import Store
+from lfs10d.store.opening import Limits
+from lfs10d.store.samplefile import Entry
 from lfs10d.telemetry import Kind, Publication, Sample
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable
+    from pathlib import Path
 
     import pytest
 
@@ -514,3 +518,42 @@ def test_other_settings_are_taken_at_a_reload(mosquitto: Mosquitto) -> None:
 
     asyncio.run(scenario())
     assert "as another" in mosquitto.log
+
+
+# The store
+
+
+def test_while_a_backlog_on_disk_leaves_in_order_live_samples_stay_live(mosquitto: Mosquitto, tmp_path: Path) -> None:
+    """None of them waits until it is history, and all of the past comes once, oldest first."""
+    stored, live = 2500, 300
+    limits = Limits(size=10**9, age=10**12)
+    store = Store(tmp_path, boot="k0000000", limits=limits)
+    kept = [sample(seq, "b").sample for seq in range(1, stored + 1)]
+    store.append([Entry(each, 0) for each in kept if each is not None], losses=(), now=0)
+    store.close()
+
+    async def scenario() -> None:
+        listener = mosquitto.subscribe(f"{B}/#")
+        site = Site(mosquitto.port)
+        site.uplink.keep_in(Store(tmp_path, boot="k0000001", limits=limits), lambda _: None)
+        async with running(site) as uplink:
+            await until(lambda: uplink.backlog.depth == stored, "the store is opened")
+            await until(lambda: bool(listener.on(f"{B}/device/b/history")), "the past is open", within=20)
+            for seq in range(1, live + 1):
+                uplink.publish([sample(seq)])
+                await asyncio.sleep(0.005)
+            await until(lambda: uplink.backlog.depth == 0, "the end of the past")
+        past = [one["seq"] for each in listener.on(f"{B}/device/b/history") for one in json.loads(each.payload)]
+        assert past == list(range(1, stored + 1))
+        assert [json.loads(each.payload)["seq"] for each in listener.on(f"{B}/device/a/telemetry")] == [
+            *range(1, live + 1)
+        ]
+        assert listener.on(f"{B}/device/a/history") == []
+        between = [each.topic for each in listener.heard].index(f"{B}/device/a/telemetry")
+        assert f"{B}/device/b/history" in {each.topic for each in listener.heard[between:]}
+
+    asyncio.run(scenario())
+    left = Store(tmp_path, boot="k0000002", limits=limits)
+    left.open()
+    assert left.rows == 0  # what was acknowledged is let go at the end
+    left.close()
