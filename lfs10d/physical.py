@@ -15,7 +15,8 @@ from functools import partial
 from math import inf
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
-from lfs10d import assembly, findings, ratechange
+from lfs10d import adoption, assembly, findings, ratechange
+from lfs10d.adoption import Adoption
 from lfs10d.aside import aside
 from lfs10d.changes import Place
 from lfs10d.commands import Answer, Call, failed, rejected
@@ -32,7 +33,8 @@ from lfs10d.requests.request import RefusedError
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping
 
-    from lfs10d.changes import Changes
+    from lfs10d.adoption import Newcomer
+    from lfs10d.changes import Changes, Saying
     from lfs10d.config import Config, SlaveConfig
     from lfs10d.effective import Effective
     from lfs10d.facts import Instant
@@ -151,6 +153,7 @@ class Physical:
         self._writing: asyncio.Future[Any] | None = None
         self._act = act
         self._rates = RateChange(self)
+        self._adoption = Adoption(self)
         trouble = journal.take()
         if trouble is not None:
             log.error("%s", trouble)
@@ -255,6 +258,16 @@ class Physical:
             finally:
                 self._act(None)
 
+    # -- line/adopt
+
+    async def adopt(self, wanted: Newcomer, call: Call) -> Answer:
+        """Take in a factory-new sensor: a free id, the line's rate, and it is polled."""
+        if (busy := self.busy) is not None:
+            return busy
+        asked = asked_by(adoption.NAME, call)
+        with self.place(adoption.NAME, wanted.slaves):
+            return await self._adoption.perform(wanted, asked)
+
     # -- device/readdress
 
     async def readdress(self, device: str, to: int, *, dry_run: bool, call: Call) -> Answer:
@@ -343,7 +356,7 @@ class Physical:
             return answer
         try:
             if verdict.ending is Ending.MOVED:
-                await self._record(device, wish.new)
+                await self.record(device, wish.new)
                 await self.put(partial(self.journal.close, self._changes_of(device), told))
                 self._tell_moved(device, wish.old, wish.new)
             elif verdict.stays_open:
@@ -364,12 +377,12 @@ class Physical:
     def _changes_of(self, device: str) -> frozenset[int]:
         return frozenset(change.number for change in self.journal.open if device in change.devices)
 
-    async def _record(self, device: str, spot: Spot) -> None:
-        """Have the device polled where it was found, on the disk first."""
+    async def record(self, device: str, spot: Spot, newcomer: Saying | None = None) -> None:
+        """Have the device polled where it was found, on the disk first; a `newcomer` is what is said of a new one."""
 
         def edit(now: Effective) -> Changes:
             if now.slave(device) is None:
-                return now.changes
+                return now.changes if newcomer is None else now.changes.adding(device, newcomer, Place(spot.slave))
             return now.changes.moving(device, Place(spot.slave), now.said)
 
         await self.change(edit)
@@ -430,13 +443,20 @@ class Physical:
 
     async def _follow_move(self, change: OpenChange, talk: Talk) -> None:
         (move,) = change.moves
-        slave = self.running().slave(move.device)
+        slave = self.running().slave(move.device) or adoption.newcomer(change, move)
         if slave is None:
             await self.drop(change, f"{move.device} is no longer configured")
             return
         now = self.running()
         clock = Now()
-        steps = follow(move.old, move.new, self.asking(slave, clock), longest_pause=now.config.poll.probe_interval_max)
+        here = Spot(slave=move.old.slave, baudrate=move.new.baudrate)
+        steps = follow(
+            here,
+            move.new,
+            self.asking(slave, clock, line_rate=0),
+            longest_pause=now.config.poll.probe_interval_max,
+            before=None if here == move.old else move.old,
+        )
         talk.begin(steps, clock, line_rate=now.config.line.baudrate, share=1.0, errand=Errand.PROBE)
         while not isinstance(what := await talk.wanted(), Over):
             if isinstance(what, Verdict):
@@ -461,7 +481,7 @@ class Physical:
         """Finish a change whose sensor was found."""
         if verdict.ending is Ending.MOVED:
             answer = findings.readdressed(move.device, _wish(move), verdict, profile)
-            await self._record(move.device, move.new)
+            await self.record(move.device, move.new, newcomer=adoption.entry(change))
             await self.close(self._changes_of(move.device), change, answer)
             self._tell_moved(move.device, move.old, move.new)
         else:

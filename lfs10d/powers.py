@@ -7,6 +7,7 @@ import contextlib
 from typing import TYPE_CHECKING, TypeVar
 
 from lfs10d import assembly
+from lfs10d.adoption import Newcomer
 from lfs10d.commands import rejected
 from lfs10d.inquiries import Inquiries, Inquiry, altered
 from lfs10d.jobs.knock import Knock
@@ -141,6 +142,14 @@ class DaemonPowers:
         if self.physical is None:
             return rejected("busy", "the daemon is starting")
         return await self.physical.baudrate(to, power_cycle=power_cycle, dry_run=dry_run, call=call)
+
+    async def adopt(
+        self, *, name: str | None, label: str | None, factory: int | None, to: int | None, call: Call
+    ) -> Answer:
+        """Take in a factory-new sensor."""
+        if self.physical is None:
+            return rejected("busy", "the daemon is starting")
+        return await self.physical.adopt(Newcomer(name, label, factory, to), call)
 
     async def knock(self, slave: int, profile: Profile) -> Knock:
         """Ask one slave id whether anybody is there."""

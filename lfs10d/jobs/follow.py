@@ -31,9 +31,15 @@ DECIDED = frozenset({Ending.MOVED, Ending.LOCKED})
 """With these the sensor is found: at the new place, or at the old one to stay."""
 
 
-def follow(old: Spot, new: Spot, asking: Asking, *, longest_pause: float) -> Generator[Step, Any, Verdict]:
-    """Ask until the sensor is found; each look that did not find it goes aside."""
+def follow(
+    old: Spot, new: Spot, asking: Asking, *, longest_pause: float, before: Spot | None = None
+) -> Generator[Step, Any, Verdict]:
+    """Ask until the sensor is found; each look that did not find it goes aside.
+
+    `before` is where it was before it came to `old`: it may be there still.
+    """
     verdict = judge((yield from verified(old, new, asking)), None, None, new.slave)
+    verdict = (yield from _still_there(before, new, asking)) or verdict
     pause = min(FIRST_PAUSE, longest_pause)
     while verdict.ending not in DECIDED:
         yield Aside(verdict)
@@ -43,7 +49,16 @@ def follow(old: Spot, new: Spot, asking: Asking, *, longest_pause: float) -> Gen
             at_new = yield from asking.who(new)
             at_old = yield from asking.who(old)
             appeared = at_new.answers or at_new.noise
-            if appeared or (at_old.answers and at_old.register != new.slave):
+            still = yield from _still_there(before, new, asking)
+            if appeared or still or (at_old.answers and at_old.register != new.slave):
                 break
-        verdict = judge((yield from told(old, new, asking)), None, None, new.slave)
+        verdict = still or judge((yield from told(old, new, asking)), None, None, new.slave)
     return verdict
+
+
+def _still_there(before: Spot | None, new: Spot, asking: Asking) -> Generator[Step, Any, Verdict | None]:
+    """Ask the place of before; return that the sensor stays there, None if it does not."""
+    if before is None:
+        return None
+    reply = yield from asking.who(before)
+    return Verdict(Ending.LOCKED, reply.register) if reply.answers and reply.register != new.slave else None

@@ -97,6 +97,15 @@ class Powers(Protocol):
         """Move every sensor and the port to another rate, verified, or back."""
         ...
 
+    async def adopt(
+        self, *, name: str | None, label: str | None, factory: int | None, to: int | None, call: Call
+    ) -> Answer:
+        """Give a factory-new sensor at id `factory` the id `to` and the line's rate, and poll it.
+
+        None is the profile's factory id, and the next free id.
+        """
+        ...
+
     async def reload(self) -> dict[str, list[str]]:
         """Read the files again and apply what changed; return `applied` and `restart_required`.
 

@@ -1,9 +1,12 @@
-"""`device/readdress` and `line/baudrate`: what physically changes a sensor."""
+"""`device/readdress`, `line/baudrate` and `line/adopt`: what physically changes a sensor."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
+from pydantic import Field
+
+from lfs10d import config
 from lfs10d.admission import Form
 from lfs10d.commands import Answer, Parameters
 from lfs10d.kinds import Choice, Flag, Name, Whole
@@ -46,7 +49,23 @@ async def baudrate(parameters: Baudrate, powers: Powers, call: Call) -> Answer:
     )
 
 
+class Adopt(Parameters):
+    """What the new sensor is to be called, where it is and which slave id it is to get."""
+
+    name: Annotated[str, Name()] | None = None
+    label: config.Label = None
+    factory: Annotated[int, Whole(1, 255)] | None = Field(default=None, alias="from")
+    to: Annotated[int, Whole(1, 255)] | None = None
+
+
+async def adopt(parameters: Adopt, powers: Powers, call: Call) -> Answer:
+    """Take in a factory-new sensor."""
+    wanted = parameters
+    return await powers.adopt(name=wanted.name, label=wanted.label, factory=wanted.factory, to=wanted.to, call=call)
+
+
 REQUESTS: Mapping[str, Request] = {
     "device/readdress": Request(Form("sensors", Readdress, REMEMBERED_FOR), readdress),
+    "line/adopt": Request(Form("sensors", Adopt, REMEMBERED_FOR), adopt),
     "line/baudrate": Request(Form("sensors", Baudrate, REMEMBERED_FOR), baudrate),
 }

@@ -81,6 +81,12 @@ class FakePowers:
         self.done.append(("baudrate", to, power_cycle, dry_run, call.id))
         return ok({"to": to})
 
+    async def adopt(
+        self, *, name: str | None, label: str | None, factory: int | None, to: int | None, call: Call
+    ) -> Answer:
+        self.done.append(("adopt", name, label, factory, to, call.id))
+        return ok({"device": name})
+
     def start(self) -> None:
         """Begin anew, as a daemon does."""
         self.holding = Running(load(self.file), ChangeFile(STATE, Disk(self.disk)), self._take)

@@ -22,6 +22,12 @@ def test_a_change_of_rate_is_handed_on_with_its_call(ask: Ask, powers: FakePower
     assert powers.done == [("baudrate", 19200, True, True, 7)]
 
 
+def test_a_newcomer_is_handed_on_with_its_call(ask: Ask, powers: FakePowers) -> None:
+    assert ask("line/adopt", '{"id":7,"name":"north","label":"Mast, 10 m","from":5,"to":9}').status == "ok"
+    assert ask("line/adopt").status == "ok"
+    assert powers.done == [("adopt", "north", "Mast, 10 m", 5, 9, 7), ("adopt", None, None, None, None, None)]
+
+
 @pytest.mark.parametrize(
     ("name", "payload", "param"),
     [
@@ -31,6 +37,9 @@ def test_a_change_of_rate_is_handed_on_with_its_call(ask: Ask, powers: FakePower
         ("device/readdress", '{"device":"mast-top","to":9.0}', "to"),
         ("device/readdress", '{"device":"mast-top"}', "to"),
         ("device/readdress", '{"to":9}', "device"),
+        ("line/adopt", '{"name":"North"}', "name"),
+        ("line/adopt", '{"from":"1"}', "from"),
+        ("line/adopt", '{"to":0}', "to"),
         ("line/baudrate", '{"to":"19200"}', "to"),
         ("line/baudrate", '{"to":14400}', "to"),
         ("line/baudrate", '{"to":9600,"power_cycle":1}', "power_cycle"),
@@ -43,6 +52,6 @@ def test_what_is_not_meant_exactly_is_not_done(
     assert (answer.code, answer.facts["param"], powers.done) == ("invalid_param", param, [])
 
 
-@pytest.mark.parametrize("name", ["device/readdress", "line/baudrate"])
+@pytest.mark.parametrize("name", ["device/readdress", "line/baudrate", "line/adopt"])
 def test_the_answer_to_a_physical_change_is_kept_for_a_day(name: str) -> None:
     assert REQUESTS[name].form.remembered_for == 24 * 3600

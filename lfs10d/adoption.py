@@ -1,0 +1,235 @@
+"""`line/adopt` from the request to the journal, the line, the configuration and the answer."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lfs10d.commands import Answer, failed, ok, rejected
+from lfs10d.config import SlaveConfig, default_device_name
+from lfs10d.errors import StateError
+from lfs10d.jobs import adopt
+from lfs10d.jobs.course import Now, Over
+from lfs10d.jobs.readdress import NOTHING_WRITTEN, Ending, Verdict, Write
+from lfs10d.journal import Move
+from lfs10d.profiles.library import builtin_names, load_profile
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from lfs10d.commands import ErrorCode
+    from lfs10d.effective import Effective
+    from lfs10d.journal import Asked, OpenChange
+    from lfs10d.physical import Physical
+    from lfs10d.profiles.schema import Profile
+
+log = logging.getLogger(__name__)
+
+NAME = "line/adopt"
+FIRST_ID = 2
+"""The first id that is given; 1 is the factory's, and is kept free for the next newcomer."""
+LAST_ID = 247
+"""The last id that is given: those above are reserved (Modbus over Serial Line V1.02, section 2.2)."""
+CANDIDATES = 8
+"""So many ids are looked at before it is told that somebody who is not configured has them all."""
+
+_WORDS: Mapping[Ending, tuple[ErrorCode, str]] = {
+    Ending.TAKEN: ("address_in_use", "somebody is heard at slave id {to}, who is not configured; see line/scan"),
+    Ending.ABSENT: ("timeout", "nobody answers at slave id {old}; is the new sensor connected and powered?"),
+    Ending.DEAF: (
+        "line_error",
+        "whether the adapter returns our own bytes is not clear yet; try again, or set line.echo to on or off",
+    ),
+    Ending.LOST_BEFORE: ("line_error", "the port was lost; nothing was written"),
+    Ending.UNWRITTEN: ("storage_full", "{why}; nothing was written"),
+    Ending.BOTH: ("duplicate_id", "more than one sensor is heard at slave id {old}; connect one at a time"),
+    Ending.GARBAGE: ("duplicate_id", "at slave id {to} several answer at once since the write; take the other off"),
+    Ending.REFUSED: ("refused", "the sensor at {old} refused the write{refusal}; perhaps its {lock} overrules it"),
+    Ending.LOCKED: (
+        "dip_switch",
+        (
+            "the sensor stays at slave id {old}: its {lock} overrules the write; set that to 0 and try again. "
+            "Or it wants its power switched off and on before it obeys"
+        ),
+    ),
+    Ending.PENDING: (
+        "power_cycle_needed",
+        (
+            "the sensor took what was written but is still at slave id {old}: switch its power off and on, and ask "
+            "again if it does not appear. If that does not help, its {lock} overrules the write"
+        ),
+    ),
+    Ending.NOWHERE: (
+        "not_verified",
+        "since the write the sensor answers neither at slave id {old} nor at {to}; it is looked for until it is found",
+    ),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Newcomer:
+    """What a request wants: the sensor at `factory` (None: as the profile says) at id `to` (None: the next free)."""
+
+    name: str | None = None
+    label: str | None = None
+    factory: int | None = None
+    to: int | None = None
+
+    @property
+    def slaves(self) -> frozenset[int]:
+        """The ids that are known to be used by it."""
+        return frozenset(slave for slave in (self.factory, self.to) if slave is not None)
+
+
+class Adoption:
+    """Newcomers; a part of `Physical`."""
+
+    def __init__(self, physical: Physical) -> None:
+        self._physical = physical
+
+    async def perform(self, wanted: Newcomer, asked: Asked) -> Answer:
+        """Take in a factory-new sensor; see `lfs10d.jobs.adopt`."""
+        physical = self._physical
+        now = physical.running()
+        wish = self._wish(wanted, now)
+        if isinstance(wish, Answer):
+            return wish
+        slave = SlaveConfig(id=wish.factory)
+        clock = Now()
+        talk = physical.talk()
+        change: OpenChange | None = None
+        try:
+            steps = adopt.adopt(wish, physical.asking(slave, clock, line_rate=0), physical.wire().echo_known)
+            ids = frozenset({wish.factory, *wish.candidates})
+            talk.begin(steps, clock, line_rate=now.config.line.baudrate, excludes=ids)
+            while not isinstance(what := await talk.wanted(), Over):
+                why = None
+                if isinstance(what, Write):
+                    try:
+                        change = await physical.put(partial(self._intend, wanted, what, asked))
+                    except StateError as error:
+                        why = str(error)
+                talk.go_on(why)
+            found: adopt.Adopted = what.result or adopt.Adopted(Verdict(Ending.LOST_BEFORE))
+            return await self._conclude(wanted, wish, found, change, asked)
+        except asyncio.CancelledError:
+            talk.halt()
+            return await physical.cut_short(asked)
+        finally:
+            talk.go_on()
+
+    def _wish(self, wanted: Newcomer, now: Effective) -> adopt.Newcomer | Answer:
+        """Return what the line is asked, or why it need not be."""
+        profile = _profile()
+        rates = tuple(profile.baudrate.codes) if profile.baudrate else ()
+        line_rate = now.config.line.baudrate
+        if profile.factory is None or line_rate not in rates or now.config.line.framing not in profile.framings:
+            return rejected("not_allowed", f"{profile.title}: none can speak on this line")
+        factory = wanted.factory or profile.factory.id
+        taken = {slave.id: f"is that of {slave.name}" for slave in now.config.slaves}
+        for slave in now.config.slaves:
+            taken |= {place.id: f"is that of {slave.name}" for place in now.places[slave.name]}
+        taken |= {
+            slave: why for slave, why in self._physical.reserved().items() if slave not in wanted.slaves | {factory}
+        }
+        for change in self._physical.open:
+            taken |= dict.fromkeys(change.slaves, "is reserved by an open change")
+        names = {slave.name for slave in now.config.slaves}
+        if factory in taken:
+            message = f"slave id {factory} {taken[factory]}; keep the factory's id free for newcomers"
+            return rejected("address_in_use", message, param="from")
+        if wanted.to is not None and (wanted.to in taken or wanted.to == factory):
+            why = taken.get(wanted.to, "is where the newcomer is")
+            return rejected("address_in_use", f"slave id {wanted.to} {why}", param="to")
+        if wanted.name is not None and (wanted.name in names or now.changes.of(wanted.name).added is not None):
+            return rejected("invalid_param", f"name: {wanted.name} is taken; give it another name", param="name")
+        ids = range(FIRST_ID, min(LAST_ID, profile.ids[1]) + 1) if wanted.to is None else (wanted.to,)
+        free = [slave for slave in ids if slave not in taken and slave != factory]
+        candidates = [slave for slave in free if wanted.name or default_device_name(slave) not in names][:CANDIDATES]
+        if not candidates and wanted.to is not None:
+            message = f"name: the default {default_device_name(wanted.to)} is taken; give it another name"
+            return rejected("invalid_param", message, param="name")
+        others = (rate for rate in rates if rate != line_rate)
+        return adopt.Newcomer(factory, tuple(candidates), line_rate, (line_rate, *others))
+
+    def _intend(self, wanted: Newcomer, write: Write, asked: Asked) -> OpenChange:
+        name = wanted.name or default_device_name(write.new.slave)
+        move = Move(device=name, old=write.old, new=write.new, register_before=write.register_before)
+        moment = self._physical.now().ts()
+        return self._physical.journal.intend("adopt", (move,), moment, asked, label=wanted.label)
+
+    async def _conclude(
+        self,
+        wanted: Newcomer,
+        wish: adopt.Newcomer,
+        found: adopt.Adopted,
+        change: OpenChange | None,
+        asked: Asked,
+    ) -> Answer:
+        physical, verdict = self._physical, found.verdict
+        old, to = wish.factory, found.to or 0
+        name = wanted.name or default_device_name(to)
+        answer = _answer(name, old, to, verdict, written=change is not None)
+        told = physical.told(asked, answer)
+        if change is None or verdict.ending in NOTHING_WRITTEN:
+            with contextlib.suppress(StateError):
+                await physical.put(partial(physical.journal.close, frozenset(), told))
+            return answer
+        numbers = frozenset({change.number})
+        try:
+            if verdict.ending is Ending.MOVED:
+                (move,) = change.moves
+                await physical.record(name, move.new, newcomer=entry(change))
+                await physical.put(partial(physical.journal.close, numbers, told))
+                facts = {"request": NAME, "id": asked.key, "device": name, "from": None, "to": {"slave": to}}
+                physical.tell("change_applied", facts)
+            elif verdict.stays_open:
+                await physical.put(partial(physical.journal.keep, change.number, told))
+            else:
+                await physical.put(partial(physical.journal.close, numbers, told))
+        except StateError as error:
+            if verdict.ending is Ending.MOVED:
+                return failed("storage_full", f"the sensor is at slave id {to} now, but that cannot be kept: {error}")
+            log.warning("%s", error)
+        return answer
+
+
+def entry(change: OpenChange) -> dict[str, Any] | None:
+    """Return what is said of the newcomer of an open change; None if it has none."""
+    if change.kind != "adopt":
+        return None
+    label = change.facts.get("label")
+    said: dict[str, Any] = {"id": change.moves[0].new.slave}
+    return said if label is None else {**said, "label": label}
+
+
+def newcomer(change: OpenChange, move: Move) -> SlaveConfig | None:
+    """Return the newcomer of an open change as it would be configured; None if it has none."""
+    return SlaveConfig(id=move.new.slave, name=move.device) if change.kind == "adopt" else None
+
+
+def _profile() -> Profile:
+    """Return the profile that a device has by default: newcomers are of its kind."""
+    return load_profile(builtin_names()[0], relative_to=Path())
+
+
+def _lock() -> str:
+    slave_id = _profile().slave_id
+    return (slave_id and slave_id.locked_by) or "address switch"
+
+
+def _answer(name: str, old: int, to: int, verdict: Verdict, *, written: bool) -> Answer:
+    if verdict.ending is Ending.MOVED:
+        return ok({"device": name, "slave": to, "from": old})
+    code, text = _WORDS[verdict.ending]
+    refusal = "" if verdict.exception is None else f" (exception {verdict.exception:02X})"
+    message = text.format(old=old, to=to, why=verdict.why, refusal=refusal, lock=_lock())
+    facts: dict[str, Any] = {} if verdict.exception is None else {"exception_code": verdict.exception}
+    if not written:
+        return rejected(code, message, param=None, **facts)
+    return failed(code, message, data={"device": name, "from": old, "to": to}, **facts)

@@ -1,0 +1,156 @@
+"""Taking in a factory-new sensor: found at its factory id, brought to the line's rate, given a free id. Pure.
+
+Rules
+-----
+1. It is looked for at the line's rate first, then at each other rate of its profile. Where it is found at several, or
+   garbage is heard, there is more than one: plug in one at a time.
+2. A new id is free if not one byte is heard there, at no rate. The candidates are tried in order.
+3. One intent, on the disk before the first write, covers all. First the rate is written, while the sensor still has
+   its factory id: cut short there, it is found again by the same request. Then it is given its id, verified as in
+   `lfs10d.jobs.readdress`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from lfs10d.jobs.baudrate import Sensor, restored, shifted
+from lfs10d.jobs.course import Aside, LineLostError
+from lfs10d.jobs.readdress import (
+    ECHO_READS,
+    TRIES,
+    Ending,
+    Verdict,
+    Write,
+    free,
+    judge,
+    present,
+    verified,
+    written,
+)
+from lfs10d.journal import Spot
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator
+
+    from lfs10d.jobs.asking import Asking
+    from lfs10d.jobs.course import Step
+
+
+@dataclass(frozen=True, slots=True)
+class Newcomer:
+    """What is wanted: the sensor at slave id `factory` at one of `candidates` and at `line_rate`.
+
+    `rates` are those of its profile, in the order in which it is looked for.
+    """
+
+    factory: int
+    candidates: tuple[int, ...]
+    line_rate: int
+    rates: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Adopted:
+    """How it ended: the sensor was at `old`, and was to get `to` (None: no id is free)."""
+
+    verdict: Verdict
+    old: Spot | None = None
+    to: int | None = None
+    at_rate: bool = True
+    """False: it ended with the write of the rate; its id is as it was."""
+
+
+def adopt(wish: Newcomer, asking: Asking, echo_known: Callable[[], bool]) -> Generator[Step, Any, Adopted]:
+    """Carry it out; see the rules."""
+    try:
+        looked = yield from _looked_before(wish, asking, echo_known)
+        if looked.verdict.ending is not Ending.FREE or looked.old is None or looked.to is None:
+            return looked
+        old, to = looked.old, looked.to
+        new = Spot(slave=to, baudrate=wish.line_rate)
+        why = yield Aside(Write(old, new, looked.verdict.register))
+        if why is not None:
+            return Adopted(Verdict(Ending.UNWRITTEN, why=str(why)), old, to)
+    except LineLostError:
+        return Adopted(Verdict(Ending.LOST_BEFORE))
+    try:
+        if old.baudrate != wish.line_rate:
+            verdict = yield from _at_line_rate(old, wish.line_rate, asking)
+            if verdict is not None:
+                return Adopted(verdict, old, to, at_rate=False)
+        here = Spot(slave=old.slave, baudrate=wish.line_rate)
+        exception = yield from written(here, asking.id_register, to, asking)
+        found = yield from verified(here, new, asking)
+        return Adopted(judge(found, looked.verdict.register, exception, to), old, to)
+    except LineLostError:
+        return Adopted(Verdict(Ending.NOWHERE, stays_open=True), old, to)
+
+
+def _looked_before(wish: Newcomer, asking: Asking, echo_known: Callable[[], bool]) -> Generator[Step, Any, Adopted]:
+    """Find the newcomer and a free id; `FREE` where it may be written."""
+    newcomer = yield from _newcomer(wish, asking)
+    old = newcomer.old
+    if newcomer.verdict.ending is not Ending.FREE or old is None:
+        return newcomer
+    to = yield from _free_id(wish, asking)
+    if to is None:
+        return Adopted(Verdict(Ending.TAKEN, at=old.baudrate), old, next(iter(wish.candidates), None))
+    for _ in range(ECHO_READS):
+        if echo_known():
+            break
+        yield from asking.who(old)
+    if not echo_known():
+        return Adopted(Verdict(Ending.DEAF), old, to)
+    again = yield from present(old, asking)
+    if not again.answers or not (yield from asking.settle(old)):
+        return Adopted(Verdict(Ending.ABSENT), old, to)
+    return Adopted(newcomer.verdict, old, to)
+
+
+def _newcomer(wish: Newcomer, asking: Asking) -> Generator[Step, Any, Adopted]:
+    """Find the one sensor at the factory id; `FREE` if there is just one."""
+    found: list[Adopted] = []
+    for rate in wish.rates:
+        spot = Spot(slave=wish.factory, baudrate=rate)
+        reply = yield from present(spot, asking)
+        if reply.silent:
+            continue
+        noise = 0
+        for _ in range(TRIES):  # the winds of two differ, though both say the same id
+            noise += (yield from asking.values(spot)).noise
+        clear = reply.register is not None and noise < TRIES
+        verdict = Verdict(Ending.FREE if clear else Ending.BOTH, reply.register, reply.exception, rate)
+        found.append(Adopted(verdict, spot))
+    if not found:
+        return Adopted(Verdict(Ending.ABSENT))
+    if len(found) > 1:
+        return Adopted(Verdict(Ending.BOTH, at=found[0].verdict.at), found[0].old)
+    return found[0]
+
+
+def _free_id(wish: Newcomer, asking: Asking) -> Generator[Step, Any, int | None]:
+    """Return the first candidate at which nothing is heard, None if there is none."""
+    for candidate in wish.candidates:
+        clear = True
+        for rate in wish.rates:
+            clear = clear and (yield from free(Spot(slave=candidate, baudrate=rate), asking))
+        if clear:
+            return candidate
+    return None
+
+
+def _at_line_rate(old: Spot, rate: int, asking: Asking) -> Generator[Step, Any, Verdict | None]:
+    """Bring the newcomer to the line's rate; return why that failed, None if it did not."""
+    sensor = Sensor("", old.slave, asking)
+    exception, at = yield from shifted(sensor, old.baudrate, rate)
+    if at == rate:
+        return None
+    if at is None:
+        return Verdict(Ending.NOWHERE, exception=exception, stays_open=True)
+    if exception is not None:
+        back = yield from restored(sensor, old.baudrate, rate)
+        return Verdict(Ending.REFUSED, exception=exception, stays_open=back is None)
+    # What it stored may stay: after a power cycle the same request finds it at the line's rate.
+    return Verdict(Ending.PENDING)
