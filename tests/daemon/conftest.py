@@ -56,7 +56,8 @@ class Manager:
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._socket.bind(f"\0lfs10d-test-{os.getpid()}-{id(self)}")
         self.address = "@" + self._socket.getsockname()[1:].decode()
-        threading.Thread(target=self._listen, daemon=True).start()
+        self._thread = threading.Thread(target=self._listen, daemon=True)
+        self._thread.start()
 
     def _listen(self) -> None:
         while message := self._socket.recv(4096).decode():
@@ -70,6 +71,7 @@ class Manager:
         """End the thread and close."""
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as last:
             last.sendto(b"", self._socket.getsockname())
+        self._thread.join()
         self._socket.close()
 
 
