@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lfs10d.facts import DeviceFacts, LineFacts
 from lfs10d.jobs.register import Target
+from lfs10d.jobs.search import Search
 from lfs10d.modbus.bus import LineRules
 from lfs10d.modbus.frames import Checksum, Codec, Framing
 from lfs10d.modbus.settings import PortSettings, Rs485
 from lfs10d.modbus.timing import LineTiming
+from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.reading import Fault, FaultCode, Reading
 from lfs10d.roster import FIRST_TIMEOUTS, DeviceSpec, PollRules
 from lfs10d.store.opening import Limits
@@ -22,6 +25,11 @@ if TYPE_CHECKING:
     from lfs10d.config import Config, LineConfig, PollConfig, SlaveConfig, StoreConfig
     from lfs10d.configfile import Loaded
     from lfs10d.profiles.schema import Profile
+
+
+GREATEST_SHARE = 0.95
+"""A scan takes at most this share of the line, whatever is asked for, so that polling goes on."""
+DEFAULT_PROFILE = builtin_names()[0]
 
 
 def port_settings(line: LineConfig) -> PortSettings:
@@ -82,6 +90,35 @@ def _device_spec(slave: SlaveConfig, line: LineConfig, profile: Profile) -> Devi
         interval=max(slave.interval, profile.min_interval),  # 0 is as fast as the line allows, and the device
         enabled=slave.enabled,
         response_timeout=slave.response_timeout,
+    )
+
+
+def search(loaded: Loaded, ids: tuple[int, ...], rates: tuple[int, ...], *, share: float) -> Search:
+    """Return what to look for on the line; without `rates` its own, and those an LFS10 can have.
+
+    Everybody is asked with the check that all configured devices share, or CRC. May read the built-in profiles.
+    """
+    line, builtin = loaded.config.line, builtin_names()
+    checksums = {spec.codec.checksum for spec in device_specs(loaded.config, loaded.profiles)}
+    codec = Codec(Framing(line.framing), checksums.pop() if len(checksums) == 1 else Checksum.CRC)
+    own = tuple(profile for word, profile in loaded.profiles.items() if word not in builtin)
+    known = (*own, *(load_profile(name, relative_to=Path()) for name in builtin))
+    ascii_line = line.framing == Framing.ASCII.value
+    profiles = tuple(
+        each for each in known
+        if line.framing in each.framings and (ascii_line or codec.checksum.value in each.checksums)
+    )  # fmt: skip
+    usual = next((each.baudrate.codes for each in profiles if each.name == DEFAULT_PROFILE and each.baudrate), ())
+    return Search(
+        ids,
+        tuple(
+            line_timing(line.model_copy(update={"baudrate": rate}))
+            for rate in rates or dict.fromkeys((line.baudrate, *usual))
+        ),
+        codec,
+        profiles,
+        line_rate=line.baudrate,
+        share=min(share, GREATEST_SHARE),
     )
 
 

@@ -101,6 +101,27 @@ class Line:
         self.poller.post(tell)
         self.wake()
 
+    async def pause(self) -> None:
+        """Give the port back until `resume`; return when it is free."""
+        freed: asyncio.Future[None] = self._loop.create_future()
+
+        def settle() -> None:
+            if not freed.done():
+                freed.set_result(None)
+
+        def tell() -> None:
+            with contextlib.suppress(RuntimeError):  # the loop is closed: we are ending
+                self._loop.call_soon_threadsafe(settle)
+
+        self.poller.pause(tell)
+        self.wake()
+        await freed
+
+    def resume(self) -> None:
+        """Open the port again, if it is paused."""
+        self.poller.resume()
+        self.wake()
+
     @property
     def unanswered(self) -> Unanswered:
         """Which requests may still be answered; for jobs, in the line's thread."""

@@ -40,6 +40,8 @@ class Logbook:
         `port` is the path, `notices` what a person should know of the port that was opened.
         """
         if isinstance(event, PortChanged):
+            if event.freed:
+                return [Entry(logging.INFO, f"{port}: freed for another program")]
             if event.fault is not None:
                 return [Entry(logging.WARNING, f"{event.fault.message}; tried again until it is back")]
             return [

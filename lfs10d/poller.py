@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import astuple
+from math import inf
 from typing import TYPE_CHECKING, TypeAlias
 
 from lfs10d.jobs.poll import Poll
 from lfs10d.modbus.bus import Order, Wait
-from lfs10d.reading import Errand, Event, Exchanged, PortChanged, UartCounted, UartCounters
+from lfs10d.reading import Errand, Event, Exchanged, Fault, FaultCode, PortChanged, UartCounted, UartCounters
 from lfs10d.schedule import Rest, Schedule
 
 if TYPE_CHECKING:
@@ -26,6 +27,9 @@ if TYPE_CHECKING:
 
 COUNTERS_EVERY = 10.0
 """How often the driver's counters are read, in s."""
+
+FREED = Fault(FaultCode.PORT_LOST, "the port is freed for another program")
+"""What is told of the devices while the line is paused."""
 
 Sink: TypeAlias = "Callable[[list[Event]], None]"
 
@@ -41,6 +45,7 @@ class Poller:
         self._posted: deque[Callable[[float], None]] = deque()
         self._events: list[Event] = []
         self._errand = Errand.POLL
+        self._paused = False
         self._count_at = clock()
         self._first_counters: UartCounters | None = None
         self._counted_before = self._counted = UartCounters(0, 0, 0, 0)
@@ -82,6 +87,26 @@ class Poller:
         self.bus.reconfigure(settings, rules, now)
         self.schedule.retime(self.bus.line_timing)
 
+    def pause(self, freed: Callable[[], None]) -> None:
+        """Give the port back after the exchange under way, until `resume`; `freed()` is called in the line thread."""
+        self.post(lambda now: self._pause(freed, now))
+
+    def _pause(self, freed: Callable[[], None], now: float) -> None:
+        if not self._paused:
+            self._paused = True
+            self.bus.close()
+            self._port_changed(PortChanged(now, FREED, freed=True))
+        freed()
+
+    def resume(self) -> None:
+        """Open the port again; whether that succeeds is told in any case. Nothing happens if it is not paused."""
+        self.post(self._resume)
+
+    def _resume(self, now: float) -> None:
+        if self._paused:
+            self._paused = False
+            self.bus.retry(now)
+
     # -- in the line thread
 
     def turn(self, now: float, *, readable: bool = True) -> Wait:
@@ -103,11 +128,7 @@ class Poller:
     def _advance(self, now: float, *, readable: bool) -> Wait | None:
         """Take one step; None where there may be more to do at once."""
         if not self.bus.open:
-            opened = self.bus.reopen(now)
-            if isinstance(opened, Wait):
-                return opened
-            self._port_changed(opened)
-            return None
+            return self._reopen(now)
         resting = None
         if self.bus.idle:
             decision = self.schedule.next(now)
@@ -125,6 +146,13 @@ class Poller:
             return Wait(resting.until, listen=True)
         self._settled(step)
         self._count(self._clock())
+        return None
+
+    def _reopen(self, now: float) -> Wait | None:
+        opened = Wait(inf, listen=False) if self._paused else self.bus.reopen(now)
+        if isinstance(opened, Wait):
+            return opened
+        self._port_changed(opened)
         return None
 
     def _ask(self, ask: Ask) -> None:

@@ -4,17 +4,23 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+from collections import defaultdict
+from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
 from lfs10d import assembly
 from lfs10d.adoption import Newcomer
+from lfs10d.aside import aside
 from lfs10d.commands import rejected
 from lfs10d.inquiries import Inquiries, Inquiry, altered
 from lfs10d.jobs.knock import Knock
 from lfs10d.jobs.register import Access
 from lfs10d.modbus.exchange import Echo
+from lfs10d.pausing import Pausing
 from lfs10d.reading import Exchanged, Reading
-from lfs10d.station import POLLING
+from lfs10d.requests.request import RefusedError
+from lfs10d.scanning import Scanning
+from lfs10d.station import PAUSED, POLLING
 from lfs10d.telemetry import event
 from lfs10d.tracing import Trace
 
@@ -26,6 +32,7 @@ if TYPE_CHECKING:
     from lfs10d.effective import Effective
     from lfs10d.facts import Instant
     from lfs10d.jobs.job import Job
+    from lfs10d.jobs.scan import Scan
     from lfs10d.line import Line
     from lfs10d.modbus.frames import Request as RegisterRequest
     from lfs10d.mqtt.uplink import Uplink
@@ -71,6 +78,9 @@ class DaemonPowers:
         """What changes sensors; given later, for it needs us."""
         self._inquiries = Inquiries(lambda device, request: line().read(device, request))
         self._trace: Trace | None = None
+        self._accesses: defaultdict[int, asyncio.Lock] = defaultdict(asyncio.Lock)
+        self._scanning = Scanning(submit=lambda job: line().submit(job), act=self.act, tell=self.tell)
+        self._pausing = Pausing(pause=lambda: line().pause(), resume=lambda: line().resume(), act=self.act)
 
     def health(self) -> dict[str, object]:
         """Return how the daemon, the line and the devices are."""
@@ -111,11 +121,33 @@ class DaemonPowers:
         until = self._now().mono + duration
         self._trace = Trace(until, codecs, assembly.usual_codec(loaded.config.line))
 
+    async def scan(self, ids: tuple[int, ...], rates: tuple[int, ...], share: float) -> Scan:
+        """Find out who is on the line."""
+        if self._pausing.paused:
+            raise RefusedError(rejected("line_error", "the port is freed for another program; see line/cancel"))
+        with self._place("line/scan"):
+            loaded = self._running.loaded
+            search = await aside(partial(assembly.search, loaded, ids, rates, share=share), "profiles")
+            return await self._scanning.scan(search)
+
+    async def pause(self, duration: float) -> None:
+        """Free the port for another program."""
+        busy = None if self.physical is None else self.physical.busy
+        if busy is not None:
+            raise RefusedError(busy)
+        await self._pausing.pause(duration)
+
+    def _place(self, request: str) -> contextlib.AbstractContextManager[None]:
+        if self.physical is None:
+            raise RefusedError(rejected("busy", "the daemon is starting"))
+        return self.physical.place(request)
+
     def cancel(self) -> tuple[str, ...]:
-        """End the trace, if there is one."""
+        """End the trace, the scan and the pause."""
         tracing = self._trace is not None and self._now().mono < self._trace.until
         self._trace = None
-        return ("trace",) if tracing else ()
+        ended = {"trace": tracing, "scan": self._scanning.cancel(), "pause": self._pausing.end()}
+        return tuple(name for name, one in ended.items() if one)
 
     def effective(self) -> Effective:
         """Return the configuration that holds."""
@@ -134,11 +166,15 @@ class DaemonPowers:
         self._publish([event(kind, self._now().ts(), **facts)])
 
     def act(self, activity: str | None) -> None:
-        """Tell everybody what the line is busy with; None: with polling."""
+        """Tell everybody what the line is busy with; None: with polling. While it is paused, nothing else is it."""
+        if self._pausing.paused and activity != PAUSED:
+            return
         self._publish(self._station.acting(activity or POLLING, self._now()))
 
     async def baudrate(self, to: int, *, power_cycle: bool, dry_run: bool, call: Call) -> Answer:
         """Move every sensor and the port to another rate."""
+        if self._pausing.paused:
+            return rejected("line_error", "the port is freed for another program; see line/cancel")
         if self.physical is None:
             return rejected("busy", "the daemon is starting")
         return await self.physical.baudrate(to, power_cycle=power_cycle, dry_run=dry_run, call=call)
@@ -160,15 +196,16 @@ class DaemonPowers:
         """Read or write registers."""
         target = assembly.access_target(self._running.now.loaded, what.slave, device)
         poller = self._line().poller
-        return await self._carry_out(
-            lambda over: Access(
-                target,
-                what,
-                unanswered=poller.schedule.unanswered,
-                echo_known=lambda: poller.bus.echo is not Echo.UNKNOWN,
-                over=over,
+        async with self._accesses[what.slave]:  # one after the other: what one writes is not read back by another
+            return await self._carry_out(
+                lambda over: Access(
+                    target,
+                    what,
+                    unanswered=poller.schedule.unanswered,
+                    echo_known=lambda: poller.bus.echo is not Echo.UNKNOWN,
+                    over=over,
+                )
             )
-        )
 
     async def _carry_out(self, job: Callable[[Callable[[J], None]], J]) -> J:
         """Have a job done that tells when it is over, in the line's thread; return it then."""
@@ -211,6 +248,8 @@ class DaemonPowers:
     def reconfigured(self, before: Config, after: Config) -> None:
         """Take note of another configuration: polls of devices that are no longer the same have no reading."""
         self._inquiries.abandon(altered(_identities(before), _identities(after)))
+        if before.line != after.line:
+            self._scanning.cancel()  # it speaks as the line did before
 
 
 def _identities(config: Config) -> dict[str, object]:

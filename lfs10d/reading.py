@@ -126,10 +126,14 @@ class UartCounters:
 
 @dataclass(frozen=True, slots=True)
 class PortChanged:
-    """The port was opened (`fault` None) or is lost, or is lost for another reason than before."""
+    """The port was opened (`fault` None) or is lost, or is lost for another reason than before.
+
+    `freed`: nothing happened to it, we gave it back for a while.
+    """
 
     at: float
     fault: Fault | None
+    freed: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
-from lfs10d import assembly
+from lfs10d import assembly, profiles
 from lfs10d.configfile import load
 from lfs10d.modbus.frames import Checksum, Framing
 from lfs10d.modbus.settings import PortSettings, Rs485
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from lfs10d.configfile import Loaded
 
 FILE = """
@@ -106,3 +105,39 @@ def test_registers_are_accessed_as_the_device_is_polled_or_as_the_line_usually_s
     assert assembly.access_target(loaded, 3, mast).response_timeout == 0.3
     stranger = assembly.access_target(loaded, 9, None)
     assert (stranger.slave, stranger.codec, stranger.profile) == (9, assembly.usual_codec(loaded.config.line), None)
+
+
+def test_a_scan_looks_at_the_lines_own_rate_first_and_at_both_of_an_lfs10(loaded: Loaded) -> None:
+    found = assembly.search(loaded, (1, 2), (), share=0.3)
+    assert [timing.baudrate for timing in found.timings] == [19200, 9600]
+    assert all(timing.bits == assembly.line_timing(loaded.config.line).bits for timing in found.timings)
+    assert (found.ids, found.line_rate, found.share) == ((1, 2), 19200, 0.3)
+    assert found.codec.checksum is Checksum.CRC, "not all devices have the same one"
+    assert found.profiles[0].name == "lfs10"
+    chosen = assembly.search(loaded, (1,), (4800, 9600), share=1.0)
+    assert [timing.baudrate for timing in chosen.timings] == [4800, 9600]
+    assert chosen.share < 1, "polling goes on"
+
+
+def test_a_scan_asks_with_the_check_that_all_devices_share(tmp_path: Path) -> None:
+    file = tmp_path / "lfs10d.yaml"
+    slave = "{id: 4, profile: eh600, checksum: sum}"
+    file.write_text(f"line: {{port: tty}}\nslaves: [{slave}]\nmqtt: {{host: localhost}}\n")
+    found = assembly.search(load(file), (1,), (), share=0.3)
+    assert found.codec.checksum is Checksum.SUM
+    assert {"sum"} <= {checksum for profile in found.profiles for checksum in profile.checksums}
+
+
+def test_on_an_ascii_line_those_are_looked_for_that_speak_it_own_profiles_first(tmp_path: Path) -> None:
+    own = (Path(profiles.__file__).parent / "ld-e.yaml").read_text().replace("name: ld-e", "name: mine")
+    (tmp_path / "mine.yaml").write_text(own)
+    file = tmp_path / "lfs10d.yaml"
+    file.write_text(
+        "line: {port: tty, framing: ascii, baudrate: 4800}\nslaves: [{id: 4, profile: mine.yaml}]\n"
+        "mqtt: {host: localhost}\n"
+    )
+    found = assembly.search(load(file), (1,), (), share=0.3)
+    assert found.codec.framing is Framing.ASCII
+    assert [timing.baudrate for timing in found.timings] == [4800]
+    assert found.profiles[0].name == "mine"
+    assert all("ascii" in profile.framings for profile in found.profiles)

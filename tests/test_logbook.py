@@ -76,6 +76,12 @@ def test_the_port_is_told_with_what_one_should_know_of_it() -> None:
     ]
 
 
+def test_a_port_that_is_freed_on_request_is_no_warning() -> None:
+    freed = PortChanged(0.0, Fault(FaultCode.PORT_LOST, "freed"), freed=True)
+    told = Logbook().happened(freed, port=PORT, notices=(), frames=False)
+    assert told == [(logging.INFO, f"{PORT}: freed for another program")]
+
+
 @pytest.mark.parametrize(
     ("heard", "fault", "words"),
     [

@@ -26,7 +26,7 @@ from lfs10d.jobs.search import LAST_TIMEOUT, RESERVED_FROM
 from lfs10d.reading import Errand, Fault, FaultCode
 
 if TYPE_CHECKING:
-    from collections.abc import Generator
+    from collections.abc import Callable, Generator
 
     from lfs10d.jobs.search import Search
     from lfs10d.modbus.exchange import Outcome
@@ -75,16 +75,24 @@ class Noise:
     last: Fault | None = None
 
 
+def _nobody(_: Scan) -> None:
+    """Tell nobody."""
+
+
 class Scan:
-    """One scan. `over` when it is; `complete` if it came to its end."""
+    """One scan. `over` when it is; `complete` if it came to its end, `lost` if the port was lost before.
+
+    `ended` is called once, with this job, when it is over.
+    """
 
     errand = Errand.SCAN
     excludes: frozenset[int] = frozenset()
 
-    def __init__(self, search: Search) -> None:
+    def __init__(self, search: Search, ended: Callable[[Scan], None] = _nobody) -> None:
         self.search = search
         self.share = search.share
-        self.over = self.complete = False
+        self.over = self.complete = self.lost = False
+        self._ended = ended
         self.noise = Noise()
         self._found: dict[tuple[int, int], Finding] = {}
         self._slow: set[int] = set()
@@ -128,8 +136,7 @@ class Scan:
         if self._began is None:
             self._began = now
         if self._following is None:
-            self.over = True
-            return Done()
+            return self._end()
         if now >= self._slice_until:
             self._slice_until = now + SLICE
         return self._following
@@ -144,8 +151,7 @@ class Scan:
                 self._following, self.complete = None, True
         following = self._following
         if following is None or asked is None:
-            self.over = True
-            return Done()
+            return self._end()
         stays = following.baudrate == asked.baudrate != self.search.line_rate
         ends = now + following.timeout + self._cost_at(following.baudrate)
         if stays and self.search.line_rate is not None and ends <= self._slice_until:
@@ -155,7 +161,13 @@ class Scan:
 
     def cut_off(self, now: float) -> None:
         """Learn that the port is lost."""
-        self._now, self._following, self.over = now, None, True
+        self._now, self._following, self.lost = now, None, True
+        self._end()
+
+    def _end(self) -> Done:
+        self.over = True
+        self._ended(self)
+        return Done()
 
     def _cost_at(self, baudrate: int | None) -> float:
         return next(self.search.cost(timing) for timing in self.search.timings if timing.baudrate == baudrate)

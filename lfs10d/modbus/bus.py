@@ -149,6 +149,12 @@ class Bus:
         self._exchange = self._order = None
         self.port.close()
 
+    def retry(self, now: float) -> None:
+        """Try to open the closed port at once; what comes of it is told even if it is as it was before."""
+        self._reopen_at = now
+        self._pause = REOPEN_FIRST
+        self._fault = None
+
     def reconfigure(self, settings: PortSettings, rules: LineRules, now: float) -> None:
         """Speak by other settings from the next exchange on; what is set at opening has the port reopened."""
         if rules.echo != self.rules.echo:

@@ -1,4 +1,4 @@
-"""`line/trace` and `line/cancel`."""
+"""`line/trace`, `line/pause` and `line/cancel`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pydantic import Field
 from lfs10d.admission import Form
 from lfs10d.commands import Answer, NoParameters, Parameters, ok
 from lfs10d.kinds import Duration
-from lfs10d.requests.request import Powers, Request
+from lfs10d.requests.request import Powers, RefusedError, Request
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from lfs10d.commands import Call
 
 LONGEST = 600.0
-"""s for which a trace may go on."""
+"""s for which a trace or a pause may go on."""
 USUAL = 30.0
 """s for which it goes on where nothing is said."""
 
@@ -34,12 +34,22 @@ async def trace(parameters: HowLong, powers: Powers, _: Call) -> Answer:
     return ok({"for": parameters.duration})
 
 
+async def pause(parameters: HowLong, powers: Powers, _: Call) -> Answer:
+    """Free the port for another program for a while."""
+    try:
+        await powers.pause(parameters.duration)
+    except RefusedError as error:
+        return error.answer
+    return ok({"for": parameters.duration})
+
+
 async def cancel(_: NoParameters, powers: Powers, __: Call) -> Answer:
-    """End a trace."""
+    """End a scan, a trace, a pause."""
     return ok({"cancelled": list(powers.cancel())})
 
 
 REQUESTS: Mapping[str, Request] = {
     "line/trace": Request(Form("sensors", HowLong), trace),
+    "line/pause": Request(Form("sensors", HowLong), pause),
     "line/cancel": Request(Form("sensors"), cancel),
 }

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from lfs10d.inquiries import Inquiry
     from lfs10d.jobs.knock import Knock
     from lfs10d.jobs.register import Access
+    from lfs10d.jobs.scan import Scan
     from lfs10d.modbus.frames import Request as RegisterRequest
     from lfs10d.profiles.schema import Profile
 
@@ -50,8 +51,22 @@ class Powers(Protocol):
         """Tell every frame for `duration` s from now on, whatever was said before."""
         ...
 
+    async def scan(self, ids: tuple[int, ...], rates: tuple[int, ...], share: float) -> Scan:
+        """Find out who is on the line, with at most that `share` of its time; return the scan that is over.
+
+        No `rates` are the usual ones. Raises RefusedError while a physical change or another scan is under way.
+        """
+        ...
+
+    async def pause(self, duration: float) -> None:
+        """Free the port for `duration` s from now on, whatever was said before; return when it is free.
+
+        Raises RefusedError while a physical change or a scan is under way.
+        """
+        ...
+
     def cancel(self) -> tuple[str, ...]:
-        """End what ends before its time when told to; return what that was: `trace`."""
+        """End what ends before its time when told to; return what that was: `trace`, `scan`, `pause`."""
         ...
 
     def republish(self) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from lfs10d.requests import config, device, general, line, register, sensors
+from lfs10d.requests import config, device, general, line, register, scan, sensors
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -17,5 +17,6 @@ REQUESTS: Mapping[str, Request] = {
     **device.REQUESTS,
     **line.REQUESTS,
     **register.REQUESTS,
+    **scan.REQUESTS,
     **sensors.REQUESTS,
 }

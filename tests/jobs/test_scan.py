@@ -320,6 +320,23 @@ def test_a_scan_cancelled_before_it_began_asks_nobody() -> None:
     assert scan.over
 
 
+@pytest.mark.parametrize(
+    ("event", "complete", "lost"), [("nothing", True, False), ("cancelled", False, False), ("unplugged", False, True)]
+)
+def test_however_it_ends_that_is_told_once(event: str, *, complete: bool, lost: bool) -> None:
+    ended: list[Scan] = []
+    running = Scanned(line_of(1), Scan(search(range(1, 21)), ended.append))
+    running.pass_time(0.5)
+    assert not ended
+    if event == "cancelled":
+        running.scan.cancel()
+    if event == "unplugged":
+        running.port.unplug()
+    running.pass_time(20.0)
+    assert ended == [running.scan]
+    assert (running.scan.over, running.scan.complete, running.scan.lost) == (True, complete, lost)
+
+
 def test_the_loss_of_the_port_ends_it_with_what_was_found() -> None:
     running = Scanned(line_of(1), Scan(search(ALL)))
     running.pass_time(1.0)
