@@ -5,7 +5,8 @@ Rules
 1. Nothing is sent to slave 0: all devices would obey, and nobody answer.
 2. What sets a slave id or a baud rate is left to `device/readdress` and `line/baudrate`, which verify it; what sets a
    motor going is never written. At a slave that is not configured that holds for every profile there is.
-3. Of a configured device only what its profile marks as a writable setting is written, within the setting's range.
+3. Nothing is written at a slave id that a physical change is about, while that is open.
+4. Of a configured device only what its profile marks as a writable setting is written, within the setting's range.
 """
 
 from __future__ import annotations
@@ -89,6 +90,9 @@ async def write(parameters: OneRegister, powers: Powers, call: Call) -> Answer:
             _check_unknown(address, now)
         else:
             _check_setting(address, value, now.loaded.profiles[device.profile])
+        reserved = powers.reserved().get(slave)
+        if reserved is not None:
+            raise refuse("busy", f"slave id {slave} {reserved}; write when that is over")
     except RefusedError as error:
         return error.answer
     access = await powers.access(WriteRegister(slave, address, value), device)

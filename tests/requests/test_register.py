@@ -63,7 +63,7 @@ def told(ask: Ask, name: str, **parameters: Any) -> Answer:  # noqa: ANN401  # a
     [
         ({"device": "motor"}, "motor", 3),
         ({"slave": 3}, "motor", 3),
-        ({"slave": 77}, None, 77),
+        ({"slave": 88}, None, 88),
         ({"slave": 4}, "pump", 4),
     ],
 )
@@ -78,8 +78,8 @@ def test_registers_are_read_of_a_device_or_of_any_slave(
 
 
 def test_one_register_is_read_where_no_count_is_given(ask: Ask, powers: FakePowers) -> None:
-    told(ask, "read", slave=77, address=0)
-    assert powers.done == [(None, ReadRegisters(77, 0, 1))]
+    told(ask, "read", slave=88, address=0)
+    assert powers.done == [(None, ReadRegisters(88, 0, 1))]
 
 
 def test_a_setting_is_written_and_everybody_told_from_what_to_what(ask: Ask, powers: FakePowers) -> None:
@@ -90,7 +90,7 @@ def test_a_setting_is_written_and_everybody_told_from_what_to_what(ask: Ask, pow
     assert powers.told == [{"request": "register/write", "id": "w1", **place, "from": 1, "to": 600}]
 
 
-@pytest.mark.parametrize(("slave", "address"), [(77, 0x0010), (77, 0), (200, 0xFFFF)])
+@pytest.mark.parametrize(("slave", "address"), [(88, 0x0010), (88, 0), (200, 0xFFFF)])
 def test_a_slave_that_is_not_configured_is_written_as_asked(
     ask: Ask, powers: FakePowers, slave: int, address: int
 ) -> None:
@@ -107,10 +107,10 @@ def test_a_slave_that_is_not_configured_is_written_as_asked(
         ({"device": "mast-top"}, 0x0005, "sets its slave id: use device/readdress"),
         ({"device": "mast-top"}, 0x0004, "sets its baud rate: use line/baudrate"),
         ({"slave": 2}, 0x0005, "sets its slave id"),
-        ({"slave": 77}, 0x0005, "0x0005 of a LFS10 wind speed sensor sets its slave id"),
-        ({"slave": 77}, 0x0004, "0x0004 of a LFS10 wind speed sensor sets its baud rate"),
-        ({"slave": 77}, 0x07D0, "0x07D0 of a Vane sets its slave id"),
-        ({"slave": 77}, 0x2000, "0x2000 of a Fuling DZB inverter may set a motor going: it is never written"),
+        ({"slave": 88}, 0x0005, "0x0005 of a LFS10 wind speed sensor sets its slave id"),
+        ({"slave": 88}, 0x0004, "0x0004 of a LFS10 wind speed sensor sets its baud rate"),
+        ({"slave": 88}, 0x07D0, "0x07D0 of a Vane sets its slave id"),
+        ({"slave": 88}, 0x2000, "0x2000 of a Fuling DZB inverter may set a motor going: it is never written"),
         ({"device": "motor"}, 0x2000, "may set a motor going"),
         ({"device": "mast-top"}, 0x0003, "0x0003 is no setting in profile lfs10; writable are: none"),
         ({"device": "motor"}, 0xF002, "0xF002 is no setting in profile eh600"),
@@ -134,6 +134,13 @@ def test_nothing_is_sent_to_everybody(ask: Ask, powers: FakePowers, name: str, m
     answer = told(ask, name, slave=0, address=16, **more)
     assert (answer.status, answer.code, answer.facts["param"]) == ("rejected", "not_allowed", "slave")
     assert powers.done == []
+
+
+def test_where_a_physical_change_is_open_registers_are_read_but_not_written(ask: Ask, powers: FakePowers) -> None:
+    answer = told(ask, "write", slave=77, address=16, value=1)
+    assert (answer.status, answer.code, powers.done) == ("rejected", "busy", [])
+    assert answer.message == "slave id 77 is reserved by the open change of slave-3; write when that is over"
+    assert told(ask, "read", slave=77, address=16).status == "ok"
 
 
 @pytest.mark.parametrize(
@@ -163,16 +170,16 @@ def test_a_value_outside_the_settings_range_is_an_invalid_parameter(
         ("read", {"slave": 5, "address": 65536}, "address"),
         ("read", {"slave": 5, "address": "0x0010"}, "address"),
         ("read", {"slave": 5, "address": 1, "count": 0}, "count"),
-        ("read", {"slave": 77, "address": 1, "count": 126}, "count"),
-        ("read", {"slave": 77, "address": 65535, "count": 2}, "count"),
+        ("read", {"slave": 88, "address": 1, "count": 126}, "count"),
+        ("read", {"slave": 88, "address": 65535, "count": 2}, "count"),
         ("read", {"device": "motor", "address": 1, "count": 6}, "count"),
         ("read", {"device": "vane", "address": 1, "count": 9}, "count"),
         ("read", {"slave": 5, "address": 1, "value": 1}, "value"),
-        ("write", {"slave": 77, "address": 16}, "value"),
-        ("write", {"slave": 77, "address": 16, "value": -1}, "value"),
-        ("write", {"slave": 77, "address": 16, "value": 65536}, "value"),
-        ("write", {"slave": 77, "address": 16, "value": 1.0}, "value"),
-        ("write", {"slave": 77, "address": 16, "value": 1, "count": 1}, "count"),
+        ("write", {"slave": 88, "address": 16}, "value"),
+        ("write", {"slave": 88, "address": 16, "value": -1}, "value"),
+        ("write", {"slave": 88, "address": 16, "value": 65536}, "value"),
+        ("write", {"slave": 88, "address": 16, "value": 1.0}, "value"),
+        ("write", {"slave": 88, "address": 16, "value": 1, "count": 1}, "count"),
     ],
 )
 def test_what_cannot_be_asked_is_an_invalid_parameter(
@@ -267,7 +274,7 @@ def test_a_write_that_did_not_take_tells_what_the_register_holds(ask: Ask, power
 
 def test_a_write_that_cannot_be_read_back_is_not_verified(ask: Ask, powers: FakePowers) -> None:
     powers.came = {"end": End.NOT_VERIFIED, "fault": REFUSED, "sent": True}
-    answer = told(ask, "write", slave=77, address=16, value=2)
+    answer = told(ask, "write", slave=88, address=16, value=2)
     assert (answer.status, answer.code, answer.data) == ("failed", "not_verified", None)
-    assert answer.message == ("slave 77: what was written cannot be read back: exception 02 illegal register address")
+    assert answer.message == ("slave 88: what was written cannot be read back: exception 02 illegal register address")
     assert answer.facts["exception_code"] == 2
