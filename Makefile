@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: demo test check format docs bench clean
+.PHONY: demo test coverage check format docs bench clean
 
 $(VENV)/.demo: pyproject.toml
 	@echo 'Setting up $(VENV), once; this takes a moment.'
@@ -20,7 +20,11 @@ $(VENV)/.dev: $(VENV)/.demo
 demo: $(VENV)/.demo
 	@$(BIN)/lfs10d demo
 
+# Most tests wait for brokers, ptys and daemons of their own: three workers share what the machine has.
 test: $(VENV)/.dev
+	$(BIN)/python -m pytest -n 3 --dist loadfile
+
+coverage: $(VENV)/.dev
 	$(BIN)/coverage run -m pytest
 	$(BIN)/coverage report
 
