@@ -127,7 +127,6 @@ class Daemon:
             respond=self._uplink.respond,
             clear=self._uplink.clear_retained,
         )
-        self._line = Line(self._running.now.polled, loaded.profiles, heard=self._heard, failed=self._line_failed)
         self._powers.physical = self._physical = Physical(
             Journal(state_directory, Disk()),
             running=lambda: self._running.now,
@@ -136,8 +135,10 @@ class Daemon:
             tell=self._powers.tell,
             recall=self._service.recall,
             act=self._powers.act,
+            repoll=self._repoll,
             now=self._now,
         )
+        self._line = Line(self._physical.polled(), loaded.profiles, heard=self._heard, failed=self._line_failed)
         file = status_file(config.line.name, os.environ)
         self._supervision = Supervision(
             notifier,
@@ -284,7 +285,7 @@ class Daemon:
         if plan.log:
             logs.install(config.log.level, config.log.format)
         if plan.polling or plan.realtime:
-            self._line.take(now.polled, now.loaded.profiles, line=plan.line, realtime=plan.realtime)
+            self._line.take(self._physical.polled(), now.loaded.profiles, line=plan.line, realtime=plan.realtime)
             devices = assembly.device_facts(config, now.loaded.profiles)
             self._publish(self._station.configure(assembly.line_facts(config.line), devices, self._now()))
             self._yield({name: why for name, why in now.conflicts.items() if name not in before.conflicts})
@@ -296,6 +297,10 @@ class Daemon:
         await self._physical.reconfigured(before.config, config)
         self._uplink.limit(assembly.store_limits(config.store))
         await self._uplink.reload(self._broker_settings() if plan.broker else None)
+
+    def _repoll(self) -> None:
+        """Poll what may be polled now that the line was asked where a device is."""
+        self._line.take(self._physical.polled(), self._running.loaded.profiles, line=False, realtime=False)
 
     def _yield(self, conflicts: Mapping[str, str]) -> None:
         """Tell of devices that are not polled, for their slave id is another's."""

@@ -26,6 +26,7 @@ from lfs10d.jobs.course import Course, Now, Over, Steps
 from lfs10d.jobs.follow import follow
 from lfs10d.jobs.readdress import NOTHING_WRITTEN, Ending, Verdict, Wish, Write, readdress
 from lfs10d.journal import REMEMBERED_FOR_MS, Asked, Journal, Move, OpenChange, Spot, Told
+from lfs10d.locating import Locating
 from lfs10d.ratechange import RateChange
 from lfs10d.reading import Errand
 from lfs10d.requests.request import RefusedError
@@ -124,11 +125,11 @@ class Physical:
     """Physical changes of one line. Used in the thread of the asyncio loop.
 
     `running()` is the configuration that holds, `change` puts another into force; `wire()` is the line. `tell`
-    publishes an event, `act` what the line is busy with (None: as usual); `recall` has a request of an earlier life
-    of the daemon remembered, or answered.
+    publishes an event, `act` what the line is busy with (None: as usual), `repoll` puts into force what is `polled`
+    now; `recall` has a request of an earlier life of the daemon remembered, or answered.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - all that it touches of the daemon, each by one callable
         self,
         journal: Journal,
         *,
@@ -139,6 +140,7 @@ class Physical:
         recall: Recall,
         now: Callable[[], Instant],
         act: Callable[[str | None], None],
+        repoll: Callable[[], None],
     ) -> None:
         self.journal = journal
         self.running = running
@@ -154,6 +156,7 @@ class Physical:
         self._act = act
         self._rates = RateChange(self)
         self._adoption = Adoption(self)
+        self._locating = Locating(self, repoll)
         trouble = journal.take()
         if trouble is not None:
             log.error("%s", trouble)
@@ -208,6 +211,12 @@ class Physical:
             self._underway = None
             self._reserve()
             self.follow()
+
+    def polled(self) -> Config:
+        """Return the configuration for the line: without the devices that it must be asked for first."""
+        config, withheld = self.running().polled, self._locating.withheld()
+        slaves = tuple(slave for slave in config.slaves if slave.name not in withheld)
+        return config.model_copy(update={"slaves": slaves})
 
     def reserved(self) -> Mapping[int, str]:
         """Return the slave ids that nobody may be given now, with the reason."""
@@ -409,6 +418,7 @@ class Physical:
         """Look for the sensors of every open change that nobody looks for now."""
         if self.ending:
             return
+        self._locating.begin()
         busy = frozenset() if self._underway is None else self._underway.slaves
         for change in self.journal.open:
             if change.number not in self._followed and not change.slaves & busy:
@@ -507,17 +517,20 @@ class Physical:
     # -- what else happens
 
     async def reconfigured(self, before: Config, after: Config) -> None:
-        """Take note of another configuration: the open changes of devices that are no more are closed."""
+        """Take note of another configuration: open changes of devices that are gone are closed."""
         devices = {slave.name for slave in before.slaves} - {slave.name for slave in after.slaves}
         for change in self.journal.open:
             if change.devices <= devices:
                 await self.leave(frozenset({change.number}))
                 with contextlib.suppress(StateError):
                     await self.drop(change, f"{', '.join(sorted(change.devices))} was removed")
+        if not self.ending:
+            self._locating.begin()
 
     async def stop(self) -> None:
         """Send no new frame of any change."""
         self.ending = True
+        self._locating.stop()
         for talk, task in self._followed.values():
             talk.halt()
             task.cancel()

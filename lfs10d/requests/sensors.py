@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
-from lfs10d import config
 from lfs10d.admission import Form
 from lfs10d.commands import Answer, Parameters
-from lfs10d.kinds import Choice, Flag, Name, Whole
+from lfs10d.kinds import Choice, Flag, Name, Text, Whole
 from lfs10d.requests.request import Powers, Request
 
 if TYPE_CHECKING:
@@ -53,7 +52,7 @@ class Adopt(Parameters):
     """What the new sensor is to be called, where it is and which slave id it is to get."""
 
     name: Annotated[str, Name()] | None = None
-    label: config.Label = None
+    label: Annotated[str | None, Text(200, null=True)] = None
     factory: Annotated[int, Whole(1, 255)] | None = Field(default=None, alias="from")
     to: Annotated[int, Whole(1, 255)] | None = None
 

@@ -92,14 +92,6 @@ class Life:
         bench = self.bench
         disk = Disk(bench.files)
         self.running = Running(load(bench.file), ChangeFile(STATE, disk), self._take)
-        config, profiles = self.running.now.polled, self.running.loaded.profiles
-        bench.port = SimulatedPort(bench.line, bench.clock, assembly.port_settings(config.line), echo=bench.echo)
-        bus = Bus(bench.port, assembly.line_rules(config.line), bench.clock)
-        schedule = Schedule(assembly.line_timing(config.line), bench.clock.now)
-        schedule.replace(
-            assembly.device_specs(config, profiles), assembly.poll_rules(config.poll), bench.clock.now
-        )  # fmt: skip
-        self.poller = Poller(bus, schedule, self._heard, bench.clock)
         self.physical = Physical(
             Journal(STATE, disk),
             running=lambda: self.running.now,
@@ -108,8 +100,17 @@ class Life:
             tell=lambda kind, facts: self.events.append((kind, facts)),
             recall=self._recall,
             act=lambda activity: self.events.append(("acting", {"activity": activity})),
+            repoll=self._repoll,
             now=lambda: Instant(bench.clock.now, EPOCH + bench.clock.now, "synced"),
         )
+        config, profiles = self.physical.polled(), self.running.loaded.profiles
+        bench.port = SimulatedPort(bench.line, bench.clock, assembly.port_settings(config.line), echo=bench.echo)
+        bus = Bus(bench.port, assembly.line_rules(config.line), bench.clock)
+        schedule = Schedule(assembly.line_timing(config.line), bench.clock.now)
+        schedule.replace(
+            assembly.device_specs(config, profiles), assembly.poll_rules(config.poll), bench.clock.now
+        )  # fmt: skip
+        self.poller = Poller(bus, schedule, self._heard, bench.clock)
         self.physical.recall()
 
     def _recall(self, name: str, call: Call, answer: Answer | None, *, forget_in: float, tell: bool = False) -> None:
@@ -122,9 +123,14 @@ class Life:
         if plan.line:
             self.poller.reconfigure(assembly.port_settings(now.config.line), assembly.line_rules(now.config.line))
         self.poller.replace(
-            assembly.device_specs(now.polled, now.loaded.profiles), assembly.poll_rules(now.config.poll)
+            assembly.device_specs(self.physical.polled(), now.loaded.profiles), assembly.poll_rules(now.config.poll)
         )  # fmt: skip
         await self.physical.reconfigured(before.config, now.config)
+
+    def _repoll(self) -> None:
+        now = self.running.now
+        specs = assembly.device_specs(self.physical.polled(), now.loaded.profiles)
+        self.poller.replace(specs, assembly.poll_rules(now.config.poll))
 
     async def _change(self, edit: Edit) -> object:
         return await self.running.change(edit)
@@ -178,7 +184,8 @@ class Bench:
         return self.begin()
 
     def begin(self) -> Life:
-        """Begin a life with what is on the disk."""
+        """Begin a life with what is on the disk; `born` is when, in ns."""
+        self.born = round(self.clock.now * 1e9)
 
         async def born() -> Life:
             return Life(self)

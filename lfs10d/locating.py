@@ -1,0 +1,132 @@
+"""Devices whose place in the file is not where they were verified last: the line is asked, and what answers is used."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+from lfs10d.changes import Changes, Place, Rate
+from lfs10d.errors import StateError
+from lfs10d.jobs.course import Now, Over
+from lfs10d.jobs.locate import locate
+from lfs10d.journal import Spot
+from lfs10d.reading import Errand
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from lfs10d.effective import Effective
+    from lfs10d.physical import Physical, Talk
+
+log = logging.getLogger(__name__)
+
+
+class Locating:
+    """A part of `Physical`; `repoll()` has the devices polled that are no longer `withheld`."""
+
+    def __init__(self, physical: Physical, repoll: Callable[[], None]) -> None:
+        self._physical = physical
+        self._repoll = repoll
+        self._asked: dict[str, tuple[Place, ...]] = {}
+        """Devices that answered nowhere when they were asked, with where that was."""
+        self._tasks: dict[str, tuple[tuple[Place, ...], Talk, asyncio.Task[None]]] = {}
+
+    def contested(self) -> dict[str, tuple[Place, ...]]:
+        """Return the devices that may be at one of several places."""
+        now = self._physical.running()
+        return {name: places for name, places in now.places.items() if len(places) > 1 and name not in now.conflicts}
+
+    def withheld(self) -> frozenset[str]:
+        """Return the devices that must not be polled before the line was asked where they are."""
+        return frozenset(name for name, places in self.contested().items() if self._asked.get(name) != places)
+
+    def begin(self) -> None:
+        """Ask for every contested device that nobody asks for now."""
+        contested = self.contested()
+        for name, (places, _, _) in tuple(self._tasks.items()):
+            if contested.get(name) != places:
+                self._end(name)
+        for name, places in contested.items():
+            if name in self._tasks:
+                continue
+            now = self._physical.running()
+            slave = now.slave(name)
+            if (
+                slave is None or now.loaded.profiles[slave.profile].slave_id is None
+            ):  # it cannot be asked who it is: the file's place is kept
+                self._asked[name] = places
+                continue
+            talk = self._physical.talk()
+            task = asyncio.create_task(self._locate(name, places, talk), name=f"locate {name}")
+            task.add_done_callback(partial(self._over, name))
+            self._tasks[name] = places, talk, task
+
+    def stop(self) -> None:
+        """Ask no more."""
+        for name in tuple(self._tasks):
+            self._end(name)
+
+    def _end(self, name: str) -> None:
+        _, talk, task = self._tasks.pop(name)
+        talk.halt()
+        talk.go_on()
+        task.cancel()
+
+    def _over(self, name: str, task: asyncio.Task[None]) -> None:
+        if name in self._tasks and self._tasks[name][-1] is task:
+            del self._tasks[name]
+        if not task.cancelled() and (mistake := task.exception()) is not None:
+            log.error("a device could not be looked for, by a mistake of ours", exc_info=mistake)
+
+    async def _locate(self, name: str, places: tuple[Place, ...], talk: Talk) -> None:
+        physical = self._physical
+        now = physical.running()
+        slave = now.slave(name)
+        if slave is None:
+            return
+        rate = now.config.line.baudrate
+        spots = [Spot(slave=place.id, baudrate=place.baudrate or rate) for place in places]
+        clock = Now()
+        asking = physical.asking(slave, clock, line_rate=0)
+        errand = Errand.PROBE if self._asked.get(name) == places else Errand.CHANGE
+        steps = locate(spots, asking, longest_pause=now.config.poll.probe_interval_max)
+        talk.begin(steps, clock, line_rate=rate, errand=errand)
+        while not isinstance(what := await talk.wanted(), Over):
+            if self._asked.get(name) != places:
+                self._asked[name] = places
+                self._tell(name, spots, None)
+                self._repoll()
+            talk.go_on()
+        talk.go_on()
+        if isinstance(what.result, Spot):
+            await self._found(name, spots, what.result)
+
+    async def _found(self, name: str, spots: list[Spot], spot: Spot) -> None:
+        def edit(now: Effective) -> Changes:
+            if now.slave(name) is None:
+                return now.changes
+            changes = now.changes.moving(name, Place(spot.slave), now.said)
+            filed = now.said.baudrate
+            if spot.baudrate != now.config.line.baudrate or changes.baudrate is not None:
+                changes = replace(changes, baudrate=None if spot.baudrate == filed else Rate(filed, spot.baudrate))
+            return changes
+
+        self._tasks.pop(name, None)  # it is found: another configuration ends no search any more
+        with contextlib.suppress(StateError):  # told as storage_full; polled where it was found after the next start
+            await self._physical.change(edit)
+            self._tell(name, spots, spot)
+        self._repoll()
+
+    def _tell(self, name: str, spots: list[Spot], used: Spot | None) -> None:
+        first, last = spots[0], spots[-1]
+        facts = {"device": name, "file": first.model_dump(), "last": last.model_dump()}
+        self._physical.tell("change_conflict", {**facts, "used": None if used is None else used.model_dump()})
+        where = "at neither; both are asked" if used is None else f"at slave id {used.slave}, {used.baudrate} baud"
+        log.warning(
+            "%s: the file says slave id %d at %d baud, it was last verified at %d at %d: it answers %s",
+            name, first.slave, first.baudrate, last.slave, last.baudrate, where,
+        )  # fmt: skip
