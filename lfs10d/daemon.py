@@ -23,6 +23,7 @@ from lfs10d.firstburst import FirstBurst
 from lfs10d.journal import Journal
 from lfs10d.line import Line
 from lfs10d.logbook import Logbook
+from lfs10d.losing import Losing
 from lfs10d.moments import Moments
 from lfs10d.mqtt.settings import BrokerSettings
 from lfs10d.mqtt.uplink import Uplink
@@ -138,6 +139,12 @@ class Daemon:
             repoll=self._repoll,
             now=self._now,
         )
+        self._losing = Losing(
+            running=lambda: self._running.now,
+            talk=self._physical.talk,
+            devices=lambda: tuple(self._line.poller.schedule.devices.values()),
+            tell=self._told_lost,
+        )
         self._line = Line(self._physical.polled(), loaded.profiles, heard=self._heard, failed=self._line_failed)
         file = status_file(config.line.name, os.environ)
         self._supervision = Supervision(
@@ -180,6 +187,7 @@ class Daemon:
             self._notifier.stopping("stopping")
             for task in tasks:
                 task.cancel()
+            self._losing.stop()
             await self._physical.stop()
             await self._service.stop()
             await self._line.stop(LINE_STOPS_WITHIN)
@@ -204,6 +212,7 @@ class Daemon:
         if any(isinstance(event, PortChanged) and event.fault is None for event in events):
             self._yield(self._running.now.conflicts)
             self._physical.follow()
+            self._losing.begin()
 
     def _publish(self, publications: Iterable[Publication]) -> None:
         self._uplink.publish(self._first_burst.passing(publications))
@@ -286,6 +295,8 @@ class Daemon:
             logs.install(config.log.level, config.log.format)
         if plan.polling or plan.realtime:
             self._line.take(self._physical.polled(), now.loaded.profiles, line=plan.line, realtime=plan.realtime)
+            if plan.line:
+                self._losing.begin()
             devices = assembly.device_facts(config, now.loaded.profiles)
             self._publish(self._station.configure(assembly.line_facts(config.line), devices, self._now()))
             self._yield({name: why for name, why in now.conflicts.items() if name not in before.conflicts})
@@ -301,6 +312,13 @@ class Daemon:
     def _repoll(self) -> None:
         """Poll what may be polled now that the line was asked where a device is."""
         self._line.take(self._physical.polled(), self._running.loaded.profiles, line=False, realtime=False)
+
+    def _told_lost(self, words: str | None) -> None:
+        """Raise or clear the error of a line whose sensors all speak at another rate."""
+        code, now = FaultCode.CONFIG_CONFLICT, self._now()
+        station = self._station
+        published = station.line_recovered(code, now) if words is None else station.line_failed(Fault(code, words), now)
+        self._publish(published)
 
     def _yield(self, conflicts: Mapping[str, str]) -> None:
         """Tell of devices that are not polled, for their slave id is another's."""

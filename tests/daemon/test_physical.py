@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from lfs10d.simulator.sensor import Sensor
+from lfs10d.simulator.wire import Format
 from tests.daemon.conftest import eventually, good, tell
 
 if TYPE_CHECKING:
@@ -40,8 +42,17 @@ def published(view: View, mosquitto: Mosquitto, name: str, payload: dict[str, An
     topic = f"response/{name}"
     before = len(view.history_of(topic))
     subprocess.run(
-        ["mosquitto_pub", "-h", "127.0.0.1", "-p", str(mosquitto.port), "-t", f"{BASE}/request/{name}"]
-        + ["-m", json.dumps(payload)],
+        [
+            "mosquitto_pub",
+            "-h",
+            "127.0.0.1",
+            "-p",
+            str(mosquitto.port),
+            "-t",
+            f"{BASE}/request/{name}",
+            "-m",
+            json.dumps(payload),
+        ],
         check=True,
     )
     eventually(lambda: len(view.history_of(topic)) > before, f"a response to {name}", within=60.0)
@@ -95,8 +106,18 @@ def test_the_intent_is_on_the_disk_before_the_first_byte_of_the_write(
     run = site.run(program=("-m", "lfs10d"))
     view.wait("device/slave-2/state", good)
     tracer = subprocess.Popen(
-        ["strace", "-f", "-y", "-xx", "-e", "trace=write,fsync,rename,renameat", "-o", str(trace)]
-        + ["-p", str(run.process.pid)],
+        [
+            "strace",
+            "-f",
+            "-y",
+            "-xx",
+            "-e",
+            "trace=write,fsync,rename,renameat",
+            "-o",
+            str(trace),
+            "-p",
+            str(run.process.pid),
+        ],
         stderr=subprocess.DEVNULL,
     )
     eventually(lambda: trace.exists() and trace.stat().st_size > 0, "strace follows")
@@ -137,3 +158,56 @@ def test_a_daemon_killed_at_any_moment_finds_every_sensor_again(site: Site, mosq
     site.run()
     view.wait("device/slave-2/config", lambda config: config["slave"] == place)
     view.wait_samples("slave-2", 3, good)
+
+
+def test_the_line_and_its_sensors_change_their_rate_by_either_way(site: Site, mosquitto: Mosquitto, view: View) -> None:
+    served = site.line((1, 2))
+    site.write()
+    run = site.run()
+    view.wait("device/slave-2/state", good)
+    answer = published(view, mosquitto, "line/baudrate", {"id": "r1", "to": 9600})
+    assert (answer["status"], answer["data"]) == ("ok", {"from": 19200, "to": 9600, "pending": []})
+    assert rates(served) == [9600, 9600]
+    view.wait("line/state", lambda state: (state["baudrate"], state["activity"]) == (9600, "polling"))
+    assert {state["activity"] for state in view.history_of("line/state")} >= {"changing_baudrate"}
+    seq = view.samples("slave-2")[-1]["seq"]
+    view.wait_samples("slave-2", 3, lambda sample: sample["seq"] > seq and good(sample))
+    run.process.kill()
+    run.process.wait()
+    view.clear()
+    site.run()
+    view.wait("device/slave-2/state", good)
+    assert view.newest("line/state")["baudrate"] == 9600
+    done = asked(site, "line/baudrate", "to=19200", "--json")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert rates(served) == [19200, 19200]
+
+
+def test_newcomers_are_adopted_by_either_way(site: Site, mosquitto: Mosquitto, view: View) -> None:
+    served = site.line((2,))
+    site.write(slaves=[2])
+    site.run()
+    view.wait("device/slave-2/state", good)
+    plug(served)
+    answer = published(view, mosquitto, "line/adopt", {"name": "north", "label": "Mast, 10 m"})
+    assert (answer["status"], answer["data"]) == ("ok", {"device": "north", "slave": 3, "from": 1})
+    view.wait_samples("north", 2, good)
+    assert view.newest("device/north/config")["label"] == "Mast, 10 m"
+    plug(served)
+    done = asked(site, "line/adopt", "--json")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert json.loads(done.stdout)["data"]["slave"] == 4
+    assert (places(served), rates(served)) == ([2, 3, 4], [19200] * 3)
+    assert asked(site, "line/adopt").returncode == 1, "nobody is there any more"
+
+
+def rates(served: PtyLine) -> list[int]:
+    """Return at which rates the sensors are."""
+    found: list[int] = []
+    tell(served, lambda line: found.extend(sensor.format.baudrate for sensor in line.sensors))
+    return found
+
+
+def plug(served: PtyLine) -> None:
+    """Connect a factory-new sensor."""
+    tell(served, lambda line: line.add(Sensor(1, format=Format(9600))))

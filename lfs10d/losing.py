@@ -1,0 +1,74 @@
+"""The line's error while all its sensors are lost: at which other rate they were found. Used in the asyncio loop."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from typing import TYPE_CHECKING
+
+from lfs10d.jobs.course import Now, Over
+from lfs10d.jobs.lost import in_words, seek
+from lfs10d.reading import Errand
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from lfs10d.effective import Effective
+    from lfs10d.physical import Talk
+    from lfs10d.roster import Device
+
+log = logging.getLogger(__name__)
+
+
+class Losing:
+    """`tell(words)` raises the line's error, `tell(None)` clears it; `devices()` are those of the line's thread."""
+
+    def __init__(
+        self,
+        *,
+        running: Callable[[], Effective],
+        talk: Callable[[], Talk],
+        devices: Callable[[], Iterable[Device]],
+        tell: Callable[[str | None], None],
+    ) -> None:
+        self._running = running
+        self._talk = talk
+        self._devices = devices
+        self._tell = tell
+        self._told: str | None = None
+        self._task: tuple[int, Talk, asyncio.Task[None]] | None = None
+
+    def begin(self) -> None:
+        """Look out from now on, at the line's rate as it is; the port is open."""
+        rate = self._running().config.line.baudrate
+        if self._task is not None and self._task[0] == rate and not self._task[2].done():
+            return
+        self.stop()
+        talk = self._talk()
+        self._task = rate, talk, asyncio.create_task(self._look_out(rate, talk), name="lost sensors")
+        self._say(None)
+
+    def stop(self) -> None:
+        """Look out no more."""
+        if self._task is not None:
+            _, talk, task = self._task
+            talk.halt()
+            talk.go_on()
+            task.cancel()
+            self._task = None
+
+    async def _look_out(self, rate: int, talk: Talk) -> None:
+        clock = Now()
+        talk.begin(seek(self._devices, clock, rate), clock, line_rate=rate, share=1.0, errand=Errand.PROBE)
+        while not isinstance(found := await talk.wanted(), Over):
+            if isinstance(found, dict):
+                polled = sum(slave.enabled for slave in self._running().config.slaves)
+                self._say(in_words(found, rate, polled) if found else None)
+            talk.go_on()
+
+    def _say(self, words: str | None) -> None:
+        if words != self._told:
+            self._told = words
+            self._tell(words)
+            if words is not None:
+                log.warning("%s", words)
