@@ -153,8 +153,7 @@ class Outbox:
                 if letter.topic not in self._refused:
                     return letter
                 self.past.dead(letter)
-        if self.past.repeat(now):
-            self._make_room()
+        self._repeat(now)
         return self.past.next(now, self._refused, self.past.dead)
 
     def due(self) -> float | None:
@@ -166,6 +165,7 @@ class Outbox:
     def settled(self, letter: Letter, now: float) -> None:
         """Note that the broker has it."""
         self._over(letter)
+        self._repeat(now)
         self.past.settled(letter, now)
 
     def refused(self, letter: Letter, reason: int) -> bool:
@@ -204,6 +204,11 @@ class Outbox:
         if isinstance(letter, Retained):
             self._retention.over(letter)
         self.past.over(letter)
+
+    def _repeat(self, now: float) -> None:
+        """Let what may have been lost at the broker wait once more, from the moment the past is opened."""
+        if self.past.repeat(now):
+            self._make_room()
 
     # What waits
 
@@ -266,6 +271,11 @@ class Outbox:
             kept = history.evict() if history else self._live.popleft().kept
             if kept is not None:
                 self.past.losses.add(kept.sample)
+
+    def not_spilled(self, now: float) -> None:
+        """Let what the store could not take wait in memory, as far as there is room."""
+        self.past.not_spilled(now)
+        self._make_room()
 
     # The clock
 

@@ -244,7 +244,7 @@ class Stowage:
                 delivered=stored.delivered,
             )
         except StoreError:
-            self._past.not_spilled(self._now())
+            self._outbox.not_spilled(self._now())
             raise
         stored.told(self._store.rows, self._store.oldest_ts)
         self._past.spilled(evicted, self._now())

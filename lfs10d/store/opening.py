@@ -87,17 +87,19 @@ class Limits:
 
 
 def connect(path: Path, *, boot: str, limits: Limits) -> sqlite3.Connection:
-    """Open the file, bring its log into it, and write `boot`.
+    """Open the file, bring its log into it, and write `boot`. A file shorter than it says SQLite refuses itself.
 
     Raises sqlite3.Error, ForeignError, or DamagedError where the file is cut.
     """
+    torn = _ends_within_a_page(path)
     db = sqlite3.connect(path, timeout=PATIENCE, isolation_level=None)
     try:
         _prepare(db)
+        _refuse(torn)
         limit(db, limits)
+        db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
         with transaction(db):  # and so it shows whether the file can be written
             db.execute("UPDATE life SET boot = ?", (boot,))
-        _look_whole(db, path)
     except BaseException:
         db.close()
         raise
@@ -125,10 +127,14 @@ def _prepare(db: sqlite3.Connection) -> None:
             db.execute(f"PRAGMA user_version = {SCHEMA}")
 
 
-def _look_whole(db: sqlite3.Connection, path: Path) -> None:
-    """Raise DamagedError if the file ends within a page; one that is shorter than it says SQLite refuses itself."""
-    db.execute("PRAGMA wal_checkpoint(TRUNCATE)")
-    if path.stat().st_size != number(db, "PRAGMA page_count") * PAGE:
+def _ends_within_a_page(path: Path) -> bool:
+    """Tell whether a file was cut. Where it has a log nobody knows: that may be about to complete it."""
+    log = path.with_name(f"{path.name}-wal")
+    return path.exists() and path.stat().st_size % PAGE > 0 and not (log.exists() and log.stat().st_size)
+
+
+def _refuse(torn: bool) -> None:  # noqa: FBT001 - it says it all
+    if torn:
         raise DamagedError("it is cut short")
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -74,3 +76,19 @@ def test_whatever_the_order_of_arrival_each_device_leaves_in_order_of_seq(
     assert len(history) == 0
     for device in "ab":
         assert [each for each in left if each[0] == device] == sorted(each for each in arrivals if each[0] == device)
+
+
+def test_a_clock_set_right_corrects_what_had_none_and_knows_its_shift() -> None:
+    unsynced = replace(kept("a", 1).sample, clock="unsynced", ts=5000)
+    history = History()
+    history.extend([Kept(unsynced, 1.0, shift=1000), Kept(replace(unsynced, seq=2), 2.0), kept("a", 3)])
+    history.correct(9000)
+    told = [(each.sample.ts, each.sample.clock, each.shift) for each in history.take(9)]
+    assert told == [(13_000, "synced", 9000), (5000, "unsynced", None), (0, "synced", None)]
+
+
+def test_what_is_cleared_is_gone() -> None:
+    history = History()
+    history.extend([kept("a", 1), kept("b", 1, repeated=True)])
+    history.clear()
+    assert (len(history), history.take(9), history.evict()) == (0, (), None)

@@ -102,3 +102,10 @@ def test_the_ranges_cover_everything_lost_once(seqs: set[int]) -> None:
     assert len(covered) == len(set(covered))
     if len(seqs) <= MOST_RANGES:
         assert set(covered) == seqs
+
+
+def test_what_the_store_had_no_room_for_counts_and_waits_to_be_declared() -> None:
+    losses = Losses()
+    losses.evicted([Loss("a", "k", 1, 5, 5), Loss("b", "k", 2, 2, 1), Loss("a", "k", 6, 6, 1)])
+    assert losses.total == 7
+    assert losses.waiting() == [Loss("a", "k", 1, 6, 6), Loss("b", "k", 2, 2, 1)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
 import pytest
@@ -604,6 +605,36 @@ def test_the_oldest_that_waits_is_told_wherever_it_waits() -> None:
     take(outbox, 5.0, Live)
     take(outbox, 5.0, Array)
     assert outbox.backlog == telemetry.Backlog(depth=2, oldest_ts=7000, dropped=0)
+
+
+def test_when_the_oldest_live_sample_grows_old_is_known() -> None:
+    outbox = Outbox()
+    assert outbox.next_old() is None
+    outbox.add(sample(1), 5.0)
+    outbox.add(sample(2), 6.0)
+    assert outbox.next_old() == 5.0 + LIVE_FOR
+
+
+def test_a_clock_set_right_corrects_live_samples_and_their_payloads() -> None:
+    outbox = connected()
+    clocks: tuple[telemetry.Clock, ...] = ("unsynced", "synced")
+    for seq, clock in enumerate(clocks, 1):
+        publication = sample(seq)
+        assert publication.sample is not None
+        measured = replace(publication.sample, clock=clock)
+        payload = measured.payload("line0")
+        outbox.add(replace(publication, sample=measured, payload=payload), 0.0, shift=500)
+    outbox.correct(7500)
+    told = [take(outbox, 0.0, Live).publication for _ in range(2)]
+    assert [(each.sample and each.sample.ts, each.sample and each.sample.clock) for each in told] == [
+        (8000, "synced"),
+        (2000, "synced"),
+    ]
+    payloads = [each.payload for each in told if isinstance(each.payload, dict)]
+    assert [(each["ts"], each["time"], each["clock"], each["line"]) for each in payloads] == [
+        (8000, "1970-01-01T00:00:08.000Z", "synced", "line0"),
+        (2000, "1970-01-01T00:00:02.000Z", "synced", "line0"),
+    ]
 
 
 # Laws

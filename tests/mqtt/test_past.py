@@ -57,7 +57,7 @@ class MemoryStore:
         past = outbox.past
         kept = past.spill()
         if self.broken:
-            past.not_spilled(now)
+            outbox.not_spilled(now)
             return
         delivered, evicted = past.stored.delivered, []
         for each in kept:
@@ -90,7 +90,7 @@ class MemoryStore:
             return
         gone = outbox.past.stored.releasing(now)
         for number in gone:
-            del self.rows[number]
+            self.rows.pop(number, None)
         self.losses = tuple(outbox.past.undeclared())
         outbox.past.stored.deleted(gone)
         self.tell(outbox)
@@ -324,7 +324,7 @@ def test_a_clock_set_right_corrects_what_waits_wherever_it_waits_and_nothing_els
     ours, earlier = sample_of(sample(9, clock="unsynced")), sample_of(sample(8))
     outbox.past.stored.take_page([Row(1, ours, 0, repeated=False), Row(2, earlier, None, repeated=False)], 9)
     outbox.correct(7000)
-    outbox.past.not_spilled(8.0)
+    outbox.not_spilled(8.0)
     connect(outbox, 8.1)
     live = [outbox.next(8.1), outbox.next(8.1)]
     told = []
@@ -383,6 +383,99 @@ def test_what_is_still_to_be_repeated_is_kept_at_the_end() -> None:
     assert outbox.past.spill_at_last()
     store.take(outbox, 22.0)
     assert [row.repeated for row in store.rows.values()] == [True]
+
+
+# Refused
+
+
+def refused_history() -> tuple[Outbox, MemoryStore]:
+    """Return an outbox whose history the broker has refused once, with three samples in memory."""
+    outbox, store = Outbox(), MemoryStore()
+    for seq in (1, 2, 3):
+        outbox.add(sample(seq), 0.0)
+    connect(outbox, 10.0)
+    array = outbox.next(20.0)
+    assert isinstance(array, Array)
+    assert outbox.refused(array, 0x87)
+    return outbox, store
+
+
+def test_where_history_is_refused_what_the_store_gives_back_is_declared_and_let_go() -> None:
+    store = MemoryStore()
+    outbox = away(3, store)
+    connect(outbox, 10.0)
+    store.page(outbox, 20.0)
+    array = outbox.next(20.0)
+    assert isinstance(array, Array)
+    assert outbox.refused(array, 0x87)
+    store.release(outbox, 20.0)
+    assert not store.rows
+    assert store.losses == (Loss("a", "k2", 1, 3, 3),)
+
+
+def test_what_would_be_refused_is_not_sent_and_declared_at_once() -> None:
+    outbox, _ = refused_history()
+    outbox.add(sample(4), 20.0)
+    outbox.age(30.0)
+    declaration = outbox.next(30.0)
+    assert isinstance(declaration, Declaration)
+    outbox.settled(declaration, 30.0)
+    assert outbox.next(30.2) is None
+    assert outbox.past.undeclared() == [Loss("a", "k2", 4, 4, 1)]
+
+
+def test_where_events_are_refused_losses_wait_and_the_past_goes_on() -> None:
+    outbox, _ = refused_history()
+    declaration = outbox.next(30.0)
+    assert isinstance(declaration, Declaration)
+    assert outbox.refused(declaration, 0x87)
+    outbox.add(sample(1, "b"), 20.0)
+    outbox.age(30.0)
+    assert outbox.due() == 20.0 + 0.1
+    assert seqs(outbox.next(30.0)) == [1]
+    assert outbox.due() is None
+    assert outbox.past.undeclared() == [Loss("a", "k2", 1, 3, 3)]
+
+
+def test_losing_a_connection_that_never_was_is_no_new_absence() -> None:
+    outbox, store = Outbox(), MemoryStore()
+    outbox.add(sample(1), 0.0)
+    outbox.lost(3.5)
+    assert store.spill(outbox, 3.6)
+
+
+def test_a_declaration_under_way_is_made_again_after_a_loss_and_kept_until_then() -> None:
+    outbox, _ = refused_history()
+    assert isinstance(outbox.next(30.0), Declaration)
+    assert outbox.past.undeclared() == [Loss("a", "k2", 1, 3, 3)]
+    outbox.lost(31.0)
+    assert outbox.past.undeclared() == [Loss("a", "k2", 1, 3, 3)]
+    connect(outbox, 32.0)
+    assert isinstance(outbox.next(42.0), Declaration)
+
+
+def test_an_array_of_memory_that_is_too_large_is_cut() -> None:
+    outbox = Outbox()
+    for seq in (1, 2, 3, 4):
+        outbox.add(sample(seq), 0.0)
+    connect(outbox, 10.0)
+    array = outbox.next(20.0)
+    assert isinstance(array, Array)
+    assert not outbox.unfit(array)
+    assert seqs(outbox.next(20.0)) == [1, 2]
+
+
+def test_the_second_sending_is_due_when_the_past_is_opened() -> None:
+    outbox = Outbox()
+    connect(outbox, 0.0)
+    outbox.add(sample(1), 20.0)
+    letter = outbox.next(20.0)
+    assert letter is not None
+    outbox.settled(letter, 20.0)
+    outbox.lost(21.0)
+    connect(outbox, 22.0)
+    assert outbox.due() == 22.0 + PAST_AFTER
+    assert seqs(outbox.next(32.0)) == [1]
 
 
 # Laws
@@ -460,7 +553,7 @@ class PastLaws(RuleBasedStateMachine):
         self.store.losses = tuple(self.outbox.past.undeclared())
         gone = self.outbox.past.stored.releasing(self.now)
         for number in gone:
-            del self.store.rows[number]
+            self.store.rows.pop(number, None)
         self.begin()
 
     @precondition(lambda self: self.online)

@@ -72,6 +72,13 @@ def test_a_series_comes_back_from_its_text(changes: dict[str, object]) -> None:
     assert Series.parse(series(**changes).text) == series(**changes)
 
 
+def test_samples_of_one_series_have_device_boot_quality_error_names_and_units_in_common() -> None:
+    good = Sample("mast", "k1", 1, 0, "synced", {"a": 3, "b": 1}, {"a": "m/s"}, ("a", "b"), "good", None, 1.0)
+    assert Series.of(good, repeated=False) == series()
+    assert Series.of(replace(good, seq=9, ts=9, rtt_ms=None), repeated=False) == series()
+    assert Series.of(good, repeated=True) == series(repeated=True)
+
+
 @pytest.mark.parametrize("text", ["", "[]", "null", "[1,2,3,4,5,6,7]", series().text + " "])
 def test_a_text_that_is_no_series_is_damage(text: str) -> None:
     with pytest.raises(DamagedError):

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import pytest
 
 from lfs10d.loss import Loss
-from lfs10d.store.opening import ForeignError, Limits
 from lfs10d.store.row import DamagedError
 from lfs10d.store.samplefile import SampleFile, runs
 from tests.store.conftest import BOOT, ROOMY, START, entries, sample
@@ -19,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
+    from lfs10d.store.opening import Limits
     from lfs10d.telemetry import Sample
 
 NOW = START + 60_000
@@ -257,56 +257,7 @@ def test_a_transaction_that_fails_leaves_no_trace(file: SampleFile, path: Path) 
     other.close()
 
 
-# Files that are not ours, or not whole
-
-
-def test_a_later_schema_is_refused(file: SampleFile, path: Path) -> None:
-    file.close()
-    db = sqlite3.connect(path)
-    db.execute("PRAGMA user_version = 2")
-    db.close()
-    with pytest.raises(ForeignError, match="schema 2, ours is 1") as refused:
-        SampleFile(path, boot=BOOT, limits=ROOMY)
-    assert refused.value.later
-
-
-@pytest.mark.parametrize("statement", ["PRAGMA application_id = 7", "CREATE TABLE t (x)", "PRAGMA user_version = 3"])
-def test_somebody_elses_database_is_refused(path: Path, statement: str) -> None:
-    db = sqlite3.connect(path)
-    db.execute(statement)
-    db.commit()
-    db.close()
-    before = path.read_bytes()
-    with pytest.raises(ForeignError, match="another program"):
-        SampleFile(path, boot=BOOT, limits=ROOMY)
-    assert path.read_bytes() == before
-
-
-def test_text_is_no_database(path: Path) -> None:
-    path.write_text("not a database " * 1000)
-    with pytest.raises(sqlite3.DatabaseError):
-        SampleFile(path, boot=BOOT, limits=ROOMY)
-
-
-@pytest.mark.parametrize(
-    "statement",
-    [
-        "UPDATE era SET base = base + 1",
-        "UPDATE series SET era = 99",
-        "UPDATE series SET facts = '[]'",
-    ],
-)
-def test_an_era_or_a_series_that_was_changed_is_found_when_the_file_is_opened(
-    file: SampleFile, path: Path, statement: str
-) -> None:
-    keep(file, sample(1))
-    file.close()
-    db = sqlite3.connect(path)
-    db.execute(statement)
-    db.commit()
-    db.close()
-    with pytest.raises(DamagedError):
-        SampleFile(path, boot=BOOT, limits=ROOMY)
+# Samples that were changed
 
 
 @pytest.mark.parametrize(
