@@ -12,6 +12,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from lfs10d import telemetry
 from lfs10d.loss import Loss
+from lfs10d.mqtt.history import Kept
 from lfs10d.mqtt.letters import Array, Declaration, Letter, Live, Message, Retained, samples_of
 from lfs10d.mqtt.losses import DECLARED_EVERY
 from lfs10d.mqtt.outbox import LIVE_FOR, MESSAGES_MOST, Outbox
@@ -605,6 +606,31 @@ def test_the_oldest_that_waits_is_told_wherever_it_waits() -> None:
     take(outbox, 5.0, Live)
     take(outbox, 5.0, Array)
     assert outbox.backlog == telemetry.Backlog(depth=2, oldest_ts=7000, dropped=0)
+
+
+def test_what_the_store_could_not_take_waits_in_memory_as_far_as_there_is_room() -> None:
+    outbox = Outbox(capacity=3)
+    for seq in (1, 2):
+        outbox.add(sample(seq), 0.0)
+    outbox.age(4.0)
+    outbox.past.spill()
+    outbox.past.history.add(Kept(sample_of(3), 4.0))
+    outbox.past.history.add(Kept(sample_of(4), 4.0))
+    outbox.not_spilled(4.0)
+    assert (outbox.depth, outbox.dropped) == (3, 1)
+
+
+def sample_of(seq: int) -> Sample:
+    measured = sample(seq).sample
+    assert measured is not None
+    return measured
+
+
+def test_what_lies_in_the_store_counts_and_is_the_oldest() -> None:
+    outbox = Outbox()
+    outbox.past.stored.told(5, 77)
+    outbox.add(sample(6), 0.0)
+    assert outbox.backlog == telemetry.Backlog(depth=6, oldest_ts=77, dropped=0)
 
 
 def test_when_the_oldest_live_sample_grows_old_is_known() -> None:

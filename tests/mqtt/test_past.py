@@ -478,6 +478,30 @@ def test_the_second_sending_is_due_when_the_past_is_opened() -> None:
     assert seqs(outbox.next(32.0)) == [1]
 
 
+def test_what_is_acknowledged_until_the_past_is_opened_goes_once_more_and_nothing_after() -> None:
+    outbox = Outbox()
+    connect(outbox, 0.0)
+    outbox.lost(50.0)
+    connect(outbox, 60.0)
+    for seq, now in ((1, 60.5), (2, 69.5), (3, 80.0)):
+        outbox.add(sample(seq), now)
+        letter = outbox.next(now)
+        assert isinstance(letter, Live)
+        outbox.settled(letter, now)
+    assert seqs(outbox.next(80.0)) == [1, 2]
+
+
+def test_the_broker_is_away_until_it_is_there_and_when_it_is_gone() -> None:
+    outbox = Outbox()
+    told = [outbox.past.away]
+    connect(outbox, 0.0)
+    told.append(outbox.past.away)
+    outbox.lost(1.0)
+    told.append(outbox.past.away)
+    assert told == [True, False, True]
+    assert outbox.backlog == telemetry.Backlog()
+
+
 # Laws
 
 
