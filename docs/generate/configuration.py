@@ -82,7 +82,7 @@ def _value(field: FieldInfo) -> str:
         return kind.words.partition(_HOW_TO_WRITE)[0]
     model = model_in(field.annotation)
     if model is None:
-        inner = next(iter(_kinds_within(field.annotation)))
+        inner = next(iter(kinds_within(field.annotation)))
         return f"a list of any of {inner.words.replace(' or ', ', ')}; `[]` for none"
     if _listed(field.annotation):
         return "a list; each item a slave id, or a mapping of the keys below"
@@ -113,11 +113,12 @@ def model_in(annotation: Any) -> Model | None:  # noqa: ANN401  # any annotation
     return next(filter(None, map(model_in, get_args(annotation))), None)
 
 
-def _kinds_within(annotation: Any) -> Iterator[Kind]:  # noqa: ANN401
+def kinds_within(annotation: Any) -> Iterator[Kind]:  # noqa: ANN401
+    """Yield what single values within an annotation may be."""
     if get_origin(annotation) is Annotated:
         yield from (each for each in get_args(annotation)[1:] if isinstance(each, Kind))
     for inner in get_args(annotation):
-        yield from _kinds_within(inner)
+        yield from kinds_within(inner)
 
 
 def _nullable(annotation: Any) -> bool:  # noqa: ANN401

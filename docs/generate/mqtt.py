@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, get_args, get_origin
 
 from pydantic import BaseModel, TypeAdapter
 
-from docs.generate.configuration import kind_of, written
+from docs.generate.configuration import kind_of, kinds_within, written
 from docs.generate.examples import Story, events, responses, trace
 from docs.generate.markdown import example, plain, table
 from docs.generate.meanings import ERROR_CODES, FAULT_CODES
@@ -211,5 +211,11 @@ def _does(request: Request) -> str:
 
 def _parameter(field: FieldInfo) -> str:
     kind = kind_of(field)
-    words = kind.words if kind else type_words(TypeAdapter[object](field.annotation or object).json_schema(), {})
+    beside_null = next(kinds_within(field.annotation), None)  # `Annotated[int, Whole(1, 255)] | None`
+    if kind is not None:
+        words = kind.words
+    elif beside_null is not None:
+        words = f"{beside_null.words}, or null"
+    else:
+        words = type_words(TypeAdapter[object](field.annotation or object).json_schema(), {})
     return f"{plain(words)}; required" if field.is_required() else f"{plain(words)}; default `{written(field)}`"
