@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).parents[2]
 BAUDRATE = 19200
 WELL_SAMPLES = 6
-"""So many samples of each device are waited for while all is well."""
+"""So many good samples of each device are waited for while all is well."""
 
 TANK = """\
 name: tank
@@ -118,6 +118,8 @@ class Recording:
     """What `lfs10d watch --json` printed."""
     responses: dict[str, dict[str, Any]] = field(default_factory=dict)
     """The responses by the id of their request."""
+    at_once: dict[str, dict[str, Any]] = field(default_factory=dict)
+    """Those to requests that came at the same time."""
     daemon_log: str = ""
 
     def profile(self, unit: Unit) -> Profile:
@@ -140,18 +142,18 @@ class Recording:
                     entries.append((unit, body, request))
         return entries
 
-    def meant(self, unit: Unit) -> Iterator[dict[str, float]]:
-        """Yield what the device meant to say in each of its polls, by the line's own log, in order."""
-        blocks = self.profile(unit).reads()
-        shapes = [bytes((block.function,)) + _words(block.address, block.count) for block in blocks]
-        told: list[list[dict[str, float]]] = [[] for _ in blocks]
-        for to, body, request in self.log:
-            if to is unit and body[1:] in shapes and request.answers and request.answers[0].values:
-                place = shapes.index(body[1:])
-                names = [value.name for value in self.profile(unit).values if value in blocks[place].values]
-                told[place].append(dict(zip(names, request.answers[0].values, strict=True)))
-        for parts in zip(*told, strict=False):
-            yield {name: number for part in parts for name, number in part.items()}
+    def meant(self, unit: Unit) -> list[list[dict[str, float]]]:
+        """Return for each read of a poll what the device meant to say in its answers, by the line's log, in order."""
+        profile = self.profile(unit)
+        meant = []
+        for block in profile.reads():
+            shape = bytes((block.function,)) + _words(block.address, block.count)
+            names = [value.name for value in profile.values if value in block.values]
+            told = (
+                answer for to, body, each in self.log if to is unit and body[1:] == shape for answer in each.answers
+            )
+            meant.append([dict(zip(names, answer.values, strict=True)) for answer in told if answer.values])
+        return meant
 
     def lfs10d(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         """Call a verb at the free port."""
@@ -201,7 +203,7 @@ def record(folder: Path, broker: Mosquitto, units: Sequence[Unit], framing: Fram
     run = site.run()
     try:
         for unit in units:
-            made.view.wait_samples(unit.name, WELL_SAMPLES)
+            made.view.wait_samples(unit.name, WELL_SAMPLES, good)
         made.well = {unit.name: made.view.samples(unit.name) for unit in units}
         _watch(made)
         _ask(made)
@@ -239,6 +241,18 @@ def _ask(made: Recording) -> None:
         answers = made.view.listener.wait_for(topic, before + 1)
         made.responses[key] = json.loads(answers[-1].payload)
 
+    topic = f"{made.view.base}/response/register/write"
+    before = len(made.view.listener.on(topic))
+    for value in AT_ONCE:
+        payload = json.dumps({"id": f"at-once-{value}", "device": "tank", "address": 0x0300, "value": value})
+        made.view.listener.publish(f"{made.view.base}/request/register/write", payload, qos=0)
+    for answer in made.view.listener.wait_for(topic, before + len(AT_ONCE))[before:]:
+        response = json.loads(answer.payload)
+        made.at_once[response["id"]] = response
+
+
+AT_ONCE = (11, 12, 13)
+"""Values written to one register by three requests at the same time."""
 
 REQUESTS: dict[Framing, list[tuple[str, dict[str, Any]]]] = {
     "rtu": [
