@@ -42,8 +42,10 @@ REGISTERS = 0x1_0000
 class OnePlace(Parameters):
     """Whose register; either by `device` or by `slave`."""
 
-    device: Annotated[str, Name()] = Field("", description="The device, by its name.")
-    slave: Annotated[int, Whole(0, 255)] = Field(0, description="Or its slave id; nobody need be configured there.")
+    device: Annotated[str, Name()] | None = Field(None, description="The device, by its name.")
+    slave: Annotated[int, Whole(0, 255)] | None = Field(
+        None, description="Or its slave id, 1 to 255; nobody need be configured there."
+    )
     address: Annotated[int, Whole(0, REGISTERS - 1)] = Field(description="The (first) register, as on the wire.")
 
 
@@ -106,20 +108,21 @@ async def write(parameters: OneRegister, powers: Powers, call: Call) -> Answer:
 
 def _whose(parameters: OnePlace, now: Effective) -> tuple[SlaveConfig | None, int]:
     """Return the device, None if none is configured there, and its slave id; raises RefusedError."""
-    given = parameters.model_fields_set & {"device", "slave"}
-    if len(given) != 1:
-        message = "device: give either device or slave" if given else "device: is missing; or give slave, a slave id"
-        raise refuse("invalid_param", message, param="device")
-    if "device" in given:
-        device = known_device(parameters.device, now)
-        conflict = now.conflicts.get(device.name)
-        if conflict is not None:
-            raise refuse("line_error", f"{device.name} cannot be asked: {conflict}")
-        return device, device.id
-    if parameters.slave == 0:
-        raise refuse("not_allowed", "slave 0 is everybody: nothing is ever sent to it", param="slave")
-    there = (each for each in now.polled.slaves if each.id == parameters.slave)
-    return next(there, None), parameters.slave
+    match parameters.device, parameters.slave:
+        case (str(name), None):
+            device = known_device(name, now)
+            conflict = now.conflicts.get(name)
+            if conflict is not None:
+                raise refuse("line_error", f"{name} cannot be asked: {conflict}")
+            return device, device.id
+        case (None, 0):
+            raise refuse("not_allowed", "slave 0 is everybody: nothing is ever sent to it", param="slave")
+        case (None, int(slave)):
+            return next((each for each in now.polled.slaves if each.id == slave), None), slave
+        case (None, None):
+            raise refuse("invalid_param", "device: is missing; or give slave, a slave id", param="device")
+        case _:
+            raise refuse("invalid_param", "device: give either device or slave", param="device")
 
 
 def _kind(device: SlaveConfig | None, now: Effective) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -199,6 +200,20 @@ def test_a_read_longer_than_the_device_gives_is_told_with_its_limit(ask: Ask) ->
 def test_an_unknown_device_is_told_which_there_are(ask: Ask, powers: FakePowers) -> None:
     answer = told(ask, "write", device="nobody", address=1, value=1)
     assert (answer.status, answer.code, powers.done) == ("rejected", "unknown_device", [])
+
+
+@pytest.mark.parametrize(("name", "more"), [("read", {}), ("write", {"value": 60})])
+def test_a_device_whose_id_is_another_ones_now_is_not_asked(
+    ask: Ask, powers: FakePowers, name: str, more: dict[str, int]
+) -> None:
+    powers.holding.now = replace(powers.holding.now, conflicts={"vane": "its id is that of motor"})
+    answer = told(ask, name, device="vane", address=16, **more)
+    assert (answer.status, answer.code, answer.message) == (
+        "rejected",
+        "line_error",
+        "vane cannot be asked: its id is that of motor",
+    )
+    assert powers.done == []
 
 
 @pytest.mark.parametrize("name", builtin_names())
