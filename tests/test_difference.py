@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from lfs10d.difference import Change, difference
 from lfs10d.config import Config, resolved
+from lfs10d.difference import Change, difference
 
 
 def config(*, line: dict[str, Any] | None = None, **sections: Any) -> Config:  # noqa: ANN401

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from fractions import Fraction
 from itertools import pairwise
 
 from hypothesis import example, given
@@ -107,3 +108,70 @@ def test_one_bad_value_makes_the_whole_block_a_fault() -> None:
 def test_another_number_of_registers_than_asked_is_malformed() -> None:
     (block,) = batch([value("a", 1)], 5)
     assert block.decode((1, 2)) == Fault(FaultCode.MALFORMED, "2 registers came, 1 were asked")
+
+
+LETTERS = {
+    ("high_first", "big"): "ABCD",
+    ("high_first", "little"): "BADC",
+    ("low_first", "big"): "CDAB",
+    ("low_first", "little"): "DCBA",
+}
+"""In which order the bytes of a number, A the most significant, lie on the wire."""
+
+
+@st.composite
+def any_value(draw: st.DrawFn, index: int) -> Value:
+    """Draw a value of any type, layout, scale and offset that a file may have."""
+    kind = draw(st.sampled_from([*FORMATS, "float32"]))
+    words = {} if kind.endswith("16") else {"word_order": draw(st.sampled_from(["high_first", "low_first"]))}
+    return Value.model_validate(
+        {
+            "name": f"v{index}",
+            "register": draw(st.integers(0, 20)),
+            "type": kind,
+            "unit": "1",
+            "function": draw(st.sampled_from([3, 4])),
+            "byte_order": draw(st.sampled_from(["big", "little"])),
+            "scale": draw(st.sampled_from([1, 0.1, 0.01, -0.5, 3.6, 10])),
+            "offset": draw(st.sampled_from([0, -40, 0.25])),
+            **words,
+        }
+    )
+
+
+def by_hand(value: Value, memory: bytes) -> Fraction | None:
+    """Decode by shuffling bytes and calculating in fractions; None for what is no measurement."""
+    wire = memory[2 * value.register :][: 2 if value.type.endswith("16") else 4]
+    letters = LETTERS[value.word_order or "high_first", value.byte_order]
+    if len(wire) == 2:
+        letters = {"big": "AB", "little": "BA"}[value.byte_order]
+    straight = bytes(wire[letters.index(letter)] for letter in sorted(letters))
+    if value.type != "float32":
+        raw = Fraction(int.from_bytes(straight, "big", signed=value.type.startswith("i")))
+    else:
+        exponent = int.from_bytes(straight, "big") >> 23 & 0xFF
+        if exponent == 0xFF or (exponent == 0 and straight[0] & 0x7F | straight[1] | straight[2] | straight[3]):
+            return None
+        raw = Fraction(struct.unpack(">f", straight)[0])
+    return raw * Fraction(repr(value.scale)) + Fraction(repr(value.offset))
+
+
+@given(data=st.data(), most=st.integers(2, 6))
+def test_any_content_of_any_profile_is_decoded_as_by_hand(data: st.DataObject, most: int) -> None:
+    values = tuple(data.draw(any_value(index)) for index in range(data.draw(st.integers(1, 6))))
+    memory = {function: data.draw(st.binary(min_size=46, max_size=46)) for function in (3, 4)}
+    for block in batch(values, most):
+        words = struct.unpack_from(f">{block.count}H", memory[block.function], 2 * block.address)
+        decoded = block.decode(words)
+        wanted = {each.name: by_hand(each, memory[each.function]) for each in block.values}
+        if isinstance(decoded, Fault):
+            assert None in wanted.values()
+            continue
+        for each in block.values:
+            expected = wanted[each.name]
+            assert expected is not None
+            if each.type == "float32":  # its number is the shortest decimal, half a unit in the last place off at most
+                slack = abs(expected - Fraction(repr(each.offset))) / 2**24 * 2
+                assert abs(Fraction(decoded[each.name]) - expected) <= slack + abs(expected) / 2**50
+            else:
+                assert decoded[each.name] == float(expected)

@@ -18,6 +18,7 @@ from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import unseal
 
 if TYPE_CHECKING:
+    from lfs10d.modbus.request import Request
     from lfs10d.profiles.schema import ChecksumName, FramingName, Profile
     from lfs10d.reading import Number
 
@@ -96,6 +97,43 @@ def test_the_eh600_with_the_other_check_is_asked_with_the_sum_of_the_bytes() -> 
     block = profile.reads()[0]
     request = ReadRegisters(1, block.address, block.count, block.function)
     assert SUM.encode(request) == bytes.fromhex("010310010001 0016")
+
+
+GOLDEN = [
+    ("lfs10", RTU, ReadRegisters(1, 0x0001, 2), "010300010002 95CB", "010304414FD70A 002F", (0x414F, 0xD70A)),
+    ("lfs10", RTU, WriteRegister(1, 0x0004, 2), "010600040002 49CA", "010600040002 49CA", (2,)),
+    ("ld-e", RTU, ReadRegisters(1, 0x1004, 2), "010310040002 810A", "010304D0F50000 D2C1", (0xD0F5, 0)),
+    ("ld-e", ASCII, ReadRegisters(1, 0x1004, 2), b":010310040002E6", b":010304D0F5000033", (0xD0F5, 0)),
+    ("ld-e", RTU, WriteRegister(1, 0x1000, 1), "010610000001 4CCA", "010610000001 4CCA", (1,)),
+    ("ld-e", ASCII, WriteRegister(1, 0x1000, 1), b":010610000001E8", b":010610000001E8", (1,)),
+    ("fuling-dzb", RTU, ReadRegisters(1, 0x0004, 2), "010300040002 85CA", "01030400000000 FA33", (0, 0)),
+    ("fuling-dzb", ASCII, ReadRegisters(1, 0x0004, 2), b":010300040002F6", b":01030400000000F8", (0, 0)),
+    ("eh600", RTU, ReadRegisters(1, 0xF002, 2), "0103F0020002 56CB", "01030400000000 FA33", (0, 0)),
+    ("eh600", SUM, ReadRegisters(1, 0xF002, 2), "0103F0020002 00F8", "01030400000000 0008", (0, 0)),
+    ("eh600", RTU, WriteRegister(2, 0xF00B, 5000), "0206F00B1388 C66D", "0206F00B1388 C66D", (5000,)),
+    ("eh600", SUM, WriteRegister(2, 0xF00B, 5000), "0206F00B1388 019E", "0206F00B1388 019E", (5000,)),
+]
+"""Frames of the makers' documents, with the check of each framing that the device speaks."""
+
+
+@pytest.mark.parametrize(("name", "codec", "request_", "asked", "answered", "content"), GOLDEN)
+def test_every_frame_of_the_documents_is_made_and_understood(
+    name: str, codec: Codec, request_: Request, asked: str | bytes, answered: str | bytes, content: tuple[int, ...]
+) -> None:
+    profile = load(name)
+    assert codec.framing.value in profile.framings
+    assert codec.framing is Framing.ASCII or codec.checksum.value in profile.checksums
+    frames = [bytes.fromhex(each) if isinstance(each, str) else each + b"\r\n" for each in (asked, answered)]
+    assert codec.encode(request_) == frames[0]
+    assert codec.answer_size(request_) == len(frames[1])
+    body = codec.unwrap(frames[1])
+    assert body is not None
+    assert codec.decode(body) == content
+
+
+def test_the_golden_frames_cover_every_device_in_every_framing_and_check() -> None:
+    seen = {(name, codec.framing.value, codec.checksum.value) for name, codec, *_ in GOLDEN}
+    assert {spoken for spoken in SPOKEN if spoken[0] in builtin_names()} <= seen
 
 
 @pytest.mark.parametrize(("name", "framing", "check"), SPOKEN)
