@@ -491,6 +491,21 @@ def test_what_is_acknowledged_until_the_past_is_opened_goes_once_more_and_nothin
     assert seqs(outbox.next(80.0)) == [1, 2]
 
 
+def test_what_was_acknowledged_before_is_no_loss_when_its_second_sending_is_refused() -> None:
+    outbox = Outbox()
+    connect(outbox, 0.0)
+    outbox.add(sample(1), 50.0)
+    letter = outbox.next(50.0)
+    assert letter is not None
+    outbox.settled(letter, 50.0)
+    outbox.lost(51.0)
+    connect(outbox, 52.0)
+    again = outbox.next(62.0)
+    assert isinstance(again, Array)
+    assert outbox.refused(again, QUOTA_EXCEEDED) is False
+    assert outbox.past.undeclared() == []
+
+
 def test_the_broker_is_away_until_it_is_there_and_when_it_is_gone() -> None:
     outbox = Outbox()
     told = [outbox.past.away]
