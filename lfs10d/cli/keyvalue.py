@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
     from lfs10d.commands import Parameters
 
 IDS = ("id", "transaction")
+
+_HEXADECIMAL = re.compile(r"0x[0-9A-Fa-f]{1,8}")
 
 
 class KeyValueError(ValueError):
@@ -43,10 +46,12 @@ def _value(key: str, text: str, form: type[Parameters] | None) -> Any:  # noqa: 
 
 
 def _readings(text: str) -> Iterator[Any]:
-    """Yield what the text may mean: null, the text itself, JSON; where nothing fits, the last one."""
+    """Yield what the text may mean: null, the text itself, a hexadecimal number, JSON; where nothing fits, the last."""
     if text == "null":
         yield None
     yield text
+    if _HEXADECIMAL.fullmatch(text):  # as registers are written in manuals and profiles
+        yield int(text, 16)
     try:
         yield json.loads(text, parse_constant=_refuse)
     except (ValueError, RecursionError):
