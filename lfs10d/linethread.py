@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 IDLE_MOST = 5.0
 """The thread passes a turn at least so often, in s, so that a watchdog can tell idle from wedged."""
+SPEAK_MOST = 0.3
+"""A request under way at the end is let out for so long, in s: eight characters at 1200 baud take 0.08."""
 WORTH_SLEEPING = 0.0002
 """A wait shorter than this (s) is not split in two."""
 REFUSED_PAUSE = 0.01
@@ -62,6 +64,7 @@ class LineThread(threading.Thread):
         except BaseException as error:  # noqa: BLE001 - the daemon must learn of whatever ended its line
             self._failed(error)
         finally:
+            time.sleep(min(max(self._poller.bus.speaking_until - time.monotonic(), 0.0), SPEAK_MOST))
             self._poller.bus.close()
 
     def _wait(self, wait: Wait) -> None:

@@ -6,6 +6,7 @@ set) and is skipped elsewhere, with one line that says what to install.
 
 from __future__ import annotations
 
+import contextlib
 import getpass
 import os
 import shutil
@@ -221,8 +222,13 @@ class Mosquitto:
     def stop(self) -> None:
         """End it in order (SIGTERM)."""
         if self.process is not None:
-            self.process.terminate()
-            self.process.wait(PATIENCE)
+            deadline = time.monotonic() + PATIENCE
+            while self.process.poll() is None:
+                assert time.monotonic() < deadline, "mosquitto does not end"
+                # A SIGTERM just before it waits for its sockets is noted, but does not wake it: send another.
+                self.process.terminate()
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    self.process.wait(1.0)
             self.process = None
 
     def kill(self) -> None:

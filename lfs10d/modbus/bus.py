@@ -143,6 +143,11 @@ class Bus:
         self._fault = fault
         return PortChanged(now, fault)
 
+    @property
+    def speaking_until(self) -> float:
+        """When the request under way has left the wire; to close the port before would cut it."""
+        return -inf if self._exchange is None else self._exchange.quiet_since
+
     def close(self) -> None:
         """Give the port back; what was asked is abandoned."""
         self.open = False

@@ -150,6 +150,14 @@ def test_an_order_waits_for_silence_is_sent_and_answered(rig: Rig) -> None:
     assert rig.bus.idle
 
 
+def test_it_knows_until_when_a_request_is_on_the_wire(rig: Rig) -> None:
+    assert rig.bus.speaking_until < rig.clock.now
+    rig.bus.ask(READ)
+    rig.step()
+    rig.step(T9600.gap)
+    assert rig.bus.speaking_until == pytest.approx(rig.clock.now + T9600.transmission(len(REQUEST)))
+
+
 def test_bytes_that_nobody_asked_for_restart_the_silence(rig: Rig) -> None:
     assert rig.step(1.0, b"\xff\xff") == Wait(inf, listen=True)
     assert rig.bus.unsolicited == 2
