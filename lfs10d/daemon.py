@@ -23,11 +23,11 @@ from lfs10d.firstburst import FirstBurst
 from lfs10d.journal import Journal
 from lfs10d.line import Line
 from lfs10d.logbook import Logbook
-from lfs10d.losing import Losing
 from lfs10d.moments import Moments
 from lfs10d.mqtt.settings import BrokerSettings
 from lfs10d.mqtt.uplink import Uplink
-from lfs10d.physical import Physical
+from lfs10d.physical.losing import Losing
+from lfs10d.physical.place import Physical
 from lfs10d.powers import DaemonPowers
 from lfs10d.reading import Exchanged, Fault, FaultCode, PortChanged
 from lfs10d.requests.table import REQUESTS

@@ -9,7 +9,6 @@ from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
 from lfs10d import assembly
-from lfs10d.adoption import Newcomer
 from lfs10d.aside import aside
 from lfs10d.commands import rejected
 from lfs10d.inquiries import Inquiries, Inquiry, altered
@@ -17,6 +16,7 @@ from lfs10d.jobs.knock import Knock
 from lfs10d.jobs.register import Access
 from lfs10d.modbus.exchange import Echo
 from lfs10d.pausing import Pausing
+from lfs10d.physical.adoption import Newcomer
 from lfs10d.reading import Exchanged, Reading
 from lfs10d.requests.request import RefusedError
 from lfs10d.scanning import Scanning
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from lfs10d.line import Line
     from lfs10d.modbus.frames import Request as RegisterRequest
     from lfs10d.mqtt.uplink import Uplink
-    from lfs10d.physical import Physical
+    from lfs10d.physical.place import Physical
     from lfs10d.profiles.schema import Profile
     from lfs10d.reading import Event
     from lfs10d.reload import Plan

@@ -24,7 +24,7 @@ from lfs10d.journal import Journal
 from lfs10d.modbus.bus import Bus
 from lfs10d.modbus.exchange import Echo
 from lfs10d.modbus.settings import PortSettings
-from lfs10d.physical import Physical
+from lfs10d.physical.place import Physical
 from lfs10d.poller import Poller
 from lfs10d.reading import Event, PortChanged, Reading
 from lfs10d.running import Running
@@ -242,7 +242,7 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
         del name
         return call()
 
-    for module in ("physical", "running"):
+    for module in ("physical.place", "running"):
         monkeypatch.setattr(f"lfs10d.{module}.aside", at_once)
     loop = asyncio.new_event_loop()
     loop.set_exception_handler(_mistake)

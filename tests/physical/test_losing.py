@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from lfs10d.losing import Losing
+from lfs10d.physical.losing import Losing
 from lfs10d.simulator.wire import Format
 
 if TYPE_CHECKING:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import logging
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ from lfs10d.commands import Answer, failed, ok, rejected
 from lfs10d.config import SlaveConfig, default_device_name
 from lfs10d.errors import StateError
 from lfs10d.jobs import adopt
-from lfs10d.jobs.course import Now, Over
+from lfs10d.jobs.course import Now
 from lfs10d.jobs.readdress import NOTHING_WRITTEN, Ending, Verdict, Write
 from lfs10d.journal import Move
 from lfs10d.profiles.library import builtin_names, load_profile
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     from lfs10d.commands import ErrorCode
     from lfs10d.effective import Effective
     from lfs10d.journal import Asked, OpenChange
-    from lfs10d.physical import Physical
+    from lfs10d.physical.place import Physical
     from lfs10d.profiles.schema import Profile
 
 log = logging.getLogger(__name__)
@@ -102,26 +101,15 @@ class Adoption:
         slave = SlaveConfig(id=wish.factory)
         clock = Now()
         talk = physical.talk()
-        change: OpenChange | None = None
-        try:
-            steps = adopt.adopt(wish, physical.asking(slave, clock, line_rate=0), physical.wire().echo_known)
-            ids = frozenset({wish.factory, *wish.candidates})
-            talk.begin(steps, clock, line_rate=now.config.line.baudrate, excludes=ids)
-            while not isinstance(what := await talk.wanted(), Over):
-                why = None
-                if isinstance(what, Write):
-                    try:
-                        change = await physical.put(partial(self._intend, wanted, what, asked))
-                    except StateError as error:
-                        why = str(error)
-                talk.go_on(why)
-            found: adopt.Adopted = what.result or adopt.Adopted(Verdict(Ending.LOST_BEFORE))
+        steps = adopt.adopt(wish, physical.asking(slave, clock, line_rate=0), physical.wire().echo_known)
+        ids = frozenset({wish.factory, *wish.candidates})
+        talk.begin(steps, clock, line_rate=now.config.line.baudrate, excludes=ids)
+
+        async def conclude(result: Any, change: OpenChange | None) -> Answer:  # noqa: ANN401 - a course's
+            found = result or adopt.Adopted(Verdict(Ending.LOST_BEFORE))
             return await self._conclude(wanted, wish, found, change, asked)
-        except asyncio.CancelledError:
-            talk.halt()
-            return await physical.cut_short(asked)
-        finally:
-            talk.go_on()
+
+        return await physical.carried_out(talk, asked, lambda write: self._intend(wanted, write, asked), conclude)
 
     def _wish(self, wanted: Newcomer, now: Effective) -> adopt.Newcomer | Answer:
         """Return what the line is asked, or why it need not be."""

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from lfs10d.effective import Effective
-    from lfs10d.physical import Talk
+    from lfs10d.physical.talk import Talk
     from lfs10d.roster import Device
 
 log = logging.getLogger(__name__)

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from lfs10d.effective import Effective
-    from lfs10d.physical import Physical, Talk
+    from lfs10d.physical.place import Physical
+    from lfs10d.physical.talk import Talk
 
 log = logging.getLogger(__name__)
 

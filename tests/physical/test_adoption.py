@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from lfs10d.adoption import Newcomer
 from lfs10d.commands import Answer, Call
 from lfs10d.forgetful import PowerCutError
+from lfs10d.physical.adoption import Newcomer
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 

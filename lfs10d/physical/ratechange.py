@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import logging
 from dataclasses import replace
@@ -34,7 +33,8 @@ if TYPE_CHECKING:
     from lfs10d.commands import ErrorCode
     from lfs10d.effective import Effective
     from lfs10d.journal import Asked, OpenChange
-    from lfs10d.physical import Physical, Talk
+    from lfs10d.physical.place import Physical
+    from lfs10d.physical.talk import Talk
 
 log = logging.getLogger(__name__)
 
@@ -86,31 +86,21 @@ class RateChange:
         if refusal is not None:
             return refusal
         earlier = frozenset(change.number for change in physical.journal.open)
-        await physical.leave(earlier)
+        physical.leave(earlier)
         clock = Now()
         sensors = self._sensors([slave.name for slave in now.config.slaves], clock)
         wish = RateWish(sensors, old, to, power_cycle, dry_run)
         talk = physical.talk()
-        change: OpenChange | None = None
-        try:
-            ids = frozenset(sensor.slave for sensor in sensors)
-            steps = change_rate(wish, physical.wire().echo_known)
-            talk.begin(steps, clock, line_rate=0, excludes=ids, share=1.0)
-            while not isinstance(what := await talk.wanted(), Over):
-                why = None
-                if isinstance(what, WriteRates):
-                    try:
-                        change = await physical.put(partial(self._intend, wish, asked))
-                    except StateError as error:
-                        why = str(error)
-                talk.go_on(why)
-            verdict: RateVerdict = what.result or RateVerdict(Ended.LOST_BEFORE)
-            return await self._conclude(wish, verdict, change, earlier, asked)
-        except asyncio.CancelledError:
-            talk.halt()
-            return await physical.cut_short(asked)
-        finally:
-            talk.go_on()
+        steps = change_rate(wish, physical.wire().echo_known)
+        talk.begin(steps, clock, line_rate=0, excludes=frozenset(sensor.slave for sensor in sensors), share=1.0)
+
+        def intend(_: WriteRates) -> OpenChange:
+            return self._intend(wish, asked)
+
+        async def conclude(result: Any, change: OpenChange | None) -> Answer:  # noqa: ANN401 - a course's
+            return await self._conclude(wish, result or RateVerdict(Ended.LOST_BEFORE), change, earlier, asked)
+
+        return await physical.carried_out(talk, asked, intend, conclude)
 
     def _unfit(self, to: int, now: Effective) -> Answer | None:
         """Return why the line need not even be asked; None if it must be."""
@@ -212,18 +202,10 @@ class RateChange:
                 pending.remove(what.name)
                 await physical.put(partial(physical.journal.amend, change.number, change.moves, pending=pending))
             elif isinstance(what, RateVerdict) and not change.answered:
-                change = await self._answered(change, old, to, what)
+                change = await physical.answered(change, _answer(old, to, what))
             talk.go_on()
         if what.result is not None:
             await self._settle(change, old, to, what.result)
-
-    async def _answered(self, change: OpenChange, old: int, to: int, verdict: RateVerdict) -> OpenChange:
-        physical = self._physical
-        told = physical.told(change.asked, _answer(old, to, verdict))
-        await physical.put(partial(physical.journal.keep, change.number, told))
-        if told is not None:
-            physical.respond(told)
-        return change.model_copy(update={"answered": True})
 
     async def _settle(self, change: OpenChange, old: int, to: int, verdict: RateVerdict) -> None:
         physical = self._physical
