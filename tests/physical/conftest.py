@@ -7,9 +7,10 @@ next one begins with what is on the disk. What blocks is called at once, so that
 from __future__ import annotations
 
 import asyncio
+import json
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import pytest
 
@@ -24,15 +25,20 @@ from lfs10d.journal import Journal
 from lfs10d.modbus.bus import Bus
 from lfs10d.modbus.exchange import Echo
 from lfs10d.modbus.settings import PortSettings
+from lfs10d.mqtt.inbound import InboundRequest
+from lfs10d.physical.adoption import Newcomer
 from lfs10d.physical.place import Physical
 from lfs10d.poller import Poller
 from lfs10d.reading import Event, PortChanged, Reading
+from lfs10d.requests.table import REQUESTS
 from lfs10d.running import Running
 from lfs10d.schedule import Schedule
+from lfs10d.service import Service
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.port import SimulatedPort, VirtualClock, run
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
+from tests.physical.loop import Loop
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterator, Mapping
@@ -42,10 +48,13 @@ if TYPE_CHECKING:
     from lfs10d.jobs.job import Job
     from lfs10d.modbus.unanswered import Unanswered
     from lfs10d.reload import Plan
+    from lfs10d.requests.request import Powers
     from lfs10d.running import Edit
 
 T = TypeVar("T")
 STATE = Path("/state")
+CHANGING = ("device/readdress", "line/baudrate", "line/adopt")
+"""The requests that physically change a sensor."""
 STEP = 0.05
 """The line goes on by so much at a time, in s."""
 EPOCH = 1_700_000_000.0
@@ -85,20 +94,27 @@ class Life:
     physical: Physical = field(init=False)
     events: list[tuple[str, Mapping[str, object]]] = field(default_factory=list)
     readings: list[Reading] = field(default_factory=list)
-    answers: list[Answer] = field(default_factory=list)
-    """Told to requests of an earlier life."""
+    service: Service = field(init=False)
 
     def __post_init__(self) -> None:
         bench = self.bench
         disk = Disk(bench.files)
         self.running = Running(load(bench.file), ChangeFile(STATE, disk), self._take)
+        self.service = Service(
+            {name: REQUESTS[name] for name in CHANGING},
+            cast("Powers", self),
+            allowed=frozenset({"sensors"}),
+            respond=bench.respond,
+            clear=bench.cleared.append,
+        )
         self.physical = Physical(
             Journal(STATE, disk),
             running=lambda: self.running.now,
             change=self._change,
+            learn=self.running.learn,
             wire=lambda: Wire(self.poller),
             tell=lambda kind, facts: self.events.append((kind, facts)),
-            recall=self._recall,
+            recall=self.service.recall,
             act=lambda activity: self.events.append(("acting", {"activity": activity})),
             repoll=self._repoll,
             now=lambda: Instant(bench.clock.now, EPOCH + bench.clock.now, "synced"),
@@ -113,10 +129,36 @@ class Life:
         self.poller = Poller(bus, schedule, self._heard, bench.clock)
         self.physical.recall()
 
-    def _recall(self, name: str, call: Call, answer: Answer | None, *, forget_in: float, tell: bool = False) -> None:
-        del name, call, forget_in
-        if tell and answer is not None:
-            self.answers.append(answer)
+    async def readdress(self, device: str, to: int, *, dry_run: bool, call: Call) -> Answer:
+        """Perform a request, as the daemon's powers do; so do the next two."""
+        return await self.physical.readdress(device, to, dry_run=dry_run, call=call)
+
+    async def baudrate(self, to: int, *, power_cycle: bool, dry_run: bool, call: Call) -> Answer:
+        return await self.physical.baudrate(to, power_cycle=power_cycle, dry_run=dry_run, call=call)
+
+    async def adopt(
+        self, *, name: str | None, label: str | None, factory: int | None, to: int | None, call: Call
+    ) -> Answer:
+        return await self.physical.adopt(Newcomer(name, label, factory, to), call)
+
+    def request(self, name: str, **parameters: Any) -> None:  # noqa: ANN401 - any JSON
+        """Let a request come in by MQTT; its response comes to `bench.responses`."""
+
+        async def come() -> None:
+            payload = json.dumps(parameters).encode()
+            topic = f"lfs10d/line0/request/{name}"
+            self.service.requested(InboundRequest(topic, tuple(name.split("/")), payload, retained=False))
+
+        self.bench.loop.run_until_complete(come())
+
+    def end(self) -> None:
+        """End as on SIGTERM, in the daemon's order."""
+
+        async def ended() -> None:
+            await self.physical.stop()
+            await self.service.stop()
+
+        self.bench.loop.run_until_complete(ended())
 
     async def _take(self, plan: Plan, before: Effective) -> None:
         now = self.running.now
@@ -154,7 +196,7 @@ class Life:
 class Bench:
     """A line with sensors, a file, a disk; one daemon after the other."""
 
-    def __init__(self, folder: Path, loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(self, folder: Path, loop: Loop) -> None:
         self.loop = loop
         self.file = folder / "lfs10d.yaml"
         self.renew()
@@ -164,8 +206,11 @@ class Bench:
         for task in asyncio.all_tasks(self.loop):
             task.cancel()
         self.pump()
-        self.clock = VirtualClock()
+        self.clock = self.loop.clock = VirtualClock()
         self.files = ForgetfulFiles()
+        self.cleared: list[str] = []
+        self.responses: list[dict[str, Any]] = []
+        """To requests that came in by MQTT, in all lives."""
         self.line = SimulatedLine()
         self.port = SimulatedPort(self.line, self.clock, PortSettings("/dev/simulated", 9600))
         self.echo = False
@@ -205,13 +250,13 @@ class Bench:
         self.pump()
 
     def pump(self) -> None:
-        """Let the loop do what can be done now; raises what ended a task by mistake."""
+        """Let the loop do what can be done now."""
+        self.loop.drain()
 
-        async def turns() -> None:
-            for _ in range(12):
-                await asyncio.sleep(0)
-
-        self.loop.run_until_complete(turns())
+    def respond(self, topic: str, response: dict[str, object], correlation: bytes | None) -> None:
+        """Take a response."""
+        del topic, correlation
+        self.responses.append(response)
 
     def ask(self, life: Life, coroutine: Awaitable[Answer], *, within: float = 120.0) -> Answer:
         """Let everything go on until a request is answered."""
@@ -244,7 +289,7 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
 
     for module in ("physical.place", "running"):
         monkeypatch.setattr(f"lfs10d.{module}.aside", at_once)
-    loop = asyncio.new_event_loop()
+    loop = Loop()
     loop.set_exception_handler(_mistake)
     made = Bench(tmp_path, loop)
     yield made
