@@ -30,6 +30,7 @@ from lfs10d.physical.losing import Losing
 from lfs10d.physical.place import Physical
 from lfs10d.powers import DaemonPowers
 from lfs10d.reading import Exchanged, Fault, FaultCode, PortChanged
+from lfs10d.recalling import Recalling
 from lfs10d.requests.table import REQUESTS
 from lfs10d.running import Running
 from lfs10d.service import Service
@@ -132,6 +133,7 @@ class Daemon:
             Journal(state_directory, Disk()),
             running=lambda: self._running.now,
             change=self._change,
+            learn=self._learn,
             wire=lambda: self._line,
             tell=self._powers.tell,
             recall=self._service.recall,
@@ -146,6 +148,14 @@ class Daemon:
             tell=self._told_lost,
         )
         self._line = Line(self._physical.polled(), loaded.profiles, heard=self._heard, failed=self._line_failed)
+        if self._running.missing:
+            recalling = Recalling(
+                running=lambda: self._running.now,
+                learn=self._learn,
+                devices=lambda: tuple(self._line.poller.schedule.devices.values()),
+                tell=self._powers.tell,
+            )
+            self._uplink.read_back(recalling.wanted, recalling.take)
         file = status_file(config.line.name, os.environ)
         self._supervision = Supervision(
             notifier,
@@ -269,6 +279,13 @@ class Daemon:
         except StateError as error:
             self._storage.failed(str(error))
             raise
+        finally:
+            self._tell_news()
+
+    async def _learn(self, edit: Edit) -> tuple[Effective, Effective]:
+        """Take up what was learnt of the line, kept or not."""
+        try:
+            return await self._running.learn(edit)
         finally:
             self._tell_news()
 

@@ -65,8 +65,8 @@ class Running:
         self._news = News()
         self._login: Mapping[str, bytes] = imprint(file)
         found = changes.take()
-        self.missing = found.missing
-        """There was no file of changes when the daemon began: it was never needed, or is gone."""
+        self.missing = found.missing or found.trouble is not None
+        """No changes were known when the daemon began: there never were any, or their file is gone or damaged."""
         if found.trouble is not None:
             self._news.dropped.append(Dropped(FILE_NAME, None, None, found.trouble))
         self.now = effective(file, found.changes)
@@ -101,13 +101,20 @@ class Running:
 
         Raises StateError if it cannot be put on the disk, and what `edit` raises; nothing is changed then.
         """
+        return await self._change(edit, self._file.save)
+
+    async def learn(self, edit: Edit) -> tuple[Effective, Effective]:
+        """Take up what was learnt of the line. It is so whether or not the disk keeps it: that is told as news."""
+        return await self._change(edit, self._save)
+
+    async def _change(self, edit: Edit, save: Callable[[Changes], None]) -> tuple[Effective, Effective]:
         async with self._lock:
             before = self.now
             changes = await aside(partial(edit, before), "changes")
             if changes == before.changes:
                 return before, before
             now = await aside(partial(effective, before.file, changes), "changes")
-            await aside(partial(self._file.save, now.changes), "changes")
+            await aside(partial(save, now.changes), "changes")
             await self._hold(now, self._login)
             return before, self.now
 

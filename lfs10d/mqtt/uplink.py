@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from functools import partial
 from typing import TYPE_CHECKING
 
 from lfs10d import telemetry
 from lfs10d.mqtt.dispatch import Dispatch
+from lfs10d.mqtt.earlier import EarlierLife
 from lfs10d.mqtt.endings import REFUSED_FROM, reason_in_words
 from lfs10d.mqtt.inbound import inbound
 from lfs10d.mqtt.link import Link
@@ -24,7 +26,7 @@ from lfs10d.mqtt.topics import OFFLINE, ONLINE, Topics
 from lfs10d.telemetry import Kind, Publication
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Awaitable, Callable, Iterable, Mapping
     from collections.abc import Set as AbstractSet
 
     from lfs10d.mqtt.endings import Ended
@@ -87,6 +89,7 @@ class Uplink:
         self._drop_told = False
         self._epoch_ms = epoch_ms
         self._stowage: Stowage | None = None
+        self._earlier: EarlierLife | None = None
         self.requests_denied = False
         """The broker refused the subscription to requests: none will come over this connection."""
 
@@ -129,6 +132,13 @@ class Uplink:
             troubled=troubled,
             tell=lambda event: self.publish([event]),
         )
+
+    def read_back(self, wanted: AbstractSet[str], told: Callable[[Mapping[str, bytes]], Awaitable[None]]) -> None:
+        """Read these retained topics under `B` before the first burst is published over them; before `start`.
+
+        `told` is given what was found, and the burst waits for it; at most 5 s for what the broker says.
+        """
+        self._earlier = EarlierLife(self._topics, wanted, told)
 
     def limit(self, limits: Limits) -> None:
         """Take other limits for what is kept on disk."""
@@ -226,7 +236,14 @@ class Uplink:
     # Events of the link
 
     def accepted(self, accepted: Accepted) -> None:
-        """Subscribe, and send the burst."""
+        """Read what an earlier life published, if that is wanted; then subscribe, and send the burst."""
+        standing = self._link.standing
+        if standing is not None and self._earlier is not None and not self._earlier.over:
+            self._earlier.begin(standing, partial(self._begin, accepted))
+        else:
+            self._begin(accepted)
+
+    def _begin(self, accepted: Accepted) -> None:
         standing = self._link.standing
         if standing is None:
             return
@@ -243,6 +260,8 @@ class Uplink:
         """Keep what is not acknowledged."""
         log.debug("%s", ended.message)
         self._dispatch.lost()
+        if self._earlier is not None:
+            self._earlier.lost()
         self._sweep = self._farewell = None
         self._drop_told = False
         self._progress.set()
@@ -266,6 +285,8 @@ class Uplink:
 
     def subscribed(self, mid: int, reasons: tuple[int, ...]) -> None:
         """Complain once about requests that will never come."""
+        if self._earlier is not None:
+            self._earlier.subscribed(mid, reasons)
         if mid == self._subscription:
             self.requests_denied = bool(reasons) and reasons[0] >= REFUSED_FROM
             for topic, reason in zip((self._topics.requests, self._topics.availability), reasons, strict=False):
@@ -279,6 +300,8 @@ class Uplink:
             if message.payload == OFFLINE.encode() and not self._leaving:
                 self._heard_offline()
             return
+        if self._earlier is not None:
+            self._earlier.arrived(message)
         now = asyncio.get_running_loop().time()
         if message.retained and self._sweep is not None and self._sweep.heard(message.topic, message.payload, now):
             return

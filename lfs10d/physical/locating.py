@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
 from lfs10d.changes import Changes, Place, Rate
-from lfs10d.errors import StateError
 from lfs10d.jobs.course import Now, Over
 from lfs10d.jobs.locate import locate
 from lfs10d.journal import Spot
 from lfs10d.reading import Errand
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from lfs10d.effective import Effective
     from lfs10d.physical.place import Physical
@@ -37,22 +35,32 @@ class Locating:
         self._tasks: dict[str, tuple[tuple[Place, ...], Talk, asyncio.Task[None]]] = {}
 
     def contested(self) -> dict[str, tuple[Place, ...]]:
-        """Return the devices that may be at one of several places."""
+        """Return the devices that may be at one of several places; less the id that another one was verified at."""
         now = self._physical.running()
-        return {name: places for name, places in now.places.items() if len(places) > 1 and name not in now.conflicts}
+        contested: dict[str, tuple[Place, ...]] = {}
+        for slave in now.config.slaves:
+            places = now.places[slave.name]
+            if len(places) > 1 and slave.name in now.conflicts:
+                contested[slave.name] = tuple(place for place in places if place.id != slave.id)
+            elif len(places) > 1:
+                contested[slave.name] = places
+        return {name: places for name, places in contested.items() if places}
 
     def withheld(self) -> frozenset[str]:
         """Return the devices that must not be polled before the line was asked where they are."""
         return frozenset(name for name, places in self.contested().items() if self._asked.get(name) != places)
 
     def begin(self) -> None:
-        """Ask for every contested device that nobody asks for now."""
+        """Ask for every contested device that nobody asks for now, and whose turn it is."""
+        if self._physical.ending:
+            return
         contested = self.contested()
+        turn = in_turn({name: places for name, places in contested.items() if self._asked.get(name) != places})
         for name, (places, _, _) in tuple(self._tasks.items()):
             if contested.get(name) != places:
                 self._end(name)
         for name, places in contested.items():
-            if name in self._tasks:
+            if name in self._tasks or (name not in turn and self._asked.get(name) != places):
                 continue
             now = self._physical.running()
             slave = now.slave(name)
@@ -90,7 +98,10 @@ class Locating:
         if slave is None:
             return
         rate = now.config.line.baudrate
-        spots = [Spot(slave=place.id, baudrate=place.baudrate or rate) for place in places]
+        known, spots = (
+            [Spot(slave=place.id, baudrate=place.baudrate or rate) for place in each]
+            for each in (now.places[name], places)
+        )
         clock = Now()
         asking = physical.asking(slave, clock, line_rate=0)
         errand = Errand.PROBE if self._asked.get(name) == places else Errand.CHANGE
@@ -99,14 +110,15 @@ class Locating:
         while not isinstance(what := await talk.wanted(), Over):
             if self._asked.get(name) != places:
                 self._asked[name] = places
-                self._tell(name, spots, None)
+                self._tell(name, known, None)
                 self._repoll()
+                self.begin()
             talk.go_on()
         talk.go_on()
         if isinstance(what.result, Spot):
-            await self._found(name, spots, what.result)
+            await self._found(name, known, what.result)
 
-    async def _found(self, name: str, spots: list[Spot], spot: Spot) -> None:
+    async def _found(self, name: str, known: list[Spot], spot: Spot) -> None:
         def edit(now: Effective) -> Changes:
             if now.slave(name) is None:
                 return now.changes
@@ -117,13 +129,13 @@ class Locating:
             return changes
 
         self._tasks.pop(name, None)  # it is found: another configuration ends no search any more
-        with contextlib.suppress(StateError):  # told as storage_full; polled where it was found after the next start
-            await self._physical.change(edit)
-            self._tell(name, spots, spot)
+        await self._physical.learn(edit)
+        self._tell(name, known, spot)
         self._repoll()
+        self.begin()
 
-    def _tell(self, name: str, spots: list[Spot], used: Spot | None) -> None:
-        first, last = spots[0], spots[-1]
+    def _tell(self, name: str, known: list[Spot], used: Spot | None) -> None:
+        first, last = known[0], known[-1]
         facts = {"device": name, "file": first.model_dump(), "last": last.model_dump()}
         self._physical.tell("change_conflict", {**facts, "used": None if used is None else used.model_dump()})
         where = "at neither; both are asked" if used is None else f"at slave id {used.slave}, {used.baudrate} baud"
@@ -131,3 +143,17 @@ class Locating:
             "%s: the file says slave id %d at %d baud, it was last verified at %d at %d: it answers %s",
             name, first.slave, first.baudrate, last.slave, last.baudrate, where,
         )  # fmt: skip
+
+
+def in_turn(waiting: Mapping[str, tuple[Place, ...]]) -> frozenset[str]:
+    """Return the devices to ask for now: those at whose first place no other was last; all, where that is nobody.
+
+    Where another one was last, that one is asked for first: it may be the one that answers there.
+    """
+    last = {name: places[-1].id for name, places in waiting.items()}
+    free = (
+        name
+        for name, places in waiting.items()
+        if not any(slave == places[0].id for other, slave in last.items() if other != name)
+    )
+    return frozenset(free) or frozenset(waiting)

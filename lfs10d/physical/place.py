@@ -54,9 +54,10 @@ class Recall(Protocol):
 class Physical:
     """Physical changes of one line. Used in the thread of the asyncio loop.
 
-    `running()` is the configuration that holds, `change` puts another into force; `wire()` is the line. `tell`
-    publishes an event, `act` what the line is busy with (None: as usual), `repoll` puts into force what is `polled`
-    now; `recall` has a request of an earlier life of the daemon remembered, or answered.
+    `running()` is the configuration that holds, `change` puts another into force, `learn` too, whether or not the disk
+    keeps it; `wire()` is the line. `tell` publishes an event, `act` what the line is busy with (None: as usual),
+    `repoll` puts into force what is `polled` now; `recall` has a request of an earlier life of the daemon remembered,
+    or answered.
     """
 
     def __init__(  # noqa: PLR0913 - all that it touches of the daemon, each by one callable
@@ -65,6 +66,7 @@ class Physical:
         *,
         running: Callable[[], Effective],
         change: Callable[[Edit], Awaitable[object]],
+        learn: Callable[[Edit], Awaitable[object]],
         wire: Callable[[], Wire],
         tell: Callable[[str, Mapping[str, object]], None],
         recall: Recall,
@@ -75,6 +77,7 @@ class Physical:
         self.journal = journal
         self.running = running
         self.change = change
+        self.learn = learn
         self.wire = wire
         self.tell = tell
         self._recall = recall

@@ -1,0 +1,58 @@
+"""What this daemon itself published in an earlier life, read before anything is published over it. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from lfs10d import telemetry
+
+if TYPE_CHECKING:
+    from collections.abc import Set as AbstractSet
+
+    from lfs10d.mqtt.topics import Topics
+
+QUIET = 0.5
+"""Seconds after the broker's answer to the subscription, or after the last message, in which no more came."""
+
+LONGEST = 5.0
+"""Seconds after which nothing is waited for any more, whatever the broker does."""
+
+FILTERS = (telemetry.LINE_STATE, telemetry.device_topic("+", telemetry.CONFIG))
+"""Two filters whatever is wanted: some brokers take eight at most."""
+
+
+@dataclass(slots=True)
+class Lookback:
+    """Collects the `wanted` topics under `B` from `begun` on (monotonic seconds); `found` are their payloads."""
+
+    topics: Topics
+    wanted: AbstractSet[str]
+    begun: float
+    found: dict[str, bytes] = field(default_factory=dict)
+    _heard: float | None = None
+    _refused: bool = False
+
+    @property
+    def filters(self) -> tuple[str, ...]:
+        """What to subscribe to."""
+        return tuple(self.topics.full(each) for each in FILTERS)
+
+    def subscribed(self, now: float, *, refused: bool) -> None:
+        """Take the broker's answer; `refused` if nothing will come."""
+        self._heard = now
+        self._refused = refused
+
+    def heard(self, topic: str, payload: bytes, now: float) -> None:
+        """Take one retained message; what is not wanted is passed over, and no reason to wait longer."""
+        relative = self.topics.relative(topic)
+        if relative is not None and relative in self.wanted:
+            self._heard = now
+            self.found[relative] = payload
+
+    def due(self, now: float) -> float:
+        """Return when it is over if nothing more comes, `now` if it is."""
+        if self._refused or self.wanted <= self.found.keys():
+            return now
+        latest = self.begun + LONGEST
+        return latest if self._heard is None else min(self._heard + QUIET, latest)
