@@ -112,7 +112,6 @@ class Life:
             running=lambda: self.running.now,
             change=self._change,
             learn=self.running.learn,
-            learn=self.running.learn,
             wire=lambda: Wire(self.poller),
             tell=lambda kind, facts: self.events.append((kind, facts)),
             recall=self.service.recall,
