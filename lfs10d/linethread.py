@@ -21,6 +21,9 @@ SPEAK_MOST = 0.3
 """A request under way at the end is let out for so long, in s: eight characters at 1200 baud take 0.08."""
 WORTH_SLEEPING = 0.0002
 """A wait shorter than this (s) is not split in two."""
+WAKING = 0.0001
+"""The thread is woken so long before a moment, in s, for the kernel needs 0.05 to 0.1 ms of it. It then takes a turn,
+which brings its code back into the processor's caches, and waits the rest awake."""
 REFUSED_PAUSE = 0.01
 """How long to wait where the system refuses to watch the port, in s: the next read tells why."""
 
@@ -58,36 +61,41 @@ class LineThread(threading.Thread):
             readable = True
             while not self._stopping:
                 wait = self._poller.turn(time.monotonic(), readable=readable)
-                self._wait(wait)
-                # What came while nobody looked must be read before time is called.
-                readable = wait.listen
+                readable = self._wait(wait)
         except BaseException as error:  # noqa: BLE001 - the daemon must learn of whatever ended its line
             self._failed(error)
         finally:
             time.sleep(min(max(self._poller.bus.speaking_until - time.monotonic(), 0.0), SPEAK_MOST))
             self._poller.bus.close()
 
-    def _wait(self, wait: Wait) -> None:
-        """Wait as told, or until woken."""
+    def _wait(self, wait: Wait) -> bool:
+        """Wait as told, or until woken, or until shortly before; return whether the port may have something to read."""
         now = time.monotonic()
         self.declared = now + min(max(wait.until - now, 0.0), IDLE_MOST)
-        if wait.not_before - now > WORTH_SLEEPING:
-            if self._select([self._woken], min(wait.not_before - now, IDLE_MOST)):
-                return
+        ahead = wait.not_before - WAKING - now
+        if ahead > WORTH_SLEEPING:
+            if self._select([self._woken], min(ahead, IDLE_MOST)):
+                return wait.listen
             now = time.monotonic()
-        watched = [self._woken]
-        if wait.listen:
-            watched.append(self._poller.bus.port.fileno())
-        self._select(watched, min(max(wait.until - now, 0.0), IDLE_MOST))
+        left = min(wait.until - now, IDLE_MOST)
+        if left <= WAKING:
+            while time.monotonic() < wait.until:
+                pass
+        # What came while nobody looked must be read before time is called: hence a look even where no time is left.
+        if not wait.listen:
+            self._select([self._woken], max(left - WAKING, 0.0))
+            return False
+        port = self._poller.bus.port.fileno()
+        return port in self._select([self._woken, port], max(left - WAKING, 0.0))
 
-    def _select(self, watched: list[int], timeout: float) -> bool:
-        """Wait until one of `watched` can be read, at most `timeout` s; whether one can."""
+    def _select(self, watched: list[int], timeout: float) -> list[int]:
+        """Wait until one of `watched` can be read, at most `timeout` s; return which; all where the system refuses."""
         try:
             ready, _, _ = select.select(watched, [], [], timeout)
         except (OSError, ValueError):  # the descriptor is gone or cannot be watched
             time.sleep(min(timeout, REFUSED_PAUSE))
-            return True
+            return watched
         if self._woken in ready:
             with contextlib.suppress(BlockingIOError):
                 os.read(self._woken, 4096)
-        return bool(ready)
+        return ready

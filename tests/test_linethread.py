@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from lfs10d.linethread import IDLE_MOST, LineThread
+from lfs10d.linethread import IDLE_MOST, WAKING, LineThread
 from lfs10d.modbus.bus import Bus, LineRules, Wait
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.port import SerialPort
@@ -175,9 +175,9 @@ def test_a_mistake_is_told_and_the_port_given_back(rig: Rig) -> None:
 
 def test_a_descriptor_that_cannot_be_watched_costs_a_short_pause_and_a_look(rig: Rig) -> None:
     began = time.monotonic()
-    assert rig.thread._select([-1], 5.0)
+    assert rig.thread._select([-1], 5.0) == [-1]
     os.close(gone := os.open("/dev/null", os.O_RDONLY))
-    assert rig.thread._select([gone], 5.0)
+    assert rig.thread._select([gone], 5.0) == [gone]
     assert time.monotonic() - began < IDLE_MOST
 
 
@@ -186,8 +186,26 @@ def test_bytes_that_can_decide_nothing_do_not_wake_it(rig: Rig, far_end: FarEnd)
     os.write(far_end.fd, b"\xff")
     now = time.monotonic()
     rig.thread._wait(Wait(now + 0.06, listen=True, not_before=now + 0.05))
-    assert time.monotonic() >= now + 0.05
+    assert time.monotonic() >= now + 0.05 - WAKING
     rig.thread.wake()
     rig.thread._wait(Wait(now + 60.0, listen=True, not_before=now + 50.0))
     assert time.monotonic() < now + 30.0
+    rig.poller.bus.close()
+
+
+def test_it_says_whether_the_port_has_something_to_read(rig: Rig, far_end: FarEnd) -> None:
+    rig.poller.bus.port.open()
+    assert not rig.thread._wait(Wait(time.monotonic() + 0.01, listen=True))
+    os.write(far_end.fd, b"\xff")
+    assert rig.thread._wait(Wait(time.monotonic() + PATIENCE, listen=True))
+    assert rig.thread._wait(Wait(time.monotonic(), listen=True))  # even when no time is left
+    assert not rig.thread._wait(Wait(time.monotonic(), listen=False))
+    rig.poller.bus.close()
+
+
+def test_it_is_back_early_enough_for_a_turn_and_then_waits_to_the_moment(rig: Rig) -> None:
+    rig.poller.bus.port.open()
+    until = time.monotonic() + WAKING / 2
+    rig.thread._wait(Wait(until, listen=True))
+    assert time.monotonic() >= until
     rig.poller.bus.close()
