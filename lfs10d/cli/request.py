@@ -15,14 +15,18 @@ from lfs10d.cli.answers import told, verdict
 from lfs10d.cli.keyvalue import IDS, KeyValueError, content_of
 from lfs10d.cli.livelines import health
 from lfs10d.cli.login import Login, login, login_options
+from lfs10d.cli.mounting import Mounting
+from lfs10d.cli.repeating import ADOPT, mount
 from lfs10d.cli.spinner import spinning
 from lfs10d.cli.visitor import Visitor
 from lfs10d.commands import LARGEST
 from lfs10d.errors import FailedError
+from lfs10d.kinds import Name
 from lfs10d.quantities import duration_text, seconds
 from lfs10d.requests.table import REQUESTS
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
     from click.shell_completion import CompletionItem
@@ -37,6 +41,7 @@ Examples:
   lfs10d request health                            how the daemon, the line and every sensor are
   lfs10d request device/read device=mast-top       poll one sensor now
   lfs10d request line/trace for=1m                 the frames of a minute, on topic trace
+  lfs10d request line/adopt --repeat               mount sensors: plug one in, then the next
   lfs10d request config/reload -c site.yaml        the daemon of another file reads it again
   lfs10d request device/read device=north --json   the response as the broker brought it
 """
@@ -74,9 +79,14 @@ def _complete(context: click.Context, parameter: click.Parameter, incomplete: st
     metavar="DURATION",
     help=f"How long to wait for the response. Default: {duration_text(USUAL_TIMEOUT)}, no end for what takes longer.",
 )
+@click.option(
+    "--repeat",
+    is_flag=True,
+    help="With line/adopt: one sensor after the other, until Ctrl-C; name=NAME,NAME,... in turn.",
+)
 @login_options
 @json_option
-def command(**options: Any) -> int:  # noqa: ANN401  # eight options; `_Wanted` names and types them
+def command(**options: Any) -> int:  # noqa: ANN401  # nine options; `_Wanted` names and types them
     """Send the request NAME to the running daemon; print its response.
 
     NAME is one such as device/read. Each VALUE is read as the request wants it: text, a number, true, a duration, or
@@ -84,6 +94,10 @@ def command(**options: Any) -> int:  # noqa: ANN401  # eight options; `_Wanted` 
     daemon is away.
     """
     wanted = _Wanted(**options)
+    if wanted.repeat:
+        mounting = wanted.mounting
+        visited = login(wanted.config, "adopt", username=wanted.username, password_file=wanted.password_file)
+        return asyncio.run(mount(visited, mounting, as_json=wanted.as_json))
     content = wanted.content
     visited = login(wanted.config, "request", username=wanted.username, password_file=wanted.password_file)
     response = asyncio.run(_ask(wanted, visited, content))
@@ -112,6 +126,31 @@ class _Wanted:
     username: str | None
     password_file: Path | None
     as_json: bool
+    repeat: bool
+
+    @property
+    def mounting(self) -> Mounting:
+        """What is adopted with `--repeat`."""
+        if self.name != ADOPT:
+            raise click.UsageError(f"--repeat goes with {ADOPT} alone")
+        if self.timeout is not None:
+            raise click.UsageError("--repeat has no --timeout: it goes on until Ctrl-C")
+        names: list[str] = []
+        others: list[str] = []
+        for parameter in self.parameters:
+            key, _, value = parameter.partition("=")
+            if key == "name":
+                names += value.split(",")
+            elif key in (*IDS, "to"):
+                raise click.UsageError(f"{key} cannot be the same for every sensor: leave it out with --repeat")
+            else:
+                others.append(parameter)
+        wrong = next((name for name in names if not Name.pattern.fullmatch(name)), None)
+        if wrong is not None:
+            raise click.UsageError(f"name: {wrong!r} is not {Name().words}")
+        if len(set(names)) < len(names):
+            raise click.UsageError("a name is given twice; each sensor needs its own")
+        return Mounting(names, self._parsed(others))
 
     @property
     def patience(self) -> float | None:
@@ -123,16 +162,19 @@ class _Wanted:
     @property
     def content(self) -> dict[str, Any]:
         """The payload; it has an id, by which a daemon that speaks 3.1.1 is understood."""
-        known = REQUESTS.get(self.name)
-        try:
-            content = content_of(self.parameters, None if known is None else known.form.parameters)
-        except KeyValueError as error:
-            raise click.UsageError(str(error)) from None
+        content = self._parsed(self.parameters)
         if not any(content.get(key) for key in IDS):
             content["id"] = secrets.token_hex(6)
         if len(json.dumps(content).encode()) > LARGEST:
             raise click.UsageError(f"these parameters are more than the {LARGEST} bytes that a request may have")
         return content
+
+    def _parsed(self, parameters: Sequence[str]) -> dict[str, Any]:
+        known = REQUESTS.get(self.name)
+        try:
+            return content_of(parameters, None if known is None else known.form.parameters)
+        except KeyValueError as error:
+            raise click.UsageError(str(error)) from None
 
 
 async def _ask(wanted: _Wanted, visited: Login, content: dict[str, Any]) -> dict[str, Any] | None:

@@ -61,6 +61,8 @@ class Visitor:
         self._asked: tuple[str, frozenset[str]] | None = None
         """The id that is asked for, and the topics on which a daemon answers that knows no Response Topic."""
         self._response: dict[str, Any] | None = None
+        self.by_response_topic = False
+        """The daemon answers where it is asked to (MQTT 5.0, section 4.10), so that a request needs no id."""
 
     @property
     def connected(self) -> bool:
@@ -99,13 +101,19 @@ class Visitor:
         if self.availability != ONLINE:
             raise BrokerError(f"{self.place}: the daemon of {base} is {OFFLINE}: start it, or look into its log")
 
+    async def come_back(self) -> None:
+        """Wait until the broker and our daemon are there again."""
+        while not self.daemon_online:
+            self._changed.clear()
+            await self._changed.wait()
+
     async def ask(self, name: str, content: dict[str, Any], within: float | None) -> dict[str, Any] | None:
         """Send a request and return its response, None if none came `within` s.
 
-        `content` has a text as `id` or as `transaction`. Raises BrokerError where broker or daemon goes away before
-        it has answered.
+        `content` has a text as `id` or as `transaction`, unless `by_response_topic`. Raises BrokerError where broker
+        or daemon goes away before it has answered.
         """
-        token = str(content.get("id") or content.get("transaction"))
+        token = str(content.get("id") or content.get("transaction") or secrets.token_hex(6))
         usual = [self.topics.full(self.topics.response(each)) for each in (name, "unknown")]
         self._asked, self._response = (token, frozenset(usual)), None
         await self._subscribe([Filter(topic) for topic in usual])
@@ -199,8 +207,10 @@ class Visitor:
         response = parsed(message.payload)
         if not isinstance(response, dict) or message.retained:
             return
-        if message.topic == self._own or token in (response.get("id"), response.get("transaction")):
+        ours = message.topic == self._own and message.correlation in {None, token.encode()}
+        if ours or token in (response.get("id"), response.get("transaction")):
             self._response = response
+            self.by_response_topic = ours
 
 
 def parsed(payload: bytes) -> Any:  # noqa: ANN401  # any JSON

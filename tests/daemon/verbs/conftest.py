@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.daemon.conftest import ENDS_WITHIN, Run, eventually
+from tests.daemon.conftest import ENDS_WITHIN, PATIENCE, Run, eventually
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -74,14 +74,14 @@ class Running:
         """What was printed, without what moves the cursor."""
         return re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", self.raw.decode(errors="replace")).replace("\r\n", "\n")
 
-    def says(self, words: str, *, since: int = 0) -> None:
+    def says(self, words: str, *, since: int = 0, within: float = PATIENCE) -> None:
         """Wait until these words were printed, beyond the first `since` characters."""
 
         def said() -> bool:
             self.read()
             return words in self.text[since:]
 
-        eventually(said, f"{words!r} in:\n{self.text[-2000:]}")
+        eventually(said, f"{words!r} in what is printed", within=within)
 
     def ends(self, number: int | None = None) -> int:
         """Send a signal and return the exit code; it must come within the time of the contract."""
