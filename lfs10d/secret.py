@@ -1,9 +1,14 @@
-"""A password that never prints itself."""
+"""A password that never prints itself, and a process that leaves no core with it."""
 
 from __future__ import annotations
 
 import hmac
+import resource
 from typing import NoReturn
+
+ONE_BYTE = 1
+"""The limit at which Linux writes no core and starts no handler of `kernel.core_pattern` either; 0 does not keep a
+handler from being fed (`do_coredump` in fs/coredump.c)."""
 
 
 class Secret:
@@ -37,3 +42,14 @@ class Secret:
 
     def __reduce__(self) -> NoReturn:
         raise TypeError("a secret is not written down")
+
+
+def leave_no_core() -> None:
+    """See to it that this process leaves no core: its memory holds the password, and keys. For ever, and inherited.
+
+    Unlike PR_SET_DUMPABLE, which bars debuggers too, this takes nothing from the person who looks for a fault: the
+    stacks that faulthandler prints on SIGABRT, `/proc`, py-spy.
+    """
+    _, hard = resource.getrlimit(resource.RLIMIT_CORE)
+    limit = ONE_BYTE if hard == resource.RLIM_INFINITY else min(ONE_BYTE, hard)
+    resource.setrlimit(resource.RLIMIT_CORE, (limit, limit))

@@ -1,13 +1,14 @@
-"""A password that never prints itself."""
+"""A password that never prints itself, and a process that leaves no core with it."""
 
 from __future__ import annotations
 
 import copy
 import pickle
+import resource
 
 import pytest
 
-from lfs10d.secret import Secret
+from lfs10d.secret import Secret, leave_no_core
 
 
 def test_only_reveal_shows_the_text() -> None:
@@ -29,3 +30,18 @@ def test_a_secret_is_not_written_down() -> None:
         pickle.dumps(Secret("a"))
     with pytest.raises(TypeError, match="not written down"):
         copy.deepcopy(Secret("a"))
+
+
+@pytest.mark.parametrize(
+    ("hard", "limit"),
+    [(resource.RLIM_INFINITY, 1), (10_000_000, 1), (1, 1), (0, 0)],
+    ids=["unlimited", "limited", "one byte", "none"],
+)
+def test_no_core_is_left_whatever_was_allowed_before(hard: int, limit: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    set_to: list[tuple[int, tuple[int, int]]] = []
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (0, hard))
+    monkeypatch.setattr(resource, "setrlimit", lambda which, limits: set_to.append((which, limits)))
+
+    leave_no_core()
+
+    assert set_to == [(resource.RLIMIT_CORE, (limit, limit))]

@@ -14,6 +14,7 @@ from lfs10d.configfile import load
 from lfs10d.credentials import UnreadableError, password_in
 from lfs10d.mqtt.settings import BrokerSettings
 from lfs10d.mqtt.topics import Topics
+from lfs10d.secret import leave_no_core
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -48,6 +49,7 @@ def login(file: Path, verb: str, *, username: str | None, password_file: Path | 
 
     A name without a password file logs in without a password: that of the configuration belongs to its own name.
     """
+    leave_no_core()
     own = username is not None or password_file is not None
     loaded = load(file, files=not own)
     given = None if password_file is None else _password(password_file)

@@ -19,6 +19,7 @@ from lfs10d.configfile import load
 from lfs10d.daemon import run
 from lfs10d.disk import Disk
 from lfs10d.errors import StateError
+from lfs10d.secret import leave_no_core
 from lfs10d.statedir import prepare, state_directory
 
 STANDARD_ERROR = 2
@@ -44,6 +45,7 @@ def command(config: Path, state_dir: Path | None) -> int:
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
     # The watchdog of the service manager ends us by SIGABRT: where every thread stood is the last thing told.
     faulthandler.enable(STANDARD_ERROR)
+    leave_no_core()
     try:
         return _run(config, state_dir)
     except KeyboardInterrupt:

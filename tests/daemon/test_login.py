@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,6 +19,15 @@ if TYPE_CHECKING:
 
 SECRET = "s3cret-and-long-enough"  # noqa: S105 - of a broker that lives for one test
 WRONG = "wr0ng-and-long-enough"
+
+CORES_ALLOWED = """
+import os, resource, runpy, sys
+hard = resource.getrlimit(resource.RLIMIT_CORE)[1]
+resource.setrlimit(resource.RLIMIT_CORE, (hard, hard))
+os.chdir(os.environ["CORES"])
+runpy.run_module("lfs10d", run_name="__main__")
+"""
+"""The daemon, where the system lets it leave as large a core as it can in the folder `CORES`."""
 
 pytestmark = pytest.mark.needs("openssl", "mosquitto_passwd")
 
@@ -118,6 +128,27 @@ def test_the_password_comes_from_its_file_and_shows_nowhere(
     assert SECRET not in run.log
     assert SECRET not in Path(f"/proc/{run.process.pid}/cmdline").read_text()
     assert SECRET not in run.status.read_text()
+
+
+def test_a_daemon_that_is_aborted_tells_its_stacks_and_leaves_no_core_with_the_password(
+    site: Site, mosquitto: Mosquitto, program: Callable[[str], str]
+) -> None:
+    with_password(mosquitto, SECRET, program)
+    file, cores = site.folder / "password", site.folder / "cores"
+    file.write_text(SECRET)
+    cores.mkdir()
+    site.write(slaves=[], mqtt={"username": "mast", "password_file": str(file)})
+    run = site.run(program=("-c", CORES_ALLOWED), environment={"CORES": str(cores)})
+    run.says("connected by MQTT 5")
+    limits = Path(f"/proc/{run.process.pid}/limits").read_text().splitlines()
+
+    assert run.ends(signal.SIGABRT) == -signal.SIGABRT
+
+    _, soft, hard, _ = next(line for line in limits if line.startswith("Max core")).rsplit(maxsplit=3)
+    assert {soft, hard} <= {"0", "1"}
+    assert not list(cores.iterdir())
+    assert "(most recent call first)" in run.log
+    assert SECRET not in run.log
 
 
 def test_the_password_comes_from_the_service_managers_credential(
