@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from lfs10d import telemetry
 from lfs10d.mqtt.encoding import array, encode, packet_size
-from lfs10d.mqtt.endings import REFUSED_FROM, reason_in_words
+from lfs10d.mqtt.endings import NO_MATCHING_SUBSCRIBERS, REFUSED_FROM, reason_in_words
 from lfs10d.mqtt.letters import Array, Declaration, Message
 from lfs10d.mqtt.outbox import IN_FLIGHT_MOST
 
@@ -88,7 +88,7 @@ class Dispatch:
         if letter is None:
             return
         if reason < REFUSED_FROM:
-            self._outbox.settled(letter, self._now())
+            self._outbox.settled(letter, self._now(), heard=reason != NO_MATCHING_SUBSCRIBERS)
         elif self._outbox.refused(letter, reason):
             log.warning(
                 "the broker refuses %s: %s; nothing more is sent there until a reload",

@@ -13,6 +13,9 @@ from lfs10d.errors import Lfs10dError
 if TYPE_CHECKING:
     from lfs10d.mqtt.settings import BrokerSettings
 
+NO_MATCHING_SUBSCRIBERS = 0x10
+"""The broker took a message that nobody listens to (MQTT 5.0, section 3.4.2.1)."""
+
 UNSUPPORTED_VERSION = 0x84
 SESSION_TAKEN_OVER = 0x8E
 REFUSED_FROM = 0x80

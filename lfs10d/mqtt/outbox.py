@@ -162,11 +162,11 @@ class Outbox:
 
     # What became of it
 
-    def settled(self, letter: Letter, now: float) -> None:
-        """Note that the broker has it."""
+    def settled(self, letter: Letter, now: float, *, heard: bool = True) -> None:
+        """Note that the broker has it; `heard`: it did not say that nobody listens."""
         self._over(letter)
         self._repeat(now)
-        self.past.settled(letter, now)
+        self.past.settled(letter, now, heard=heard)
 
     def refused(self, letter: Letter, reason: int) -> bool:
         """Note that the broker refused it with reason code >= 0x80; return True if its topic is to be reported."""

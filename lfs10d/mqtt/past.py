@@ -6,7 +6,8 @@ The rules (contract, section 3):
    then it goes oldest first, by boot and seq: what lies in the store, then what waits in memory. One device and one
    boot per array, one array under way at a time and at most ten a second.
 2. What was acknowledged from 10 s before a loss until the past is opened goes once more, in its place by seq, because
-   an acknowledgement of a broker that dies is not durable.
+   an acknowledgement of a broker that dies is not durable. After the first connect of a life so does what
+   was acknowledged until then with the word that nobody listens: after a power cut subscribers are late there too.
 3. While the broker has been away for more than 3 s, what waits here is handed to the store, at first at once, then
    every 5 s; and whenever half of the memory is taken, which happens where the broker is too slow.
    What the store cannot take waits in memory.
@@ -65,6 +66,7 @@ class Past:
         self._array_most = ARRAY_MOST
         self._under_way: Array | Declaration | None = None
         self._acknowledged: deque[tuple[float, Kept]] = deque(maxlen=capacity)
+        self._unheard: deque[tuple[float, Kept]] = deque(maxlen=capacity)
         self._repeat = False
         self._spilling: list[Kept] = []
         self._spill_at = float("-inf")
@@ -91,6 +93,8 @@ class Past:
         self._connected = False
         if not self._repeat:
             self._forget(now - AGAIN_WITHIN - self._detection)
+        self._acknowledged.extend(self._unheard)
+        self._unheard.clear()
         self._repeat = True
         self._under_way = None
         self.stored.rewind()
@@ -99,6 +103,7 @@ class Past:
         """Note that we part from a broker that has answered everything: what it has needs no second sending."""
         if not self._repeat:
             self._acknowledged.clear()
+        self._unheard.clear()
         self.stored.release_all()
 
     # What goes
@@ -129,16 +134,17 @@ class Past:
         return () if self.stored.more else self.history.take(self._array_most)
 
     def repeat(self, now: float) -> bool:
-        """Once the past is open, let what was acknowledged around the loss wait once more; return True if it does."""
-        if not self._repeat or now < self._open_from:
+        """Once the past is open, let what rule 2 says wait once more; return True if it does."""
+        if now < self._open_from or not (self._repeat or self._unheard):
             return False
+        again = self._acknowledged if self._repeat else self._unheard
         self._repeat = False
-        self._take_acknowledged()
+        self._take_again(again)
         return True
 
-    def _take_acknowledged(self) -> None:
-        self.history.extend(replace(kept, repeated=True) for _, kept in self._acknowledged)
-        self._acknowledged.clear()
+    def _take_again(self, again: deque[tuple[float, Kept]]) -> None:
+        self.history.extend(replace(kept, repeated=True) for _, kept in again)
+        again.clear()
 
     def due(self, refused: AbstractSet[str]) -> float | None:
         """Return when `next` may have something though nothing happens before; None: not by time alone."""
@@ -146,7 +152,8 @@ class Past:
             return None
         declared = self.losses.due() if telemetry.EVENT not in refused else None
         times = [] if declared is None else [declared]
-        in_memory = not self.stored.more and (self.history or (self._repeat and self._acknowledged))
+        again = self._acknowledged if self._repeat else self._unheard
+        in_memory = not self.stored.more and (self.history or again)
         if self.stored.page or in_memory:
             times.append(self._array_at)
         return max(self._open_from, min(times)) if times else None
@@ -158,15 +165,16 @@ class Past:
         if letter is self._under_way:
             self._under_way = None
 
-    def settled(self, letter: Letter, now: float) -> None:
-        """Note that the broker has it."""
+    def settled(self, letter: Letter, now: float, *, heard: bool = True) -> None:
+        """Note that the broker has it; `heard`: it did not say that nobody listens."""
         if not self._repeat:
             self._forget(now - AGAIN_WITHIN)
         rows = [kept.row for kept in samples_of(letter) if kept.row is not None]
         if rows:
             self.stored.settled(rows, now)
         else:
-            self._acknowledged.extend((now, kept) for kept in samples_of(letter))
+            late = not (heard or self._repeat) and now < self._open_from
+            (self._unheard if late else self._acknowledged).extend((now, kept) for kept in samples_of(letter))
 
     def dead(self, letter: Letter) -> None:
         """Note that it will never be delivered."""
@@ -219,7 +227,7 @@ class Past:
     def spill(self) -> list[Kept]:
         """Take what the store shall keep; `spilled` or `not_spilled` is to follow."""
         if not self._connected and self._repeat:
-            self._take_acknowledged()
+            self._take_again(self._acknowledged)
         while len(self._spilling) < SPILL_MOST and self.history:
             self._spilling += self.history.take(SPILL_MOST - len(self._spilling))
         return self._spilling

@@ -12,6 +12,7 @@ import pytest
 
 from lfs10d import telemetry
 from lfs10d.mqtt.dispatch import ACKNOWLEDGED_WITHIN, LETTERS_AT_ONCE, SAMPLES_AT_ONCE, Dispatch
+from lfs10d.mqtt.endings import NO_MATCHING_SUBSCRIBERS
 from lfs10d.mqtt.messages import Accepted
 from lfs10d.mqtt.outbox import Outbox
 from lfs10d.mqtt.past import PAST_AFTER
@@ -111,6 +112,23 @@ class Desk:
 def sample(seq: int) -> Publication:
     measured = Sample("a", "k", seq, 0, "synced", None, {}, (), "bad", "timeout", None)
     return Publication("device/a/telemetry", {"seq": seq}, Kind.SAMPLE, retain=False, qos=1, sample=measured)
+
+
+def test_a_sample_that_nobody_listened_to_after_the_first_connect_goes_once_more_as_history() -> None:
+    async def scenario() -> None:
+        desk = Desk()
+        await desk.connect()
+        desk.add(sample(1))
+        await desk.turn()
+        desk.acknowledge(NO_MATCHING_SUBSCRIBERS)
+        desk.add(sample(2))
+        await desk.turn()
+        desk.acknowledge()
+        await asyncio.sleep(11.0)
+        history = [json.loads(payload) for topic, payload, *_ in desk.wire.sent if topic.endswith("/history")]
+        assert [[one["seq"] for one in array] for array in history] == [[1]]
+
+    in_virtual_time(scenario())
 
 
 def test_a_letter_goes_with_its_topic_qos_retain_flag_and_correlation() -> None:

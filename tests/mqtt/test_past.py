@@ -309,6 +309,60 @@ def test_samples_of_earlier_boots_come_first_and_never_in_one_array_with_others(
     assert told == [[("k1", 8), ("k1", 9)], [("k2", 1)]]
 
 
+# The second sending
+
+
+def heard_by_nobody(outbox: Outbox, now: float) -> None:
+    letter = outbox.next(now)
+    assert isinstance(letter, Live)
+    outbox.settled(letter, now, heard=False)
+
+
+def test_what_nobody_listened_to_after_the_first_connect_of_a_life_goes_once_more_when_the_past_is_opened() -> None:
+    outbox = Outbox()
+    connect(outbox, 0.0)
+    outbox.add(sample(1), 1.0)
+    heard_by_nobody(outbox, 1.0)
+    outbox.add(sample(2), 2.0)
+    live = outbox.next(2.0)
+    assert live is not None
+    outbox.settled(live, 2.0)
+    assert outbox.due() == PAST_AFTER
+    assert outbox.next(PAST_AFTER - 0.1) is None
+    array = outbox.next(PAST_AFTER)
+    assert isinstance(array, Array)
+    assert [(kept.sample.seq, kept.repeated) for kept in array.samples] == [(1, True)]
+    outbox.settled(array, PAST_AFTER)
+    outbox.add(sample(3), 11.0)
+    heard_by_nobody(outbox, 11.0)
+    assert outbox.due() is None
+    assert outbox.next(30.0) is None
+
+
+def test_what_nobody_listened_to_goes_once_more_only_once_where_the_connection_is_lost_meanwhile() -> None:
+    outbox = Outbox()
+    connect(outbox, 0.0)
+    outbox.add(sample(1), 1.0)
+    heard_by_nobody(outbox, 1.0)
+    outbox.lost(2.0)
+    connect(outbox, 3.0)
+    array = outbox.next(13.0)
+    assert seqs(array) == [1]
+    assert array is not None
+    outbox.settled(array, 13.0)
+    assert outbox.next(30.0) is None
+
+
+def test_what_nobody_listened_to_is_not_kept_on_disk_by_a_daemon_that_parts() -> None:
+    outbox = Outbox()
+    connect(outbox, 0.0)
+    outbox.add(sample(1), 1.0)
+    heard_by_nobody(outbox, 1.0)
+    outbox.past.part()
+    outbox.lost(2.0)
+    assert not outbox.past.spill_at_last()
+
+
 # The clock
 
 
