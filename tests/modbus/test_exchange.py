@@ -745,3 +745,23 @@ def test_whatever_comes_it_settles_by_a_bound_and_believes_no_wrong_frame(
     assert len(outcome.late) <= len(each.earlier)
     if outcome.gap is not None:
         assert outcome.gap >= max(each.timing.gap, each.gap or 0.0) - 1e-9
+
+
+def test_an_outcome_says_what_was_asked_when_and_what_was_sent() -> None:
+    outcome = carry_out(PLAIN, [], asked=1.0, quiet_since=0.9)
+    assert (outcome.request, outcome.asked, outcome.began, outcome.sent) == (WIND, 1.0, 1.0, RTU.encode(WIND))
+    assert outcome.sent_end == pytest.approx(1.0 + SENT_END)
+
+
+def test_only_a_refusal_has_an_exception_code() -> None:
+    fault = carry_out(PLAIN, []).fault
+    assert fault is not None
+    assert fault.exception_code is None
+
+
+def test_a_write_that_ends_before_it_began_is_a_mistake() -> None:
+    exchange = Exchange(PLAIN, asked=0.0, quiet_since=-1.0)
+    exchange.step(0.0)
+    with pytest.raises(MisuseError, match=r"^a request cannot have been written before it was begun$"):
+        exchange.sent(1.0, 0.9)
+    assert exchange.state is State.READY

@@ -142,3 +142,76 @@ def test_what_is_missing_is_what_the_soonest_frame_still_needs(heard: str, missi
     for quarry in (normal, exception):
         hunt.seek(quarry)
     assert hunt.missing([normal, exception]) == missing
+
+
+def test_of_two_frames_the_first_is_caught_first() -> None:
+    hunt, quarry, caught = fed(ANSWER + ANSWER)
+    assert caught is not None
+    assert (caught.begin, caught.end) == (0, 9)
+    again = hunt.seek(quarry)
+    assert again is not None
+    assert (again.begin, again.end) == (9, 18)
+
+
+def test_a_head_that_overlaps_a_false_one_is_found() -> None:
+    (normal, _) = RTU.shapes(ReadRegisters(4, 0x0001, 2, 4))
+    frame = RTU.wrap(bytes.fromhex("040404414FD70A"))
+    hunt, quarry = Hunt(), Quarry(RTU, normal)
+    hunt.feed(b"\x04" + frame, 0.0)
+    caught = hunt.seek(quarry)
+    assert caught is not None
+    assert caught.begin == 1
+
+
+def test_skipping_ahead_leaves_a_frame_begun_there_and_skipping_on_the_spot_does_not() -> None:
+    _, quarry, _ = fed(ANSWER[:5])
+    quarry.skip(quarry.start)
+    assert quarry.partial
+    quarry.skip(quarry.start + 1)
+    assert not quarry.partial
+
+
+def test_a_frame_that_spans_what_is_forgotten_keeps_the_time_of_its_first_byte() -> None:
+    _, _, caught = fed(b"\xff" * 2 * KEPT, ANSWER[:5], ANSWER[5:])
+    assert caught is not None
+    assert (caught.first_at, caught.last_at) == (1.0, 2.0)
+
+
+def test_no_more_is_kept_than_twice_the_least() -> None:
+    hunt = Hunt()
+    for now in range(100):
+        hunt.feed(b"\xff" * 100, float(now))
+        assert len(hunt._stream) <= 2 * KEPT + 100
+    assert hunt.end == 10_000
+
+
+def test_frames_side_by_side_do_not_claim_each_other() -> None:
+    hunt, quarry, first = fed(ANSWER + ANSWER)
+    second = hunt.seek(quarry)
+    assert first is not None
+    assert second is not None
+    hunt.claim(second)
+    assert not hunt.claimed(first)
+    assert hunt.unclaimed(0) == ANSWER
+
+
+def test_a_frame_at_the_very_beginning_is_explained_whole() -> None:
+    hunt, _, caught = fed(ANSWER + b"\xff")
+    assert caught is not None
+    hunt.claim(caught)
+    assert hunt.unclaimed(0) == b"\xff"
+
+
+def test_what_lies_around_a_claimed_frame_is_told_though_older_bytes_are_forgotten() -> None:
+    hunt, _, caught = fed(b"\xff" * 3 * KEPT, b"\xfe" * 3, ANSWER, b"\xfd")
+    assert caught is not None
+    hunt.claim(caught)
+    assert hunt.unclaimed(3 * KEPT) == b"\xfe\xfe\xfe\xfd"
+
+
+def test_a_head_that_began_before_the_start_is_no_beginning() -> None:
+    hunt, quarry = Hunt(), Quarry(RTU, NORMAL)
+    quarry.skip(1)
+    hunt.feed(ANSWER[:2], 0.0)
+    assert hunt.seek(quarry) is None
+    assert not hunt.begins(quarry)

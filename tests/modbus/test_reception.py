@@ -305,3 +305,89 @@ def test_a_slave_with_another_check_field_is_heard_late_too() -> None:
     assert not ear.late
     ear.take(summed.wrap(bytes.fromhex("0103020007")), 0.5)
     assert ear.late[0].latency == 1.5
+
+
+def test_nothing_heard_before_is_held_against_a_byte_that_comes_just_in_time() -> None:
+    ear = reception()
+    ear.take(b"\xff", TIMING.transmission(len(REQUEST) - 1))
+    assert ear.rest == 1
+
+
+def test_huge_pieces_do_not_make_the_memory_grow() -> None:
+    ear = reception()
+    for n in range(10):
+        ear.take(b"\xff" * 5000, 0.02 + n)
+        assert len(ear.heard) <= 2 * HEARD_KEPT
+
+
+def test_what_was_no_echo_is_not_taken_for_the_rest_of_one_later() -> None:
+    ear = reception(echo=Echo.UNKNOWN)
+    ear.take(REQUEST[:3] + b"\xff", 0.05)
+    ear.take(REQUEST[3:], 0.06)
+    assert ear.leftover() == REQUEST[:3] + b"\xff" + REQUEST[3:]
+
+
+def test_an_echo_in_many_pieces_is_left_over_as_it_came() -> None:
+    ear = reception(echo=Echo.UNKNOWN)
+    for at in range(5):
+        ear.take(REQUEST[at : at + 1], 0.05 + at * TIMING.character)
+    assert ear.leftover() == REQUEST[:5]
+
+
+OLDER = ReadRegisters(1, 0x0001, 5)
+LATE_OLDER = RTU.wrap(bytes.fromhex("01030A") + bytes(10))
+
+
+def test_of_two_earlier_requests_the_one_that_was_answered_is_told_and_the_older_is_over() -> None:
+    ear = reception(earlier=(WHO, OLDER))
+    ear.take(LATE_OLDER, 0.1)
+    assert [(late.request, late.latency) for late in ear.late] == [(OLDER, pytest.approx(0.6))]
+    ear.take(LATE, 0.15)
+    assert len(ear.late) == 1
+
+
+def test_two_late_answers_in_two_pieces_are_both_told() -> None:
+    ear = reception(earlier=(WHO, OLDER))
+    ear.take(LATE, 0.1)
+    ear.take(LATE_OLDER, 0.15)
+    assert [late.request for late in ear.late] == [WHO, OLDER]
+    assert ear.late_at == 0.15
+
+
+REFUSED_OTHER = RTU.wrap(bytes.fromhex("048302"))
+
+
+def owed_by_two(*heard: bytes) -> Reception:
+    """Return an ear that heard these bytes, one piece every 100 ms, while slaves 1 and 4 still owe answers."""
+    owed = {1: (Pending(WHO, RTU, -0.5),), 4: (Pending(OTHER, RTU, -0.5),)}
+    ear = Reception(replace(reception()._attempt, elsewhere=owed), REQUEST)
+    ear.sent(0.0)
+    for n, piece in enumerate(heard, 1):
+        ear.take(piece, 0.1 * n)
+    ear.look_elsewhere()
+    return ear
+
+
+def test_a_late_answer_of_another_slave_is_told_with_its_age() -> None:
+    ear = owed_by_two(LATE_OTHER)
+    assert [(late.request, late.latency) for late in ear.late] == [(OTHER, pytest.approx(0.6))]
+
+
+def test_of_two_frames_that_could_be_the_late_answer_the_first_is() -> None:
+    ear = owed_by_two(REFUSED_OTHER, LATE_OTHER)
+    assert [(late.request, late.latency) for late in ear.late] == [(OTHER, pytest.approx(0.6))]
+    assert ear.unsolicited == len(LATE_OTHER)
+
+
+def test_the_last_byte_of_a_frame_is_not_postponed_either() -> None:
+    ear = reception()
+    ear.take(ANSWER[:7], 0.02)
+    ear.take(ANSWER[7:8], 0.024)
+    assert ear.whole_at == pytest.approx(0.02 + 2 * TIMING.character)
+
+
+def test_a_frame_that_begins_anew_is_waited_for_anew() -> None:
+    ear = reception()
+    ear.take(ANSWER[:1], 0.02)
+    ear.take(ANSWER[:1], 0.03)
+    assert ear.whole_at == pytest.approx(0.03 + 8 * TIMING.character)

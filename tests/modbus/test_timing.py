@@ -22,6 +22,7 @@ PARITIES = st.sampled_from(["none", "even", "odd"])
 )
 def test_the_times_of_the_usual_rates(baudrate: int, character: float, t15: float, t35: float, exchange: float) -> None:
     timing = LineTiming.of(baudrate)
+    assert timing.baudrate == baudrate
     assert timing.character * 1e6 == pytest.approx(character, abs=0.05)
     assert timing.t15 * 1e6 == pytest.approx(t15, abs=0.05)
     assert timing.t35 * 1e6 == pytest.approx(t35, abs=0.05)
@@ -66,6 +67,7 @@ def test_at_a_change_of_rate_the_slower_gap_holds() -> None:
         (9600, 8, "none", 3, 0.0),
         (9600, 8, "none", 1, -0.001),
         (9600, 8, "none", 1, float("nan")),
+        (9600, 8, "none", 1, float("inf")),
     ],
 )
 def test_an_impossible_line_is_refused(
@@ -84,3 +86,7 @@ def test_times_add_up(baudrate: int, parity: str, stopbits: int, request: int, a
     assert timing.exchange(request, answer) == pytest.approx(2 * timing.gap + timing.transmission(request + answer))
     assert timing.t15 < timing.t35
     assert timing.t35 >= 1750e-6
+
+
+def test_the_slowest_line_there_is_has_one_bit_a_second() -> None:
+    assert LineTiming.of(1).character == 10.0

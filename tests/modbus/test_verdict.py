@@ -142,3 +142,46 @@ def test_the_nearest_thing_to_an_answer_names_the_fault(
 def test_a_right_frame_of_somebody_else_is_a_stranger(heard: bytes, *, spoke: bool) -> None:
     reception = heard_by(WIND, Echo.OFF, heard)
     assert verdict.stranger_spoke(reception._attempt, reception) is spoke
+
+
+def test_the_remaining_faults_have_their_codes() -> None:
+    assert verdict.babble(0.2).code is FaultCode.COLLISION
+    assert verdict.refusal(2).code is FaultCode.EXCEPTION
+    assert verdict.changed_echo() == (
+        FaultCode.COLLISION,
+        "our own request came back changed: another device sent at the same time, or noise",
+    )
+
+
+def test_two_bytes_are_several() -> None:
+    assert verdict.broken(b"\xff\xff", 9, begun=False).message == "2 bytes in place of an answer of 9: noise"
+
+
+def test_a_request_to_read_input_registers_is_a_request_too() -> None:
+    found = verdict.stranger(WIND, RTU, framed("040400010002"))
+    assert found == (FaultCode.WRONG_SLAVE, "a request to slave 4 was heard: is there a second master?")
+
+
+def test_another_write_is_told_in_capital_digits() -> None:
+    found = verdict.stranger(MOVE, RTU, framed("0306000500FA"))
+    assert found == (FaultCode.MALFORMED, "slave 3 confirmed another write: 00 05 00 FA")
+
+
+def test_a_frame_of_an_unknown_function_is_found_behind_noise_where_it_is_the_slaves_own() -> None:
+    found = verdict.stranger(WIND, RTU, b"\xff" + framed("034104414FD70A"))
+    assert found == (FaultCode.WRONG_FUNCTION, "slave 3 answered function 41 in place of 03")
+
+
+@pytest.mark.parametrize(
+    ("heard", "message"),
+    [
+        (BEGUN, "answer cut short: 5 of 9 bytes"),
+        (RTU.encode(WIND), "no answer in 200 ms but our own request came back: does the adapter echo?"),
+        (b"", "no answer in 200 ms"),
+    ],
+)
+def test_the_verdict_is_in_words(heard: bytes, message: str) -> None:
+    reception = heard_by(WIND, Echo.OFF, heard)
+    found = verdict.judge(reception._attempt, reception)
+    assert found is not None
+    assert found.message == message
