@@ -181,3 +181,23 @@ def test_what_was_never_raised_cannot_end() -> None:
     alarm = LineAlarm()
     assert alarm.ended(PORT_CODES, 100) is False
     assert alarm.payload() == FINE
+
+
+def test_an_error_that_rises_with_its_first_failure_has_happened_once_and_just_now() -> None:
+    alarm = DeviceAlarm(1)
+    alarm.failed(TIMEOUT, 100)
+    payload = alarm.payload()
+    assert (payload["since"], payload["last"], payload["count"]) == (100, 100, 1)
+    line = LineAlarm()
+    line.failed(LOST, 100)
+    payload = line.payload()
+    assert (payload["since"], payload["last"], payload["count"]) == (100, 100, 1)
+
+
+def test_an_alarm_is_active_from_its_rise_to_its_end() -> None:
+    alarm = DeviceAlarm(1)
+    assert alarm.active is False
+    alarm.failed(TIMEOUT, 100)
+    assert alarm.active is True
+    alarm.ended(200)
+    assert alarm.active is False

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lfs10d.jobs.job import Ask
 from lfs10d.jobs.poll import Poll
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.unanswered import Unanswered
@@ -175,3 +176,29 @@ def test_what_passed_while_offline_is_no_overrun() -> None:
     assert device.due == 100.5
     back_on_grid(device, 50.0)
     assert device.due == 100.5
+
+
+@pytest.mark.parametrize(("interval", "due"), [(1.0, 0.5), (0.0, 0.7)])
+def test_a_poll_knows_what_it_is_for_and_when_it_was_due(interval: float, due: float) -> None:
+    device = a_device(1, interval, due=0.5)
+    unanswered = Unanswered()
+    queue = PollQueue(unanswered)
+    queue.enqueue(device)
+    poll = queue.choose(0.7, NOBODY)
+    assert poll is not None
+    assert (poll.errand, poll.due, poll.device) == (Errand.POLL, due, device)
+    assert isinstance(poll.ask(0.7), Ask)
+    assert device.polling
+    assert device.last_asked == 0.7
+
+
+@pytest.mark.parametrize(
+    ("interval", "due", "now", "following"),
+    [(0.25, 0.5, 100.2, 100.25), (4.0, 0.5, 9.0, 12.5), (1.0, 2.0, 2.0, 3.0), (0.0, 0.5, 100.2, 0.5)],
+)
+def test_one_that_is_back_goes_on_at_the_next_point_of_its_own_grid(
+    interval: float, due: float, now: float, following: float
+) -> None:
+    device = a_device(1, interval, due=due)
+    back_on_grid(device, now)
+    assert device.due == following

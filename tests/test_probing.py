@@ -120,3 +120,76 @@ def test_while_the_port_is_lost_nobody_is_probed() -> None:
     probing.stop()
     assert probing.next_at == inf
     assert probing.choose(100.0, NOBODY) is None
+
+
+def test_before_the_first_review_nobody_is_probed() -> None:
+    probing = Probing(0.0)
+    assert (probing.next_at, probing.anyone_online) == (inf, False)
+    assert probing.choose(0.0, NOBODY) is None
+    probing.plan(0.0)
+    assert probing.next_at == inf
+
+
+def test_after_a_stop_nobody_is_offline_or_online() -> None:
+    probing = a_line(a_device(1, dead_since=0.0))
+    probing.stop()
+    assert not probing.anyone_online
+    probing.plan(5.0)
+    assert probing.next_at == inf
+
+
+def test_one_whose_time_has_not_come_is_not_probed_in_place_of_an_excluded_one() -> None:
+    due, later = a_device(1, dead_since=0.0), a_device(2, dead_since=3.0)
+    probing = a_line(due, later)
+    assert probing.choose(1.5, frozenset({1})) is None
+    assert probing.next_at == pytest.approx(4.0)
+
+
+def exhausted(*devices: Device) -> Probing:
+    """Return the probes of a line, with nothing left of their share for a long time."""
+    probing = a_line(*devices)
+    probing.account.spend(100.0, 0.0)
+    return probing
+
+
+def test_the_share_binds_while_any_device_answers() -> None:
+    account = exhausted().account
+    assert not account.allows(10.0)
+    assert account.ready_at(10.0) == pytest.approx((100.0 - PROBE_CREDIT) / PROBE_SHARE)
+
+
+def test_while_none_answers_the_share_binds_nobody_and_costs_nothing() -> None:
+    dead = a_device(1, dead_since=0.0)
+    probing = Probing(0.0)
+    probing.review([dead], 0.0)
+    probing.account.spend(100.0, 0.0)
+    probing.spend(dead, 100.0, 0.0)
+    assert probing.account.allows(0.0)
+    assert probing.account.ready_at(7.0) == 7.0
+    probing.review([dead, a_device(255)], 0.0)
+    assert probing.account.allows(0.0)
+
+
+def test_what_an_exempt_probe_takes_is_not_charged() -> None:
+    dead = a_device(1, dead_since=0.0)
+    probing = a_line(dead)
+    dead.probe_exempt = True
+    probing.spend(dead, 100.0, 0.0)
+    assert probing.account.allows(0.0)
+    dead.probe_exempt = False
+    probing.spend(dead, 100.0, 0.0)
+    assert not probing.account.allows(0.0)
+
+
+def test_an_exhausted_share_holds_up_neither_an_exempt_probe_nor_those_of_a_line_where_none_answers() -> None:
+    dead = a_device(1, dead_since=0.0)
+    probing = exhausted(dead)
+    probing.plan(0.0)
+    assert probing.next_at > 1000.0
+    dead.probe_exempt = True
+    probing.plan(0.0)
+    assert probing.next_at == dead.next_probe
+    dead.probe_exempt = False
+    dead.last_asked = 4.0
+    probing.review([dead], 4.0)
+    assert probing.next_at == pytest.approx(5.0)

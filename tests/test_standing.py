@@ -307,3 +307,101 @@ def test_a_poll_that_a_request_wants_of_a_disabled_device_is_a_numbered_sample_a
     assert cast("Mapping[str, object]", sample.payload)["seq"] == 2
     assert watched.poll(3, TIMEOUT) == ["telemetry"]
     assert watched.shown == shown
+
+
+def test_a_sample_says_whose_it_is_of_which_life_and_by_which_clock() -> None:
+    watched = Watched()
+    (telemetry, *_) = watched.publish(0.5, 12.34)
+    assert telemetry.payload == {
+        "v": 1,
+        "line": "line0",
+        "device": "a",
+        "boot": "k3f9a2c7",
+        "seq": 1,
+        "ts": 1_795_298_000_500,
+        "time": "2026-11-21T21:53:20.500Z",
+        "clock": "synced",
+        "wind_speed": 12.34,
+        "unit": "m/s",
+        "quality": "good",
+        "error": None,
+        "rtt_ms": 18.2,
+    }
+
+
+def test_before_the_first_poll_the_state_is_of_the_line_too_and_none_waits() -> None:
+    watched = Watched()
+    assert fields(watched.shown["state"], "line", "device", "boot") == ("line0", "a", "k3f9a2c7")
+    assert (Watched().standing.online, Watched().standing.state_due) == (False, None)
+
+
+def test_what_is_told_late_has_the_time_at_which_it_happened() -> None:
+    standing = Watched().standing
+    reading = Reading("a", 10.0, {"wind_speed": 1.0}, None, 0.5, online=True, response_timeout=0.2)
+    (telemetry, *_) = standing.read(reading, instant(12.0), masked=False)
+    assert fields(telemetry.payload, "ts", "rtt_ms") == (1_795_298_010_000, 500.0)
+    fault = replace(reading, values=None, fault=TIMEOUT, rtt=None, online=False)
+    standing.read(replace(fault, at=13.0), instant(15.0), masked=False)
+    risen = standing.read(replace(fault, at=14.0), instant(16.0), masked=False)[-1]
+    assert fields(risen.payload, "since", "last") == (1_795_298_013_000, 1_795_298_014_000)
+    cleared = standing.read(replace(reading, at=17.0), instant(19.0), masked=False)[-1]
+    assert fields(cleared.payload, "active", "cleared") == (False, 1_795_298_017_000)
+
+
+@pytest.mark.parametrize("masked", [False, True])
+def test_an_error_taken_back_was_cleared_when_that_was_found(masked: bool) -> None:  # noqa: FBT001  # a case
+    watched = Watched()
+    watched.poll(1.0, TIMEOUT)
+    watched.poll(2.0, TIMEOUT)
+    published = watched.publish(3.0, LOST, masked=True) if masked else watched.standing.mask(instant(3.0))
+    assert fields(published[-1].payload, "cleared") == (1_795_298_003_000,)
+
+
+def test_a_good_reading_without_a_time_of_answer_has_none() -> None:
+    standing = Watched().standing
+    reading = Reading("a", 1.0, {"wind_speed": 1.0}, None, None, online=True, response_timeout=0.2)
+    assert fields(standing.read(reading, instant(1.0), masked=False)[0].payload, "rtt_ms") == (None,)
+
+
+def test_a_disabled_devices_requested_sample_is_of_the_line_too() -> None:
+    standing = Standing(replace(FACTS, enabled=False), line="line0", boot="k3f9a2c7", seq=0, now=instant(0))
+    reading = Reading("a", 1.0, {"wind_speed": 1.0}, None, 0.02, online=False, response_timeout=0.2)
+    assert fields(standing.read(reading, instant(1.0), masked=False)[0].payload, "line") == ("line0",)
+
+
+def test_statistics_have_a_time_and_know_a_fixed_time_out_from_the_start() -> None:
+    standing = Standing(replace(FACTS, response_timeout=0.3), line="line0", boot="b", seq=0, now=instant(0))
+    assert fields(standing.stats(instant(5.0)).payload, "ts", "response_timeout_ms") == (1_795_298_005_000, 300.0)
+
+
+def test_the_configuration_is_that_of_the_facts() -> None:
+    assert Watched().shown["config"] == FACTS.payload()
+
+
+def test_a_state_just_at_its_early_time_is_shown() -> None:
+    watched = Watched()
+    watched.poll(0.0, 1.0)
+    assert "state" in watched.poll(1.0 - STATE_EARLY, 2.0)
+
+
+def test_a_snapshot_tells_everything_a_live_view_shows() -> None:
+    watched = Watched()
+    watched.publish(0.5, 12.34)
+    assert watched.standing.snapshot(instant(1.06)) == {
+        "name": "a",
+        "slave": 3,
+        "label": "Mast",
+        "profile": "lfs10",
+        "enabled": True,
+        "interval": 0.25,
+        "online": True,
+        "seq": 1,
+        "ts": 1_795_298_000_500,
+        "values": {"wind_speed": 12.34},
+        "units": {"wind_speed": "m/s"},
+        "quality": "good",
+        "error": None,
+        "rtt_ms": 18.2,
+        "age_s": 0.6,
+        "alarm": {"v": 1, "active": False, "code": None, "last_code": None, "cleared": None},
+    }

@@ -292,3 +292,78 @@ def test_a_lost_port_is_an_error_but_no_poll() -> None:
     assert tally.polled(reading(START + 1, LOST), 2) is None
     assert tally.polled(reading(START + 9), 3) is None
     assert (tally.payload(7)["polls"], tally.payload(7)["errors"]) == (2, {"port_lost": 1})
+
+
+def test_a_percentile_is_not_one_too_small_where_the_share_is_just_above_a_whole_number() -> None:
+    assert percentile([float(n) for n in range(26)], 77) == 20.0
+
+
+def test_figures_are_told_to_a_tenth_of_their_unit() -> None:
+    tally = LineTally(START)
+    odd = 0.50000014
+    tally.exchanged(exchange(START + 1.0, gap=odd))
+    told = tally.payload(START + 30, ts=7, gap_required=odd, backlog=Backlog())
+    assert told["gap_required_us"] == 500_000.1
+    assert told["gap_us"] == {"min": 500_000.1, "p50": 500_000.1, "p99": 500_000.1}
+    device = DeviceTally(0.50014)
+    device.polled(reading(START, rtt=0.50014), 7)
+    device.response_timeout = 0.50014
+    told = device.payload(7)
+    assert told["rtt_ms"] == {"p50": 500.1, "p95": 500.1}
+    assert told["response_timeout_ms"] == 500.1
+
+
+def test_rates_are_told_in_tenths_of_a_percent_hundredths_of_a_poll_and_milliseconds() -> None:
+    tally = LineTally(START)
+    tally.exchanged(exchange(START + 1.0, took=0.37037))
+    tally.polled(reading(START + 1.0), 1.23456)
+    rates = tally.rates(START + 3.0)
+    assert (rates.load_pct, rates.polls_per_s, rates.cycle_s) == (12.3, 0.33, 1.235)
+
+
+def test_a_load_of_half_the_time_is_half() -> None:
+    tally = LineTally(START)
+    for second in range(30):
+        tally.exchanged(exchange(START + second + 0.6, took=0.5))
+    assert tally.rates(START + 30).load_pct == pytest.approx(50.0, abs=0.1)
+
+
+def test_within_the_first_second_the_cycle_is_known_and_after_it_the_rates() -> None:
+    tally = LineTally(START)
+    tally.polled(reading(START + 0.5), 0.25)
+    assert tally.rates(START + 0.9).payload() == {"load_pct": None, "polls_per_s": None, "cycle_s": 0.25}
+    assert tally.rates(START + 1.0).polls_per_s == 1.0
+
+
+def test_the_events_of_one_second_are_kept_as_one() -> None:
+    tally = LineTally(START)
+    for n in range(1000):
+        tally.exchanged(exchange(START + n / 1001, took=0.0))
+    assert len(tally._seconds) == 1
+
+
+def test_of_gaps_only_the_last_thousand_are_kept() -> None:
+    tally = LineTally(START)
+    for gap in (0.5, 0.25):
+        for n in range(1000):
+            tally.exchanged(exchange(START + n, gap=gap))
+    assert gaps(tally) == {"min": 250_000.0, "p50": 250_000.0, "p99": 250_000.0}
+
+
+def test_of_answer_times_only_the_last_hundred_are_kept() -> None:
+    tally = DeviceTally(None)
+    for rtt in (0.5, 0.25):
+        for n in range(100):
+            tally.polled(reading(START + n, rtt=rtt), 7)
+    assert tally.payload(7)["rtt_ms"] == {"p50": 250.0, "p95": 250.0}
+
+
+def test_what_happens_twice_counts_twice() -> None:
+    line, device = LineTally(START), DeviceTally(None)
+    for at in (START, START + 1):
+        line.exchanged(exchange(at, late=2))
+        line.overran(3)
+        line.lost(FaultCode.PORT_LOST)
+        device.polled(reading(at, TIMEOUT, overruns=4), 7)
+    assert line.errors == {"late": 4, "overrun": 6, "port_lost": 2}
+    assert device.errors == {"timeout": 2, "overrun": 8}
