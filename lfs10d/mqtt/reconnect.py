@@ -3,8 +3,9 @@
 - A connection that held is renewed at once; then after 1, 2, 4 ... 30 s, each shortened by chance by up to a
   quarter, so that a hundred gateways do not come back in step.
 - Each round begins with the configured version. A broker that refuses 5, or does not answer, is asked in
-  3.1.1 at once: some old brokers say nothing. Nothing is remembered, because a broker
-  may be replaced by a better one.
+  3.1.1 at once: some old brokers say nothing. A refusal is not remembered, because a broker may be replaced by a
+  better one. But one that has spoken 5 and says nothing now is stalled, or still starting behind a forwarder: it is
+  asked in 5 again, for 3.1.1 would last as long as that connection and hide every reason code.
 - Taken over by a client with our id, we wait 60 s, doubling to 1 h, until a connection has held for 2 h. Not
   every broker says so (by 3.1.1 none can, mosquitto 2.0.11 does not). So the third connection in a row that
   does not hold is taken for that, if no attempt failed between them and the broker itself ended those before:
@@ -42,6 +43,9 @@ TAKEN_OVER_FORGOTTEN = 7200.0
 SHORT_MOST = 3
 """This many connections in a row that the broker ended before they held are another client with our id."""
 
+SILENT_MOST = 20
+"""This many times in a row, about ten minutes, a broker that has spoken 5 may say nothing before 3.1.1 is tried."""
+
 
 @dataclass(slots=True)
 class Reconnect:
@@ -60,6 +64,8 @@ class Reconnect:
     _since: float | None = None
     _short: int = 0
     _unproved: bool = False
+    _silent: int | None = None
+    """How often in a row a broker that has spoken 5 said nothing; None: it never has."""
 
     def __post_init__(self) -> None:
         self.version = self.configured
@@ -67,6 +73,8 @@ class Reconnect:
     def accepted(self, now: float) -> None:
         """Note that the connection stands."""
         self._since = now
+        if self.version is Version.V5:
+            self._silent = 0
 
     def missed(self) -> None:
         """Note that the broker had published our will: it lives, and ended the last connection itself."""
@@ -85,13 +93,25 @@ class Reconnect:
         since, self._since = self._since, None
         if since is not None:
             self._lost(ended, now - since, now)
-        elif ended.ending is Ending.WRONG_VERSION and version is Version.V5:
+        elif version is Version.V5 and self._refuses_five(ended):
             self.version = Version.V311
             self.due = now
         else:
             self._short = 0
             self._unproved = False
             self._later(now)
+
+    def _refuses_five(self, ended: Ended) -> bool:
+        """Tell whether 3.1.1 is worth a try, and count the silence of a broker that can do better."""
+        if ended.ending is not Ending.WRONG_VERSION:
+            return False
+        if self._silent is None or ended.reason is not None:
+            return True
+        self._silent += 1
+        if self._silent <= SILENT_MOST:
+            return False
+        self._silent = None
+        return True
 
     def _lost(self, ended: Ended, life: float, now: float) -> None:
         if life >= TAKEN_OVER_FORGOTTEN:

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.mqtt.endings import Ended, Ending
-from lfs10d.mqtt.reconnect import HELD, SHORT_MOST, TAKEN_OVER_FIRST, TAKEN_OVER_FORGOTTEN, Reconnect
+from lfs10d.mqtt.endings import UNSUPPORTED_VERSION, Ended, Ending
+from lfs10d.mqtt.reconnect import HELD, SHORT_MOST, SILENT_MOST, TAKEN_OVER_FIRST, TAKEN_OVER_FORGOTTEN, Reconnect
 from lfs10d.mqtt.settings import Version
 
 UNREACHABLE = Ended(Ending.UNREACHABLE, "")
@@ -75,8 +75,47 @@ def test_each_round_begins_with_5_again() -> None:
     live(policy, 0.0, 100.0)
     assert policy.version is Version.V5
     policy.ended(WRONG_VERSION, 100.0)
+    assert policy.version is Version.V311
     policy.ended(WRONG_VERSION, 100.0)
     assert (policy.version, policy.due) == (Version.V5, 101.0)
+
+
+def test_a_broker_that_has_spoken_5_and_says_nothing_now_is_asked_in_5_again() -> None:
+    policy = fresh()
+    live(policy, 0.0, HELD)
+    for delay in (1.0, 2.0, 4.0):
+        policy.ended(WRONG_VERSION, 100.0)
+        assert (policy.version, policy.due) == (Version.V5, 100.0 + delay)
+
+
+def test_a_broker_that_has_spoken_5_and_refuses_it_in_so_many_words_is_asked_in_3_1_1_at_once() -> None:
+    policy = fresh()
+    live(policy, 0.0, HELD)
+    policy.ended(Ended(Ending.WRONG_VERSION, "", UNSUPPORTED_VERSION), 100.0)
+    assert (policy.version, policy.due) == (Version.V311, 100.0)
+
+
+def test_a_broker_that_spoke_5_and_says_nothing_for_long_is_taken_for_another_one() -> None:
+    policy = fresh()
+    live(policy, 0.0, HELD)
+    for _ in range(SILENT_MOST):
+        policy.ended(WRONG_VERSION, 100.0)
+        assert policy.version is Version.V5
+    policy.ended(WRONG_VERSION, 200.0)
+    assert (policy.version, policy.due) == (Version.V311, 200.0)
+    live(policy, 200.0, HELD)
+    policy.ended(WRONG_VERSION, 300.0)
+    assert policy.version is Version.V311
+
+
+def test_the_silence_of_a_broker_that_has_spoken_5_is_forgotten_when_it_speaks_again() -> None:
+    policy = fresh()
+    live(policy, 0.0, HELD)
+    for _ in range(SILENT_MOST):
+        policy.ended(WRONG_VERSION, 100.0)
+    live(policy, 200.0, HELD)
+    policy.ended(WRONG_VERSION, 300.0)
+    assert policy.version is Version.V5
 
 
 def test_3_1_1_where_configured_is_the_only_one_tried() -> None:
