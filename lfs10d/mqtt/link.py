@@ -25,7 +25,10 @@ log = logging.getLogger(__name__)
 
 
 class Link:
-    """`events.accepted` and `events.ended` come in turn, once for each connection that stood."""
+    """`events.accepted` and `events.ended` come in turn, once for each connection that stood.
+
+    `connect` begins a connection; in virtual time it is one to a broker in memory.
+    """
 
     def __init__(
         self,
@@ -34,11 +37,13 @@ class Link:
         *,
         will: Will | None = None,
         chance: Callable[[], float] = random.random,
+        connect: type[Connection] = Connection,
     ) -> None:
         self._settings = settings
         self._events = events
         self._will = will
         self._chance = chance
+        self._connect = connect
         self._reconnect = Reconnect(settings.version, chance)
         self._connection: Connection | None = None
         self._accepted: Accepted | None = None
@@ -127,7 +132,7 @@ class Link:
 
     def _try(self) -> None:
         self._timer = None
-        self._connection = Connection(self._settings, self._reconnect.version, self, will=self._will)
+        self._connection = self._connect(self._settings, self._reconnect.version, self, will=self._will)
 
     # Events of the connection
 

@@ -13,6 +13,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from lfs10d import telemetry
+from lfs10d.mqtt.connection import Connection
 from lfs10d.mqtt.dispatch import Dispatch
 from lfs10d.mqtt.earlier import EarlierLife
 from lfs10d.mqtt.endings import REFUSED_FROM, reason_in_words
@@ -54,10 +55,10 @@ class Uplink:
     `base` is `B`, whose last level is the line's name. `burst()` returns every retained topic but `availability`;
     `stands_behind()` the retained topics under `B` that are ours; `requested` takes each request; `changed` is told
     of every connect, loss, takeover and subscription, whose state is then in the properties; `announced` of every
-    burst after a connect that the broker has whole; `epoch_ms()` is the wall clock.
+    burst after a connect that the broker has whole; `epoch_ms()` is the wall clock; `connect` is as in `Link`.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - each is one side of the uplink, named where it is called
         self,
         settings: BrokerSettings,
         *,
@@ -68,6 +69,7 @@ class Uplink:
         epoch_ms: Callable[[], int],
         changed: Callable[[], None] = lambda: None,
         announced: Callable[[], None] = lambda: None,
+        connect: type[Connection] = Connection,
     ) -> None:
         self._topics = Topics(base)
         self._burst = burst
@@ -76,7 +78,7 @@ class Uplink:
         self._changed = changed
         self._announced = announced
         self._announcing = False
-        self._link = Link(settings, self, will=Will(self._topics.availability, OFFLINE.encode()))
+        self._link = Link(settings, self, will=Will(self._topics.availability, OFFLINE.encode()), connect=connect)
         self._outbox = Outbox(detection=2.0 * settings.keepalive)
         line = base.rpartition("/")[2]
         self._dispatch = Dispatch(self._outbox, self._topics, line, epoch_ms=epoch_ms, stuck=self._acknowledges_nothing)

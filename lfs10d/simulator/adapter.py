@@ -62,7 +62,7 @@ class Adapter:
 
     def _hear(self, now: int) -> None:
         """Take over what has arrived by `now`, together with what the adapter still keeps."""
-        arrived: list[tuple[int, bytes]] = []
+        arrived: list[tuple[int, int, bytes]] = []  # when the last bit came, when readable, what
         coming: list[tuple[Burst, int]] = []
         for burst, taken in self._bursts:
             count = bisect_right(burst.ends, now)
@@ -70,11 +70,14 @@ class Adapter:
                 data = as_heard(burst, self.format, taken, count)
                 if burst.format != self.format:
                     self.framing_errors += count - taken
+                ends = burst.ends[taken:count]
                 if self.latency == 0:
-                    arrived.append((burst.ends[count - 1], data))
+                    arrived.append((ends[-1], ends[-1], data))
                 else:
-                    arrived += [(self._ready(burst.ends[taken + n]), data[n : n + 1]) for n in range(count - taken)]
+                    arrived += [(end, self._ready(end), data[n : n + 1]) for n, end in enumerate(ends)]
             if count < len(burst.ends):
                 coming.append((burst, max(count, taken)))
         self._bursts = coming
-        self._held.extend(sorted(arrived, key=lambda one: one[0]) if len(arrived) > 1 else arrived)
+        if len(arrived) > 1:
+            arrived.sort(key=lambda one: one[0])
+        self._held.extend([(ready, data) for _, ready, data in arrived])

@@ -46,15 +46,19 @@ def stray(
     line.after_each_request(after)
 
 
-def second_master(line: SimulatedLine, body: bytes, first: float, every: float, check: Check = "crc") -> None:
-    """Let another master send this request from `first` on, `every` so many seconds, deaf to the line."""
+def second_master(
+    line: SimulatedLine, body: bytes, first: float, every: float, check: Check = "crc", *, last: float | None = None
+) -> None:
+    """Let another master send this request from `first` to before `last`, `every` so many seconds, deaf to the line."""
     frame = seal(body, line.framing, check)
+    end = None if last is None else nanoseconds(last)
 
     def ask(now: int) -> None:
         ended = now + line.format.span(len(frame))
         burst = line.speak(SECOND_MASTER, frame, now)
         request = Request(SECOND_MASTER, frame, now, ended, None, Verdict.HEARD)
         line.at_nanosecond(ended, lambda when: line.carry(request, burst, when))
-        line.at_nanosecond(now + nanoseconds(every), ask)
+        if end is None or now + nanoseconds(every) < end:
+            line.at_nanosecond(now + nanoseconds(every), ask)
 
     line.at(first, ask)

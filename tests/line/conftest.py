@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +19,7 @@ from lfs10d.reading import Event, Exchanged, FaultCode, PortChanged, Reading
 from lfs10d.roster import DeviceSpec, PollRules
 from lfs10d.schedule import Schedule
 from lfs10d.simulator.burst import MASTER
+from lfs10d.simulator.inturn import InTurn
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.port import SimulatedPort, VirtualClock, run
 from lfs10d.simulator.sensor import Sensor
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
 
     from lfs10d.profiles.schema import Profile
     from lfs10d.simulator.line import Answer, Request
-    from lfs10d.simulator.sensor import Reply
 
 LFS10 = load_profile("lfs10", relative_to=Path())
 NAMES = {slave: f"slave-{slave}" for slave in range(256)}
@@ -132,19 +132,6 @@ def _nearest(requests: dict[int, Request], when: float) -> Request:
 
 def _is_ours(answer: Answer, request: Request) -> bool:
     return bool(answer.values) and answer.sensor.slave == request.body[0]
-
-
-class InTurn(Sensor):
-    """A sensor that answers one request after the other, however late: as every real one does."""
-
-    def hear(self, body: bytes, ended: int, *, after_dead: bool = False) -> Reply | None:
-        reply = super().hear(body, ended, after_dead=after_dead)
-        if reply is None:
-            return None
-        free = getattr(self, "free", 0)
-        reply = replace(reply, start=max(reply.start, free))
-        self.free = reply.start + reply.format.ends(0, len(reply.data), reply.pause)[-1] + reply.format.t35
-        return reply
 
 
 class Rigs:

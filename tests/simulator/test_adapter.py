@@ -61,9 +61,10 @@ def test_the_own_bytes_come_back_with_echo_only() -> None:
         assert adapter.collect(10**9) == (b"mine" if echo else b"")
 
 
-def test_bytes_of_two_speakers_come_in_the_order_of_the_wire() -> None:
+@pytest.mark.parametrize("latency", [0, 500_000_000])
+def test_bytes_of_two_speakers_come_in_the_order_of_the_wire(latency: int) -> None:
     line = SimulatedLine()
-    adapter = Adapter(line, SHAPE)
+    adapter = Adapter(line, SHAPE, latency=latency)
     line.speak(NOISE, b"second", 100_000_000)
     line.speak(NOISE, b"first", 0)
     assert adapter.collect(10**9) == b"firstsecond"

@@ -1,0 +1,26 @@
+"""A sensor that answers one request after the other, however late: as every real one does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from lfs10d.simulator.sensor import Sensor
+
+if TYPE_CHECKING:
+    from lfs10d.simulator.sensor import Reply
+
+
+class InTurn(Sensor):
+    """Begins an answer no earlier than t3.5 after the end of its answer before."""
+
+    _free = 0
+
+    def hear(self, body: bytes, ended: int, *, after_dead: bool = False) -> Reply | None:
+        """Hear a request as any sensor does; what it answers waits for what it still has to say."""
+        reply = super().hear(body, ended, after_dead=after_dead)
+        if reply is None:
+            return None
+        reply = replace(reply, start=max(reply.start, self._free))
+        self._free = reply.format.ends(reply.start, len(reply.data), reply.pause)[-1] + reply.format.t35
+        return reply
