@@ -196,8 +196,10 @@ def test_an_error_that_rises_with_its_first_failure_has_happened_once_and_just_n
 
 def test_an_alarm_is_active_from_its_rise_to_its_end() -> None:
     alarm = DeviceAlarm(1)
-    assert alarm.active is False
+    states = [alarm.active]
     alarm.failed(TIMEOUT, 100)
-    assert alarm.active is True
+    states.append(alarm.active)
     alarm.ended(200)
-    assert alarm.active is False
+    states.append(alarm.active)
+    assert [state is True for state in states] == [False, True, False]
+    assert None not in states

@@ -6,20 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from lfs10d.facts import DaemonFacts, DeviceFacts, Instant, LineFacts
+from lfs10d.facts import DaemonFacts, Instant, LineFacts
+from tests.stations import ONE_VALUE
 
-DEVICE = DeviceFacts(
-    name="mast-top",
-    slave=3,
-    label="Mast, 10 m",
-    profile="lfs10",
-    interval=0.25,
-    enabled=True,
-    response_timeout=None,
-    value_names=("wind_speed",),
-    units={"wind_speed": "m/s"},
-    offline_after=3,
-)
+DEVICE = replace(ONE_VALUE, name="mast-top", slave=3, label="Mast, 10 m", interval=0.25)
 
 
 def test_an_instant_tells_the_wall_time_of_an_earlier_monotonic_time() -> None:

@@ -4,134 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import inf
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
-from lfs10d.jobs.job import Again, Ask, Done, Hold, Later, Next
-from lfs10d.jobs.poll import Poll
-from lfs10d.modbus.exchange import LateAnswer, Outcome
-from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
+from lfs10d.jobs.job import Again, Hold, Later
+from lfs10d.modbus.exchange import LateAnswer
+from lfs10d.modbus.frames import ReadRegisters
 from lfs10d.modbus.timing import LineTiming
-from lfs10d.profiles.library import load_profile
-from lfs10d.reading import Errand, Fault, FaultCode, Reading
-from lfs10d.roster import DeviceSpec, PollRules
+from lfs10d.reading import Errand, Fault, FaultCode
+from lfs10d.roster import LEARNED_MOST, PollRules
 from lfs10d.schedule import Rest, Schedule
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-RTU = Codec(Framing.RTU)
-LFS10 = load_profile("lfs10", relative_to=Path())
-T9600 = LineTiming.of(9600)
-GONE = Fault(FaultCode.PORT_LOST, "gone")
-NONE: frozenset[int] = frozenset()
-VALUES = {0x0001: (0x414F, 0xD70A), 0x0005: (1,)}
-TAKES = 0.03
-
-
-def spec(slave: int, interval: float = 1.0, *, name: str = "", enabled: bool = True) -> DeviceSpec:
-    return DeviceSpec(name or f"slave-{slave}", slave, LFS10, RTU, interval, enabled)
-
-
-class Task:
-    """A job that says what it is told to say, one word after the other; then it is done."""
-
-    def __init__(self, *words: Ask | Hold | Next, share: float = 1.0, excludes: frozenset[int] = NONE) -> None:
-        self.words = list(words)
-        self.share = share
-        self.excludes = excludes
-        self.errand = Errand.SCAN
-        self.over_at: float | None = None
-
-    def ask(self, now: float) -> Ask | Hold | Done:  # noqa: ARG002 - a job
-        word = self.words.pop(0) if self.words else Done()
-        assert isinstance(word, Ask | Hold | Done)
-        return word
-
-    def heard(self, outcome: Outcome, now: float) -> Next:  # noqa: ARG002 - a job
-        word = self.words.pop(0) if self.words else Done()
-        assert isinstance(word, Later | Again | Done)
-        return word
-
-    def cut_off(self, now: float) -> None:
-        self.over_at = now
-
-
-def asking(slave: int) -> Ask:
-    return Ask(ReadRegisters(slave, 0x0004, 1), RTU, 0.2)
-
-
-class Rig:
-    """A schedule and a line whose `dead` slaves are silent."""
-
-    def __init__(self, *specs: DeviceSpec, rules: PollRules | None = None) -> None:
-        self.now = 0.0
-        self.schedule = Schedule(T9600, 0.0)
-        self.rules = rules or PollRules()
-        self.schedule.replace(specs, self.rules, 0.0)
-        self.dead: set[int] = set()
-        self.asked: list[int] = []
-
-    def replace(self, *specs: DeviceSpec) -> None:
-        self.schedule.replace(specs, self.rules, self.now)
-
-    def outcome(self, ask: Ask, late: Iterable[LateAnswer] = ()) -> Outcome:
-        request = ask.request
-        assert isinstance(request, ReadRegisters)
-        silent = request.slave in self.dead
-        ended = self.now + (ask.timeout if silent else TAKES)
-        return Outcome(
-            request=request,
-            answer=None if silent else VALUES.get(request.address, (0,)),
-            fault=Fault(FaultCode.TIMEOUT, "no answer") if silent else None,
-            asked=self.now,
-            began=self.now,
-            sent_end=self.now,
-            gap=0.004,
-            ended=ended,
-            turnaround=None if silent else 0.005,
-            rtt=None if silent else TAKES,
-            answered=not silent,
-            late=tuple(late),
-            echoed=None,
-            sent=b"",
-            heard=b"",
-            unsolicited=0,
-            quiet_since=ended,
-        )
-
-    def ask(self) -> Ask | None:
-        """Have the schedule decide; None where nobody wants the line now."""
-        decision = self.schedule.next(self.now)
-        if isinstance(decision, Rest):
-            assert decision.until > self.now
-            return None
-        self.asked.append(decision.request.slave)
-        return decision
-
-    def settle(self, ask: Ask, late: Iterable[LateAnswer] = ()) -> list[Reading]:
-        outcome = self.outcome(ask, late)
-        self.now = outcome.ended
-        return self.schedule.settled(outcome, self.now)
-
-    def run(self, until: float) -> list[Reading]:
-        """Carry out what is wanted until then; return the readings."""
-        readings: list[Reading] = []
-        while self.now < until:
-            decision = self.schedule.next(self.now)
-            if isinstance(decision, Ask):
-                self.asked.append(decision.request.slave)
-                readings += self.settle(decision)
-            else:
-                assert decision.until > self.now
-                self.now = min(decision.until, until)
-        return readings
-
-    def poll_of(self, name: str, request: int = 1) -> Poll:
-        device = self.schedule.devices[name]
-        return Poll(device, self.schedule.unanswered, due=self.now, errand=Errand.REQUEST, request=request)
+from tests.rig import GONE, RTU, T9600, TAKES, Rig, Task, asking, spec
 
 
 def test_with_nobody_to_poll_it_rests() -> None:
@@ -151,7 +34,7 @@ def test_a_poll_is_one_reading() -> None:
 
 def test_an_outcome_without_a_question_is_a_mistake() -> None:
     rig = Rig(spec(1))
-    with pytest.raises(RuntimeError):
+    with pytest.raises(RuntimeError, match=r"^an outcome without an Ask$"):
         rig.schedule.settled(rig.outcome(asking(1)), 1.0)
 
 
@@ -376,3 +259,153 @@ def test_a_requested_poll_does_not_disturb_the_one_in_progress() -> None:
     readings = rig.run(4.0)
     assert [reading.requests for reading in readings].count((5,)) == 1
     assert sum(1 + reading.overruns for reading in readings if not reading.requests) == pytest.approx(6, abs=1)
+
+
+def test_a_line_without_devices_carries_out_jobs() -> None:
+    rig = Rig()
+    rig.schedule = Schedule(T9600, 0.0)
+    rig.schedule.submit(Task(asking(7)), 0.0)
+    assert rig.run(1.0) == []
+    assert rig.asked == [7]
+
+
+def test_jobs_and_requested_polls_outlast_a_change_of_what_is_polled() -> None:
+    rig = Rig(spec(1, 100.0), spec(2, 100.0))
+    rig.run(1.0)
+    rig.schedule.submit(rig.poll_of("slave-1", 5), rig.now)
+    rig.schedule.submit(Task(asking(7)), rig.now)
+    rig.replace(spec(1, 100.0))
+    rig.asked.clear()
+    assert [reading.requests for reading in rig.run(2.0)] == [(5,)]
+    assert rig.asked == [1, 7]
+
+
+def test_a_job_that_probes_has_the_share_of_probes_while_somebody_answers() -> None:
+    rig = Rig(spec(1, 0.0))
+    job = Task(*[word for _ in range(2000) for word in (asking(7), Later(0.0))], share=0.3)
+    job.errand = Errand.PROBE
+    rig.run(0.5)
+    rig.schedule.submit(job, rig.now)
+    rig.run(100.0)
+    assert rig.asked.count(7) / len(rig.asked) < 0.06
+
+
+def test_while_the_port_is_lost_nothing_is_told_of_a_device_that_is_gone() -> None:
+    rig = Rig(spec(1), spec(2))
+    stale = rig.poll_of("slave-2")
+    rig.replace(spec(1))
+    lost = rig.schedule.port_lost(GONE, 1.0)
+    assert [(reading.device, reading.at) for reading in lost] == [("slave-1", 1.0)]
+    assert rig.schedule.submit(stale, 2.0) == []
+    (told,) = rig.schedule.submit(rig.poll_of("slave-1"), 3.0)
+    assert told.at == 3.0
+
+
+def test_when_the_port_is_back_what_a_lost_job_excluded_is_free_and_jobs_are_carried_out() -> None:
+    rig = Rig(spec(1))
+    rig.schedule.submit(Task(asking(1), excludes=frozenset({1})), 0.0)
+    assert rig.ask() == asking(1)
+    rig.schedule.port_lost(GONE, 0.5)
+    assert [each.codec for each in rig.schedule.unanswered.earlier(1)] == [RTU]
+    rig.now = 1.0
+    rig.schedule.port_opened(1.0)
+    rig.schedule.submit(Task(asking(7)), 1.0)
+    rig.asked.clear()
+    rig.run(1.5)
+    assert rig.asked == [7, 1]
+
+
+def test_a_single_dead_device_is_probed_and_the_line_rests_until_then() -> None:
+    rig = Rig(spec(1, 0.5), rules=PollRules(offline_after=1))
+    rig.dead = {1}
+    (first,) = rig.run(0.3)
+    decision = rig.schedule.next(rig.now)
+    assert not first.online
+    assert isinstance(decision, Rest)
+    assert decision.until == pytest.approx(1.0, abs=0.3)
+    rig.now = decision.until
+    ask = rig.ask()
+    assert ask is not None
+    device = rig.schedule.devices["slave-1"]
+    assert rig.schedule.errand is Errand.PROBE
+    assert (device.polling, device.last_asked) == (True, rig.now)
+    (reading,) = rig.settle(ask)
+    assert reading.probe
+    assert not device.polling
+
+
+def test_the_line_rests_until_the_share_of_a_job_allows() -> None:
+    rig = Rig()
+    rig.schedule.submit(Task(*[word for _ in range(9) for word in (asking(7), Later(0.0))], share=0.01), 0.0)
+    while (ask := rig.ask()) is not None:
+        rig.settle(ask)
+    decision = rig.schedule.next(rig.now)
+    assert isinstance(decision, Rest)
+    assert rig.now < decision.until < rig.now + 10.0
+    rig.now = decision.until
+    assert rig.ask() is not None
+
+
+def test_a_requested_poll_that_is_tried_again_goes_before_others_that_are_due() -> None:
+    rig = Rig(spec(1, 100.0), spec(2, 1.0))
+    rig.run(1.5)
+    rig.dead = {1}
+    rig.schedule.submit(rig.poll_of("slave-1"), 1.95)
+    rig.now = 1.95
+    rig.asked.clear()
+    rig.run(2.2)
+    assert rig.asked[:2] == [1, 1]
+
+
+def test_a_requested_poll_whose_device_goes_while_it_is_on_the_line_is_over_then() -> None:
+    rig = Rig(spec(1, 100.0))
+    rig.run(1.0)
+    poll = rig.poll_of("slave-1")
+    rig.schedule.submit(poll, rig.now)
+    ask = rig.ask()
+    rig.replace()
+    assert ask is not None
+    assert rig.settle(ask) == []
+    assert poll.at == rig.now
+
+
+def test_one_never_heard_that_is_silent_after_another_is_asked_twice_though_somebody_answers() -> None:
+    rig = Rig(spec(1, 100.0), spec(2, 100.0), spec(3, 100.0))
+    rig.dead = {2, 3}
+    rig.run(1.0)
+    assert rig.asked == [1, 2, 3, 3]
+
+
+def test_one_that_answered_before_is_not_asked_again_at_once_for_the_silence_of_another() -> None:
+    rig = Rig(spec(1, 1.0), spec(2, 1.0), spec(3, 1.0), rules=PollRules(retries=0))
+    rig.run(1.9)
+    rig.dead = {2, 3}
+    rig.asked.clear()
+    rig.run(2.9)
+    assert rig.asked == [1, 2, 3]
+
+
+def test_what_takes_exactly_the_longest_time_out_is_learned() -> None:
+    rig = Rig(spec(1))
+    ask = rig.ask()
+    assert ask is not None
+    rig.settle(ask, [LateAnswer(ReadRegisters(1, 0x0001, 2), LEARNED_MOST)])
+    assert rig.schedule.devices["slave-1"].turnarounds.p99 == LEARNED_MOST
+
+
+def test_a_refusal_teaches_nothing_about_time_nor_does_an_answer_without_one() -> None:
+    rig = Rig(spec(1))
+    ask = rig.ask()
+    assert ask is not None
+    refused = replace(rig.outcome(ask), answer=None, fault=Fault(FaultCode.EXCEPTION, "refused", 2))
+    rig.schedule.settled(refused, 0.1)
+    rig.now = 1.0
+    ask = rig.ask()
+    assert ask is not None
+    rig.schedule.settled(replace(rig.outcome(ask), turnaround=None), 1.1)
+    assert len(rig.schedule.devices["slave-1"].turnarounds) == 0
+
+
+def test_grids_of_slow_devices_lie_two_exchanges_apart() -> None:
+    rig = Rig(spec(1, 100.0), spec(2, 100.0))
+    assert rig.schedule.devices["slave-2"].due == pytest.approx(2 * T9600.exchange(8, 9))

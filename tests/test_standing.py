@@ -7,28 +7,18 @@ from typing import TYPE_CHECKING, cast
 
 import pytest
 
-from lfs10d.facts import DeviceFacts, Instant
+from lfs10d.facts import Instant
 from lfs10d.reading import Fault, FaultCode, Reading
 from lfs10d.standing import STATE_EARLY, Standing
 from lfs10d.telemetry import Kind
+from tests.stations import ONE_VALUE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from lfs10d.telemetry import Publication
 
-FACTS = DeviceFacts(
-    name="a",
-    slave=3,
-    label="Mast",
-    profile="lfs10",
-    interval=0.25,
-    enabled=True,
-    response_timeout=None,
-    value_names=("wind_speed",),
-    units={"wind_speed": "m/s"},
-    offline_after=2,
-)
+FACTS = replace(ONE_VALUE, slave=3, label="Mast", interval=0.25)
 TIMEOUT = Fault(FaultCode.TIMEOUT, "no answer in 200 ms")
 CRC = Fault(FaultCode.CRC, "check wrong")
 BUSY = Fault(FaultCode.EXCEPTION, "busy", exception_code=6, busy=True)

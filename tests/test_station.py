@@ -9,94 +9,35 @@ from typing import TYPE_CHECKING, cast
 import pytest
 
 from lfs10d.outbound import outbound
-from lfs10d.reading import (
-    Errand,
-    Exchanged,
-    Fault,
-    FaultCode,
-    PortChanged,
-    Reading,
-    UartCounted,
-    UartCounters,
-)
-from lfs10d.station import DaemonFacts, DeviceFacts, Instant, LineFacts, Station
+from lfs10d.reading import Errand, Exchanged, FaultCode, PortChanged, UartCounted, UartCounters
+from lfs10d.station import Instant, Station
 from lfs10d.telemetry import Backlog, Kind
+from tests.stations import (
+    DAEMON,
+    FULL,
+    LINE,
+    LINE_TOPICS,
+    LOCKED,
+    LOST,
+    ONE_VALUE,
+    THIRD,
+    TIMEOUT,
+    TWO_VALUES,
+    WALL,
+    ail,
+    failed,
+    fields,
+    good,
+    instant,
+    shown,
+    station,
+    topics,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping
 
-    from lfs10d.telemetry import Clock, Payload, Publication
-
-WALL = 1_795_298_000.0
-DAEMON = DaemonFacts("0.1", "gw", "k3f9a2c7", "k3f9a2c6", "abc", 0, {"version": "5"}, ("store",))
-LINE = LineFacts("line0", "/dev/ttyUSB0", 9600, "none", 8, 1, "rtu", 0.0036458)
-ONE_VALUE = DeviceFacts(
-    name="a",
-    slave=2,
-    label=None,
-    profile="lfs10",
-    interval=1.0,
-    enabled=True,
-    response_timeout=None,
-    value_names=("wind_speed",),
-    units={"wind_speed": "m/s"},
-    offline_after=2,
-)
-TWO_VALUES = replace(
-    ONE_VALUE,
-    name="b",
-    slave=3,
-    label="Fan",
-    profile="fuling-dzb",
-    value_names=("output_current", "speed"),
-    units={"output_current": "A", "speed": "rpm"},
-)
-THIRD = replace(ONE_VALUE, name="c", slave=4)
-
-TIMEOUT = Fault(FaultCode.TIMEOUT, "no answer in 200 ms")
-LOST = Fault(FaultCode.PORT_LOST, "absent: plug it in")
-LOCKED = Fault(FaultCode.PORT_BUSY, "locked by minicom")
-FULL = Fault(FaultCode.STORAGE_FULL, "disk full")
-
-LINE_TOPICS = {"info", "devices", "line/state", "line/error", "line/stats"}
-
-
-def instant(mono: float, clock: Clock = "synced") -> Instant:
-    return Instant(mono, WALL + mono, clock)
-
-
-def station(*devices: DeviceFacts) -> Station:
-    return Station(DAEMON, LINE, devices or (ONE_VALUE, TWO_VALUES), instant(0))
-
-
-def good(device: str, at: float) -> Reading:
-    values = {"output_current": 1.5, "speed": 1450} if device == "b" else {"wind_speed": 12.34}
-    return Reading(device, at, values, None, 0.02, online=True, response_timeout=0.2)
-
-
-def failed(device: str, at: float, fault: Fault, *, online: bool = False, overruns: int = 0) -> Reading:
-    return Reading(device, at, None, fault, None, online=online, response_timeout=0.2, overruns=overruns)
-
-
-def topics(published: Iterable[Publication]) -> list[str]:
-    return [each.topic for each in published]
-
-
-def fields(payload: object, *keys: str) -> tuple[object, ...]:
-    return tuple(cast("Mapping[str, object]", payload)[key] for key in keys)
-
-
-def shown(of: Station, topic: str, at: float = 0) -> Payload:
-    """Return what the next burst says on one topic."""
-    (payload,) = [each.payload for each in of.burst(instant(at)) if each.topic == topic]
-    return payload
-
-
-def ail(of: Station, device: str = "a", *, since: float = 0) -> list[str]:
-    """Let a device fail until its error has risen."""
-    first = of.heard(failed(device, since, TIMEOUT), instant(since))
-    return topics(first + of.heard(failed(device, since + 1, TIMEOUT), instant(since + 1)))
-
+    from lfs10d.telemetry import Payload
 
 # -- the burst ----------------------------------------------------------------------------------------------------
 
@@ -512,3 +453,41 @@ def test_a_reading_of_a_disabled_device_is_told_only_if_a_request_wants_it() -> 
     told = station(replace(ONE_VALUE, enabled=False))
     assert told.heard(good("a", 1), instant(1)) == []
     assert topics(told.heard(replace(good("a", 2), requests=(1,)), instant(2))) == ["device/a/telemetry"]
+
+
+def test_statistics_that_are_due_just_now_are_due_once() -> None:
+    running = station()
+    assert running.due() == 30
+    assert "line/stats" in topics(running.tick(instant(60)))
+    assert running.due() == 90
+
+
+def test_a_snapshot_says_when_it_is_and_since_when_the_daemon_runs() -> None:
+    snapshot = station().snapshot(instant(2))
+    assert (snapshot["ts"], snapshot["time"]) == (1_795_298_002_000, "2026-11-21T21:53:22.000Z")
+    assert fields(snapshot["info"], "started", "clock") == (1_795_298_000_000, "synced")
+
+
+def test_a_summary_counts_who_is_polled_and_says_how_busy_the_line_is() -> None:
+    running = station(ONE_VALUE, TWO_VALUES, replace(THIRD, enabled=False))
+    running.heard(good("a", 0.4), instant(0.4))
+    assert running.summary(instant(0.5)) == "1 of 2 slaves online"
+    running.heard(Exchanged(1.5, 0.0, 0.0, None, 2, Errand.POLL, None, b"", b""), instant(1.5))
+    assert running.summary(instant(2)) == "1 of 2 slaves online, line 75 % busy"
+
+
+def test_what_is_told_late_is_dated_when_it_happened() -> None:
+    running = station()
+    running.heard(good("a", 1), instant(5))
+    assert fields(shown(running, "device/a/stats", 5), "last_good_ts") == (1_795_298_001_000,)
+    running.heard(PortChanged(6, LOST), instant(9))
+    assert fields(shown(running, "line/error", 9), "since") == (1_795_298_006_000,)
+    running.heard(PortChanged(10, None), instant(11))
+    assert fields(shown(running, "line/error", 11), "cleared") == (1_795_298_011_000,)
+
+
+def test_while_the_port_is_lost_no_failure_is_held_against_a_device() -> None:
+    running = station()
+    running.heard(PortChanged(0, LOST), instant(0))
+    assert "device/a/error" not in ail(running, since=1)
+    assert fields(shown(running, "device/a/error"), "active") == (False,)

@@ -11,56 +11,13 @@ from hypothesis import strategies as st
 
 from lfs10d.outbound import check
 from lfs10d.reading import Errand, Exchanged, Fault, FaultCode, PortChanged, Reading
-from lfs10d.station import DaemonFacts, DeviceFacts, Instant, LineFacts, Station
+from lfs10d.station import DeviceFacts, Instant, Station
+from tests.stations import DAEMON, FULL, LINE, LOCKED, LOST, ONE_VALUE, THIRD, TWO_VALUES, fields, good, instant
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
     from lfs10d.telemetry import Clock, Payload, Publication
-
-WALL = 1_795_298_000.0
-DAEMON = DaemonFacts("0.1", "gw", "k3f9a2c7", "k3f9a2c6", "abc", 0, {"version": "5"}, ("store",))
-LINE = LineFacts("line0", "/dev/ttyUSB0", 9600, "none", 8, 1, "rtu", 0.0036458)
-ONE_VALUE = DeviceFacts(
-    name="a",
-    slave=2,
-    label=None,
-    profile="lfs10",
-    interval=1.0,
-    enabled=True,
-    response_timeout=None,
-    value_names=("wind_speed",),
-    units={"wind_speed": "m/s"},
-    offline_after=2,
-)
-TWO_VALUES = replace(
-    ONE_VALUE,
-    name="b",
-    slave=3,
-    label="Fan",
-    profile="fuling-dzb",
-    value_names=("output_current", "speed"),
-    units={"output_current": "A", "speed": "rpm"},
-)
-THIRD = replace(ONE_VALUE, name="c", slave=4)
-
-LOST = Fault(FaultCode.PORT_LOST, "absent: plug it in")
-LOCKED = Fault(FaultCode.PORT_BUSY, "locked by minicom")
-FULL = Fault(FaultCode.STORAGE_FULL, "disk full")
-
-
-def instant(mono: float, clock: Clock = "synced") -> Instant:
-    return Instant(mono, WALL + mono, clock)
-
-
-def good(device: str, at: float) -> Reading:
-    values = {"output_current": 1.5, "speed": 1450} if device == "b" else {"wind_speed": 12.34}
-    return Reading(device, at, values, None, 0.02, online=True, response_timeout=0.2)
-
-
-def fields(payload: object, *keys: str) -> tuple[object, ...]:
-    return tuple(cast("Mapping[str, object]", payload)[key] for key in keys)
-
 
 FLEET = (ONE_VALUE, TWO_VALUES, THIRD)
 FAULTS = [Fault(code, "why", 6 if code is FaultCode.EXCEPTION else None, b"\x01\xff") for code in FaultCode] + [

@@ -6,6 +6,7 @@ a fixed moment, so the page is the same each time.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from lfs10d import telemetry
@@ -41,18 +42,7 @@ _MAST = DeviceFacts(
     units={"wind_speed": "m/s"},
     offline_after=3,
 )
-_ROOF = DeviceFacts(
-    name="slave-3",
-    slave=3,
-    label=None,
-    profile="lfs10",
-    interval=1.0,
-    enabled=True,
-    response_timeout=None,
-    value_names=("wind_speed",),
-    units={"wind_speed": "m/s"},
-    offline_after=3,
-)
+_ROOF = replace(_MAST, name="slave-3", slave=3, label=None)
 _LINE = LineFacts(
     name=LINE,
     port="/dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A50285BI-if00-port0",
