@@ -184,8 +184,7 @@ class Life:
         self.daemon.go(seconds)
         for sensor in self.line.sensors:
             sensor.heal()
-            if sensor.hung:
-                sensor.power_cycle()
+            sensor.hung = False  # not by a power cycle: its registers know no 115200 baud
         ended = self.daemon.clock.now
         self.daemon.go(CALM)
         while not self._recovered(ended) and self.daemon.clock.now < ended + RECOVERY:
