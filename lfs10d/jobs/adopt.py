@@ -144,7 +144,10 @@ def _free_id(wish: Newcomer, asking: Asking) -> Generator[Step, Any, int | None]
 def _at_line_rate(old: Spot, rate: int, asking: Asking) -> Generator[Step, Any, Verdict | None]:
     """Bring the newcomer to the line's rate; return why that failed, None if it did not."""
     sensor = Sensor("", old.slave, asking)
-    exception, at = yield from shifted(sensor, old.baudrate, rate)
+    exception, at, twins = yield from shifted(sensor, old.baudrate, rate)
+    if twins:
+        back = yield from restored(sensor, old.baudrate, rate)
+        return Verdict(Ending.BOTH, at=old.baudrate, stays_open=back is None)
     if at == rate:
         return None
     if at is None:

@@ -6,14 +6,15 @@ Rules
    is on the disk before the first write. Only the register of the rate is written, and only to one slave at a time.
 2. The first sensor is the canary: if it answers only at the old rate its register is written back, and nothing else
    is touched. Each next one is written when the one before answers at the new rate.
-3. If a later one fails, those already moved are moved back, for up to `ROLL_BACK`.
+3. If a later one fails, those already moved are moved back, for up to `ROLL_BACK`. One that answers at both rates
+   since the write is two sensors: they are moved back too.
 4. With `power_cycle` all are written and none is expected at the new rate yet; each register must say the new rate.
 5. A sensor that is found nowhere is asked at both rates until it is found, and brought to the line's.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
@@ -47,6 +48,7 @@ class Ended(StrEnum):
     PENDING = "pending"
     REFUSED = "refused"
     CANARY = "canary"
+    TWINS = "twins"
     ROLLED_BACK = "rolled_back"
     UNVERIFIED = "unverified"
 
@@ -102,6 +104,11 @@ class RateVerdict:
     exception: int | None = None
     why: str = ""
 
+    @property
+    def restored(self) -> bool:
+        """Every sensor is at the old rate again."""
+        return self.ended is Ended.ROLLED_BACK
+
 
 @dataclass(frozen=True, slots=True)
 class WriteRates:
@@ -155,8 +162,11 @@ def _looked_before(wish: RateWish, echo_known: Callable[[], bool]) -> Generator[
 
 def _one_by_one(wish: RateWish, where: dict[str, int | None]) -> Generator[Step, Any, RateVerdict]:
     for n, sensor in enumerate(wish.sensors):
-        exception, rate = yield from shifted(sensor, wish.old, wish.to)
+        exception, rate, twins = yield from shifted(sensor, wish.old, wish.to)
         where[sensor.name] = rate
+        if twins:
+            verdict = yield from rolled_back(wish.sensors[: n + 1], wish.old, wish.to, where)
+            return replace(verdict, ended=Ended.TWINS, names=(sensor.name,)) if verdict.restored else verdict
         if rate == wish.to:
             continue
         if n == 0 and rate == wish.old:
@@ -181,13 +191,16 @@ def _all_written(wish: RateWish, where: dict[str, int | None]) -> Generator[Step
     return RateVerdict(Ended.PENDING if pending else Ended.MOVED, where, pending)
 
 
-def shifted(sensor: Sensor, old: int, to: int) -> Generator[Step, Any, tuple[int | None, int | None]]:
-    """Write another rate to a sensor; return the code of an exception, and the rate at which it answers then."""
+def shifted(sensor: Sensor, old: int, to: int) -> Generator[Step, Any, tuple[int | None, int | None, bool]]:
+    """Write another rate to a sensor; return the code of an exception, and the rate at which it answers then.
+
+    The third says that it answers at both: there are two of this slave id.
+    """
     exception = yield from written(sensor.at(old), sensor.register, sensor.code(to), sensor.asking)
     found = yield from verified(sensor.at(old), sensor.at(to), sensor.asking)
     if found.new.answers:
-        return exception, to
-    return exception, old if found.old.answers else None
+        return exception, to, found.old.answers
+    return exception, old if found.old.answers else None, False
 
 
 def _found(sensor: Sensor, rates: Sequence[int]) -> Generator[Step, Any, tuple[int | None, int | None]]:
@@ -202,11 +215,11 @@ def _found(sensor: Sensor, rates: Sequence[int]) -> Generator[Step, Any, tuple[i
 
 def restored(sensor: Sensor, rate: int, other: int) -> Generator[Step, Any, int | None]:
     """Bring one sensor to `rate`, and its register; return the rate it answers at, None if it is not found."""
-    says, at = yield from _found(sensor, (rate, other))
+    says, at = yield from _found(sensor, (other, rate))  # there first: of two of this id one may have moved
     if at is None or (at == rate and says == sensor.code(rate)):
         return at
     if at == other:
-        _, at = yield from shifted(sensor, other, rate)
+        _, at, _ = yield from shifted(sensor, other, rate)
         return at
     yield from written(sensor.at(rate), sensor.register, sensor.code(rate), sensor.asking)
     for _ in range(TRIES):

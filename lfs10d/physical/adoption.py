@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import logging
 from dataclasses import dataclass
 from functools import partial
@@ -97,7 +96,7 @@ class Adoption:
         now = physical.running()
         wish = self._wish(wanted, now)
         if isinstance(wish, Answer):
-            return wish
+            return await physical.refused(asked, wish)
         slave = SlaveConfig(id=wish.factory)
         clock = Now()
         talk = physical.talk()
@@ -163,11 +162,9 @@ class Adoption:
         old, to = wish.factory, found.to or 0
         name = wanted.name or default_device_name(to)
         answer = _answer(name, old, to, verdict, written=change is not None)
-        told = physical.told(asked, answer)
         if change is None or verdict.ending in NOTHING_WRITTEN:
-            with contextlib.suppress(StateError):
-                await physical.put(partial(physical.journal.close, frozenset(), told))
-            return answer
+            return await physical.refused(asked, answer)
+        told = physical.told(asked, answer)
         numbers = frozenset({change.number})
         try:
             if verdict.ending is Ending.MOVED:

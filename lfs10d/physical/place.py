@@ -119,8 +119,9 @@ class Physical:
         return self.journal.open
 
     def changes_of(self, device: str) -> frozenset[int]:
-        """Return the numbers of the open changes of a device."""
-        return frozenset(change.number for change in self.journal.open if device in change.devices)
+        """Return the numbers of the open changes of a device's slave id."""
+        moves = (change for change in self.journal.open if change.kind != "baudrate")
+        return frozenset(change.number for change in moves if device in change.devices)
 
     @property
     def busy(self) -> Answer | None:
@@ -150,9 +151,9 @@ class Physical:
 
     async def baudrate(self, to: int, *, power_cycle: bool, dry_run: bool, call: Call) -> Answer:
         """Move every sensor and the port to another rate, verified, or back."""
-        if (busy := self.busy) is not None:
-            return busy
         who = asked.asked_by(ratechange.NAME, call)
+        if (busy := self.busy) is not None:
+            return await self.refused(who, busy)
         with self.place(ratechange.NAME):
             self._act(ratechange.ACTIVITY)
             try:
@@ -162,20 +163,28 @@ class Physical:
 
     async def adopt(self, wanted: Newcomer, call: Call) -> Answer:
         """Take in a factory-new sensor: a free id, the line's rate, and it is polled."""
-        if (busy := self.busy) is not None:
-            return busy
+        who = asked.asked_by(adoption.NAME, call)
+        if (busy := self.busy or self._rates.unsettled()) is not None:
+            return await self.refused(who, busy)
         with self.place(adoption.NAME, wanted.slaves):
-            return await self._adoption.perform(wanted, asked.asked_by(adoption.NAME, call))
+            return await self._adoption.perform(wanted, who)
 
     async def readdress(self, device: str, to: int, *, dry_run: bool, call: Call) -> Answer:
         """Give a sensor another slave id, verified."""
+        who = asked.asked_by(readdressing.NAME, call)
         slave = self._moves.fit(device, to)
         if isinstance(slave, Answer):
-            return slave
-        if (busy := self.busy) is not None:
-            return busy
+            return await self.refused(who, slave)
+        if (busy := self.busy or self._rates.unsettled(device)) is not None:
+            return await self.refused(who, busy)
         with self.place(readdressing.NAME, frozenset({slave.id, to})):
-            return await self._moves.perform(slave, to, asked.asked_by(readdressing.NAME, call), dry_run=dry_run)
+            return await self._moves.perform(slave, to, who, dry_run=dry_run)
+
+    async def refused(self, who: Asked, answer: Answer) -> Answer:
+        """Return the answer to a request of which nothing was written, kept for its repeats."""
+        with contextlib.suppress(StateError):  # a repeat may be judged anew
+            await self.put(partial(self.journal.close, frozenset(), self.told(who, answer)))
+        return answer
 
     # -- what the kinds of change have in common
 
@@ -229,7 +238,7 @@ class Physical:
             await asyncio.wait([self._writing])
         mine = next((each for each in self.journal.open if each.asked == asked and not each.answered), None)
         if mine is None:
-            return rejected("cancelled", "the daemon is ending; nothing was written")
+            return await self.refused(asked, rejected("cancelled", "the daemon is ending; nothing was written"))
         answer = failed("cancelled", "the daemon is ending; at its next start it looks where the sensor is")
         with contextlib.suppress(StateError):
             await self.put(partial(self.journal.keep, mine.number, self.told(asked, answer)))

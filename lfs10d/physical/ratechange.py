@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import logging
 from dataclasses import replace
 from functools import partial
@@ -61,6 +60,13 @@ _WORDS: Mapping[Ended, tuple[ErrorCode, str]] = {
             "locked by a switch"
         ),
     ),
+    Ended.TWINS: (
+        "duplicate_id",
+        (
+            "since the write {names} answers at {old} and at {to} baud: two sensors have its slave id; take one of "
+            "them off the line. All are at {old} again"
+        ),
+    ),
     Ended.ROLLED_BACK: ("rolled_back", "not every sensor followed to {to} baud; all are at {old} again"),
     Ended.UNVERIFIED: (
         "not_verified",
@@ -80,11 +86,13 @@ class RateChange:
         physical = self._physical
         now = physical.running()
         old = now.config.line.baudrate
+        if to == old and (unsettled := self.unsettled()) is not None:
+            return await physical.refused(asked, unsettled)
         if to == old:
-            return ok({"from": old, "to": to, "pending": []})
+            return await physical.refused(asked, ok({"from": old, "to": to, "pending": []}))
         refusal = self._unfit(to, now)
         if refusal is not None:
-            return refusal
+            return await physical.refused(asked, refusal)
         earlier = frozenset(change.number for change in physical.journal.open)
         physical.leave(earlier)
         clock = Now()
@@ -101,6 +109,15 @@ class RateChange:
             return await self._conclude(wish, result or RateVerdict(Ended.LOST_BEFORE), change, earlier, asked)
 
         return await physical.carried_out(talk, asked, intend, conclude)
+
+    def unsettled(self, device: str | None = None) -> Answer | None:
+        """Return the rejection of what must wait until the rate of a device, or of all, is settled."""
+        for change in self._physical.open:
+            missing = change.facts.get("pending", sorted(change.devices)) if change.kind == "baudrate" else []
+            if missing and (device is None or device in missing):
+                to, names = change.facts["to"], ", ".join(missing)
+                return rejected("busy", f"the change to {to} baud is not over: {names} is still to be found there")
+        return None
 
     def _unfit(self, to: int, now: Effective) -> Answer | None:
         """Return why the line need not even be asked; None if it must be."""
@@ -142,11 +159,12 @@ class RateChange:
     ) -> Answer:
         physical = self._physical
         answer = _answer(wish.old, wish.to, verdict, dry_run=wish.dry_run)
-        told = physical.told(asked, answer)
         if change is None or verdict.ended in UNTOUCHED:
-            with contextlib.suppress(StateError):
-                await physical.put(partial(physical.journal.close, frozenset(), told))
-            return answer
+            return await physical.refused(asked, answer)
+        told = physical.told(asked, answer)
+        for sensor in wish.sensors if verdict.ended is Ended.TWINS else ():
+            if sensor.name in verdict.names:
+                physical.tell("duplicate_id", {"device": sensor.name, "slave": sensor.slave, "from": sensor.slave})
         try:
             if verdict.ended is Ended.MOVED or (wish.to in verdict.where.values() and verdict.ended is Ended.PENDING):
                 await self._record(wish.old, wish.to)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import logging
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -56,7 +55,8 @@ class Readdressing:
             if to in {other.id, *(place.id for place in now.places[other.name])}:
                 return rejected("address_in_use", f"slave id {to} is that of {other.name}", param="to")
         reserved = physical.reserved()
-        own = frozenset().union(*(each.slaves for each in physical.open if device in each.devices))
+        mine = physical.changes_of(device)
+        own = frozenset().union(*(each.slaves for each in physical.open if each.number in mine))
         if to in reserved and to not in own:
             return rejected("address_in_use", f"slave id {to} {reserved[to]}", param="to")
         return None
@@ -91,11 +91,9 @@ class Readdressing:
         physical = self._physical
         journal = physical.journal
         answer = findings.readdressed(device, wish, verdict, profile)
-        told = physical.told(asked, answer)
         if change is None or verdict.ending in NOTHING_WRITTEN:
-            with contextlib.suppress(StateError):  # nothing changed: a repeat may be judged anew
-                await physical.put(partial(journal.close, frozenset(), told))
-            return answer
+            return await physical.refused(asked, answer)
+        told = physical.told(asked, answer)
         try:
             if verdict.ending is Ending.MOVED:
                 await physical.record(device, wish.new)

@@ -1,21 +1,22 @@
-"""What holds whatever the sensors are like, whoever dies when: nobody is stranded, no id is shared, all is answered."""
+"""What holds whatever the sensors are like, whoever dies when: nobody is stranded, no id is shared, all is answered.
+
+`LFS10D_EXAMPLES` is how many stories are told of each kind, 60 if it is not set.
+"""
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Any
 
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from lfs10d.commands import Call
-from lfs10d.forgetful import PowerCutError
+from tests.physical.story import Story
 
 if TYPE_CHECKING:
-    import asyncio
-
     from tests.physical.conftest import Bench
 
-IDS = (3, 4, 5)
+EXAMPLES = int(os.environ.get("LFS10D_EXAMPLES", "60"))
 AILMENTS: list[tuple[str, dict[str, Any]]] = [
     ("none", {}),
     ("none", {}),
@@ -32,108 +33,78 @@ AILMENTS: list[tuple[str, dict[str, Any]]] = [
     ("slow_flash", {"delay": 5.0}),
     ("echo_losing", {}),
     ("silent", {}),
+    ("silent", {"first": 4.0, "last": 9.0}),
+    ("silent", {"first": 8.0}),
     ("exception", {"code": 4}),
     ("late", {"delay": 0.35}),
     ("late", {"delay": 0.75}),
 ]
-STEPS = st.one_of(
-    st.tuples(st.just("ask"), st.sampled_from(IDS), st.sampled_from([3, 4, 5, 9, 10, 200])),
-    st.tuples(st.just("ask then crash"), st.sampled_from(IDS), st.tuples(st.sampled_from([9, 10]), st.integers(0, 18))),
-    st.tuples(
-        st.just("ask then leave"), st.sampled_from(IDS), st.tuples(st.sampled_from([9, 10]), st.integers(1, 260))
-    ),
-    st.tuples(st.just("sensor power"), st.sampled_from(IDS), st.just(0)),
-    st.tuples(st.just("heal"), st.sampled_from(IDS), st.just(0)),
-    st.tuples(st.just("wait"), st.just(0), st.integers(1, 200)),
-    st.tuples(st.just("unplug"), st.just(0), st.integers(1, 60)),
+SPEAKING = [ailment for ailment in AILMENTS if ailment[0] != "silent"]
+ENDS = st.one_of(
+    st.just(("finish", 0)),
+    st.just(("finish", 0)),
+    st.tuples(st.just("crash"), st.integers(0, 18)),
+    st.tuples(st.just("leave"), st.integers(1, 400)),
+    st.tuples(st.just("sigterm"), st.integers(1, 260)),
 )
+DONE = st.just(("finish", 0))
+NAMES = st.sampled_from(["s3", "s3", "s4", "s5"])
+TARGETS = st.sampled_from([3, 4, 5, 9, 10, 200])
+READDRESS = st.tuples(st.just("readdress"), NAMES, TARGETS, ENDS)
+BAUDRATE = st.tuples(st.just("baudrate"), st.booleans(), st.just(0), ENDS)
+ADOPT = st.tuples(st.just("adopt"), st.just(0), st.just(0), ENDS)
+PLUG = st.tuples(st.just("plug"), st.sampled_from([9600, 19200]), st.sampled_from(SPEAKING), DONE)
+HAPPENINGS = st.one_of(
+    st.tuples(st.just("power"), st.integers(0, 6), st.just(0), DONE),
+    st.tuples(st.just("heal"), st.integers(0, 6), st.just(0), DONE),
+    st.tuples(st.just("wait"), st.sampled_from([0.3, 2.0, 20.0]), st.just(0), DONE),
+    st.tuples(st.just("unplug"), st.sampled_from([0.3, 2.0, 6.0]), st.just(0), DONE),
+)
+THREE = st.lists(st.sampled_from(AILMENTS), min_size=3, max_size=3)
+CHECKS = settings(max_examples=EXAMPLES, deadline=None, suppress_health_check=list(HealthCheck))
 
 
-class Story:
-    """One run: sensors by their first id, the lives that follow one another, what was asked."""
-
-    def __init__(self, bench: Bench, ailments: list[tuple[str, dict[str, Any]]]) -> None:
-        self.bench = bench
-        self.life = bench.sensors(*IDS, poll="{interval: 500ms}")
-        self.by_name = {f"s{sensor.slave}": sensor for sensor in bench.line.sensors}
-        for sensor, (kind, particulars) in zip(bench.line.sensors, ailments, strict=True):
-            if kind != "none":
-                sensor.ail(kind, **particulars)
-        bench.go(self.life, 3.0)
-
-    def step(self, what: str, slave: int, more: Any) -> None:  # noqa: ANN401 - as the step wants
-        bench, name = self.bench, f"s{slave}"
-        match what:
-            case "ask":
-                bench.readdress(self.life, name, more)
-            case "ask then crash":
-                to, steps = more
-                self._crash(name, to, steps)
-            case "ask then leave":
-                to, turns = more
-                self._begin(name, to)
-                for _ in range(turns):
-                    bench.turn(self.life)
-                self._restart()
-            case "sensor power":
-                self.by_name[name].power_cycle()
-            case "heal":
-                self.by_name[name].heal()
-            case "wait":
-                bench.go(self.life, more * 0.1)
-            case _:
-                bench.port.unplug()
-                bench.go(self.life, more * 0.1)
-                bench.port.replug()
-                bench.go(self.life, 3.0)
-        self.check()
-
-    def _begin(self, name: str, to: int) -> asyncio.Task[Any]:
-        request = self.life.physical.readdress(name, to, dry_run=False, call=Call("x", fingerprint=str(to)))
-        return self.bench.loop.create_task(request)
-
-    def _crash(self, name: str, to: int, steps: int) -> None:
-        """Die at this step on the disk of the request, if it gets so far."""
-        bench = self.bench
-        task = self._begin(name, to)
-        bench.files.steps_left = bench.files.steps + steps
-        for _ in range(800):
-            bench.turn(self.life)
-            if task.done():
-                break
-        if task.done() and isinstance(task.exception(), PowerCutError):
-            self._restart()
-        bench.files.steps_left = None
-
-    def _restart(self) -> None:
-        self.bench.cut()
-        self.life = self.bench.begin()
-        self.bench.go(self.life, 1.0)
-
-    def check(self) -> None:
-        """No two sensors have one id, and each is where the daemon has it, or where it says it may be."""
-        ids = [sensor.slave for sensor in self.by_name.values()]
-        assert len(set(ids)) == len(ids)
-        for name, sensor in self.by_name.items():
-            place = self.life.place(name)
-            assert sensor.slave == place or {sensor.slave, place} <= set(self.life.physical.reserved())
-
-
-@given(st.lists(st.sampled_from(AILMENTS), min_size=3, max_size=3), st.lists(STEPS, min_size=1, max_size=6))
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_no_sensor_is_stranded_whatever_happens(
-    bench: Bench, ailments: list[tuple[str, dict[str, Any]]], steps: list[tuple[str, int, Any]]
-) -> None:
-    bench.renew()
-    story = Story(bench, ailments)
+def told(story: Story, steps: list[tuple[str, Any, Any, tuple[str, int]]]) -> None:
     for step in steps:
         story.step(*step)
-    for sensor in story.by_name.values():
-        sensor.heal()
-        sensor.power_cycle()
-    story._restart()
-    bench.go(story.life, 60.0)
-    story.check()
-    for name, sensor in story.by_name.items():
-        assert story.life.place(name) == sensor.slave, "healed and powered anew, it is found"
-    assert not [change for change in story.life.physical.open if not change.answered], "every request has its answer"
+    story.mend()
+    story.settled()
+
+
+@given(THREE, st.lists(st.one_of(READDRESS, READDRESS, HAPPENINGS), min_size=1, max_size=6))
+@CHECKS
+def test_no_sensor_is_stranded_by_new_ids(bench: Bench, ails: list[Any], steps: list[Any]) -> None:
+    bench.renew()
+    told(Story(bench, ails), steps)
+
+
+@given(THREE, st.lists(st.one_of(BAUDRATE, BAUDRATE, HAPPENINGS), min_size=1, max_size=4))
+@CHECKS
+def test_no_sensor_is_stranded_by_another_rate(bench: Bench, ails: list[Any], steps: list[Any]) -> None:
+    bench.renew()
+    told(Story(bench, ails), steps)
+
+
+@given(THREE, st.lists(st.one_of(READDRESS, BAUDRATE, PLUG, ADOPT, HAPPENINGS), min_size=2, max_size=7))
+@CHECKS
+def test_no_sensor_is_stranded_by_any_mix_of_changes(bench: Bench, ails: list[Any], steps: list[Any]) -> None:
+    bench.renew()
+    story = Story(bench, ails)
+    told(story, steps)
+    for newcomer in story.newcomers:
+        places = {slave.id for slave in story.life.running.now.config.slaves}
+        assert newcomer.slave == 1 or (newcomer.slave in places and newcomer.format.baudrate == story.rate)
+
+
+@given(
+    THREE,
+    st.tuples(st.sampled_from([None, *SPEAKING]), st.sampled_from([None, *SPEAKING])),
+    st.sampled_from([0.005, 0.0055, 0.009, 0.04]),
+    st.lists(st.one_of(READDRESS, READDRESS, BAUDRATE, PLUG, ADOPT, HAPPENINGS), min_size=1, max_size=5),
+)
+@CHECKS
+def test_duplicates_are_told_and_nobody_is_stranded(
+    bench: Bench, ails: list[Any], others: tuple[Any, Any], turnaround: float, steps: list[Any]
+) -> None:
+    bench.renew()
+    told(Story(bench, ails, twin=others[0], stranger=others[1], turnaround=turnaround), steps)

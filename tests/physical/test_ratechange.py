@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from lfs10d.commands import Answer, Call
+from lfs10d.physical.adoption import Newcomer
+from lfs10d.simulator.sensor import Sensor
 
 if TYPE_CHECKING:
     from lfs10d.simulator.line import Request
@@ -131,3 +133,45 @@ def test_with_power_cycle_all_are_written_and_followed_until_they_come_up(bench:
     bench.go(life, 60.0)
     assert not life.physical.open
     assert min(fresh(bench, life).values()) >= 8
+
+
+def test_two_sensors_of_one_id_of_which_one_moves_are_told_and_moved_back(bench: Bench) -> None:
+    life = bench.sensors(3, 4)
+    twin = bench.line.add(Sensor(4))
+    twin.ail("power_cycle")
+    bench.go(life, 3.0)
+    answer = change(bench, life)
+    assert (answer.status, answer.code) == ("failed", "duplicate_id")
+    assert rates(bench) == [9600] * 3
+    assert [sensor.words[4] for sensor in bench.line.sensors[:2]] == [1, 1]
+    assert life.told("duplicate_id") == [{"device": "s4", "slave": 4, "from": 4}]
+    assert not life.physical.open
+
+
+def test_while_sensors_are_still_to_come_up_nothing_else_is_done_to_them(bench: Bench) -> None:
+    life = bench.sensors(3, 4, 5)
+    for sensor in bench.line.sensors[:2]:
+        sensor.ail("power_cycle")
+    bench.go(life, 3.0)
+    assert change(bench, life, power_cycle=True).data == {"from": 9600, "to": 19200, "pending": ["s3", "s4"]}
+    assert life.running.now.config.line.baudrate == 19200, "s5 is there already"
+    busy = bench.readdress(life, "s3", 9)
+    assert (busy.status, busy.code) == ("rejected", "busy")
+    adopting = bench.ask(life, life.physical.adopt(Newcomer(), Call("n1")))
+    assert (adopting.status, adopting.code) == ("rejected", "busy")
+    assert bench.readdress(life, "s5", 9, id="a2").status == "ok", "it is there already"
+    for sensor in bench.line.sensors[:2]:
+        sensor.power_cycle()
+    bench.go(life, 60.0)
+    assert not life.physical.open
+    assert set(fresh(bench, life)) == {"s3", "s4", "s5"}
+
+
+def test_the_rate_of_now_is_not_called_settled_while_sensors_may_come_up_at_another(bench: Bench) -> None:
+    life = bench.sensors(3, 4)
+    for sensor in bench.line.sensors:
+        sensor.ail("power_cycle")
+    bench.go(life, 3.0)
+    assert change(bench, life, power_cycle=True).status == "ok"
+    answer = change(bench, life, to=9600)
+    assert (answer.status, answer.code) == ("rejected", "busy")

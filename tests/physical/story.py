@@ -1,0 +1,228 @@
+"""A story of a line: requests, faults, crashes and power cuts in any order, and what must hold after each of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from lfs10d.forgetful import PowerCutError
+from lfs10d.simulator.sensor import Sensor
+from lfs10d.simulator.wire import Format
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from tests.physical.conftest import Bench, Life
+
+IDS = (3, 4, 5)
+RATES = 9600 + 19200
+LONGEST = 4000
+"""Turns of 50 ms after which a request counts as never answered."""
+
+
+@dataclass
+class Asked:
+    """One request, and how often its answer was heard before it was repeated."""
+
+    name: str
+    parameters: dict[str, Any]
+    journalled: bool = False
+    """Its intent was on the disk, or its life went on to the end: it has to be answered."""
+    answers: list[dict[str, Any]] = field(default_factory=list)
+
+
+class Story:
+    """One run. `ails` are those of `s3`, `s4` and `s5`, of a twin of s3 and of a stranger at 9 if there are."""
+
+    def __init__(
+        self,
+        bench: Bench,
+        ails: Sequence[tuple[str, dict[str, Any]]],
+        *,
+        twin: tuple[str, dict[str, Any]] | None = None,
+        stranger: tuple[str, dict[str, Any]] | None = None,
+        turnaround: float = 0.005,
+    ) -> None:
+        self.bench = bench
+        self.life: Life = bench.sensors(*IDS, poll="{interval: 500ms}")
+        self.by_name = {f"s{sensor.slave}": sensor for sensor in bench.line.sensors}
+        self.others: list[Sensor] = []
+        self.newcomers: list[Sensor] = []
+        self.asked: list[Asked] = []
+        self.told: list[tuple[str, Any]] = []
+        """Events of the lives that are over."""
+        self.twinned = twin is not None
+        for sensor, ailment in zip(bench.line.sensors, ails, strict=True):
+            _ail(sensor, ailment)
+        for slave, its in ((3, twin), (9, stranger)):
+            if its is not None:
+                other = bench.line.add(Sensor(slave, format=Format(9600), turnaround=turnaround))
+                _ail(other, its)
+                self.others.append(other)
+        self.before = self._ids()
+        bench.go(self.life, 3.0)
+
+    # -- what happens
+
+    def step(self, what: str, one: Any, more: Any, end: tuple[str, int]) -> None:  # noqa: ANN401 - as it wants
+        """Let one thing happen, and judge."""
+        bench = self.bench
+        match what:
+            case "readdress":
+                self.ask("device/readdress", end, device=one, to=more)
+            case "baudrate":
+                self.ask("line/baudrate", end, to=RATES - self.rate, power_cycle=one)
+            case "adopt":
+                self.ask("line/adopt", end)
+            case "plug":
+                self.newcomers.append(bench.line.add(Sensor(1, format=Format(one))))
+                _ail(self.newcomers[-1], more)
+                self.before = self._ids()
+            case "power":
+                self.sensors[one % len(self.sensors)].power_cycle()
+            case "heal":
+                self.sensors[one % len(self.sensors)].heal()
+            case "wait":
+                bench.go(self.life, one)
+            case "unplug":
+                bench.port.unplug()
+                bench.go(self.life, one)
+                bench.port.replug()
+                bench.go(self.life, 3.0)
+        self.check()
+
+    def ask(self, name: str, end: tuple[str, int], **parameters: Any) -> Asked:  # noqa: ANN401 - any JSON
+        """Send a request, and end the daemon as `end` says: at its answer, at a step on the disk, after some turns."""
+        bench = self.bench
+        asked = Asked(name, {"id": len(self.asked), **parameters})
+        self.asked.append(asked)
+        how, after = end
+        if how == "crash":
+            bench.files.steps_left = bench.files.steps + after
+        heard = len(bench.responses)
+        try:
+            self.life.request(name, **asked.parameters)
+            for _ in range(after if how in ("leave", "sigterm") else LONGEST):
+                bench.turn(self.life)
+                if len(bench.responses) > heard or self._dead:
+                    break
+        except PowerCutError:  # the loop was told by the task that met it
+            pass
+        asked.journalled = any(change.asked and change.asked.id == asked.parameters["id"] for change in self._open)
+        if how == "sigterm":
+            self.life.end()
+            assert self.answers_of(asked), "SIGTERM answers what is under way"
+        dead, bench.files.steps_left = self._dead, None
+        if how in ("leave", "sigterm") or dead:
+            self.restart()
+        else:
+            assert self.answers_of(asked), "a request is answered"
+        return asked
+
+    @property
+    def _dead(self) -> bool:
+        left = self.bench.files.steps_left
+        return left is not None and self.bench.files.steps >= left
+
+    @property
+    def _open(self) -> Any:  # noqa: ANN401 - changes
+        return self.life.physical.open
+
+    def restart(self) -> None:
+        """Cut the gateway's power and begin another life."""
+        self.told += self.life.events
+        self.bench.cut()
+        self.life = self.bench.begin()
+        self.bench.go(self.life, 1.0)
+
+    def mend(self, seconds: float = 200.0) -> None:
+        """Heal everybody, switch the power of all off and on, take the others off, begin anew, and wait."""
+        for sensor in self.sensors:
+            sensor.heal()
+            sensor.power_cycle()
+        for other in self.others:
+            self.bench.line.sensors.remove(other)
+        self.restart()
+        self.bench.go(self.life, seconds)
+
+    # -- what must hold
+
+    @property
+    def sensors(self) -> list[Sensor]:
+        """Everybody on the line."""
+        return [*self.by_name.values(), *self.others, *self.newcomers]
+
+    @property
+    def rate(self) -> int:
+        """The line's."""
+        return self.life.running.now.config.line.baudrate
+
+    def _ids(self) -> dict[int, int]:
+        return {id(sensor): sensor.slave for sensor in self.sensors}
+
+    def answers_of(self, asked: Asked) -> list[dict[str, Any]]:
+        """Return every response to a request so far."""
+        key = asked.parameters["id"]
+        return [each for each in self.bench.responses if (each["request"], each["id"]) == (asked.name, key)]
+
+    def check(self) -> None:
+        """Judge: ids, places, rates and responses."""
+        self._apart()
+        for name, sensor in self.by_name.items():
+            self._known(name, sensor)
+        for asked in self.asked:
+            assert len(self.answers_of(asked)) <= 1, "no request is answered twice"
+
+    def _apart(self) -> None:
+        """Nobody who had another id than somebody else has the same now."""
+        now = self._ids()
+        for one, its in now.items():
+            for other, others in now.items():
+                if one < other and its == others:
+                    assert self.before[one] == self.before[other], "two sensors that had different ids share one"
+        self.before = now
+
+    def _known(self, name: str, sensor: Sensor) -> None:
+        """Judge that a configured sensor is where the daemon has it, or where it says it may be."""
+        place, reserved = self.life.place(name), set(self.life.physical.reserved())
+        slaves = {facts["slave"] for kind, facts in (*self.told, *self.life.events) if kind == "duplicate_id"}
+        assert (
+            sensor.slave == place
+            or {sensor.slave, place} <= reserved
+            or (self.twinned and name == "s3" and sensor.slave in slaves)
+        ), f"{name} is at {sensor.slave}, configured at {place}, reserved {reserved}"
+        opened = any(name in change.devices for change in self._open if change.kind == "baudrate")
+        assert sensor.format.baudrate == self.rate or opened, f"{name} is at {sensor.format.baudrate}"
+
+    def settled(self) -> None:
+        """Judge the end: all are found, every request has its answer, and its repeat gets the same."""
+        self.check()
+        for name, sensor in self.by_name.items():
+            if not (self.twinned and name == "s3"):
+                assert sensor.slave == self.life.place(name), "healed and powered anew, it is found"
+                assert sensor.format.baudrate == self.rate
+        assert not [change for change in self._open if not change.answered], "every request has its answer"
+        for asked in self.asked:
+            self._repeated(asked)
+
+    def _repeated(self, asked: Asked) -> None:
+        """Judge that a request that was answered, or may have written, is answered alike and not carried out twice."""
+        heard, first = len(self.bench.responses), self.answers_of(asked)
+        if not first and not asked.journalled:
+            return  # it died with its life before anything was written
+        writes = self._writes()
+        self.life.request(asked.name, **asked.parameters)
+        self.bench.turn(self.life)
+        (again,) = self.bench.responses[heard:]
+        assert self._writes() == writes
+        if first:
+            assert {**again, "took_ms": 0} == {**first[0], "took_ms": 0}
+
+    def _writes(self) -> int:
+        return sum(request.body[1:2] == b"\x06" for request in self.bench.line.log)
+
+
+def _ail(sensor: Sensor, ailment: tuple[str, dict[str, Any]]) -> None:
+    kind, particulars = ailment
+    if kind != "none":
+        sensor.ail(kind, **particulars)
