@@ -16,6 +16,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from lfs10d.jobs.job import Ask, Done, Hold, Later, Next
+from lfs10d.modbus.exchange import FAULT_HEARD
 from lfs10d.modbus.frames import ReadRegisters
 from lfs10d.reading import ALIVE_CODES, Errand, Fault, FaultCode, Number
 
@@ -102,7 +103,7 @@ class Poll:
                 self._barrier_due = False
                 return Later(self.due)
         elif fault is None and outcome.answer is not None:
-            fault = self._take(self._blocks[self._block], outcome.answer)
+            fault = self._take(self._blocks[self._block], outcome.answer, outcome.heard)
             if fault is None:
                 self.rtt = outcome.rtt
                 return Later(self.due) if self._block < len(self._blocks) else Done()
@@ -115,10 +116,10 @@ class Poll:
         self.values = {}
         return Done()
 
-    def _take(self, block: Block, registers: tuple[int, ...]) -> Fault | None:
+    def _take(self, block: Block, registers: tuple[int, ...], heard: bytes) -> Fault | None:
         decoded = self.device.spec.profile.decode(block, registers)
         if isinstance(decoded, Fault):
-            return decoded
+            return replace(decoded, heard=heard[-FAULT_HEARD:])
         self.values.update(decoded)
         self._block += 1
         return None

@@ -71,6 +71,7 @@ class Rig:
         *,
         late: tuple[ReadRegisters, ...] = (),
         ambiguous: bool = False,
+        heard: bytes = b"",
     ) -> Later | Done:
         """Ask and hear; remembered by the line as in the schedule."""
         request = self.asks(now)
@@ -86,6 +87,7 @@ class Rig:
             answered=answer is not None or code is FaultCode.EXCEPTION,
             late=tuple(LateAnswer(each, 0.3) for each in late),
             ambiguous=ambiguous,
+            heard=heard,
         )
         self.unanswered.settled(outcome, RTU, 0.2, now + 0.02)
         following = self.poll.heard(outcome, now + 0.02)
@@ -165,6 +167,14 @@ def test_a_refusal_and_a_bad_value_are_final() -> None:
     assert rig.poll.fault is not None
     assert rig.poll.fault.code is FaultCode.NOT_FINITE
     assert rig.poll.good is None
+
+
+def test_the_fault_of_a_bad_value_shows_the_last_bytes_that_were_heard() -> None:
+    rig = Rig()
+    frame = bytes.fromhex("01 03 04 7F C0 00 00 E2 27")
+    rig.hears(0.0, NAN, heard=bytes(30) + frame)
+    assert rig.poll.fault is not None
+    assert rig.poll.fault.heard == bytes(23) + frame
 
 
 def test_a_refused_barrier_will_do_unless_the_refusal_may_be_an_older_ones() -> None:
