@@ -110,7 +110,7 @@ class Oracle:
     The numbers in the log are unique; `epoch` is the wall clock at the line's time 0 (s).
     """
 
-    def __init__(self, log: Sequence[Request], handed: Sequence[tuple[float, bytes]], *, epoch: int) -> None:
+    def __init__(self, log: Sequence[Request], handed: Sequence[tuple[float, bytes]], *, epoch: float) -> None:
         self._epoch = epoch
         self._handed = handed
         self._requests = [request for request in log if request.speaker is MASTER]

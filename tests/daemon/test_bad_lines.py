@@ -1,0 +1,113 @@
+"""The family of bad lines once in real time: the daemon's process, a pseudo terminal at 115200 baud, a real broker.
+
+What the broker's subscriber heard is held to the simulated line's log, as in virtual time (`soak.attestation`).
+"""
+
+from __future__ import annotations
+
+import signal
+import time
+from typing import TYPE_CHECKING
+
+import pytest
+
+from lfs10d.simulator.burst import MASTER
+from lfs10d.simulator.inturn import InTurn
+from lfs10d.simulator.line import SimulatedLine
+from lfs10d.simulator.pty import PtyLine
+from lfs10d.simulator.wire import SECOND, Format
+from soak.attestation import Oracle, parsed
+from soak.troubles import KINDS
+from tests.daemon.conftest import eventually, tell
+
+if TYPE_CHECKING:
+    from tests.daemon.conftest import Site, View
+
+pytestmark = pytest.mark.needs("mosquitto")
+
+SLAVES = (1, 2, 3, 4)
+RATE = 115200
+EACH = 100
+"""Exchanges under each kind of fault; the line counts them, no clock."""
+WELL = 200
+"""Exchanges before the first and after the last."""
+SHARE = 0.3
+WITHIN = 120.0
+
+
+class Recorded:
+    """The line of this test on a terminal; `handed` is what its adapter gave the master, with the time."""
+
+    def __init__(self, site: Site) -> None:
+        self.line = SimulatedLine([InTurn(slave, format=Format(RATE)) for slave in SLAVES], format=Format(RATE))
+        self.served = PtyLine(self.line, link=site.tty)
+        self.handed: list[tuple[float, bytes]] = []
+        collect = self.served.adapter.collect
+
+        def recording(now: int) -> bytes:
+            data = collect(now)
+            if data:
+                self.handed.append((now / SECOND, data))
+            return data
+
+        self.served.adapter.collect = recording  # type: ignore[method-assign]  # it is all that hands over
+        site.lines.append(self.served)
+        self.served.start()
+        self.epoch = time.time() - self.served.now()
+
+    @property
+    def exchanges(self) -> int:
+        return sum(request.speaker is MASTER for request in list(self.line.log))
+
+    def carry(self, count: int) -> None:
+        """Wait until the line has carried so many more requests."""
+        wanted = self.exchanges + count
+        eventually(lambda: self.exchanges >= wanted, f"{count} more exchanges", within=WITHIN)
+
+
+def ail(line: SimulatedLine, kind: str) -> None:
+    """Let two neighbours show it now and then, and nobody anything else."""
+    for sensor in line.sensors:
+        sensor.heal()
+        sensor.hung = False
+    for slave in (2, 3):
+        line.sensor(slave).ail(kind, SHARE, **KINDS[kind])
+
+
+def heal(line: SimulatedLine) -> None:
+    for sensor in line.sensors:
+        sensor.heal()
+        sensor.hung = False
+
+
+def test_under_every_fault_in_turn_the_broker_is_told_no_wrong_number_and_every_poll(site: Site, view: View) -> None:
+    bad = Recorded(site)
+    site.write(
+        line={"baudrate": RATE}, poll={"interval": 0, "probe_interval_max": "1s"}, slaves=list(SLAVES)
+    )  # fmt: skip
+    run = site.run()
+    run.ready()
+    bad.carry(WELL)
+    for kind in KINDS:
+        tell(bad.served, lambda line, kind=kind: ail(line, kind))
+        bad.carry(EACH)
+    tell(bad.served, heal)
+    healed = round(time.time() * 1000)
+    for slave in SLAVES:
+        view.wait(f"device/slave-{slave}/state", lambda state: state["quality"] == "good" and state["ts"] > healed)
+    bad.carry(WELL)
+    assert run.ends(signal.SIGTERM) == 0
+    eventually(lambda: view.newest("availability") == "offline", "the end")
+    devices = parsed((each.topic, each.payload) for each in view.heard)
+    oracle = Oracle(bad.line.log, bad.handed, epoch=bad.epoch)
+    good = 0
+    for slave in SLAVES:
+        samples = devices[f"slave-{slave}"]
+        assert samples.judge(max(samples.by_seq)) == []
+        found = oracle.judge(f"slave-{slave}", slave, samples.in_order())
+        assert found.wrong == []
+        good += found.good
+    codes = {sample["error"] for samples in devices.values() for sample in samples.in_order() if sample["error"]}
+    assert codes >= {"timeout", "crc", "malformed", "wrong_slave", "wrong_function", "exception", "not_finite"}
+    assert good > bad.exchanges / 2
+    assert bad.exchanges >= 2 * WELL + len(KINDS) * EACH
