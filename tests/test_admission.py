@@ -21,7 +21,7 @@ from lfs10d.admission import (
     Ticket,
     Waiting,
 )
-from lfs10d.commands import LARGEST, Parameters, failed, ok
+from lfs10d.commands import LARGEST, Call, Parameters, failed, ok
 from lfs10d.kinds import Whole
 
 if TYPE_CHECKING:
@@ -346,3 +346,20 @@ def test_every_request_is_given_back_exactly_once_and_no_id_is_performed_twice_w
             performed[ticket.call.id] = door.now
     given += sum(1 + len(door.done(ticket)) for ticket in running)
     assert given == owed
+
+
+def test_a_request_of_an_earlier_life_is_not_carried_out_again_and_its_repeats_wait_for_its_answer() -> None:
+    door = Door()
+    call = Call("a1", fingerprint=json.dumps({"to": 9}))
+    assert door.admission.recall("device/readdress", call, None, NOW + DAY) == []
+    waiting = door.tell("device/readdress", {"id": "a1", "to": 9}, whence="again")
+    assert isinstance(waiting, Waiting)
+    ((repeat, whence),) = door.admission.recall("device/readdress", call, ok({"to": 9}), NOW + DAY)
+    assert (repeat.id, whence) == ("a1", "again")
+    answered = door.tell("device/readdress", {"id": "a1", "to": 9})
+    assert isinstance(answered, Answered)
+    assert answered.answer == ok({"to": 9})
+
+
+def test_a_request_of_an_earlier_life_without_an_id_cannot_be_repeated() -> None:
+    assert Door().admission.recall("device/readdress", Call(None), ok({}), NOW + DAY) == []

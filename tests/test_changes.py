@@ -77,3 +77,14 @@ def test_every_change_has_its_key_and_is_counted() -> None:
 def test_what_the_file_gives_is_what_it_says_or_what_is_usual() -> None:
     assert value_of(SAID.slaves["a"], "interval", SAID) == 2.0
     assert value_of(SAID.slaves["b"], "interval", SAID) == 1.0
+
+
+def test_moving_a_device_of_the_file_notes_where_it_was_verified_and_what_the_file_said() -> None:
+    moved = Changes().moving("a", Place(7), SAID)
+    assert moved.of("a") == DeviceChange(verified=Verified(Place(7), file=1))
+    assert moved.moving("a", Place(1), SAID) == Changes()
+
+
+def test_moving_a_device_that_was_added_changes_its_entry() -> None:
+    moved = Changes().adding("c", {"id": 3, "label": "x"}, Place(3)).moving("c", Place(8), SAID)
+    assert moved.of("c") == DeviceChange(added={"id": 8, "label": "x"}, added_at=Place(8))

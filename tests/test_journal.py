@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from pathlib import Path
 
 import pytest
@@ -100,3 +101,61 @@ def test_answers_are_kept_for_a_day_and_only_the_newest() -> None:
     assert [each.asked.key for each in journal.answers] == [f"id-{number}" for number in range(5, REMEMBERED + 5)]
     journal.close(frozenset(), told("late", at=REMEMBERED_FOR_MS + 1000))
     assert [each.asked.key for each in journal.answers] == ["late"]
+
+
+def test_a_file_that_cannot_be_read_is_told_and_nothing_is_written_over_it(tmp_path: Path) -> None:
+    (tmp_path / "journal.json").mkdir()
+    journal = Journal(tmp_path, Disk())
+    trouble = journal.take()
+    assert trouble is not None
+    assert trouble.endswith("cannot be read: Is a directory; whether a sensor was being moved is not known")
+    with pytest.raises(StateError, match=r"cannot be read: Is a directory$"):
+        journal.intend("readdress", (move(),), 5, None)
+    assert journal.open == ()
+
+
+class Stuck(ForgetfulFiles):
+    """A disk on which no file can be renamed while it is `stuck`, nor a folder synced while it is `unsynced`."""
+
+    stuck = unsynced = False
+
+    def rename(self, source: Path, target: Path) -> None:
+        if self.stuck:
+            raise OSError(errno.EROFS, "Read-only file system")
+        super().rename(source, target)
+
+    def sync_folder(self, folder: Path) -> None:
+        if self.unsynced:
+            self.unsynced = False
+            raise OSError(errno.EIO, "Input/output error")
+        super().sync_folder(folder)
+
+
+def test_a_damaged_file_that_cannot_be_put_aside_is_not_written_over() -> None:
+    files = Stuck()
+    Disk(files).replace(FILE, b"{")
+    files.stuck = True
+    journal = Journal(STATE, Disk(files))
+    assert journal.take() == f"{FILE} is damaged, or a newer lfs10d wrote it"
+    files.stuck = False
+    with pytest.raises(StateError, match="is damaged"):
+        journal.intend("readdress", (move(),), 5, None)
+    assert files.read(FILE) == b"{"
+
+
+def test_an_intent_that_was_written_but_not_synced_is_taken_back_with_its_refusal() -> None:
+    files = Stuck()
+    journal = read(files)
+    first = journal.intend("readdress", (move(),), 5, None)
+    files.unsynced = True
+    with pytest.raises(StateError, match=r"journal\.json cannot be written: Input/output error"):
+        journal.intend("readdress", (move("other", 4, 5),), 6, None)
+    assert journal.open == (first,)
+    assert read(files).open == (first,)
+
+
+@pytest.mark.parametrize(("id_", "transaction", "key"), [("a", 7, "a"), (None, 7, 7), (None, None, None)])
+def test_a_request_is_told_from_its_repeat_by_its_id_or_else_its_transaction(
+    id_: str | None, transaction: int | None, key: str | int | None
+) -> None:
+    assert Asked(name="r", id=id_, transaction=transaction).key == key

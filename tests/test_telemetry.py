@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from datetime import datetime
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -13,6 +14,7 @@ from lfs10d.telemetry import (
     Kind,
     Publication,
     Sample,
+    device_of,
     device_topic,
     dropped,
     event,
@@ -121,3 +123,17 @@ def test_dropped_declares_which_numbers_are_gone() -> None:
         "to_seq": 9,
         "count": 7,
     }
+
+
+@pytest.mark.parametrize(
+    ("topic", "device"),
+    [
+        ("device/mast-top/state", "mast-top"),
+        ("device/mast-top/error", None),
+        ("device/state", None),
+        ("device/a/b/state", None),
+        ("line/a/state", None),
+    ],
+)
+def test_a_topic_tells_whose_it_is(topic: str, device: str | None) -> None:
+    assert device_of(topic, "state") == device

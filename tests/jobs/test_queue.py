@@ -16,6 +16,7 @@ from lfs10d.modbus.unanswered import Unanswered
 from lfs10d.profiles.library import load_profile
 from lfs10d.reading import Errand
 from lfs10d.roster import Device, DeviceSpec, PollRules
+from lfs10d.share import Share
 
 if TYPE_CHECKING:
     from lfs10d.modbus.exchange import Outcome
@@ -148,3 +149,15 @@ def test_what_is_dropped_is_forgotten_wherever_it_waits(queue: JobQueue) -> None
     assert queue.excluded == NONE
     assert queue.released(5.0) == []
     assert queue.choose(0.0) is kept
+
+
+def test_a_job_with_an_account_is_charged_there_and_keeps_to_it(queue: JobQueue) -> None:
+    account = Share(0.5, credit=0.0, now=0.0)
+    probe = Task(0.9)
+    queue.submit(probe, 0.0, account)
+    assert queue.choose(0.0) is probe
+    queue.spend(probe, 1.0, 0.0)
+    queue.resume(probe)
+    assert not account.allows(1.9)
+    assert queue.choose(1.9) is None
+    assert queue.choose(2.0) is probe

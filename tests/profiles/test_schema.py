@@ -248,3 +248,7 @@ def test_what_sets_a_motor_going_is_no_setting(profile_of: Build) -> None:
 )
 def test_the_longest_read_fits_every_framing(profile_of: Build, limits: dict[str, Any], most: int) -> None:
     assert profile_of(**limits).most_words == most
+
+
+def test_where_a_key_comes_from_is_kept(profile_of: Build) -> None:
+    assert profile_of(provenance={"ids": "the manual, section 2"}).provenance == {"ids": "the manual, section 2"}
