@@ -2,8 +2,8 @@
 
 The rules (contract, section 3):
 
-1. Classes in order: retained topics; responses and events; live samples; traces; the past. Within a class the
-   oldest goes first.
+1. Classes in order: retained topics; responses and events, and live samples, in turn where both wait, so that a flood
+   of requests delays no sample; traces; the past. Within a class the oldest goes first.
 2. Of a retained topic only the newest version waits, and no second version goes while the first is under way.
    After a connect the whole burst goes first; its `last` (availability) only when all of it is settled, and
    everything else only after that.
@@ -70,6 +70,7 @@ class Outbox:
         self._messages: deque[Message] = deque(maxlen=MESSAGES_MOST)
         self._live: deque[Live] = deque()
         self._traces: deque[Message] = deque(maxlen=MESSAGES_MOST)
+        self._message_went = False
         self._refused: set[str] = set()
         self._unfit: set[str] = set()
         self.past = Past(capacity=capacity, detection=detection)
@@ -147,10 +148,12 @@ class Outbox:
         if retained is not None or self._retention.first:
             return retained
         self.age(now)
-        for queue in (self._messages, self._live, self._traces):
+        in_turn = (self._live, self._messages) if self._message_went else (self._messages, self._live)
+        for queue in (*in_turn, self._traces):
             while queue:
                 letter = queue.popleft()
                 if letter.topic not in self._refused:
+                    self._message_went = queue is self._messages
                     return letter
                 self.past.dead(letter)
         self._repeat(now)

@@ -109,6 +109,16 @@ def test_a_refused_part_of_the_burst_does_not_keep_online_back() -> None:
     assert take(outbox, 0.0, Retained).topic == "availability"
 
 
+def test_a_flood_of_responses_delays_no_sample() -> None:
+    outbox = connected()
+    for number in range(4):
+        outbox.add(telemetry.event(f"e{number}", 0), 0.0)
+    outbox.add(sample(1), 0.0)
+    outbox.add(sample(2), 0.0)
+    kinds = [type(outbox.next(0.0)) for _ in range(6)]
+    assert kinds == [Message, Live, Message, Live, Message, Message]
+
+
 def test_classes_go_in_order() -> None:
     outbox = connected()
     outbox.add(trace(1), 1.0)
