@@ -8,18 +8,22 @@ import re
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
-from tests.daemon.conftest import eventually, good, tell
+from tests.daemon.conftest import Site, View, eventually, good, tell
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    from lfs10d.simulator.line import SimulatedLine
     from lfs10d.simulator.pty import PtyLine
     from tests.conftest import Mosquitto
-    from tests.daemon.conftest import Site, View
 
 BASE = "lfs10d/line0"
 
@@ -29,6 +33,24 @@ def places(served: PtyLine) -> list[int]:
     found: list[int] = []
     tell(served, lambda line: found.extend(sensor.slave for sensor in line.sensors))
     return sorted(found)
+
+
+def all_places(served: PtyLine) -> list[int]:
+    """Return where the sensors are, in the order they were put on the line."""
+    found: list[int] = []
+    tell(served, lambda line: found.extend(sensor.slave for sensor in line.sensors))
+    return found
+
+
+def written(line: SimulatedLine) -> int:
+    """Return how many writes the line heard."""
+    return sum(request.frame[1:2] == b"\x06" for request in line.log)
+
+
+def publish(mosquitto: Mosquitto, topic: str, payload: dict[str, Any]) -> None:
+    """Publish by mosquitto_pub."""
+    broker = ["mosquitto_pub", "-h", "127.0.0.1", "-p", str(mosquitto.port)]
+    subprocess.run([*broker, "-t", topic, "-m", json.dumps(payload)], check=True)
 
 
 def asked(site: Site, name: str, *parameters: str) -> subprocess.CompletedProcess[str]:
@@ -41,20 +63,7 @@ def published(view: View, mosquitto: Mosquitto, name: str, payload: dict[str, An
     """Send a request by mosquitto_pub and return its one response."""
     topic = f"response/{name}"
     before = len(view.history_of(topic))
-    subprocess.run(
-        [
-            "mosquitto_pub",
-            "-h",
-            "127.0.0.1",
-            "-p",
-            str(mosquitto.port),
-            "-t",
-            f"{BASE}/request/{name}",
-            "-m",
-            json.dumps(payload),
-        ],
-        check=True,
-    )
+    publish(mosquitto, f"{BASE}/request/{name}", payload)
     eventually(lambda: len(view.history_of(topic)) > before, f"a response to {name}", within=60.0)
     (response,) = view.history_of(topic)[before:]
     return dict(response)
@@ -135,29 +144,117 @@ def test_the_intent_is_on_the_disk_before_the_first_byte_of_the_write(
     assert journal[0] < renamed[0] < min(n for n in folder if n > renamed[0]) < written
 
 
-def test_a_daemon_killed_at_any_moment_finds_every_sensor_again(site: Site, mosquitto: Mosquitto, view: View) -> None:
+def test_at_sigterm_a_change_ends_is_answered_and_settled_at_the_next_start(
+    site: Site, mosquitto: Mosquitto, view: View
+) -> None:
     served = site.line((1, 2))
     site.write()
-    rng = random.Random(7)  # noqa: S311 - moments, no secrets
-    place = 2
-    for number in range(12):
-        run = site.run()
-        view.clear()
-        view.wait("device/slave-2/state", good)
-        to = 20 + number
-        mosquitto_pub = ["mosquitto_pub", "-h", "127.0.0.1", "-p", str(mosquitto.port)]
-        payload = json.dumps({"id": number, "device": "slave-2", "to": to})
-        subprocess.run([*mosquitto_pub, "-t", f"{BASE}/request/device/readdress", "-m", payload], check=True)
-        time.sleep(rng.uniform(0.5, 9.0))
-        run.process.kill()
-        run.process.wait()
-        assert places(served)[0] == 1
-        place = places(served)[1]
-        assert place in range(2, to + 1)
+    request = {"id": "t1", "device": "slave-2", "to": 9}
+    run = site.run()
+    view.wait("device/slave-2/state", good)
+    publish(mosquitto, f"{BASE}/request/device/readdress", request)
+    journal = site.folder / "state" / "journal.json"
+    eventually(lambda: journal.exists() and '"kind":' in journal.read_text().replace(" ", ""), "the intent")
+    writes: list[int] = []
+    run.process.send_signal(15)
+    tell(served, lambda line: writes.append(written(line)))
+    assert run.ends(within=5.0) == 0
+    tell(served, lambda line: writes.append(written(line)))
+    assert writes[1] <= max(writes[0], 1), "the one write at most"
+    (answer,) = view.history_of("response/device/readdress")
+    assert answer["id"] == "t1"
+    assert answer["status"] == "ok" or answer["error"]["code"] == "cancelled"
     view.clear()
     site.run()
+    (place,) = set(places(served)) - {1}
     view.wait("device/slave-2/config", lambda config: config["slave"] == place)
     view.wait_samples("slave-2", 3, good)
+    again = published(view, mosquitto, "device/readdress", request)
+    assert {**again, "took_ms": 0} == {**answer, "took_ms": 0}
+    assert set(places(served)) == {1, place}
+
+
+KILLS = 10
+"""Of each of the daemons side by side."""
+
+
+@dataclass
+class Victim:
+    """A daemon on a line of its own that is killed again and again while `what` is done."""
+
+    site: Site
+    view: View
+    mosquitto: Mosquitto
+    what: str
+    number: int = 0
+
+    def begin(self) -> PtyLine:
+        """Put up the line."""
+        served = self.site.line((1, 2) if self.what != "line/adopt" else (2,))
+        name = self.view.base.split("/")[-1]
+        self.site.write(line={"name": name}, slaves=[1, 2] if self.what != "line/adopt" else [2])
+        return served
+
+    def asked(self) -> dict[str, Any]:
+        """Return the next request's parameters."""
+        self.number += 1
+        if self.what == "device/readdress":
+            return {"id": self.number, "device": "slave-2", "to": 20 + self.number}
+        if self.what == "line/baudrate":
+            return {"id": self.number, "to": 28800 - self.view.newest("line/state")["baudrate"]}
+        return {"id": self.number}
+
+    def round(self, served: PtyLine, rng: random.Random) -> None:
+        """Start, see that everybody configured is found, ask, and kill."""
+        self.view.clear()
+        run = self.site.run()
+        self.view.wait("device/slave-2/state", good)
+        if self.what == "line/adopt" and 1 not in places(served):
+            plug(served)
+        publish(self.mosquitto, f"{self.view.base}/request/{self.what}", self.asked())
+        time.sleep(rng.uniform(0.2, 6.0))
+        run.process.kill()
+        run.process.wait()
+        assert len(set(places(served))) == len(places(served))
+
+    def settled(self, served: PtyLine) -> None:
+        """Start once more: everybody is found, at the place and the rate that the configuration says."""
+        self.view.clear()
+        self.site.run()
+
+        def truth() -> bool:
+            configured = {each["id"] for each in self.view.newest("devices") or []}
+            rate = (self.view.newest("line/state") or {}).get("baudrate")
+            found = dict(zip(all_places(served), rates(served), strict=True))
+            at_rate = all(found[slave] == rate for slave in found if slave != 1 or self.what != "line/adopt")
+            return set(found) - ({1} if self.what == "line/adopt" else set()) == configured and at_rate
+
+        eventually(truth, f"the truth of {self.what}", within=60.0)
+        self.view.wait_samples("slave-2", 3, good)
+
+
+def test_daemons_killed_at_any_moment_find_every_sensor_again(mosquitto: Mosquitto, tmp_path: Path) -> None:
+    changes = ("device/readdress", "device/readdress", "line/baudrate", "line/adopt")
+    victims: list[Victim] = []
+    for number, what in enumerate(changes):
+        folder = tmp_path / f"line{number}"
+        folder.mkdir()
+        view = View(mosquitto.subscribe(), f"lfs10d/line{number}")
+        victims.append(Victim(Site(folder, mosquitto.port), view, mosquitto, what))
+
+    def live(number: int) -> None:
+        victim, rng = victims[number], random.Random(number)  # noqa: S311 - moments, no secrets
+        try:
+            served = victim.begin()
+            for _ in range(KILLS):
+                victim.round(served, rng)
+            victim.settled(served)
+        finally:
+            victim.site.close()
+
+    with ThreadPoolExecutor(len(victims)) as side_by_side:
+        for done in [side_by_side.submit(live, number) for number in range(len(victims))]:
+            done.result()
 
 
 def test_the_line_and_its_sensors_change_their_rate_by_either_way(site: Site, mosquitto: Mosquitto, view: View) -> None:
