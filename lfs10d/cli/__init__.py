@@ -89,7 +89,7 @@ def config_option(function: Callable[..., Any]) -> Callable[..., Any]:
         default=Path("/etc/lfs10d/lfs10d.yaml"),
         show_default=True,
         metavar="FILE",
-        type=click.Path(path_type=Path),
+        type=click.Path(path_type=Path, readable=False),  # whether it can be read is told in our words
         help="The configuration file.",
     )(function)
 

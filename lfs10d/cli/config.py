@@ -41,7 +41,7 @@ Examples:
 @click.option("--merged", is_flag=True, help="Print YAML to put into the file.")
 @click.option(
     "--state-dir",
-    type=click.Path(path_type=Path),
+    type=click.Path(path_type=Path, readable=False),  # whether it can be read is told in our words
     metavar="DIRECTORY",
     help="Where the daemon keeps state. Default: as `lfs10d run` has it.",
 )

@@ -38,7 +38,7 @@ def login_options(function: Callable[..., Any]) -> Callable[..., Any]:
     password = click.option(
         "--password-file",
         metavar="FILE",
-        type=click.Path(path_type=Path),
+        type=click.Path(path_type=Path, readable=False),  # whether it can be read is told in our words
         help="Its first line is the password, not the file's.",
     )
     return name(password(function))

@@ -35,7 +35,7 @@ Examples:
 @config_option
 @click.option(
     "--state-dir",
-    type=click.Path(path_type=Path),
+    type=click.Path(path_type=Path, readable=False),  # whether it can be read is told in our words
     metavar="DIRECTORY",
     help="Where to keep state. Default: $STATE_DIRECTORY, else below /var/lib or ~/.local/state.",
 )
