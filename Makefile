@@ -1,10 +1,11 @@
-# make demo | make test | make check | make docs | make bench: what a newcomer types. Everything lives in .venv.
+# make demo | make test | make check | make docs | make bench | make soak: what a newcomer types.
+# Everything lives in .venv.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: demo test coverage check format docs bench clean
+.PHONY: demo test coverage check format docs bench soak clean
 
 $(VENV)/.demo: pyproject.toml
 	@echo 'Setting up $(VENV), once; this takes a moment.'
@@ -43,6 +44,10 @@ docs: $(VENV)/.dev
 
 bench: $(VENV)/.dev
 	$(BIN)/python -m bench
+
+# make soak FOR=12h SEED=7; each has a default.
+soak: $(VENV)/.dev
+	$(BIN)/python -m soak --for $(or $(FOR),5m) --exchanges $(or $(EXCHANGES),1000000) $(if $(SEED),--seed $(SEED))
 
 clean:
 	rm -rf $(VENV) bench/build

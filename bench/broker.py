@@ -26,7 +26,10 @@ PATIENCE = 10.0
 
 
 class Broker:
-    """A mosquitto without persistence on the loopback; a context manager."""
+    """A mosquitto without persistence on the loopback, running from the start; a context manager.
+
+    It can be killed, ended, stopped in its tracks and started again, on the same port and with nothing in memory.
+    """
 
     def __init__(self, folder: Path) -> None:
         executable = shutil.which("mosquitto", path=SEARCH_PATH)
@@ -38,13 +41,42 @@ class Broker:
         configuration = folder / "mosquitto.conf"
         lines = [f"listener {self.port} 127.0.0.1", "allow_anonymous true", "max_queued_messages 0"]
         configuration.write_text("\n".join(lines) + "\n")
+        self._command = [executable, "-c", str(configuration)]
+        self._process: subprocess.Popen[str] | None = None
+        self.start()
+
+    @property
+    def runs(self) -> bool:
+        """Whether it was started and neither ended nor killed since."""
+        return self._process is not None
+
+    def start(self) -> None:
+        """Start it and wait until it listens."""
         self._process = subprocess.Popen(
-            [executable, "-c", str(configuration)],
+            self._command,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             text=True,
         )
         await_claim(self._listens, "mosquitto listens")
+
+    def end(self) -> None:
+        """End it in order; a second time does nothing."""
+        process, self._process = self._process, None
+        if process is not None:
+            end(process)
+
+    def signal(self, number: int) -> None:
+        """Send it SIGSTOP or SIGCONT."""
+        if self._process is not None:
+            self._process.send_signal(number)
+
+    def kill(self) -> None:
+        """End it at once; a second time does nothing."""
+        process, self._process = self._process, None
+        if process is not None:
+            process.kill()
+            process.wait()
 
     def _listens(self) -> bool:
         with socket.socket() as probe:
@@ -54,7 +86,7 @@ class Broker:
         return self
 
     def __exit__(self, *_: object) -> None:
-        end(self._process)
+        self.end()
 
 
 def await_claim(claim: Callable[[], bool], what: str) -> None:
