@@ -138,3 +138,10 @@ def test_one_that_does_not_come_to_the_lines_rate_keeps_its_id(
     pretence.sensor(1, baudrate=19200, manner=manner)
     assert adopted(pretence) == Adopted(verdict, AT_19200, 2, at_rate=False)
     assert {write.address for write in pretence.writes} == {4}
+
+
+def test_two_newcomers_that_part_when_brought_to_the_lines_rate_are_told(pretence: Pretence) -> None:
+    sensors = [pretence.sensor(1, baudrate=19200), pretence.sensor(1, baudrate=19200, manner="stores")]
+    found = adopted(pretence)
+    assert (found.verdict.ending, found.verdict.stays_open, found.at_rate) == (Ending.BOTH, False, False)
+    assert [sensor.baudrate for sensor in sensors] == [19200, 19200]

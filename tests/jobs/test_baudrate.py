@@ -261,3 +261,14 @@ def test_each_sensor_that_comes_up_at_the_new_rate_is_told_and_the_end_is_when_a
     assert pretence.aside == [CameUp("s1"), CameUp("s2")]
     assert pretence.clock.now < 100.0 + 6.0
     assert pretence.writes == []
+
+
+# -- two sensors of one slave id
+
+
+def test_one_that_answers_at_both_rates_since_the_write_is_two_and_all_are_moved_back(pretence: Pretence) -> None:
+    sensors = line(pretence, "obeys", "obeys")
+    pretence.sensor(2, manner="stores")
+    verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True))
+    assert verdict == RateVerdict(Ended.TWINS, {"s1": 9600, "s2": 9600}, ("s2",))
+    assert [sensor.baudrate for sensor in pretence.sensors] == [9600] * 3
