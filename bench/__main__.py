@@ -40,8 +40,10 @@ def run_rows(rows: tuple[Row, ...], options: argparse.Namespace) -> tuple[Runs, 
     daemon = tuple(shlex.split(options.daemon)) if options.daemon else DAEMON
     turns = [(row, master) for row in rows for master in row.masters]
     with tempfile.TemporaryDirectory(prefix="lfs10d-bench-") as folder, Broker(Path(folder)) as broker:
-        for number in range(1, options.runs + 1):
+        for number in range(1, 1 + max(options.runs or row.runs for row in rows)):
             for row, master in turns:
+                if number > (options.runs or row.runs):
+                    continue
                 told = f"run {number}: {row.title}, {master}"
                 try:
                     run = measure(row, master, broker.port, daemon)
@@ -63,7 +65,7 @@ def main() -> None:
     parser.add_argument("--rows", help="names, like 9600,noise (default: all)")
     parser.add_argument("--quick", action="store_true", help=f"only {', '.join(FIRST_ROWS)}")
     parser.add_argument("--engine", action="store_true", help="ways to wait, without the daemon (decision 0001)")
-    parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--runs", type=int, help="of each row (default: 5 of the first three, 2 of the others)")
     parser.add_argument("--seconds", type=float, help="length of a run, instead of the row's own")
     parser.add_argument("--daemon", help="command of the daemon (default: lfs10d beside this Python)")
     parser.add_argument("--no-write", action="store_true", help="print only; leave bench/RESULTS.md alone")

@@ -121,6 +121,7 @@ class Subscriber:
     def __init__(self, port: int, base: str) -> None:
         self._messages: list[tuple[float, bytes]] = []
         self._subscribed = threading.Event()
+        self._base = base
         self._topics = [(f"{base}/device/+/telemetry", 1), (f"{base}/device/+/history", 1)]
         self._client = Client(CallbackAPIVersion.VERSION2, protocol=MQTTProtocolVersion.MQTTv5)
         self._client.on_connect = self._subscribe
@@ -143,6 +144,10 @@ class Subscriber:
 
     def _hear(self, _client: object, _userdata: object, message: MQTTMessage) -> None:
         self._messages.append((time.monotonic(), bytes(message.payload)))
+
+    def ask(self, request: str, payload: str) -> None:
+        """Send a request to the daemon."""
+        self._client.publish(f"{self._base}/request/{request}", payload, qos=1)
 
     def samples(self) -> list[Heard]:
         """Return every sample once, in order of arrival."""

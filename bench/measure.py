@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from bench import backlog
 from bench.broker import Heard, Subscriber, missing_seqs
 from bench.line import PacedLine, Sent, read_log
 from bench.masters import BASE, command, scratch, start
@@ -130,6 +131,17 @@ def rates(sent: list[Sent], healthy: tuple[int, ...], seconds: float, interval: 
     return rate, min(counts.values()) / seconds * len(healthy)
 
 
+def spend(row: Row, subscriber: Subscriber) -> None:
+    """Let the row's time pass, asking of the daemon what the row asks."""
+    asked = 0.0
+    while asked < row.seconds:
+        if row.request is not None:
+            subscriber.ask(*row.request)
+        pause = row.every or row.seconds
+        time.sleep(min(pause, row.seconds - asked))
+        asked += pause
+
+
 def measure(row: Row, master: Master, broker: int, daemon: tuple[str, ...]) -> Run:
     """Let one master poll the row's line for its time; return what was seen."""
     options = ["--baudrate", str(row.baudrate), "--sensors", str(row.sensors)]
@@ -137,6 +149,8 @@ def measure(row: Row, master: Master, broker: int, daemon: tuple[str, ...]) -> R
     with scratch() as name, Subscriber(broker, f"{BASE}/line0") as subscriber:
         folder = Path(name)
         with PacedLine(folder, *options) as line:
+            if row.backlog:
+                backlog.leave(folder / "state", row.backlog)
             words = command(master, row, folder, line.port, broker, daemon)
             started = time.monotonic()
             process = start(words, folder / "errors")
@@ -146,7 +160,7 @@ def measure(row: Row, master: Master, broker: int, daemon: tuple[str, ...]) -> R
                     raise RuntimeError(f"{words[0]} ended: {(folder / 'errors').read_text().strip()}")
                 line.window()
                 begun, before = time.monotonic(), weigh(process.pid)
-                time.sleep(row.seconds)
+                spend(row, subscriber)
                 window: dict[str, Any] = line.window()
                 ended, after = time.monotonic(), weigh(process.pid)
                 time.sleep(TAIL)
@@ -154,7 +168,7 @@ def measure(row: Row, master: Master, broker: int, daemon: tuple[str, ...]) -> R
                 end(process)
             line.close()
             log = read_log(line.log)
-        samples = subscriber.samples()
+        samples = [heard for heard in subscriber.samples() if heard.boot != backlog.BOOT]
     ends = [each.ended for each in log]
     within = log[bisect.bisect_left(ends, begun) : bisect.bisect_left(ends, ended)]
     rate, slowest = rates(within, row.healthy, ended - begun, interval_seconds(row))

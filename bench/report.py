@@ -23,6 +23,7 @@ Runs: TypeAlias = dict[tuple[str, str], list[Run]]
 COLUMNS = (
     "row",
     "master",
+    "runs",
     "polls/s",
     "of wire",
     "against",
@@ -83,6 +84,7 @@ def line_of(row: Row, master: str, runs: Runs) -> list[str]:
     return [
         row.title,
         master,
+        str(len(mine)),
         number(median([run.rate for run in mine]), 2),
         number(median([run.share for run in mine]), 4),
         against(row, master, runs),
@@ -142,12 +144,11 @@ def revision() -> str:
 
 def results(rows: Sequence[Row], runs: Runs, when: str) -> str:
     """Write bench/RESULTS.md."""
-    times = max(len(each) for each in runs.values())
     pace = max(run.pace_p99_us for each in runs.values() for run in each)
     return (
         "# Results of the bench\n\n"
         f"Written by `make bench` on {when}; {revision()}.\n\n"
-        f"{machine()}; {versions()}; load before: {os.getloadavg()[0]:.2f}. Medians of {times} runs, masters in turn.\n"
+        f"{machine()}; {versions()}; load before: {os.getloadavg()[0]:.2f}. Medians of the runs, masters in turn.\n"
         f"The line's own bytes were late by at most {pace:.0f} us (99th percentile of the worst run).\n\n"
         f"{markdown(table(rows, runs))}\n\n{EXPLAINED}"
     )
