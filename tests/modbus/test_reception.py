@@ -322,9 +322,28 @@ def test_huge_pieces_do_not_make_the_memory_grow() -> None:
 
 def test_what_was_no_echo_is_not_taken_for_the_rest_of_one_later() -> None:
     ear = reception(echo=Echo.UNKNOWN)
-    ear.take(REQUEST[:3] + b"\xff", 0.05)
-    ear.take(REQUEST[3:], 0.06)
-    assert ear.leftover() == REQUEST[:3] + b"\xff" + REQUEST[3:]
+    pieces = (REQUEST[:3], b"\xff", REQUEST[3:])
+    for n, piece in enumerate(pieces):
+        ear.take(piece, 0.05 + 0.01 * n)
+    assert ear.leftover() == b"".join(pieces)
+
+
+def test_two_bytes_that_may_be_echo_may_be_the_answers_first() -> None:
+    ear = reception(echo=Echo.UNKNOWN)
+    ear.take(REQUEST[:2], 0.05)
+    assert ear.begun
+
+
+def test_an_echo_has_changed_where_it_was_expected_and_a_single_other_byte_came() -> None:
+    ear = reception(echo=Echo.ON)
+    ear.take(b"\xff", 0.05)
+    assert ear.echo_changed
+    ear = reception(echo=Echo.OFF)
+    ear.take(b"\xff", 0.05)
+    assert not ear.echo_changed
+    ear = reception(echo=Echo.ON)
+    ear.take(REQUEST + b"\xff", 0.05)
+    assert not ear.echo_changed
 
 
 def test_an_echo_in_many_pieces_is_left_over_as_it_came() -> None:
