@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import threading
 import time
+from itertools import islice
 from typing import TYPE_CHECKING
 
 from lfs10d.simulator.build import Plan, build
@@ -16,6 +17,7 @@ from lfs10d.simulator.wire import SECOND, Format
 from soak.oracle import Numbered, Sent, number_of
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
     from lfs10d.simulator.line import Request, SimulatedLine
@@ -117,15 +119,20 @@ class Line:
         origin = time.time() - self._served.now()
         self.settled_until = origin + max(0, settled) / SECOND
         going, staying = taken
-        requests = going + staying
-        sent = []
-        for place, request in enumerate(going):
-            following = next((one.begun for one in requests[place + 1 :] if one.speaker is MASTER), None)
-            sent += self._of(request, following, origin)
-        return sent
+        return answers_of(going, going + staying, self._names, origin)
 
-    def _of(self, request: Request, following: int | None, origin: float) -> list[Sent]:
-        sent = []
+
+def answers_of(
+    going: Iterable[Request], requests: Sequence[Request], names: Mapping[Sensor, str], origin: float
+) -> list[Sent]:
+    """Return the answers with a value to the first of the `requests`, those `going`; all are in order of time.
+
+    `origin` is the line's time 0 in epoch seconds.
+    """
+    sent = []
+    for place, request in enumerate(going):
+        later = islice(requests, place + 1, None)
+        following = next((one.begun for one in later if one.speaker is MASTER), None)
         for answer in request.answers:
             number = number_of(answer.values[0]) if answer.values else None
             if number is None:
@@ -135,5 +142,5 @@ class Line:
             in_time = following is None or end <= following
             believable = request.speaker is MASTER and answer.believable and in_time
             prompt = burst.start - request.ended <= PROMPT
-            sent.append(Sent(number, self._names[answer.sensor], origin + end / SECOND, believable, prompt))
-        return sent
+            sent.append(Sent(number, names[answer.sensor], origin + end / SECOND, believable, prompt))
+    return sent
