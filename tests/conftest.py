@@ -1,5 +1,7 @@
 """What all tests share: programs they need, a real mosquitto, an independent listener, a certificate authority.
 
+`LFS10D_EXAMPLES=20000` in the environment lets hypothesis try so many examples of each law, where a law does not say.
+
 `needs("program", ...)` marks a test that starts a program: where it is absent the test fails in CI (`CI` is
 set) and is skipped elsewhere, with one line that says what to install.
 """
@@ -18,6 +20,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import pytest
+from hypothesis import settings
 from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion, MQTTProtocolVersion
 from paho.mqtt.packettypes import PacketTypes
@@ -33,6 +36,10 @@ PATIENCE = 10.0
 
 SEARCH_PATH = os.pathsep.join((os.environ.get("PATH", os.defpath), "/usr/sbin", "/sbin"))
 """Debian keeps daemons in /usr/sbin, which is not on a user's PATH."""
+
+
+settings.register_profile("ours", max_examples=int(os.environ.get("LFS10D_EXAMPLES", "100")), deadline=None)
+settings.load_profile("ours")  # without a deadline: a busy machine is no failure
 
 
 def path_of(name: str) -> str:

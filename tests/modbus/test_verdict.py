@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from lfs10d.modbus import verdict
 from lfs10d.modbus.attempt import Attempt, Echo, Pending
@@ -185,3 +187,18 @@ def test_the_verdict_is_in_words(heard: bytes, message: str) -> None:
     found = verdict.judge(reception._attempt, reception)
     assert found is not None
     assert found.message == message
+
+
+PIECES = st.sampled_from([LATE, STRANGER, BEGUN, RTU.encode(WIND), RTU.encode(MOVE), framed("038302")]) | st.binary(
+    max_size=40
+)
+
+
+@given(st.sampled_from([WIND, MOVE, WriteRegister(0, 5, 7)]), st.sampled_from(Echo), st.lists(PIECES, max_size=8))
+def test_whatever_was_heard_there_is_one_verdict_in_words_that_can_be_printed(
+    request_: Request, echo: Echo, pieces: list[bytes]
+) -> None:
+    reception = heard_by(request_, echo, b"".join(pieces))
+    found = verdict.judge(reception._attempt, reception)
+    assert (found is None) is (request_.slave == 0 and not reception.echo_changed)
+    assert found is None or found.message.isprintable()
