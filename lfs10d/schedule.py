@@ -21,6 +21,7 @@ from lfs10d.jobs.job import Again, Ask, Hold, Job, Later
 from lfs10d.jobs.poll import Poll
 from lfs10d.jobs.queue import JobQueue
 from lfs10d.jobs.telling import tell, tell_lost
+from lfs10d.jobs.toll import Toll
 from lfs10d.modbus.frames import ReadRegisters
 from lfs10d.modbus.unanswered import Unanswered
 from lfs10d.pollqueue import PollQueue, back_on_grid, spread
@@ -60,6 +61,7 @@ class Schedule:
         self._polls = PollQueue(self.unanswered)
         self._probing = Probing(now)
         self._jobs = JobQueue()
+        self._toll = Toll()
         self._current: tuple[Job, Ask] | None = None
         self._silent: int | None = None
         self._lost: Fault | None = None
@@ -233,6 +235,8 @@ class Schedule:
             self._jobs.resume(job)
             return []
         following = job.heard(outcome, now)
+        if not isinstance(following, Again):
+            self._toll.released()
         if isinstance(job, Poll) and not self._wanted(job):
             job.cut_off(now)
             return []
@@ -273,8 +277,18 @@ class Schedule:
         taken = outcome.ended - outcome.asked + self.timing.gap
         if isinstance(job, Poll) and job.errand is Errand.PROBE:
             self._probing.spend(job.device, taken, now)
+        elif job.errand is Errand.CHANGE:
+            self._jobs.spend(job, self._charge(job, outcome), now)
         else:
             self._jobs.spend(job, taken, now)
+
+    def _charge(self, job: Job, outcome: Outcome) -> float:
+        """Return what an exchange of a change costs, with what it costs the others."""
+        others = [each for each in self.devices.values() if each.online and each.spec.enabled]
+        intervals = [each.spec.interval for each in others if each.slave not in job.excludes]
+        wire_time = _wire_time(others[0], self.timing) if others else 0.0
+        ended = outcome.ended + self.timing.gap
+        return self._toll.charge(job.share, outcome.asked, ended, intervals=intervals, wire_time=wire_time)
 
     def _finish(self, poll: Poll, now: float) -> Reading:
         device = poll.device

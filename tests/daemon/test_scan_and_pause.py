@@ -99,6 +99,8 @@ def test_a_scan_finds_everybody_while_polling_goes_on_and_tells_how_far_it_is(
     assert (percents[0], percents[-1]) == (0, 100)
     assert 3 <= len(percents) <= 12
     assert progress[0]["remaining_s"] > progress[-1]["remaining_s"] == 0
+    # All of them are good in tests/line/test_scan_and_pause.py, in virtual time; here the simulator shares a processor
+    # with other tests, and may read a request only after the rate has changed.
     assert len(list(filter(good, view.samples("slave-2")))) > before + 3
     assert view.newest("device/slave-2/availability") == "online"
     assert activities(view) == ["polling", "scanning", "polling"]

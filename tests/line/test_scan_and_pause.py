@@ -13,6 +13,9 @@ from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.reading import FaultCode
+from lfs10d.roster import PollRules
+from lfs10d.simulator.sensor import Sensor
+from lfs10d.simulator.wire import Format
 
 if TYPE_CHECKING:
     from tests.line.conftest import Rig, Rigs
@@ -46,6 +49,33 @@ def test_during_a_scan_the_others_keep_70_percent_of_their_rate_on_a_line_that_i
         assert not rig.codes(slave)
     if rates == (9600,):  # at the other rate sensors hear nothing, and their own line's bytes are not judged
         rig.prove()
+
+
+@pytest.mark.parametrize("retries", [0, 1])
+@pytest.mark.parametrize("echo", [False, True])
+def test_wherever_its_slices_fall_a_scan_at_another_rate_costs_the_others_no_answer(
+    rigs: Rigs, retries: int, *, echo: bool
+) -> None:
+    """Sensors at 19200 baud, polled five times a second, while those at 9600 baud are looked for."""
+    for phase in range(12):
+        rig = rigs(
+            (1, 2, 5), interval=0.2, baudrate=19200, turnaround=0.003, rules=PollRules(retries=retries), echo=echo
+        )
+        rig.line.add(Sensor(9, format=Format(9600)))
+        rig.run(2.0 + phase * 0.017)
+        timings = LineTiming.of(19200), LineTiming.of(9600)
+        ids = tuple(range(1, 13))
+        scan = Scan(Search(ids, timings, Codec(Framing.RTU), PROFILES, line_rate=19200, share=0.6))
+        rig.poller.submit(scan)
+        while not scan.over:
+            rig.run(rig.clock.now + 0.5)
+        assert [(found.slave, found.baudrate) for found in scan.found] == [
+            (9, 9600),
+            (1, 19200),
+            (2, 19200),
+            (5, 19200),
+        ]
+        assert not any(rig.codes(slave) for slave in (1, 2, 5))
 
 
 def paused(rig: Rig) -> list[bool]:
