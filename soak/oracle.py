@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import struct
 from bisect import bisect_left, insort
+from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -90,6 +91,20 @@ class Sent:
     """Boot and seq of the sample that published it."""
 
 
+@dataclass(frozen=True, slots=True)
+class Excuse:
+    """Why answers that ended from `since` to `until` may be told by nobody: what happened `at`. Epoch seconds."""
+
+    why: str
+    since: float
+    at: float
+    until: float
+
+    def covers(self, sent: Sent) -> bool:
+        """Tell whether it is one for this answer."""
+        return self.since <= sent.at <= self.until
+
+
 class Oracle:
     """The answers of the last hour, and who published them.
 
@@ -103,10 +118,13 @@ class Oracle:
         self.told_of = 0
         self.missed = 0
         self.untold = 0
-        self.excused = 0
+        self.excused: Counter[str] = Counter()
+        """By the excuse."""
+        self.reach: dict[str, float] = {}
+        """How long before the moment that is the excuse the earliest of them ended (s)."""
         self.examples: list[Sent] = []
         self._sent: dict[int, Sent] = {}
-        self._excuses: list[tuple[float, float]] = []
+        self._excuses: list[Excuse] = []
         self._times: dict[str, list[float]] = {}
 
     def sent(self, answer: Sent) -> None:
@@ -114,9 +132,9 @@ class Oracle:
         self.heard += 1
         self._sent[answer.number] = answer
 
-    def excuse(self, since: float, until: float) -> None:
-        """Expect no sample of answers that ended between these times."""
-        self._excuses.append((since, until))
+    def excuse(self, excuse: Excuse) -> None:
+        """Expect no sample of the answers it is for."""
+        self._excuses.append(excuse)
 
     def fault_of(self, told: Told) -> str | None:
         """Return what is wrong with a sample, None if nothing; note that its answer was published."""
@@ -159,18 +177,24 @@ class Oracle:
             del self._sent[number]
             fate = self._fate(sent)
             self.missed += fate == "missed"
-            self.excused += fate == "excused"
+            if fate == "excused":
+                self._excuse(sent)
             if fate == "untold":
                 self.untold += 1
                 self.examples = [*self.examples, sent][:EXAMPLES]
-        self._excuses = [each for each in self._excuses if each[1] >= before]
+        self._excuses = [each for each in self._excuses if each.until >= before]
         for times in self._times.values():
             del times[: bisect_left(times, before)]
+
+    def _excuse(self, sent: Sent) -> None:
+        excuse = next(each for each in self._excuses if each.covers(sent))
+        self.excused[excuse.why] += 1
+        self.reach[excuse.why] = max(self.reach.get(excuse.why, 0.0), excuse.at - sent.at)
 
     def _fate(self, sent: Sent) -> str:
         if sent.claimed is not None or not sent.believable or not sent.prompt:
             return ""
-        if any(since <= sent.at <= until for since, until in self._excuses):
+        if any(excuse.covers(sent) for excuse in self._excuses):
             return "excused"
         times = self._times.get(sent.device, [])
         place = bisect_left(times, sent.at - ROUNDING)

@@ -22,9 +22,11 @@ def figures(soak: Soak) -> Iterable[tuple[str, str]]:
     yield "unjudged", str(counts["unjudged"])
     yield "duplicates", str(counts["duplicates"])
     yield "declared as dropped", f"{counts['declared']} samples, {counts['dropped events']} events"
-    yield "lost with a SIGKILL", f"{counts['killed with it']} samples, at most {soak.ledger.killed_seconds:.1f} s"
-    around = f"{oracle.excused} around an end or a pulled port"
-    yield "answers with a value", f"{oracle.heard}, {oracle.told_of} published, {around}"
+    around = "".join(f", {number} around {why}" for why, number in sorted(oracle.excused.items()))
+    yield "answers with a value", f"{oracle.heard}, {oracle.told_of} published{around}"
+    killed = f"{counts['killed with it']} samples between others, {oracle.excused['SIGKILL']} answers at the end"
+    reach = max(soak.ledger.killed_seconds, oracle.reach.get("SIGKILL", 0.0))
+    yield "lost with a SIGKILL", f"{killed}, of at most {reach:.1f} s"
     yield "good answers not believed", f"{oracle.missed}, told as failures or asked for again"
     yield "good answers nobody told of", str(oracle.untold)
     yield "stale shown as live", str(len(soak.stale))

@@ -14,7 +14,7 @@ from soak.ear import Ear
 from soak.heard import Message, samples_of
 from soak.ledger import Ledger
 from soak.line import Line
-from soak.oracle import KEPT_FOR, Oracle
+from soak.oracle import KEPT_FOR, Excuse, Oracle
 from soak.plan import Act, Step, steps
 from soak.shown import Shown
 
@@ -43,6 +43,7 @@ SETTLED = 4.0
 
 BEFORE_PULL = 1.0
 AROUND_END = 1.0
+PULLED, ENDED, KILLED = "a pulled port", "SIGTERM", "SIGKILL"
 BEFORE_KILL = 9.0
 """Seconds before the port is pulled, the daemon is ended or killed with a backlog: answers nobody may tell of."""
 
@@ -200,20 +201,23 @@ class Soak:
                 self.ear.come()
             case Act.PORT_PULL:
                 self._change_port(plugged=False)
-                self.oracle.excuse(now - BEFORE_PULL, time.time())
+                self._excuse(PULLED, now, BEFORE_PULL)
             case Act.PORT_BACK:
                 self._change_port(plugged=True)
             case Act.RELOAD:
                 self.daemon.reload()
             case Act.DAEMON_END:
                 self.daemon.end()
-                self.oracle.excuse(now - AROUND_END, time.time() + AROUND_END)
+                self._excuse(ENDED, now, AROUND_END)
             case Act.DAEMON_KILL:
                 self.daemon.kill()
-                lost = AROUND_END if self.broker.runs else BEFORE_KILL
-                self.oracle.excuse(now - lost, time.time() + AROUND_END)
+                self._excuse(KILLED, now, AROUND_END if self.broker.runs else BEFORE_KILL)
             case Act.DAEMON_START:
                 self.daemon.start()
+
+    def _excuse(self, why: str, at: float, before: float) -> None:
+        """Expect nothing of answers from so long before that moment until it is over."""
+        self.oracle.excuse(Excuse(why, at - before, at, time.time() + AROUND_END))
 
     def _change_port(self, *, plugged: bool) -> None:
         if plugged and not self._line_in:
@@ -239,7 +243,7 @@ class Soak:
                 break
         ended = time.time()
         self.daemon.end()
-        self.oracle.excuse(ended - AROUND_END, time.time() + AROUND_END)
+        self._excuse(ENDED, ended, AROUND_END)
         until = self.elapsed + SETTLED
         while self.elapsed < until and self.line.settled_until < ended + AROUND_END:
             time.sleep(TICK)

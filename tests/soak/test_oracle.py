@@ -6,12 +6,13 @@ import json
 import math
 import struct
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from soak import oracle as oracles
 from soak.ledger import Told
-from soak.oracle import COUNT, Numbered, Oracle, Sent, number_of, value_of
+from soak.oracle import COUNT, Excuse, Numbered, Oracle, Sent, number_of, value_of
 
 NUMBERS = st.integers(0, COUNT - 1)
 
@@ -74,11 +75,12 @@ def test_what_was_sent_and_not_published_is_missed_unless_it_is_excused() -> Non
     oracle = Oracle()
     for number, at in ((1, 100.0), (2, 101.0), (3, 102.0), (4, 110.0)):
         oracle.sent(sent(number, at=at))
-    oracle.excuse(100.5, 101.5)
+    oracle.excuse(Excuse("SIGKILL", 100.5, 101.2, 101.5))
     assert oracle.fault_of(told(1)) is None
     assert oracle.waiting(105.0) == 1
     oracle.fold(105.0)
-    assert (oracle.untold, oracle.excused, oracle.heard) == (1, 1, 4)
+    assert (oracle.untold, oracle.excused, oracle.heard) == (1, {"SIGKILL": 1}, 4)
+    assert oracle.reach["SIGKILL"] == pytest.approx(0.2)
     assert [each.number for each in oracle.examples] == [3]
     assert oracle.fault_of(told(4, at=110.0)) is None
 
@@ -118,7 +120,7 @@ def test_damaged_and_late_answers_need_not_be_published() -> None:
     oracle.sent(sent(1, believable=False))
     oracle.sent(sent(2, prompt=False))
     oracle.fold(200.0)
-    assert (oracle.untold, oracle.excused) == (0, 0)
+    assert (oracle.untold, oracle.excused) == (0, {})
 
 
 def test_a_late_answer_may_be_published_if_nothing_else_was_asked_meanwhile() -> None:
@@ -131,7 +133,7 @@ def test_answers_are_forgotten() -> None:
     oracle = Oracle()
     for number in range(100):
         oracle.sent(sent(number, at=100.0 + number))
-        oracle.excuse(100.0 + number, 100.5 + number)
+        oracle.excuse(Excuse("SIGTERM", 100.0 + number, 100.0 + number, 100.5 + number))
         oracle.fold(100.0 + number - 10)
     assert len(oracle._sent) <= 11
     assert len(oracle._excuses) <= 12
