@@ -310,7 +310,7 @@ class Daemon:
         config = now.config
         if plan.log:
             logs.install(config.log.level, config.log.format)
-        if plan.polling or plan.realtime:
+        if plan.polling or plan.realtime or now.places != before.places:
             self._line.take(self._physical.polled(), now.loaded.profiles, line=plan.line, realtime=plan.realtime)
             if plan.line:
                 self._losing.begin()

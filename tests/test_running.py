@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from lfs10d.changefile import FILE_NAME, ChangeFile
-from lfs10d.changes import Changes
+from lfs10d.changes import Changes, Place
 from lfs10d.configfile import load
 from lfs10d.disk import Disk
 from lfs10d.errors import ConfigError, StateError
@@ -116,6 +116,29 @@ def test_what_cannot_be_kept_is_not_done(site: Site) -> None:
     with pytest.raises(StateError):
         site.change(slower)
     assert (site.taken, site.interval(), site.running.now.changes) == ([], 1.0, Changes())
+
+
+def test_what_was_learnt_of_the_line_is_so_though_the_disk_does_not_keep_it(site: Site) -> None:
+    site.disk.full = 0
+    run(site.running.learn(lambda now: now.changes.moving("slave-2", Place(9), now.said)))
+    assert site.taken == [("slaves.slave-2.id",)]
+    news = site.running.news()
+    assert news.storage is not None
+    assert "changes.yaml cannot be written" in news.storage
+    site.disk.full = None
+    run(site.running.learn(lambda now: now.changes.moving("slave-2", Place(10), now.said)))
+    site.disk.power_cut()
+    site.start()
+    assert site.running.now.places["slave-2"] == (Place(10, 9600),)
+
+
+def test_a_file_of_changes_that_is_damaged_is_as_good_as_gone(site: Site) -> None:
+    site.change(slower)
+    site.start()
+    assert not site.running.missing
+    site.disk.write(STATE / FILE_NAME, b"nonsense", mode=0o640)
+    site.start()
+    assert site.running.missing
 
 
 def test_what_the_edit_refuses_is_not_done(site: Site) -> None:

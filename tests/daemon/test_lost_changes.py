@@ -138,6 +138,24 @@ def test_measuring_waits_for_no_broker_and_the_sensor_is_found_when_one_comes(
     view.wait_samples("slave-2", 3, good)
 
 
+def test_who_answers_at_an_id_that_was_another_s_is_not_measured_under_a_guessed_name(
+    site: Site, view: View, mosquitto: Mosquitto
+) -> None:
+    served = site.line((1, 2))
+    site.write(slaves=[1, 2, {"id": 7, "name": "roof"}])
+    mosquitto.publish(f"{B}/device/slave-2/config", '{"slave": 9}', retain=True)
+    mosquitto.publish(f"{B}/device/roof/config", '{"slave": 2}', retain=True)
+    started(site, view)
+    view.wait("device/roof/config", lambda config: config["slave"] == 2)
+    view.wait("device/slave-2/error", lambda error: error["code"] == "config_conflict")
+    view.wait_samples("roof", 3, good)
+    (sought, *_) = eventually(lambda: requests_to(served, 9), "slave-2 is looked for where it was")
+    before = [each for each in requests_to(served, 2) if 0 < sought.begun - each.begun < 1_500_000_000]
+    # Each of the three questions to 7 takes longer than an interval of 200 ms: five polls would have found place.
+    assert sum(each.body[2:4] == b"\x00\x01" for each in before) <= 2
+    assert view.newest("device/slave-2/availability") == "offline"
+
+
 def requests_to(served: PtyLine, slave: int) -> list[Any]:
     found: list[Any] = []
     tell(served, lambda line: found.extend(request for request in line.log if request.body[:1] == bytes([slave])))
