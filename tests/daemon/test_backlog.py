@@ -32,13 +32,15 @@ def backlog_of(site: Site) -> Path:
 
 
 def committed(site: Site) -> dict[str, int]:
-    """Return how many samples of each device a copy of the daemon's file holds."""
+    """Return how many samples of each device a copy of the daemon's file holds; none where it is just being made."""
     copy = site.folder / "copy.db"
     for end in ("", "-wal"):
         beside = backlog_of(site).with_name(f"backlog.db{end}")
         if beside.exists():
             copy.with_name(f"copy.db{end}").write_bytes(beside.read_bytes())
     with closing(sqlite3.connect(copy)) as db:
+        if not db.execute("SELECT count(*) FROM sqlite_schema WHERE name = 'sample'").fetchone()[0]:
+            return Counter()
         rows = db.execute("SELECT facts FROM sample JOIN series ON series.id = series").fetchall()
     return Counter(json.loads(facts)[1] for (facts,) in rows)
 
