@@ -10,11 +10,14 @@ from pathlib import Path
 
 import pytest
 
+from docs.generate import commands
+from docs.generate.commands import WALK, recorded
 from docs.generate.configuration import parts
 from docs.generate.examples import HEARD, SENT
 from docs.generate.markdown import WIDTH, example, plain
 from docs.generate.mqtt import _meanings, examples
 from docs.generate.pages import PAGES, filled, stale
+from lfs10d.commands import Answer, Call, parameters_of
 from lfs10d.config import Config
 from lfs10d.difference import RESTART_KEYS
 from lfs10d.kinds import Kind
@@ -40,7 +43,7 @@ def test_no_page_is_stale() -> None:
 
 def test_a_page_that_differs_or_is_missing_is_stale(tmp_path: Path) -> None:
     (tmp_path / "mqtt.md").write_text(PAGES["mqtt.md"]() + "\n", encoding="utf-8")
-    assert stale(tmp_path) == ["architecture.md", "configuration.md", "mqtt.md"]
+    assert stale(tmp_path) == ["architecture.md", "commands.md", "configuration.md", "mqtt.md"]
 
 
 def test_the_generator_writes_what_is_stale_and_only_names_it_with_check() -> None:
@@ -132,6 +135,24 @@ def test_every_request_has_its_class_and_parameters(name: str) -> None:
         assert f"| `{field.alias or key}` |" in told
         kind = next((each for each in field.metadata if isinstance(each, Kind)), None)
         assert kind is None or plain(kind.words) in told
+
+
+def test_every_request_of_the_page_of_examples_is_one_and_its_answer_is_as_promised() -> None:
+    for step, response in zip(WALK, recorded(), strict=True):
+        assert not isinstance(
+            parameters_of(REQUESTS[step.name].form.parameters, Call(parameters=step.parameters)), Answer
+        )
+        assert check(f"response/{step.name}", json.dumps(response)) is not None
+
+
+def test_a_request_that_is_not_walked_and_a_code_without_advice_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(commands, "REQUESTS", {**REQUESTS, "line/dance": REQUESTS["health"]})
+    with pytest.raises(ValueError, match="line/dance"):
+        commands.parts()
+    monkeypatch.undo()
+    monkeypatch.setattr(commands, "ADVICE", {})
+    with pytest.raises(ValueError, match="timeout"):
+        commands.parts()
 
 
 @pytest.mark.parametrize(

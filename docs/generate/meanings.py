@@ -51,3 +51,32 @@ ERROR_CODES: Final = {
     "internal": "A fault of lfs10d itself; its log says more. Please report it.",
 }
 """Why a request was not carried out (lfs10d.commands.ErrorCode)."""
+
+ADVICE: Final = {
+    "invalid_json": "Send one JSON object in UTF-8; in a shell put it in single quotes.",
+    "invalid_param": "Correct what the message says of `param`.",
+    "unknown_request": "Take one of the names in the message.",
+    "unknown_device": "Take one of the names in the message: a name, not an id.",
+    "not_allowed": "Add the class to `commands` and reload. Where the message says that it is never permitted, use the "
+    "request that it names.",
+    "retained": "Publish it without the retain flag (`-r`). It is cleared already.",
+    "duplicate_conflict": "Give every request an `id` of its own.",
+    "busy": "Wait for the end of what the message names, or end a scan by `line/cancel`; then send it again.",
+    "address_in_use": "Choose another id, or take the stranger there off the line; `line/scan` tells who is where.",
+    "duplicate_id": "Take one of the two off the line, then re-address the other.",
+    "dip_switch": "Set the DIP switch inside the sensor to 0 and ask again.",
+    "power_cycle_needed": "Switch the sensor's power off and on. The daemon notices when it comes up.",
+    "refused": "Look up `exception_code` in the device's manual; 06 means busy, so ask again.",
+    "not_verified": "Switch the sensor's power off and on, and look at the cable. It is being looked for; event "
+    "`readdressed` or `change_dropped` tells the end.",
+    "rolled_back": "Nothing is lost. The message names the sensor that failed: see to it, and ask again.",
+    "line_error": "See `line/error` and [when-it-goes-wrong.md](when-it-goes-wrong.md), and ask again.",
+    "storage_full": "Make room on the disk of the state directory, or make it writable, and ask again.",
+    "timeout": "Is the sensor connected, powered, at this id and rate? `line/scan` finds it.",
+    "too_large": "Send less than 4 KiB.",
+    "rate_limited": "Wait a second, and send fewer.",
+    "cancelled": "Somebody ended it, or the daemon was ending: ask again. A sensor that was written to is looked for "
+    "at the next start.",
+    "internal": "Report it with the log of that moment.",
+}
+"""What a person does about each of them."""

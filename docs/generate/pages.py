@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from docs.generate import architecture, configuration, mqtt
+from docs.generate import architecture, commands, configuration, mqtt
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -33,6 +33,7 @@ def _page(name: str, parts: Callable[[], Mapping[str, str]]) -> Callable[[], str
 
 PAGES: Mapping[str, Callable[[], str]] = {
     "architecture.md": _page("architecture.md", architecture.parts),
+    "commands.md": _page("commands.md", commands.parts),
     "configuration.md": _page("configuration.md", configuration.parts),
     "mqtt.md": _page("mqtt.md", mqtt.parts),
 }

@@ -142,9 +142,9 @@ async def _knock(slave: int, profile: Profile, powers: Powers) -> None:
         return
     if knock.fault is None:
         raise refuse("line_error", f"slave {slave} could not be asked: the port is lost")
-    heard = knock.fault.heard.hex(" ").upper()
-    message = f"slave {slave} does not answer: {knock.fault.message}; with probe false it is added all the same"
-    raise refuse("timeout", message, heard=heard)
+    heard = f" (heard {knock.fault.heard.hex(' ').upper()})" if knock.fault.heard else ""
+    message = f"slave {slave} does not answer: {knock.fault.message}{heard}; with probe false it is added all the same"
+    raise refuse("timeout", message)
 
 
 async def remove(parameters: OneDevice, powers: Powers, call: Call) -> Answer:
