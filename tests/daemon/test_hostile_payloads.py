@@ -1,0 +1,94 @@
+"""Hostile payloads and floods of them at a running daemon: answered or dropped, and the line goes on."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import time
+from typing import TYPE_CHECKING
+
+import pytest
+
+from lfs10d.outbound import check
+from soak.attestation import Oracle, parsed
+from tests.daemon.conftest import eventually, good
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from tests.conftest import Mosquitto
+    from tests.daemon.conftest import Site, View
+
+pytestmark = [pytest.mark.needs("mosquitto"), pytest.mark.needs("mosquitto_pub")]
+
+BASE = "lfs10d/line0"
+HOSTILE = {
+    "nesting": (b"[" * 4000, "invalid_json"),
+    "nested objects": (b'{"a":' * 600 + b"1" + b"}" * 600, "invalid_json"),
+    "a huge number": (b'{"device":1e999}', "invalid_json"),
+    "a long number": (b'{"device":' + b"9" * 4000 + b"}", "invalid_param"),
+    "control characters": (b'{"device":"\\u001b]0;x\\u0007\\u0000"}', "invalid_param"),
+    "no UTF-8": (b'{"device":"\xff\xfe"}', "invalid_json"),
+    "UTF-16": ('{"device":"slave-1"}'.encode("utf-16"), "invalid_json"),
+    "a megabyte": (b'{"device":"' + b"x" * 1_000_000 + b'"}', "too_large"),
+}
+FLOOD = 2000
+"""Messages of each of two floods at once."""
+
+
+def send(mosquitto: Mosquitto, pub: str, file: str, repeat: int) -> subprocess.Popen[bytes]:
+    """Publish a file over and over, in a process of its own."""
+    topic = f"{BASE}/request/device/read"
+    command = [pub, "-p", str(mosquitto.port), "-t", topic, "-q", "0", "-f", file, "--repeat", str(repeat)]
+    return subprocess.Popen(command)
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_hostile_payload_has_one_answer_with_its_code(
+    site: Site, view: View, mosquitto: Mosquitto, name: str
+) -> None:
+    payload, code = HOSTILE[name]
+    site.line()
+    site.write()
+    run = site.run()
+    view.wait_samples("slave-1", 1, good)
+    mosquitto.publish(f"{BASE}/request/device/read", payload)
+    answer = view.wait("response/device/read")
+    assert (answer["status"], answer["error"]["code"]) == ("rejected", code)
+    view.wait_samples("slave-1", len(view.samples("slave-1")) + 2, good)
+    assert len(view.history_of("response/device/read")) == 1
+    assert "\x1b" not in run.log
+    assert run.ends(signal.SIGTERM) == 0
+
+
+def test_during_a_flood_polls_go_on_and_no_number_is_wrong(
+    site: Site, view: View, mosquitto: Mosquitto, program: Callable[[str], str]
+) -> None:
+    line = site.line()
+    epoch = time.time() - line.now()
+    site.write(poll={"interval": "100ms"})
+    run = site.run()
+    view.wait_samples("slave-1", 5, good)
+    small, large = site.folder / "small", site.folder / "large"
+    small.write_bytes(b'{"device":')
+    large.write_bytes(b'{"a":"' + b"x" * 100_000)
+    pub = program("mosquitto_pub")
+    before = len(view.samples("slave-1"))
+    floods = [send(mosquitto, pub, str(file), FLOOD) for file in (small, large)]
+    assert [flood.wait(60) for flood in floods] == [0, 0]
+    mosquitto.publish(f"{BASE}/request/health", json.dumps({"id": "last"}))
+    eventually(
+        lambda: any(each["id"] == "last" for each in view.history_of("response/health")), "the answer after the flood"
+    )
+    view.wait_samples("slave-1", before + 5, good)
+    assert run.ends(signal.SIGTERM) == 0
+    for slave in (1, 2):
+        samples = parsed((each.topic, each.payload) for each in view.heard)[f"slave-{slave}"]
+        assert samples.judge(max(samples.by_seq)) == []
+        found = Oracle(line.line.log, [], epoch=epoch).judge(f"slave-{slave}", slave, samples.in_order())
+        assert (found.wrong, found.good > before) == ([], True)
+    answers = [each for each in view.heard if each.topic == f"{BASE}/response/device/read"]
+    assert answers
+    for each in answers:
+        check("response/device/read", each.payload.decode())
