@@ -7,6 +7,7 @@ Exit code 1 if a sample is lost, wrong or out of order, if a stale value looks l
 from __future__ import annotations
 
 import argparse
+import logging
 import secrets
 import shutil
 import sys
@@ -73,6 +74,7 @@ def run_virtual(options: argparse.Namespace) -> list[str]:
             told = time.monotonic()
             tell(f"virtual time: {account.exchanges} exchanges, {account.findings} findings")
 
+    logging.disable()  # of the daemon in this process: what it logs of faults by the thousand helps nobody
     account = run_family(options.exchanges, options.seed, progress)
     tell(str(account))
     return account.faults
