@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import signal
 import time
+from functools import partial
 from typing import TYPE_CHECKING
 
 import pytest
@@ -89,7 +90,7 @@ def test_under_every_fault_in_turn_the_broker_is_told_no_wrong_number_and_every_
     run.ready()
     bad.carry(WELL)
     for kind in KINDS:
-        tell(bad.served, lambda line, kind=kind: ail(line, kind))
+        tell(bad.served, partial(ail, kind=kind))
         bad.carry(EACH)
     tell(bad.served, heal)
     healed = round(time.time() * 1000)
