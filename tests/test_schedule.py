@@ -409,3 +409,37 @@ def test_a_refusal_teaches_nothing_about_time_nor_does_an_answer_without_one() -
 def test_grids_of_slow_devices_lie_two_exchanges_apart() -> None:
     rig = Rig(spec(1, 100.0), spec(2, 100.0))
     assert rig.schedule.devices["slave-2"].due == pytest.approx(2 * T9600.exchange(8, 9))
+
+
+@pytest.mark.parametrize(("errand", "share"), [(Errand.SCAN, 0.3), (Errand.CHANGE, 0.2)])
+def test_a_change_pays_half_as_much_again_on_a_crowded_line(errand: Errand, share: float) -> None:
+    rig = Rig(spec(1, 0.0))
+    rig.run(0.5)
+    job = Task(*[word for _ in range(1000) for word in (asking(7), Later(0.0))], share=0.3)
+    job.errand = errand
+    rig.schedule.submit(job, rig.now)
+    rig.asked.clear()
+    rig.run(20.0)
+    assert rig.asked.count(7) / len(rig.asked) == pytest.approx(share, abs=0.03)
+
+
+def test_a_change_pays_nothing_for_others_where_there_are_none() -> None:
+    rig = Rig()
+    job = Task(*[word for _ in range(1000) for word in (asking(7), Later(0.0))], share=0.3)
+    job.errand = Errand.CHANGE
+    rig.schedule.submit(job, 0.0)
+    rig.run(20.0)
+    assert len(rig.asked) * (TAKES + T9600.gap) / 20.0 == pytest.approx(0.3, abs=0.03)
+
+
+def test_those_probed_in_turn_after_the_first_answer_are_asked_twice_where_they_follow_a_silent_one() -> None:
+    rig = Rig(*(spec(slave, 100.0) for slave in (1, 2, 3)), rules=PollRules(offline_after=1, retries=0))
+    rig.run(1.0)
+    rig.dead = {1, 2, 3}
+    rig.run(150.0)
+    rig.dead = {2, 3}
+    while not rig.schedule.devices["slave-1"].online:
+        rig.run(rig.now + 0.01)
+    rig.asked.clear()
+    rig.run(rig.now + 0.65)
+    assert rig.asked in ([2, 3, 3], [3, 2, 2])
