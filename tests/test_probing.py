@@ -193,3 +193,5 @@ def test_an_exhausted_share_holds_up_neither_an_exempt_probe_nor_those_of_a_line
     dead.last_asked = 4.0
     probing.review([dead], 4.0)
     assert probing.next_at == pytest.approx(5.0)
+    assert probing.account.allows(4.0)
+    assert probing.account.ready_at(4.0) == 4.0
