@@ -25,6 +25,7 @@ from lfs10d.jobs.readdress import (
     Write,
     free,
     judge,
+    parted,
     present,
     verified,
     written,
@@ -83,7 +84,8 @@ def adopt(wish: Newcomer, asking: Asking, echo_known: Callable[[], bool]) -> Gen
         here = Spot(slave=old.slave, baudrate=wish.line_rate)
         exception = yield from written(here, asking.id_register, to, asking)
         found = yield from verified(here, new, asking)
-        return Adopted(judge(found, looked.verdict.register, exception, to), old, to)
+        verdict = judge(found, looked.verdict.register, exception, to)
+        return Adopted((yield from parted(verdict, here, to, asking)), old, to)
     except LineLostError:
         return Adopted(Verdict(Ending.NOWHERE, stays_open=True), old, to)
 

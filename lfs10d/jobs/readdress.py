@@ -5,7 +5,9 @@ Rules
 1. Before anything is written: the new id is silent in three questions at the line's rate and at each other rate of
    the profile, not one byte is heard; the sensor answers at its old id, and nothing older can come from there; how
    the adapter echoes is known.
-2. The intent is on the disk before the write. There is one write, to one slave, and no other register is written.
+2. The intent is on the disk before the write. There is one write, to one slave, and no other register is written. Only
+   where two had the old id and the one that stayed has stored the new one is its old id written back: it would come
+   to the other's at its next power-up.
 3. An echo, an exception, silence: all of them are only hints. For up to `VERIFY` both places are asked, once more
    right after that; what they say then is the truth.
 
@@ -25,7 +27,7 @@ silent            silent, garbage                            not_verified, stays
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
@@ -137,7 +139,8 @@ def readdress(wish: Wish, asking: Asking, echo_known: Callable[[], bool]) -> Gen
     try:
         exception = yield from written(wish.old, asking.id_register, wish.to, asking)
         found = yield from verified(wish.old, wish.new, asking)
-        return judge(found, before.register, exception, wish.to)
+        verdict = judge(found, before.register, exception, wish.to)
+        return (yield from parted(verdict, wish.old, wish.to, asking))
     except LineLostError:
         return Verdict(Ending.NOWHERE, stays_open=True)
 
@@ -240,6 +243,18 @@ def told(old: Spot, new: Spot, asking: Asking) -> Generator[Step, Any, Found]:
         if at_old.answers:
             break
     return Found(at_new, at_old, spoilt >= TRIES)
+
+
+def parted(verdict: Verdict, old: Spot, to: int, asking: Asking) -> Generator[Step, Any, Verdict]:
+    """Have the one of two that stayed at `old` forget the new id, if it has stored that."""
+    if verdict.ending is not Ending.BOTH or verdict.register != to:
+        return verdict
+    for _ in range(TRIES):
+        yield from written(old, asking.id_register, old.slave, asking)
+        reply = yield from asking.who(old, PATIENT)
+        if reply.register == old.slave:
+            return replace(verdict, register=old.slave, stays_open=False)
+    return verdict
 
 
 def _nearer(one: Reply, other: Reply) -> Reply:

@@ -21,6 +21,7 @@ from lfs10d.jobs.readdress import (
     Write,
     free,
     judge,
+    parted,
     present,
     readdress,
     told,
@@ -75,6 +76,20 @@ def test_of_two_sensors_at_one_id_one_that_moves_alone_is_a_duplicate(pretence: 
     pretence.sensor(3, manner="ignores")
     verdict = carried_out(pretence)
     assert verdict.ending is Ending.BOTH
+
+
+def test_the_one_of_two_that_stays_and_stored_the_new_id_gets_its_old_one_back(pretence: Pretence) -> None:
+    pretence.sensor(3)
+    pretence.sensor(3, manner="stores")
+    assert carried_out(pretence) == Verdict(Ending.BOTH, 3)
+    assert pretence.writes == [WriteRegister(3, 5, 9), WriteRegister(3, 5, 3)]
+
+
+def test_one_that_keeps_the_new_id_stored_leaves_the_change_open(pretence: Pretence) -> None:
+    stays = pretence.sensor(3, manner="ignores")
+    stays.stored[5] = 9
+    before = Verdict(Ending.BOTH, 9, stays_open=True)
+    assert pretence.carry_out(parted(before, OLD, 9, pretence.asking())) == before
 
 
 def test_a_dry_run_looks_and_writes_nothing(pretence: Pretence) -> None:

@@ -136,14 +136,16 @@ class Story:
         self.bench.go(self.life, 1.0)
 
     def mend(self, seconds: float = 200.0) -> None:
-        """Heal everybody, switch the power of all off and on, take the others off, begin anew, and wait."""
+        """Heal everybody, switch the power of all off and on, take the others off, and wait until nothing is open."""
         for sensor in self.sensors:
             sensor.heal()
             sensor.power_cycle()
         for other in self.others:
             self.bench.line.sensors.remove(other)
         self.restart()
-        self.bench.go(self.life, seconds)
+        begun = self.bench.clock.now
+        while self.bench.clock.now < begun + (seconds if self._open else 5.0):
+            self.bench.turn(self.life)
 
     # -- what must hold
 

@@ -1,6 +1,6 @@
 """What holds whatever the sensors are like, whoever dies when: nobody is stranded, no id is shared, all is answered.
 
-`LFS10D_EXAMPLES` is how many stories are told of each kind, 60 if it is not set.
+`LFS10D_EXAMPLES` is how many stories are told of each kind, 40 if it is not set.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from tests.physical.story import Story
 if TYPE_CHECKING:
     from tests.physical.conftest import Bench
 
-EXAMPLES = int(os.environ.get("LFS10D_EXAMPLES", "60"))
+EXAMPLES = int(os.environ.get("LFS10D_EXAMPLES", "40"))
 AILMENTS: list[tuple[str, dict[str, Any]]] = [
     ("none", {}),
     ("none", {}),

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from lfs10d.simulator.sensor import Sensor
+
 if TYPE_CHECKING:
     from tests.physical.conftest import Bench
 
@@ -60,3 +62,20 @@ def test_one_that_does_not_obey_stays_and_the_answer_says_why(
     before = len(life.readings)
     bench.go(life, 10.0)
     assert len([r for r in life.readings[before:] if r.device == "s3" and r.values]) >= 8
+
+
+@pytest.mark.parametrize("manner", ["power_cycle", "stores_but_ignores"])
+def test_two_sensors_that_part_are_told_and_do_not_meet_again_at_a_power_cycle(bench: Bench, manner: str) -> None:
+    life = bench.sensors(3, 4)
+    twin = bench.line.add(Sensor(3))
+    twin.ail(manner)
+    bench.go(life, 3.0)
+    answer = bench.readdress(life, "s3", 9)
+    assert (answer.status, answer.code) == ("failed", "duplicate_id")
+    assert life.told("duplicate_id") == [{"device": "s3", "slave": 9, "from": 3}]
+    twin.heal()
+    for sensor in bench.line.sensors:
+        sensor.power_cycle()
+    bench.go(life, 30.0)
+    assert sorted(sensor.slave for sensor in bench.line.sensors) == [3, 4, 9]
+    assert not life.physical.open
