@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 import click
 
+from lfs10d import startup
 from lfs10d.cli import EXIT_CONFIG, EXIT_FAILED, EXIT_UNAVAILABLE, lfs10d
 from lfs10d.errors import BrokerError, ConfigError, Lfs10dError, PortError
 
@@ -32,6 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     signal.signal(signal.SIGTERM, _terminated)
+    startup.begin()
     code = _run(arguments)
     sys.exit(_flushed(code))
 
