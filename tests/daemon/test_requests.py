@@ -309,6 +309,7 @@ def test_by_3_1_1_a_request_is_told_apart_by_its_id(site: Site, mosquitto: Mosqu
         payload = json.dumps({"id": number, **({"device": "slave-1"} if number == 0 else {})})
         command = ["mosquitto_pub", "-V", "mqttv311", "-p", str(mosquitto.port), "-q", "1"]
         subprocess.run([*command, "-t", f"{BASE}/request/{name}", "-m", payload], check=True, timeout=20)
+    eventually(lambda: any(_id(each) == 0 for each in operator.responses), "the reading, which waits for the line")
     heard = operator.settled()
     assert {_id(each): code for each, code in zip(heard, codes(heard), strict=True)} == {
         "kept": "retained",
