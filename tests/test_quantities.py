@@ -118,3 +118,10 @@ def test_anything_else_is_no_size(written: object) -> None:
 @given(st.integers(0, 10**15))
 def test_a_size_reads_back_as_itself(count: int) -> None:
     assert size(size_text(count)) == count
+
+
+@pytest.mark.parametrize(
+    ("count", "text"), [(0, "0B"), (999, "999B"), (1000, "1kB"), (512_000_000, "512MB"), (2_000_000_000, "2GB")]
+)
+def test_a_size_is_told_in_the_largest_unit_that_is_exact(count: int, text: str) -> None:
+    assert size_text(count) == text
