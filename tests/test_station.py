@@ -491,3 +491,10 @@ def test_while_the_port_is_lost_no_failure_is_held_against_a_device() -> None:
     running.heard(PortChanged(0, LOST), instant(0))
     assert "device/a/error" not in ail(running, since=1)
     assert fields(shown(running, "device/a/error"), "active") == (False,)
+
+
+def test_everything_that_changes_at_once_is_told() -> None:
+    running = station(ONE_VALUE, TWO_VALUES, THIRD)
+    told = topics(running.configure(LINE, [replace(THIRD, label="x")], instant(1)))
+    assert {"device/a/state", "device/b/state", "device/c/config", "devices"} <= set(told)
+    assert told.count("event") == 2
