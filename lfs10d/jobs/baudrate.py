@@ -220,7 +220,12 @@ def restored(sensor: Sensor, rate: int, other: int) -> Generator[Step, Any, int 
         return at
     if at == other:
         _, at, _ = yield from shifted(sensor, other, rate)
-        return at
+        if at != rate:
+            return at
+        # Of two of this id the other one may have stored the rate and be here still.
+        reply = yield from sensor.asking.who(sensor.at(rate), PATIENT, register=sensor.register)
+        if reply.register == sensor.code(rate):
+            return rate
     yield from written(sensor.at(rate), sensor.register, sensor.code(rate), sensor.asking)
     for _ in range(TRIES):
         reply = yield from sensor.asking.who(sensor.at(rate), PATIENT, register=sensor.register)

@@ -272,3 +272,11 @@ def test_one_that_answers_at_both_rates_since_the_write_is_two_and_all_are_moved
     verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True))
     assert verdict == RateVerdict(Ended.TWINS, {"s1": 9600, "s2": 9600}, ("s2",))
     assert [sensor.baudrate for sensor in pretence.sensors] == [9600] * 3
+
+
+def test_the_one_of_two_that_stayed_forgets_the_rate_it_stored(pretence: Pretence) -> None:
+    sensors = line(pretence, "stores")
+    pretence.sensor(1)
+    verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True))
+    assert verdict.ended is Ended.TWINS
+    assert [sensor.stored.get(4, 1) for sensor in pretence.sensors] == [1, 1]
