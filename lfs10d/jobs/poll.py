@@ -13,6 +13,7 @@ Rules
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from lfs10d.jobs.job import Ask, Done, Hold, Later, Next
@@ -34,6 +35,12 @@ _NOTHING: frozenset[int] = frozenset()
 def told_busy(fault: Fault, exceptions: tuple[int, ...]) -> Fault:
     """Return the fault, marked as busy where its exception is one of those that mean so."""
     return replace(fault, busy=True) if fault.exception_code in exceptions else fault
+
+
+@lru_cache(maxsize=1024)
+def _read(slave: int, address: int, count: int, function: int) -> ReadRegisters:
+    """Return a request, the same object for the same read: it is asked again and again, and looked up by it."""
+    return ReadRegisters(slave, address, count, function)
 
 
 class Poll:
@@ -74,7 +81,7 @@ class Poll:
         device = self.device
         spec = device.spec
         block = self._blocks[self._block]
-        request = ReadRegisters(device.slave, block.address, block.count, block.function)
+        request = _read(device.slave, block.address, block.count, block.function)
         barrier = spec.profile.barrier
         if barrier is None and self._unanswered.confusable(request, spec.codec):
             self._unanswered.leave_alone(device.slave, device.timeout)
@@ -83,7 +90,7 @@ class Poll:
             return Hold(until)
         self._barrier_asked = False
         if barrier is not None and (self._barrier_due or self._unanswered.confusable(request, spec.codec)):
-            request = ReadRegisters(device.slave, barrier.register, barrier.count, barrier.function)
+            request = _read(device.slave, barrier.register, barrier.count, barrier.function)
             self._barrier_asked = True
         elif (until := self._unanswered.lingering_until(request, spec.codec, now)) is not None:
             return Hold(until)

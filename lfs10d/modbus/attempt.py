@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -101,22 +101,19 @@ class Outcome:
     ambiguous: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Quiet:
+class Quiet(NamedTuple):
     """Let the line be silent: call `step` again at `until`, or when bytes have been given to `received`."""
 
     until: float
 
 
-@dataclass(frozen=True, slots=True)
-class Send:
+class Send(NamedTuple):
     """Look once more whether bytes wait; if none do, write `frame` at once and tell it by `sent`."""
 
     frame: bytes
 
 
-@dataclass(frozen=True, slots=True)
-class Listen:
+class Listen(NamedTuple):
     """Read what comes and give it to `received`; call `step` after that, or at `until`.
 
     Nothing can be decided on new bytes before `not_before`, so the caller may sleep to it. At `until` what is
@@ -127,8 +124,7 @@ class Listen:
     not_before: float
 
 
-@dataclass(frozen=True, slots=True)
-class Settled:
+class Settled(NamedTuple):
     """The exchange is over."""
 
     outcome: Outcome

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from math import inf
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
 
 from lfs10d.errors import PortBusyError, PortError
 from lfs10d.modbus.echo import EchoLearner
@@ -34,8 +34,7 @@ RATE_SETTLE = 0.005
 """Silence before and after a change of rate, in s: the divisor can change under bytes still in the adapter."""
 
 
-@dataclass(frozen=True, slots=True)
-class Wait:
+class Wait(NamedTuple):
     """Nothing to do before `until`; with `listen` also when bytes come, but not before `not_before`."""
 
     until: float

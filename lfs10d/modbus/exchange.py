@@ -137,6 +137,7 @@ class Exchange:
         self._state = State.SILENCE
         self._frame = attempt.codec.encode(attempt.request)
         self._reception = Reception(attempt, self._frame)
+        self._answer_size = attempt.codec.answer_size(attempt.request)
         self._gap = timing.gap if attempt.gap is None else max(timing.gap, attempt.gap)
         # Silence that was still running when the line was given to us is no babble.
         self._give_up = max(asked + attempt.turn, quiet_since + self._gap)
@@ -233,7 +234,7 @@ class Exchange:
             over = self._sent_end + attempt.turnaround_delay
             return over, over
         first = max(self._sent_end + attempt.timeout, self._reception.late_at + self._patience)
-        size = attempt.codec.answer_size(attempt.request)
+        size = self._answer_size
         if attempt.codec.framing is Framing.ASCII and self._reception.begun:
             return first, first + size * ASCII_PAUSE
         return first, first + attempt.timing.transmission(size) + self._hush

@@ -17,6 +17,7 @@ from binascii import a2b_hex, b2a_hex
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
+from struct import unpack
 from typing import TYPE_CHECKING
 
 from pymodbus.framer import FramerAscii, FramerRTU
@@ -177,6 +178,9 @@ class Codec:
 
         `body` must be of a frame that was found right and of a shape of `shapes`.
         """
+        if body[1] in (READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS):
+            # What pymodbus says, at a tenth of its price: it is asked at every poll.
+            return unpack(f">{body[2] // 2}H", body[3:])
         answer = _ANSWERS.decode(body[1:])
         if isinstance(answer, ExceptionResponse):
             return (answer.exception_code,)

@@ -81,7 +81,8 @@ class Reception:
             data = self._compare(data, now)
         if data:
             self._sort(data, now)
-        self._foresee(now)
+        if self.answer is None:
+            self._foresee(now)
 
     def _compare(self, data: bytes, now: float) -> bytes:
         """Hold back what may be echo; return what is none."""

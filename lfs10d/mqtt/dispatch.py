@@ -96,7 +96,8 @@ class Dispatch:
                 self._topics.full(letter.topic),
                 reason_in_words(reason),
             )
-        self.wake()
+        if self._outbox.waits:
+            self.wake()
 
     def _now(self) -> float:
         return asyncio.get_running_loop().time()

@@ -149,7 +149,8 @@ class Outbox:
             return retained
         self.age(now)
         in_turn = (self._live, self._messages) if self._message_went else (self._messages, self._live)
-        for queue in (*in_turn, self._traces):
+        queues: tuple[deque[Message] | deque[Live], ...] = (*in_turn, self._traces)
+        for queue in queues:
             while queue:
                 letter = queue.popleft()
                 if letter.topic not in self._refused:
@@ -158,6 +159,11 @@ class Outbox:
                 self.past.dead(letter)
         self._repeat(now)
         return self.past.next(now, self._refused, self.past.dead)
+
+    @property
+    def waits(self) -> bool:
+        """Something may go, now or later; False: nothing before something is added."""
+        return bool(self._retention or self._messages or self._live or self._traces) or self.due() is not None
 
     def due(self) -> float | None:
         """Return when `next` may have something though nothing happens before; None: not by time alone."""

@@ -107,8 +107,12 @@ def _length(number: int) -> bytes:
     """Return a variable byte integer (1.5.5)."""
     if not 0 <= number <= LONGEST:
         raise ValueError(f"a packet has at most {LONGEST} bytes, not {number}")
+    if number <= 0x7F:  # noqa: PLR2004 - seven bits a byte
+        return bytes((number,))
+    if number <= 0x3FFF:  # noqa: PLR2004 - twice seven: a sample
+        return bytes((number & 0x7F | 0x80, number >> 7))
     out = bytearray()
-    while number > 0x7F:  # noqa: PLR2004 - seven bits a byte
+    while number > 0x7F:  # noqa: PLR2004
         out.append(number & 0x7F | 0x80)
         number >>= 7
     out.append(number)

@@ -795,3 +795,18 @@ def test_a_backlog_of_any_length_leaves_whole(count: int) -> None:
         outbox.settled(letter, now)
         now += ARRAY_EVERY
     assert told == list(range(1, count + 1))
+
+
+def test_it_says_whether_anything_waits() -> None:
+    outbox = Outbox()
+    told = [outbox.waits]
+    outbox.connected(0.0)
+    outbox.burst([], ONLINE)
+    told.append(outbox.waits)
+    letter = outbox.next(0.0)
+    assert letter is not None
+    told.append(outbox.waits)
+    outbox.settled(letter, 0.0)
+    outbox.add(Publication("event", {}, Kind.EVENT, retain=False, qos=1), 0.0)
+    told.append(outbox.waits)
+    assert told == [False, True, False, True]
