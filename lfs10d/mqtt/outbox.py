@@ -148,8 +148,10 @@ class Outbox:
         if retained is not None or self._retention.first:
             return retained
         self.age(now)
-        in_turn = (self._live, self._messages) if self._message_went else (self._messages, self._live)
-        for queue in (*in_turn, self._traces):
+        queues: tuple[deque[Live] | deque[Message], ...] = (self._messages, self._live, self._traces)
+        if self._message_went:
+            queues = (self._live, self._messages, self._traces)
+        for queue in queues:
             while queue:
                 letter = queue.popleft()
                 if letter.topic not in self._refused:
