@@ -79,19 +79,15 @@ class ConnectionInMemory(Connection):
         retain: bool = False,
         response_topic: str | None = None,
         correlation: bytes | None = None,
-        hold: bool = False,
     ) -> int | None:
         """Take one message."""
-        del qos, retain, response_topic, correlation, hold
+        del qos, retain, response_topic, correlation
         if self.home.connection is not self:
             return None
         self.home.published.append((topic, payload))
         self._last += 1
         self.tell("acknowledged", self._last, 0)
         return self._last
-
-    def flush(self) -> None:
-        """Do nothing: nothing is held."""
 
     def subscribe(self, filters: Sequence[Filter]) -> int | None:
         """Grant everything; nobody else publishes here."""

@@ -11,12 +11,24 @@ if TYPE_CHECKING:
     from lfs10d.mqtt.settings import Tls
 
 
+class _Socket(ssl.SSLSocket):
+    """Is closed when the handshake fails; paho leaves that to chance."""
+
+    def do_handshake(self, block: bool = False) -> None:  # noqa: FBT001, FBT002 - the signature of the library
+        try:
+            super().do_handshake(block)
+        except BaseException:
+            self.close()
+            raise
+
+
 def tls_context(tls: Tls) -> ssl.SSLContext:
     """Return a context for TLS 1.2 or newer that checks certificate and name; raise BrokerError. Reads files."""
     try:
         context = ssl.create_default_context(cafile=tls.ca)
     except OSError as error:
         raise BrokerError(f"mqtt.tls.ca: {tls.ca}: {_words(error)}") from error
+    context.sslsocket_class = _Socket
     context.minimum_version = ssl.TLSVersion.TLSv1_2
     if tls.cert is not None:
         try:

@@ -60,19 +60,13 @@ class Wire:
     sent: list[tuple[str, bytes, int, bool, bytes | None]] = field(default_factory=list)
     gone: bool = False
 
-    held: int = 0
-
     def publish(
-        self, topic: str, payload: bytes, *, qos: int, retain: bool, correlation: bytes | None, hold: bool
+        self, topic: str, payload: bytes, *, qos: int = 1, retain: bool = False, correlation: bytes | None = None
     ) -> int | None:
         if self.gone:
             return None
         self.sent.append((topic, payload, qos, retain, correlation))
-        self.held += hold
         return len(self.sent)
-
-    def flush(self) -> None:
-        self.held = 0
 
 
 class Desk:
@@ -100,7 +94,6 @@ class Desk:
         self.dispatch.wake()
         for _ in range(times):
             await asyncio.sleep(0)
-        assert not self.wire.held, "what is handed over goes"
 
     def acknowledge(self, reason: int = 0) -> None:
         """Answer everything that was handed over."""

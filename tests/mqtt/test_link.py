@@ -166,23 +166,6 @@ def test_garbage_from_a_broker_ends_the_connection_and_no_more(
     assert "Traceback" not in caplog.text
 
 
-def test_a_message_of_qos_0_is_told_when_it_is_written(mosquitto: Mosquitto) -> None:
-    async def scenario() -> None:
-        async with linked(settings_of(mosquitto.port)) as (link, witness):
-            await link.opened(PATIENCE)
-            connection = link.standing
-            assert connection is not None
-            mid = connection.publish("t", b"x" * 10_000_000, qos=0, hold=True)
-            assert not witness.acknowledgements
-            connection.flush()
-            await witness.until(lambda: witness.acknowledgements == {mid: 0})
-            link.drop("for the test")
-            assert connection.publish("t", b"x") is None
-            assert connection.subscribe([Filter("t")]) is None
-
-    asyncio.run(scenario())
-
-
 @pytest.mark.parametrize("said", [b"\x20\x03\x00\x00\x00", b"\x20\x06\x00\x00\x03\x13\x00\x01"])
 def test_a_broker_that_answers_no_ping_is_given_up(serving: Serving, said: bytes) -> None:
     """Where it names a keepalive, that one counts."""
@@ -477,7 +460,7 @@ def test_what_is_given_up_before_it_was_open_never_speaks_to_the_broker(mosquitt
         await link.leave(1.0)
         given_up.set()
         for each in threading.enumerate():
-            if each.name == "connect":
+            if each.name.startswith(("connect", "paho")):
                 await asyncio.to_thread(each.join, PATIENCE)
 
     asyncio.run(scenario())
