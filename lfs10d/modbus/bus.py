@@ -32,6 +32,10 @@ REOPEN_LAST = 1.0
 """The longest pause between two tries to open the port, in s."""
 RATE_SETTLE = 0.005
 """Silence before and after a change of rate, in s: the divisor can change under bytes still in the adapter."""
+AWAKE_BEFORE = 0.00025
+"""Who waits for an answer is awake so long before its last byte, in s, at most a character: what came until then is
+sorted, which brings the code back into the processor's caches, and the last byte is read when it comes, not 0.2 ms
+later. The next silence begins at that moment."""
 
 
 class Wait(NamedTuple):
@@ -255,7 +259,8 @@ class Bus:
         while True:
             action = exchange.step(now)
             if isinstance(action, Listen):
-                return Wait(action.until, listen=True, not_before=action.not_before)
+                early = min(AWAKE_BEFORE, self.timing.character)
+                return Wait(action.until, listen=True, not_before=action.not_before - early)
             if isinstance(action, Quiet):
                 return Wait(action.until, listen=True)
             if isinstance(action, Settled):

@@ -8,7 +8,7 @@ from math import inf
 import pytest
 
 from lfs10d.errors import PortBusyError, PortLostError
-from lfs10d.modbus.bus import RATE_SETTLE, REOPEN_FIRST, Bus, LineRules, Order, Wait
+from lfs10d.modbus.bus import AWAKE_BEFORE, RATE_SETTLE, REOPEN_FIRST, Bus, LineRules, Order, Wait
 from lfs10d.modbus.exchange import Echo, Outcome
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters, WriteRegister
 from lfs10d.modbus.settings import PortSettings
@@ -143,7 +143,7 @@ def test_an_order_waits_for_silence_is_sent_and_answered(rig: Rig) -> None:
     assert wait.listen
     begun = rig.step(0.02, ANSWER[:4])
     assert isinstance(begun, Wait)
-    assert begun.not_before == pytest.approx(rig.clock.now + 5 * T9600.character)
+    assert begun.not_before == pytest.approx(rig.clock.now + 5 * T9600.character - AWAKE_BEFORE)
     outcome = rig.step(0.006, ANSWER[4:])
     assert isinstance(outcome, Outcome)
     assert outcome.answer == (0x414F, 0xD70A)
