@@ -6,7 +6,8 @@ The line's own log is the oracle; it shares no code with the daemon. A number is
   of ours that was the last one when it was believed;
 - *right by construction*, if nobody on that line could have told: after it had asked, the master was handed a whole
   frame of that sensor with that number, though troubles made it so (two speakers at once whose bytes happen to fit,
-  an answer to another master);
+  an answer to another master, or our own that comes late because such a one had come in its place: RTU has no
+  transaction id);
 - *wrong* otherwise.
 """
 
@@ -32,6 +33,8 @@ ANSWER = 9
 """Bytes of an answer with one number."""
 ROUNDED = 1_000_000
 """`ts` is in whole ms; in ns."""
+HELD = 20_000_000
+"""An adapter holds bytes back for up to 16 ms: what ended so long before a request may be handed over after it (ns)."""
 
 
 @dataclass
@@ -115,6 +118,7 @@ class Oracle:
         self._handed = handed
         self._requests = [request for request in log if request.speaker is MASTER]
         self._begun = [request.begun for request in self._requests]
+        self._replies = [(request, answer) for request in log for answer in request.answers if answer.believable]
         self._answers: dict[float, tuple[Request, Answer]] = {}
         self._published: set[float] = set()
         for request in log:
@@ -158,6 +162,8 @@ class Oracle:
                 wrong = "a number nobody sent so"
         elif answer.sensor.slave != slave:
             wrong = f"the number of slave {answer.sensor.slave}"
+        elif request is not last and self._displaced(request, last):
+            found.by_construction += 1
         elif request is not last:
             wrong = f"the answer to an earlier request, begun at {request.begun} ns"
         else:
@@ -170,6 +176,22 @@ class Oracle:
         while place and self._requests[place - 1].ended > at + ROUNDED:
             place -= 1
         return self._requests[place - 1] if place else None
+
+    def _displaced(self, asked: Request, last: Request) -> bool:
+        """Tell whether, before `last`, an answer to another master came in the place of the answer to `asked`.
+
+        Nothing tells it from ours, so ours comes in the place of the next, and so on until one is missing.
+        """
+        slave = asked.frame[0]
+        for request, answer in self._replies:
+            came = answer.sensor.slave == slave and asked.begun - HELD <= answer.burst.ends[-1] and request is not asked
+            if (
+                came
+                and answer.burst.start < last.begun
+                and (request.speaker is not MASTER or (request.begun < asked.begun and self._displaced(request, asked)))
+            ):
+                return True
+        return False
 
     def _was_handed(self, last: Request, sample: Mapping[str, Any], slave: int) -> bool:
         """Tell whether the master was handed, after it had asked, a whole frame of that slave with that number."""

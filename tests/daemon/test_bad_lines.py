@@ -28,9 +28,9 @@ pytestmark = pytest.mark.needs("mosquitto")
 
 SLAVES = (1, 2, 3, 4)
 RATE = 115200
-EACH = 100
+EACH = 70
 """Exchanges under each kind of fault; the line counts them, no clock."""
-WELL = 200
+WELL = 100
 """Exchanges before the first and after the last."""
 SHARE = 0.3
 WITHIN = 120.0

@@ -101,6 +101,28 @@ def test_the_answer_to_another_master_is_right_by_construction() -> None:
     assert (found.good, found.by_construction, found.wrong) == (0, 1, [])
 
 
+def displaced(speaker: str) -> Attested:
+    """Judge a number that came one request late, after one that answered a request of `speaker` took its place."""
+    wire = Wire()
+    wire.ask(1)  # theirs, whose answer we take for that to our next
+    late = wire.ask(1)
+    now = wire.ask(1)
+    theirs, ours, _ = wire.line.log
+    theirs.speaker = speaker
+    theirs.answers[0].burst.start = ours.ended + 1
+    theirs.answers[0].burst.ends[:] = [ours.ended + 2]
+    return wire.judge(1, {**now, "wind_speed": late["wind_speed"]})
+
+
+def test_an_answer_that_another_masters_took_the_place_of_is_right_by_construction() -> None:
+    found = displaced("second master")
+    assert (found.by_construction, found.wrong) == (1, [])
+
+
+def test_an_answer_that_an_earlier_one_of_ours_took_the_place_of_is_wrong() -> None:
+    assert "earlier request" in displaced("master").wrong[0]
+
+
 @pytest.mark.parametrize(
     "said", [sample(1.0, quality="bad"), sample(1.0, error="crc"), sample(None, error=None), sample(1.0, rtt_ms=None)]
 )
