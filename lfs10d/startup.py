@@ -38,5 +38,5 @@ def begin() -> None:
 
 
 def done() -> None:
-    """Never look for garbage among what was imported: 100 000 objects, while which the line would wait 30 ms."""
+    """Never look for garbage among what was imported: the line would have to wait meanwhile."""
     gc.freeze()
