@@ -1,135 +1,102 @@
-"""Where every verb ends: one line and an exit code, never a traceback."""
+"""Where every verb begins: signals are heard from there on, and end each verb with its code."""
 
 from __future__ import annotations
 
-import errno
-import os
 import signal
 import subprocess
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 import pytest
 
-from lfs10d import __main__, cli
-from lfs10d.errors import BrokerError, ConfigError, FailedError, PortBusyError, PortLostError, Problem, StateError
+from lfs10d import __main__
+from lfs10d.cli import outcome
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+SLOW = ("traceback", "click", "lfs10d.cli", "lfs10d.errors", "pydantic")
+
 
 @pytest.fixture(autouse=True)
 def the_signals_as_they_were() -> Iterator[None]:
-    before = signal.getsignal(signal.SIGTERM)
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     yield
-    signal.signal(signal.SIGTERM, before)
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
-def ended(monkeypatch: pytest.MonkeyPatch, outcome: BaseException | int | None) -> int | str | None:
-    """Return the exit code of a verb that ends like this."""
-
-    @click.command()
-    def verb() -> int | None:
-        if isinstance(outcome, BaseException):
-            raise outcome
-        return outcome
-
-    monkeypatch.setattr(__main__, "lfs10d", verb)
+def exit_code(arguments: list[str]) -> int | str | None:
+    """Return the code that the program exits with."""
     with pytest.raises(SystemExit) as exited:
-        __main__.main([])
+        __main__.main(arguments)
     return exited.value.code
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize(
-    ("outcome", "code", "told"),
+    ("arguments", "code"),
     [
-        (None, 0, ""),
-        (0, 0, ""),
-        (1, 1, ""),
-        (78, 78, ""),
-        (
-            ConfigError((Problem("f", 1, 2, "a", "x"), Problem("f", 3, 4, "b", "y"))),
-            78,
-            "f:1:2: a: x\nf:3:4: b: y\n",
-        ),
-        (PortLostError("/dev/x", "gone"), 69, "lfs10d: /dev/x: gone\n"),
-        (PortBusyError("/dev/x", "held"), 69, "lfs10d: /dev/x: held\n"),
-        (BrokerError("no broker"), 69, "lfs10d: no broker\n"),
-        (StateError("no state"), 1, "lfs10d: no state\n"),
-        (FailedError("nobody answered"), 1, "lfs10d: nobody answered\n"),
-        (KeyboardInterrupt(), 1, ""),
-        (BrokenPipeError(), 1, ""),
-        (click.UsageError("no such thing"), 2, "Error: no such thing\n"),
-        (
-            OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "/full"),
-            1,
-            "lfs10d: No space left on device: /full\n",
-        ),
-        (OSError("odd"), 1, "lfs10d: odd\n"),
-        (RuntimeError("a\x1b[2Jb\nc"), 1, "RuntimeError: a [2Jb c; this is a fault of lfs10d itself\n"),
+        (["run"], 0),
+        (["run", "-c", "x.yaml"], 0),
+        (["watch"], 0),
+        (["trace", "--for", "1s"], 0),
+        (["simulate"], 0),
+        (["demo"], 0),
+        (["read", "/dev/x", "2", "--watch"], 0),
+        (["read", "/dev/x", "2"], 1),
+        (["scan", "/dev/x"], 1),
+        (["request", "health"], 1),
+        (["check", "-c", "watch"], 1),
+        (["config"], 1),
+        ([], 1),
     ],
 )
-def test_every_error_ends_in_its_exit_code_and_a_line(
-    outcome: BaseException | int | None,
-    code: int,
-    told: str,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+def test_a_signal_ends_each_verb_with_its_code(
+    number: signal.Signals, arguments: list[str], code: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert ended(monkeypatch, outcome) == code
-    err = capsys.readouterr().err
-    assert err.endswith(told)
-    assert "Traceback" not in err
+    @click.command(context_settings={"ignore_unknown_options": True})
+    @click.argument("words", nargs=-1)
+    def verb(words: tuple[str, ...]) -> None:
+        del words
+        signal.raise_signal(number)
+
+    monkeypatch.setattr(outcome, "lfs10d", verb)
+    assert exit_code(arguments) == code
 
 
-def test_who_asks_for_it_is_shown_where_a_fault_of_the_program_happened(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(("arguments", "code"), [(["watch"], 0), (["check"], 1)])
+def test_a_signal_among_the_imports_ends_each_verb_with_its_code(
+    arguments: list[str], code: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("LFS10D_TRACEBACK", "1")
-    assert ended(monkeypatch, RuntimeError("x")) == 1
-    assert "Traceback" in capsys.readouterr().err
+    class Signal:
+        """Stands in for a module that a signal comes in the middle of."""
+
+        def __getattr__(self, name: str) -> object:
+            signal.raise_signal(signal.SIGTERM)
+            raise AttributeError(name)
+
+    monkeypatch.setitem(sys.modules, "lfs10d.cli.outcome", Signal())
+    assert exit_code(arguments) == code
 
 
-def test_sigterm_ends_a_verb_as_ctrl_c_does(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_sigint_is_heard_where_whoever_started_us_ignores_it(monkeypatch: pytest.MonkeyPatch) -> None:
     @click.command()
     def verb() -> None:
-        signal.raise_signal(signal.SIGTERM)
+        signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(__main__, "lfs10d", verb)
-    with pytest.raises(SystemExit) as exited:
-        __main__.main([])
-    assert exited.value.code == cli.EXIT_FAILED
-
-
-@pytest.mark.parametrize("out", ["/dev/full", "pipe", "closed"])
-def test_output_that_cannot_be_written_is_no_traceback(out: str, tmp_path: Path) -> None:
-    arguments = [sys.executable, "-m", "lfs10d", "--help"]
-    if out == "pipe":
-        reader, writer = os.pipe()
-        os.close(reader)
-        result = subprocess.run(arguments, stdout=writer, stderr=subprocess.PIPE, check=False, cwd=tmp_path)
-        os.close(writer)
-    elif out == "closed":
-        shell = ["sh", "-c", '"$@" >&-', "sh", *arguments]
-        result = subprocess.run(shell, stderr=subprocess.PIPE, check=False, cwd=tmp_path)
-    else:
-        with Path(out).open("wb") as full:
-            result = subprocess.run(arguments, stdout=full, stderr=subprocess.PIPE, check=False, cwd=tmp_path)
-    assert result.returncode == (0 if out == "closed" else 1)
-    assert b"Traceback" not in result.stderr
-    assert b"Exception ignored" not in result.stderr
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    monkeypatch.setattr(outcome, "lfs10d", verb)
+    assert exit_code([]) == 1
 
 
-def test_characters_a_terminal_does_not_know_are_escaped(tmp_path: Path) -> None:
-    (tmp_path / "→.yaml").write_text("line: {port: /dev/x}\nslaves: [2]\n")
-    result = subprocess.run(
-        [sys.executable, "-m", "lfs10d", "check", "-c", "→.yaml"],
-        capture_output=True,
-        check=False,
-        cwd=tmp_path,
-        env={"PATH": "/usr/bin:/bin", "PYTHONIOENCODING": "latin-1"},
-    )
-    assert result.returncode == 0
-    assert result.stdout.startswith(b"\\u2192.yaml: valid")
+def test_a_verb_that_comes_to_its_end_gives_its_own_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(outcome, "lfs10d", click.command()(lambda: 69))
+    assert exit_code([]) == 69
+
+
+def test_nothing_slow_is_imported_before_signals_are_heard() -> None:
+    code = f"import sys, lfs10d.__main__; print([name for name in {SLOW!r} if name in sys.modules])"
+    printed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert printed == "[]\n"
