@@ -11,7 +11,7 @@ import pytest
 from lfs10d import startup
 from lfs10d.startup import NoPlugins
 
-NEVER = ("importlib.metadata", "zipfile", "csv", "rich")
+NEVER = ("importlib.metadata", "zipfile", "csv", "rich", "http.client", "email")
 """Megabytes that no running daemon needs."""
 
 
@@ -52,3 +52,21 @@ def test_no_plugins_are_found_and_the_rest_of_the_loader_is_the_true_one() -> No
     assert loader.PYDANTIC_ENTRY_POINT_GROUP == "pydantic"
     assert sys.modules[startup._LOADER] is not loader
     assert loader.PYDANTIC_ENTRY_POINT_GROUP == "pydantic"
+
+
+def test_what_stands_in_for_a_client_of_the_web_gives_way_to_it() -> None:
+    code = (
+        "import sys; from lfs10d import startup; startup.begin()\n"
+        "import urllib.request as web; print(type(web).__name__, 'http.client' in sys.modules)\n"
+        "print(web.getproxies.__module__, web.Request.__name__, 'http.client' in sys.modules)\n"
+        "import urllib.request; print(type(urllib.request).__name__)"
+    )
+    assert in_a_fresh_interpreter(code).splitlines() == ["Later False", "urllib.request Request True", "module"]
+
+
+def test_a_client_of_the_web_that_is_there_stays() -> None:
+    code = (
+        "import urllib.request; there = urllib.request; from lfs10d import startup; startup.begin()\n"
+        "import urllib.request; print(urllib.request is there)"
+    )
+    assert in_a_fresh_interpreter(code) == "True"
