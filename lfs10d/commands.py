@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import from_json
 
+from lfs10d.kinds import quoted
 from lfs10d.telemetry import VERSION
 from lfs10d.wording import in_words
 
@@ -147,6 +148,11 @@ def read(payload: bytes) -> tuple[Call, Answer | None]:
         content = from_json(payload, allow_inf_nan=False)
     except ValueError:
         return Call(), rejected("invalid_json", "the payload is no JSON in UTF-8")
+    try:
+        # The parser above takes the last of two; this one is asked second, for it minds neither depth nor NaN.
+        json.loads(payload, object_pairs_hook=_once)
+    except _TwiceError as error:
+        return Call(), rejected("invalid_json", f"{quoted(str(error))} is given twice; which is meant?")
     if not isinstance(content, dict):
         return Call(), rejected("invalid_json", 'the payload must be a JSON object, {"id": "a1"} for example')
     ids: dict[str, Identifier | None] = {}
@@ -163,6 +169,19 @@ def read(payload: bytes) -> tuple[Call, Answer | None]:
         problem = rejected("invalid_json", "the payload holds a number that is too large")
         return Call(ids["id"], ids["transaction"]), problem
     return Call(ids["id"], ids["transaction"], content, fingerprint), problem
+
+
+class _TwiceError(Exception):
+    """An object has this key twice."""
+
+
+def _once(pairs: list[tuple[str, object]]) -> None:
+    """Raise _TwiceError at the second of two equal keys."""
+    seen: set[str] = set()
+    for key, _ in pairs:
+        if key in seen:
+            raise _TwiceError(key)
+        seen.add(key)
 
 
 def _is_identifier(value: object) -> bool:

@@ -67,12 +67,16 @@ class Place:
 
 @dataclass(frozen=True)
 class Document:
-    """Data of dict, list, str, int, float, bool and None; `places` by path; `problems` found while reading."""
+    """Data of dict, list, str, int, float, bool and None; `places` by path; `problems` found while reading.
+
+    `unread` are the paths of values that are among the problems already: there None stands in the data.
+    """
 
     file: str
     data: object
     places: Mapping[KeyPath, Place]
     problems: tuple[Problem, ...] = field(default=())
+    unread: frozenset[KeyPath] = frozenset()
 
     def problem(self, path: KeyPath, message: str, *, key: bool = False, shown_path: KeyPath | None = None) -> Problem:
         """Return a problem at the value of `path` (at its key if `key`), or of what surrounds it if absent."""
@@ -100,11 +104,16 @@ class Document:
         return self.problem(path, "").line
 
     def problems_of(self, error: ValidationError, model: type[BaseModel] | None = None) -> tuple[Problem, ...]:
-        """Return what pydantic found as problems with places, in order of place.
+        """Return what pydantic found as problems with places, in order of place; what is `unread` is told already.
 
         With the `model` that was validated, an unknown key is answered with the nearest known one.
         """
-        return tuple(sorted(self._problem_of(detail, model) for detail in error.errors(include_url=False)))
+        details = (detail for detail in error.errors(include_url=False) if not self._is_unread(detail))
+        return tuple(sorted(self._problem_of(detail, model) for detail in details))
+
+    def _is_unread(self, detail: ErrorDetails) -> bool:
+        # An unknown key is a mistake of its own, whatever its value is.
+        return detail["type"] != "extra_forbidden" and self._walked(detail["loc"]) in self.unread
 
     def _problem_of(self, detail: ErrorDetails, model: type[BaseModel] | None) -> Problem:
         path = self._walked(detail["loc"])
@@ -168,7 +177,7 @@ def parse(text: str, file: str) -> Document:
         raise ConfigError((Problem(file, 1, 1, "", "the file is empty"),))
     reader = _NodeReader(file)
     data = reader.read(node, (), None)
-    return Document(file, data, reader.places, tuple(sorted(reader.problems)))
+    return Document(file, data, reader.places, tuple(sorted(reader.problems)), frozenset(reader.unread))
 
 
 def _syntax(error: yaml.MarkedYAMLError) -> str:
@@ -181,6 +190,10 @@ def _syntax(error: yaml.MarkedYAMLError) -> str:
     return f"is not valid YAML: {problem}{context}".replace("\n", " ")
 
 
+_UNREAD = object()
+"""In place of a value that is among the problems."""
+
+
 class _NodeReader:
     """Turns nodes to data, notes every place, collects what is wrong."""
 
@@ -188,6 +201,7 @@ class _NodeReader:
         self.file = file
         self.places: dict[KeyPath, Place] = {}
         self.problems: list[Problem] = []
+        self.unread: list[KeyPath] = []
         self.open: list[int] = []
         self.values = 0
 
@@ -208,7 +222,11 @@ class _NodeReader:
         self.places[path] = Place(place, key)
         match node:
             case ScalarNode():
-                return self.scalar(node, path)
+                value = self.scalar(node, path)
+                if value is _UNREAD:
+                    self.unread.append(path)
+                    return None
+                return value
             case SequenceNode():
                 return self.within(node, "seq", path, self.sequence)
             case MappingNode():
@@ -235,6 +253,8 @@ class _NodeReader:
         lines: dict[str | int, int] = {}
         for key_node, value_node in node.value:
             key = self.scalar(key_node, path) if isinstance(key_node, ScalarNode) else []
+            if key is _UNREAD:
+                continue
             if isinstance(key, bool) or not isinstance(key, str | int):
                 self.report(key_node, path, f"a key must be text or a whole number, not {shown(key)}")
             elif key in lines:
@@ -250,14 +270,14 @@ class _NodeReader:
         if word == "str":
             if any("\ud800" <= character <= "\udfff" for character in text):
                 self.report(node, path, "holds half a character (a surrogate); write it whole")
-                return None
+                return _UNREAD
             return text
         if word not in FORMS:
             self.report(node, path, f"the tag {quoted(node.tag)} is not known; leave it out")
-            return None
+            return _UNREAD
         if FORMS[word].fullmatch(text) is None:
             self.report(node, path, f"{quoted(text)} is not what its tag says; leave the tag out")
-            return None
+            return _UNREAD
         return self.plain(node, word, text, path)
 
     def plain(self, node: ScalarNode, word: str, text: str, path: KeyPath) -> object:
@@ -273,7 +293,7 @@ class _NodeReader:
             return int(text[2:], {"0o": 8, "0x": 16}[text[:2]]) if text[:2] in {"0o", "0x"} else int(text)
         except ValueError:  # more digits than Python converts
             self.report(node, path, "has too many digits")
-            return None
+            return _UNREAD
 
     def report(self, node: Node, path: KeyPath, message: str) -> None:
         self.problems.append(Problem(self.file, *_place(node), path_text(path), message))

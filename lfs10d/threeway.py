@@ -3,7 +3,8 @@
 Rules
 -----
 1. A change holds as long as the file still says what it said when the change was made (`instead_of`, `removed`,
-   `file`; nothing said is a saying too). Keys are compared one by one, as values; devices go by their names.
+   `file`). Nothing said is a saying too: who writes a default out after a request changed it wants it back. Keys are
+   compared one by one, as values; devices go by their names.
 2. Once a person edits such a key the file wins and the change is dropped; silently where both now say the same.
 3. A slave id or a baud rate is a fact, not a wish: where the file was edited to another one than was last verified,
    neither has won before the line was asked. The file's place is then tried first, and the change is kept.

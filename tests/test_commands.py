@@ -70,6 +70,24 @@ def test_anything_but_a_json_object_is_invalid_json_and_has_no_id(payload: bytes
     assert refused(payload) == (Call(), "invalid_json")
 
 
+@pytest.mark.parametrize(
+    ("payload", "key"),
+    [
+        (b'{"id":"a1","to":5,"to":6}', '"to"'),
+        (b'{"id":1,"id":1}', '"id"'),
+        (b'{"a":[{"b":{"c":1,"\\u0063":1}}]}', '"c"'),
+    ],
+)
+def test_a_key_that_is_given_twice_is_invalid_json_that_names_it(payload: bytes, key: str) -> None:
+    call, problem = read(payload)
+    assert call == Call()
+    assert problem == rejected("invalid_json", f"{key} is given twice; which is meant?")
+
+
+def test_two_objects_may_have_the_same_key() -> None:
+    assert read(b'{"a":[{"b":1},{"b":2}]}')[1] is None
+
+
 @pytest.mark.parametrize("number", ["1e999", "-1e999", "[1e999]", '{"b":1e999}'])
 def test_a_number_that_no_float_holds_is_invalid_json_told_to_its_id(number: str) -> None:
     call, code = refused(f'{{"id":"a1","transaction":7,"a":{number}}}'.encode())

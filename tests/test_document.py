@@ -247,6 +247,32 @@ def found(text: str, model: type[BaseModel] | None = Outer) -> list[str]:
 
 
 @pytest.mark.parametrize(
+    ("text", "already"),
+    [
+        ("inner: {required: !mine 1}", "inner.required: the tag"),
+        ("inner: {required: !!int x}", 'inner.required: "x" is not'),
+        (f"inner: {{required: {'9' * 5000}}}", "inner.required: has too many"),
+        ('inner: {required: "\\ud800"}', "inner.required: holds half"),
+    ],
+)
+def test_what_could_not_be_read_is_told_once(text: str, already: str) -> None:
+    (problem,) = problems(text)
+    assert already in problem
+    assert found(text) == []
+
+
+def test_a_key_that_could_not_be_read_is_told_once() -> None:
+    (problem,) = problems("!mine a: 1")
+    assert "the tag" in problem
+
+
+def test_an_unknown_key_is_told_beside_its_value_that_could_not_be_read() -> None:
+    text = "inner: {zzz: !mine 9, required: 1}"
+    assert len(problems(text)) == 1
+    assert found(text) == ["f:1:9: inner.zzz: is not a known key; known here: number, needed, required, bare"]
+
+
+@pytest.mark.parametrize(
     ("text", "expected"),
     [
         (

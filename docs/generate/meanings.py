@@ -26,7 +26,7 @@ FAULT_CODES: Final = {
 """Why a sample has no value, or what ails the line (lfs10d.reading.FaultCode)."""
 
 ERROR_CODES: Final = {
-    "invalid_json": "The payload is no JSON object.",
+    "invalid_json": "The payload is no JSON object, or gives a key twice.",
     "invalid_param": "A parameter is wrong, unknown or missing: `param` names it.",
     "unknown_request": "There is no such request; the message lists those there are.",
     "unknown_device": "No device has this name.",

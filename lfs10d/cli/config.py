@@ -20,7 +20,7 @@ from lfs10d.credentials import reason
 from lfs10d.disk import Disk
 from lfs10d.document import path_text
 from lfs10d.effective import Effective, effective, merged_data
-from lfs10d.errors import StateError
+from lfs10d.errors import FailedError, StateError
 from lfs10d.kinds import Duration, Size
 from lfs10d.quantities import duration_text, size_text
 from lfs10d.statedir import state_directory
@@ -58,6 +58,7 @@ def command(config: Path, state_dir: Path | None, *, merged: bool, as_json: bool
     directory = state_directory(config, file.config.line.name, chosen=state_dir, environment=os.environ)
     now = _with_changes(file, directory, chosen=state_dir is not None)
     if merged:
+        _refuse_conflicts(now, config)
         click.echo(render(merged_data(now)), nl=False)
     elif as_json:
         click.echo(json.dumps(_report(now.loaded), indent=2, allow_nan=False))
@@ -93,6 +94,12 @@ def _with_changes(file: Loaded, directory: Path, *, chosen: bool) -> Effective:
     if found.trouble is not None:
         raise StateError(f"what requests changed cannot be understood: {found.trouble}")
     return effective(file, found.changes)
+
+
+def _refuse_conflicts(now: Effective, file: Path) -> None:
+    """Raise FailedError where no file can say what holds: it would give one slave id to two devices."""
+    for name, why in now.conflicts.items():
+        raise FailedError(f"{file}: no file can say what holds now: {name} is not polled, for {why}")
 
 
 def _warnings(now: Effective) -> Iterator[str]:

@@ -35,6 +35,8 @@ USUAL_TIMEOUT = 10.0
 """Seconds after which the response no longer comes."""
 PATIENT = frozenset({"line/scan", "line/baudrate", "line/adopt", "device/readdress"})
 """Requests that take as long as they take: scans and physical changes."""
+CANCELLABLE = frozenset({"line/scan"})
+"""Those of them that a request can end."""
 
 EXAMPLES = """\b
 Examples:
@@ -184,5 +186,10 @@ async def _ask(wanted: _Wanted, visited: Login, content: dict[str, Any]) -> dict
             await visitor.enter()
             await visitor.find_daemon()
             return await visitor.ask(wanted.name, content, wanted.patience)
+    except asyncio.CancelledError:  # Ctrl-C, SIGTERM
+        if visitor.asked:
+            ends = "; `lfs10d request line/cancel` ends it" if wanted.name in CANCELLABLE else ""
+            click.echo(f"lfs10d: {wanted.name} was sent and is not called back by this{ends}", err=True)
+        raise
     finally:
         await visitor.leave()

@@ -70,6 +70,11 @@ class Visitor:
         return self._link.standing is not None
 
     @property
+    def asked(self) -> bool:
+        """A request was on its way, whatever became of it."""
+        return self._asked is not None
+
+    @property
     def daemon_online(self) -> bool:
         """Our daemon says so, and we would hear if it did not."""
         return self.connected and self.availability == ONLINE

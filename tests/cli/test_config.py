@@ -14,7 +14,7 @@ from lfs10d.cli.config import command
 from lfs10d.configfile import load
 from lfs10d.disk import Disk
 from lfs10d.effective import said
-from lfs10d.errors import StateError
+from lfs10d.errors import FailedError, StateError
 
 TEXT = """\
 line: {port: /dev/x, extra_gap: 0.5ms}
@@ -125,6 +125,14 @@ def test_what_does_not_fit_the_file_any_more_is_told() -> None:
     lost, conflict = result.stderr.splitlines()
     assert lost.startswith("lfs10d: slaves.slave-2.interval: the file says something else now")
     assert conflict.startswith("lfs10d: roof: slave id 9 is taken by nine")
+
+
+def test_merged_refuses_what_no_file_can_say() -> None:
+    changed()
+    Path("lfs10d.yaml").write_text(TEXT.replace("[2,", "[2, {id: 9, name: nine},"))
+    runner = CliRunner()
+    with pytest.raises(FailedError, match="roof is not polled, for slave id 9 is taken by nine; change the id of one"):
+        runner.invoke(command, ["-c", "lfs10d.yaml", "--merged"], catch_exceptions=False)
 
 
 def test_another_state_directory_may_be_named() -> None:
