@@ -12,8 +12,11 @@ if TYPE_CHECKING:
 
     from lfs10d.mqtt.topics import Topics
 
-QUIET = 0.5
+QUIET_LEAST, QUIET_MOST = 0.05, 0.5
 """Seconds after the broker's answer to the subscription, or after the last message, in which no more came."""
+
+QUIET_ROUNDS = 4
+"""So many times as long as that answer took is waited beside: a broker far away delivers in fits and starts."""
 
 LONGEST = 5.0
 """Seconds after which nothing is waited for any more, whatever the broker does."""
@@ -31,6 +34,7 @@ class Lookback:
     begun: float
     found: dict[str, bytes] = field(default_factory=dict)
     _heard: float | None = None
+    _quiet: float = QUIET_MOST
     _refused: bool = False
 
     @property
@@ -41,6 +45,7 @@ class Lookback:
     def subscribed(self, now: float, *, refused: bool) -> None:
         """Take the broker's answer; `refused` if nothing will come."""
         self._heard = now
+        self._quiet = min(QUIET_MOST, QUIET_LEAST + QUIET_ROUNDS * (now - self.begun))
         self._refused = refused
 
     def heard(self, topic: str, payload: bytes, now: float) -> None:
@@ -55,4 +60,4 @@ class Lookback:
         if self._refused or self.wanted <= self.found.keys():
             return now
         latest = self.begun + LONGEST
-        return latest if self._heard is None else min(self._heard + QUIET, latest)
+        return latest if self._heard is None else min(self._heard + self._quiet, latest)

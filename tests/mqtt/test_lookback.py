@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lfs10d.mqtt.lookback import LONGEST, QUIET, Lookback
+from lfs10d.mqtt.lookback import LONGEST, QUIET_LEAST, QUIET_MOST, Lookback
 from lfs10d.mqtt.topics import Topics
 
 WANTED = frozenset({"line/state", "device/a/config"})
@@ -27,19 +27,19 @@ def test_it_is_over_at_once_when_all_is_found() -> None:
 
 def test_what_is_not_wanted_is_passed_over_and_delays_nothing() -> None:
     lookback = begun()
-    lookback.subscribed(10.1, refused=False)
+    lookback.subscribed(10.2, refused=False)
     lookback.heard("b/line0/device/stranger/config", b"{}", 10.4)
     lookback.heard("elsewhere/line/state", b"{}", 10.4)
     assert lookback.found == {}
-    assert lookback.due(10.4) == 10.1 + QUIET
+    assert lookback.due(10.4) == 10.2 + QUIET_MOST
 
 
 def test_it_is_over_when_the_broker_has_answered_and_fallen_silent() -> None:
     lookback = begun()
-    lookback.subscribed(10.1, refused=False)
-    assert lookback.due(10.1) == 10.1 + QUIET
+    lookback.subscribed(10.2, refused=False)
+    assert lookback.due(10.2) == 10.2 + QUIET_MOST
     lookback.heard("b/line0/line/state", b"{}", 10.3)
-    assert lookback.due(10.3) == 10.3 + QUIET
+    assert lookback.due(10.3) == 10.3 + QUIET_MOST
 
 
 def test_a_broker_that_never_answers_is_waited_for_five_seconds() -> None:
@@ -53,3 +53,12 @@ def test_a_refused_subscription_is_not_waited_for() -> None:
     lookback = begun()
     lookback.subscribed(10.1, refused=True)
     assert lookback.due(10.1) == 10.1
+
+
+def test_a_broker_that_answers_at_once_is_given_less_time_to_go_on() -> None:
+    near = begun()
+    near.subscribed(10.0, refused=False)
+    assert near.due(10.0) == 10.0 + QUIET_LEAST
+    farther = begun()
+    farther.subscribed(10.0625, refused=False)
+    assert farther.due(10.0625) == 10.0625 + QUIET_LEAST + 0.25
