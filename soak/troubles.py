@@ -72,7 +72,8 @@ def _unplugged(daemon: DaemonInMemory, seconds: float) -> None:
 
 
 LATE = "timeout late malformed crc collision"
-"""A late answer may run into the next request (a changed echo is a collision) or its answer, and so break it."""
+"""A late answer may run into the next request (a changed echo is a collision) or its answer, and so break it; into
+the first too, where a barrier was before it."""
 STRUCK = "timeout late malformed crc collision wrong_slave wrong_function"
 """Where two speak at once anything but a wrong value may come of it."""
 
@@ -80,7 +81,7 @@ STRUCK = "timeout late malformed crc collision wrong_slave wrong_function"
 def _late(delay: float, also: str = "", **ailments: Particulars) -> Fault:
     """Return one that is late: whether its polls fail, and how, depends on the time-out, and that is learned."""
     return Fault(
-        _codes("timeout late" + also), _codes(LATE + also), ailments={"late": {"delay": delay}, **ailments},
+        _codes(LATE + also), _codes(LATE + also), ailments={"late": {"delay": delay}, **ailments},
         neighbours=_codes(LATE),
     )  # fmt: skip
 

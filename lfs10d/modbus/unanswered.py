@@ -36,8 +36,9 @@ QUIET_LEAST = 1.0
 """How long a slave is left alone where no barrier can tell, at least; in s."""
 _SILENT = frozenset({FaultCode.TIMEOUT, FaultCode.LATE, FaultCode.WRONG_SLAVE})
 """With these faults the asked slave itself said nothing."""
-EQUALS_KEPT = 4
-"""Of equal pending requests so many are remembered, the newest: no sensor keeps more of them in mind."""
+EQUALS_KEPT = 16
+"""Of equal pending requests so many are remembered, the newest: more than any sensor keeps in mind. The answer of one
+forgotten too soon would count as that of the next, and whatever was asked between the two as answered."""
 
 
 class Unanswered:
@@ -48,6 +49,7 @@ class Unanswered:
         self._lingers: dict[Pending, float] = {}
         self._over: set[Pending] = set()
         self._quiet_until: dict[int, float] = {}
+        self._tardy: set[int] = set()
 
     @property
     def everybodys(self) -> Mapping[int, tuple[Pending, ...]]:
@@ -57,6 +59,10 @@ class Unanswered:
     def earlier(self, slave: int) -> tuple[Pending, ...]:
         """Return the requests to `slave` whose answers may still come, the oldest first."""
         return self._pending.get(slave, ())
+
+    def tardy(self, slave: int) -> bool:
+        """Whether an answer of `slave` has ever come after its time, whoever was asked meanwhile."""
+        return slave in self._tardy
 
     def confusable(self, request: Request, codec: Codec) -> bool:
         """Whether an answer to an older request could pass for that to `request`, unless a barrier goes first."""
@@ -115,6 +121,7 @@ class Unanswered:
 
     def _came_late(self, request: Request, now: float) -> None:
         """Drop `request` and, since a slave answers in order, what its slave was asked before."""
+        self._tardy.add(request.slave)
         pending = self._pending.get(request.slave, ())
         for place, each in enumerate(pending):
             if each.request == request:

@@ -234,6 +234,18 @@ def test_of_equal_requests_the_newest_are_remembered(line: Line) -> None:
     assert pending[-1].sent_end == 20.0
 
 
+def test_answers_to_many_barriers_do_not_end_a_value_asked_after_those(line: Line) -> None:
+    before, after = 4, 5
+    for n in range(before):
+        line.silent(WHO, 1.0 + n)
+    line.silent(WIND, 10.0)
+    for n in range(after):
+        line.silent(WHO, 20.0 + n)
+    for n in range(before):
+        line.answered(WHO, 30.0 + n)
+    assert line.unanswered.confusable(WIND, RTU)
+
+
 @given(
     st.lists(st.tuples(st.sampled_from(["asks", "answers"]), st.floats(0.0, 0.4)), max_size=60),
     st.integers(0, 3),
