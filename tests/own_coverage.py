@@ -1,4 +1,4 @@
-"""Every pure module is covered by its own test file alone, branch by branch: `python -m tests.own_coverage [NAME ...]`.
+"""Every pure module is covered by its own tests alone, branch by branch: `python -m tests.own_coverage [NAME ...]`.
 
 Which modules are pure stands in `pyproject.toml`, in the contract of import-linter. Each is measured in a process of
 its own, so that nothing counts which other tests happen to call. Names (`modbus/hunt`) choose some of them. It ends
@@ -40,22 +40,23 @@ def declares_only(source: str) -> bool:
     return all(isinstance(each, ast.Expr) and isinstance(each.value, ast.Constant) for each in done)
 
 
-def test_file(module: str) -> Path:
-    """Return where the tests of a module stand."""
+def test_files(module: str) -> list[Path]:
+    """Return where the tests of a module stand: in `test_NAME.py`, and by subject in `test_NAME_SUBJECT.py`."""
     path = Path(module)
-    return Path("tests") / path.parent / f"test_{path.name}.py"
+    folder = ROOT / "tests" / path.parent
+    return [*folder.glob(f"test_{path.name}.py"), *sorted(folder.glob(f"test_{path.name}_*.py"))]
 
 
 def missing(module: str) -> str:
-    """Return what its own test file leaves uncovered of a module, in words; nothing where that is nothing."""
+    """Return what its own test files leave uncovered of a module, in words; nothing where that is nothing."""
     source = Path("lfs10d") / f"{module}.py"
-    tests = test_file(module)
-    if not (ROOT / tests).exists():
-        return "" if declares_only((ROOT / source).read_text()) else f"there is no {tests}"
+    tests = test_files(module)
+    if not tests:
+        return "" if declares_only((ROOT / source).read_text()) else f"there is no tests/.../test_{source.name}"
     with tempfile.TemporaryDirectory() as folder:
         coverage = [sys.executable, "-m", "coverage"]
         data = f"--data-file={folder}/coverage"
-        run = [*coverage, "run", data, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tests)]
+        run = [*coverage, "run", data, "-m", "pytest", "-q", "-p", "no:cacheprovider", *map(str, tests)]
         # As in CI: examples are drawn the same way each time, without a deadline, and nothing is skipped.
         environment = {**os.environ, "CI": "1"}
         tested = subprocess.run(run, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)

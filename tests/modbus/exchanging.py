@@ -1,0 +1,108 @@
+"""What the tests of the exchange share: an attempt, bytes for it, and the shell that carries it out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from lfs10d.modbus.exchange import (
+    Attempt,
+    Echo,
+    Exchange,
+    Listen,
+    Outcome,
+    Quiet,
+    Send,
+    Settled,
+)
+from lfs10d.modbus.frames import Checksum, Codec, Framing, ReadRegisters, WriteRegister
+from lfs10d.modbus.timing import LineTiming
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from lfs10d.reading import FaultCode
+
+RTU, SUM, ASCII = Codec(Framing.RTU), Codec(Framing.RTU, Checksum.SUM), Codec(Framing.ASCII)
+T9600 = LineTiming.of(9600)
+CHARACTER = T9600.character
+WIND = ReadRegisters(1, 0x0001, 2)
+WHO = ReadRegisters(1, 0x0005, 1)
+MOVE = WriteRegister(1, 0x0005, 7)
+ANSWER = bytes.fromhex("010304414FD70A002F")
+VALUES = (0x414F, 0xD70A)
+BROKEN = bytes.fromhex("010304414FD70A0030")
+REFUSED = bytes.fromhex("018302C0F1")
+SENT_END = 8 * CHARACTER
+"""Of an RTU request begun at 0 and written in no time."""
+HUSH = T9600.t35 + 0.004
+
+
+def framed(body: str, codec: Codec = RTU) -> bytes:
+    return codec.wrap(bytes.fromhex(body))
+
+
+def attempt(request: ReadRegisters | WriteRegister = WIND, codec: Codec = RTU) -> Attempt:
+    """Return an attempt with a time-out of 200 ms, a learned turnaround of 30 ms and an adapter without echo."""
+    return Attempt(
+        request=request,
+        codec=codec,
+        timing=T9600,
+        timeout=0.2,
+        patience=0.03,
+        echo=Echo.OFF,
+        adapter_latency=0.004,
+        earlier=(),
+        turn=0.5,
+        paced=True,
+    )
+
+
+PLAIN = attempt()
+
+
+ECHOING = replace(PLAIN, echo=Echo.ON)
+UNKNOWN = replace(PLAIN, echo=Echo.UNKNOWN)
+REQUEST = RTU.encode(WIND)
+LATE = framed("0103020007")
+"""The answer to `WHO`, which the exchange of `WIND` may still hear."""
+CONFIRMED = framed("010600050007")
+"""The answer to `MOVE`."""
+
+
+def byte_by_byte(data: bytes, begin: float) -> list[tuple[float, bytes]]:
+    """Return the bytes of a frame, each when its last bit has come."""
+    return [(begin + (i + 1) * CHARACTER, data[i : i + 1]) for i in range(len(data))]
+
+
+def carry_out(
+    each: Attempt, arrivals: list[tuple[float, bytes]], *, asked: float = 0.0, quiet_since: float = -1.0
+) -> Outcome:
+    """Obey an exchange as the bus does: sleep, read what is there, step."""
+    exchange = Exchange(each, asked=asked, quiet_since=quiet_since)
+    waiting = sorted(arrivals, key=lambda arrival: arrival[0])
+    now = asked
+    while True:
+        there = b"".join(data for at, data in waiting if at <= now)
+        waiting = [arrival for arrival in waiting if arrival[0] > now]
+        exchange.received(there, now)
+        match exchange.step(now):
+            case Settled(outcome):
+                return outcome
+            case Send():
+                exchange.sent(now, now)
+            case Quiet(until):
+                now = min([until, *(at for at, _ in waiting)])
+            case Listen(until, not_before):
+                now = min([until, *(max(at, not_before) for at, _ in waiting)])
+
+
+def code(outcome: Outcome) -> FaultCode | None:
+    assert (outcome.answer is None) is (outcome.fault is not None)
+    return outcome.fault.code if outcome.fault else None
+
+
+def listening(each: Attempt = PLAIN) -> Exchange:
+    """Return an exchange whose request was begun at 0 and written in no time."""
+    exchange = Exchange(each, asked=0.0, quiet_since=-1.0)
+    assert exchange.step(0.0) == Send(each.codec.encode(each.request))
+    exchange.sent(0.0, 0.0)
+    return exchange
