@@ -25,7 +25,7 @@ demo: $(VENV)/.demo
 test: $(VENV)/.dev
 	$(BIN)/python -m pytest -n 3 --dist loadfile
 
-# Each pure module by its own test file alone; fails below 100 % of lines and branches.
+# Each pure module by its own tests alone; fails below 100 % of lines and branches.
 coverage: $(VENV)/.dev
 	$(BIN)/python -m tests.own_coverage
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from lfs10d.modbus.exchange import (
     Attempt,
@@ -16,7 +17,6 @@ from lfs10d.modbus.exchange import (
 )
 from lfs10d.modbus.frames import Checksum, Codec, Framing, ReadRegisters, WriteRegister
 from lfs10d.modbus.timing import LineTiming
-from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from lfs10d.reading import FaultCode
