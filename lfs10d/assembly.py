@@ -7,13 +7,13 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from lfs10d.budget import timing_of
 from lfs10d.facts import DeviceFacts, LineFacts
 from lfs10d.jobs.register import Target
 from lfs10d.jobs.search import Search
 from lfs10d.modbus.bus import LineRules
 from lfs10d.modbus.frames import Checksum, Codec, Framing
 from lfs10d.modbus.settings import PortSettings, Rs485
-from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.reading import Fault, FaultCode, Reading
 from lfs10d.roster import FIRST_TIMEOUTS, DeviceSpec, PollRules
@@ -48,17 +48,6 @@ def port_settings(line: LineConfig) -> PortSettings:
 def line_rules(line: LineConfig) -> LineRules:
     """Return how the line is spoken on."""
     return LineRules(extra_gap=line.extra_gap, turnaround_delay=line.turnaround_delay, echo=line.echo)
-
-
-def line_timing(line: LineConfig) -> LineTiming:
-    """Return the times at the line's rate."""
-    return LineTiming.of(
-        line.baudrate,
-        databits=line.databits,
-        parity=line.parity,
-        stopbits=line.stopbits,
-        extra_gap=line.extra_gap,
-    )
 
 
 def poll_rules(poll: PollConfig) -> PollRules:
@@ -112,7 +101,7 @@ def search(loaded: Loaded, ids: tuple[int, ...], rates: tuple[int, ...], *, shar
     return Search(
         ids,
         tuple(
-            line_timing(line.model_copy(update={"baudrate": rate}))
+            timing_of(line.model_copy(update={"baudrate": rate}))
             for rate in rates or dict.fromkeys((line.baudrate, *usual))
         ),
         codec,
@@ -141,7 +130,7 @@ def line_facts(line: LineConfig) -> LineFacts:
         databits=line.databits,
         stopbits=line.stopbits,
         framing=line.framing,
-        gap_required=line_timing(line).gap,
+        gap_required=timing_of(line).gap,
     )
 
 

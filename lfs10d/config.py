@@ -1,14 +1,14 @@
 """The configuration as frozen, strict models: every key with its default, its range and its meaning.
 
 The names are the keys of the file. Durations are float seconds, sizes bytes. `Config` as read from a file still has
-gaps (a slave without a name, a broker without a client id); `resolved` fills them. Nothing here reads a file.
+gaps (a slave without a name, a broker without a client id); `lfs10d.resolution` fills them. Nothing here reads a file.
 `docs/configuration.md` is generated from these models.
 """
 
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticCustomError
@@ -288,38 +288,3 @@ def default_device_name(slave: int) -> str:
 def device_name(slave: SlaveConfig) -> str:
     """Return the name as given, or the default."""
     return slave.name or default_device_name(slave.id)
-
-
-def resolved(config: Config, *, stem: str, host: str) -> Config:
-    """Return the configuration without gaps: names, inherited values, the broker's port, %H.
-
-    `stem` is the file's name without suffix, `host` the host's name.
-    """
-    line = config.line.name or default_line_name(stem)
-    return config.model_copy(
-        update={
-            "line": config.line.model_copy(update={"name": line}),
-            "slaves": tuple(inherited(slave, config.poll) for slave in config.slaves),
-            "mqtt": _named(config.mqtt, line, host),
-        }
-    )
-
-
-def inherited(slave: SlaveConfig, poll: PollConfig) -> SlaveConfig:
-    """Return a slave as it is polled: with its name, and with what `poll` says where it says nothing itself."""
-    update: dict[str, Any] = {"name": device_name(slave)}
-    for key in ("interval", "response_timeout"):
-        if key not in slave.model_fields_set:
-            update[key] = getattr(poll, key)
-    return slave.model_copy(update=update)
-
-
-def _named(mqtt: MqttConfig, line: str, host: str) -> MqttConfig:
-    client_id = mqtt.client_id or f"lfs10d-%H-{line}"
-    update: dict[str, Any] = {
-        "base_topic": mqtt.base_topic.replace("%H", host),
-        "client_id": client_id.replace("%H", host),
-    }
-    if mqtt.tls is not None and "port" not in mqtt.model_fields_set:
-        update["port"] = TLS_PORT
-    return mqtt.model_copy(update=update)

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ValidationError
 
-from lfs10d.config import Config, MqttConfig, SlaveConfig, resolved
+from lfs10d.config import Config, MqttConfig, SlaveConfig
 from lfs10d.contradictions import contradictions
 from lfs10d.credentials import CREDENTIAL, UnreadableError, credential_file, password_in, readable, reason, unreadable
 from lfs10d.document import Document, decode, parse, path_text
 from lfs10d.errors import ConfigError, Problem
 from lfs10d.kinds import quoted, shown
 from lfs10d.profiles.library import builtin_names, load_profile
+from lfs10d.resolution import resolved
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

@@ -13,6 +13,7 @@ from collections import deque
 from typing import TYPE_CHECKING
 
 from lfs10d import assembly
+from lfs10d.budget import timing_of
 from lfs10d.linethread import LineThread
 from lfs10d.modbus.bus import Bus
 from lfs10d.modbus.exchange import Echo
@@ -51,7 +52,7 @@ class Line:
         line = config.line
         self.port = SerialPort(assembly.port_settings(line))
         bus = Bus(self.port, assembly.line_rules(line), time.monotonic)
-        schedule = Schedule(assembly.line_timing(line), time.monotonic())
+        schedule = Schedule(timing_of(line), time.monotonic())
         schedule.replace(
             assembly.device_specs(config, profiles), assembly.poll_rules(config.poll), time.monotonic()
         )  # fmt: skip

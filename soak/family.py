@@ -15,8 +15,9 @@ from random import Random
 from random import seed as seed_the_uplink
 from typing import TYPE_CHECKING
 
-from lfs10d.config import Config, resolved
+from lfs10d.config import Config
 from lfs10d.profiles.library import load_profile
+from lfs10d.resolution import resolved
 from lfs10d.simulator.burst import MASTER
 from lfs10d.simulator.inturn import InTurn
 from lfs10d.simulator.judge import Verdict

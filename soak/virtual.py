@@ -13,6 +13,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from lfs10d import assembly
+from lfs10d.budget import timing_of
 from lfs10d.facts import DaemonFacts, Instant
 from lfs10d.firstburst import FirstBurst
 from lfs10d.modbus.bus import Bus
@@ -117,7 +118,7 @@ class DaemonInMemory:
         self._told = False
         self.mistakes: list[str] = []
         """What ended by a mistake in the loop."""
-        schedule = Schedule(assembly.line_timing(config.line), 0.0)
+        schedule = Schedule(timing_of(config.line), 0.0)
         schedule.replace(assembly.device_specs(config, profiles), assembly.poll_rules(config.poll), 0.0)
         self.poller = Poller(
             Bus(self.port, assembly.line_rules(config.line), self.clock), schedule, self._take_over, self.clock

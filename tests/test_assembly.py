@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from lfs10d import assembly, profiles
+from lfs10d.budget import timing_of
 from lfs10d.configfile import load
 from lfs10d.modbus.frames import Checksum, Framing
 from lfs10d.modbus.settings import PortSettings, Rs485
@@ -44,7 +45,7 @@ def test_the_port_is_opened_as_configured(loaded: Loaded) -> None:
 
 def test_the_line_is_spoken_on_as_configured(loaded: Loaded) -> None:
     rules = assembly.line_rules(loaded.config.line)
-    timing = assembly.line_timing(loaded.config.line)
+    timing = timing_of(loaded.config.line)
 
     assert (rules.extra_gap, rules.turnaround_delay, rules.echo) == (0.005, 0.05, "on")
     assert timing.bits == 12
@@ -110,7 +111,7 @@ def test_registers_are_accessed_as_the_device_is_polled_or_as_the_line_usually_s
 def test_a_scan_looks_at_the_lines_own_rate_first_and_at_both_of_an_lfs10(loaded: Loaded) -> None:
     found = assembly.search(loaded, (1, 2), (), share=0.3)
     assert [timing.baudrate for timing in found.timings] == [19200, 9600]
-    assert all(timing.bits == assembly.line_timing(loaded.config.line).bits for timing in found.timings)
+    assert all(timing.bits == timing_of(loaded.config.line).bits for timing in found.timings)
     assert (found.ids, found.line_rate, found.share) == ((1, 2), 19200, 0.3)
     assert found.codec.checksum is Checksum.CRC, "not all devices have the same one"
     assert found.profiles[0].name == "lfs10"

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from lfs10d.budget import Budget, budget
-from lfs10d.config import Config, resolved
+from lfs10d.config import Config
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.schema import Profile
+from lfs10d.resolution import resolved
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 
-from lfs10d.config import Config, resolved
+from lfs10d.config import Config
 from lfs10d.difference import Change, difference
+from lfs10d.resolution import resolved
 
 
 def config(*, line: dict[str, Any] | None = None, **sections: Any) -> Config:  # noqa: ANN401

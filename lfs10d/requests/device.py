@@ -10,7 +10,7 @@ from lfs10d.admission import Form
 from lfs10d.aside import aside
 from lfs10d.changes import OPTIONS, Place
 from lfs10d.commands import Answer, Parameters, failed, ok
-from lfs10d.config import Interval, Label, ResponseTimeout, SlaveConfig, SlaveId, default_device_name, inherited
+from lfs10d.config import Interval, Label, ResponseTimeout, SlaveConfig, SlaveId, default_device_name
 from lfs10d.contradictions import contradictions
 from lfs10d.effective import effective
 from lfs10d.errors import ConfigError
@@ -19,6 +19,7 @@ from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.reading import FaultCode
 from lfs10d.requests.amending import amend, known_device, plainly, refuse, unknown_device
 from lfs10d.requests.request import Powers, RefusedError, Request
+from lfs10d.resolution import inherited
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import pytest
 
 from lfs10d import assembly
+from lfs10d.budget import timing_of
 from lfs10d.changefile import ChangeFile
 from lfs10d.commands import Answer, Call
 from lfs10d.configfile import load
@@ -122,7 +123,7 @@ class Life:
         config, profiles = self.physical.polled(), self.running.loaded.profiles
         bench.port = SimulatedPort(bench.line, bench.clock, assembly.port_settings(config.line), echo=bench.echo)
         bus = Bus(bench.port, assembly.line_rules(config.line), bench.clock)
-        schedule = Schedule(assembly.line_timing(config.line), bench.clock.now)
+        schedule = Schedule(timing_of(config.line), bench.clock.now)
         schedule.replace(
             assembly.device_specs(config, profiles), assembly.poll_rules(config.poll), bench.clock.now
         )  # fmt: skip
