@@ -3,8 +3,8 @@
 A thread of its own, gone afterwards, does what may block: the password and the certificates are read, the name is
 resolved, the socket is connected, TLS is agreed upon, CONNECT is sent. A thread that hangs there is left to itself.
 From then on paho runs in the asyncio loop: a thread for it would wake twice for every message (see
-docs/decisions/0003-one-loop.md). Its callbacks only pass on what happened, to be dealt with when paho is done: to
-publish inside a callback would wait for paho itself. It keeps no queue and reconnects nothing here.
+docs/decisions/0003-one-loop.md). Its callbacks only note what happened, to be dealt with when paho is done: to publish
+inside a callback would wait for paho itself. It keeps no queue and reconnects nothing here.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ import asyncio
 import contextlib
 import socket
 import threading
+from collections import deque
+from functools import partial
 from typing import TYPE_CHECKING
 
 from paho.mqtt.client import Client, ConnectFlags, DisconnectFlags, MQTTMessage
@@ -71,6 +73,8 @@ class Connection:
         self._upkeep: asyncio.TimerHandle | None = None
         self._descriptor: int | None = None  # while the loop watches the socket
         self._writing = False
+        self._reading = False
+        self._happened: deque[Callable[[], None]] = deque()
         self._client = self._build(will)
         threading.Thread(target=self._connect, name="connect", daemon=True).start()
 
@@ -236,6 +240,7 @@ class Connection:
 
     def _readable(self, opened: socket.socket) -> None:
         pending = getattr(opened, "pending", None)  # what TLS has decrypted makes no descriptor readable
+        self._reading = True
         try:
             self._client.loop_read()
             while pending is not None and self._descriptor is not None and pending():
@@ -243,8 +248,10 @@ class Connection:
         except Exception as caught:  # noqa: BLE001 - as above
             self._close()
             self._failed(failed(caught, self._settings))
-        else:
-            self._watch_writing()
+        finally:
+            self._reading = False
+        self._deal()
+        self._watch_writing()
 
     def _watch_writing(self) -> None:
         """Come back when the socket takes more, as long as paho has more for it."""
@@ -269,27 +276,37 @@ class Connection:
 
     # Callbacks of paho
 
+    def _note(self, call: Callable[..., None], *values: object) -> None:
+        """Have it dealt with as soon as paho is done: in this turn of the loop by `_readable`, else in the next."""
+        if not (self._happened or self._reading):
+            self._loop.call_soon(self._deal)
+        self._happened.append(partial(call, *values))
+
+    def _deal(self) -> None:
+        while self._happened:
+            self._happened.popleft()()
+
     def _on_socket_close(self, _client: Client, _userdata: object, _closing: object) -> None:
         self._unwatch()
 
     def _on_connect(
         self, _c: Client, _u: object, _flags: ConnectFlags, reason: ReasonCode, properties: Properties | None
     ) -> None:
-        self._loop.call_soon(self._answered, reason.value, properties)
+        self._note(self._answered, reason.value, properties)
 
     def _on_disconnect(
         self, _c: Client, _u: object, flags: DisconnectFlags, reason: ReasonCode, _p: Properties | None
     ) -> None:
-        self._loop.call_soon(self._gone, reason.value if flags.is_disconnect_packet_from_server else None)
+        self._note(self._gone, reason.value if flags.is_disconnect_packet_from_server else None)
 
     def _on_publish(self, _c: Client, _u: object, mid: int, reason: ReasonCode, _p: Properties) -> None:
-        self._loop.call_soon(self._acknowledged, mid, reason.value)
+        self._note(self._acknowledged, mid, reason.value)
 
     def _on_subscribe(self, _c: Client, _u: object, mid: int, reasons: list[ReasonCode], _p: Properties | None) -> None:
-        self._loop.call_soon(self._subscribed, mid, tuple(reason.value for reason in reasons))
+        self._note(self._subscribed, mid, tuple(reason.value for reason in reasons))
 
     def _on_message(self, _client: Client, _userdata: object, message: MQTTMessage) -> None:
-        self._loop.call_soon(self._arrived, message)
+        self._note(self._arrived, message)
 
     # What became of it
 
