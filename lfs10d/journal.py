@@ -183,21 +183,23 @@ class Journal:
         changes = self._with(number, lambda change: change.model_copy(update={"answered": True}))
         self._save(changes=changes, answers=self._answers(told))
 
-    def close(self, numbers: frozenset[int], told: Told | None = None) -> None:
-        """Note that these changes are finished or undone, and the answer that is given with that."""
+    def close(self, numbers: frozenset[int], *told: Told | None) -> None:
+        """Note that these changes are finished or undone, and the answers that are given with that."""
         changes = tuple(change for change in self.open if change.number not in numbers)
-        answers = self._answers(told)
+        answers = self._answers(*told)
         if (changes, answers) != (self.open, self.answers):
             self._save(changes=changes, answers=answers)
 
     def _with(self, number: int, amended: Callable[[OpenChange], OpenChange]) -> tuple[OpenChange, ...]:
         return tuple(amended(change) if change.number == number else change for change in self.open)
 
-    def _answers(self, told: Told | None) -> tuple[Told, ...]:
-        if told is None or told.asked.key is None:
-            return self.answers
-        kept = [each for each in self.answers if each.at > told.at - REMEMBERED_FOR_MS]
-        return (*kept[-REMEMBERED + 1 :], told)
+    def _answers(self, *told: Told | None) -> tuple[Told, ...]:
+        answers = self.answers
+        for each in told:
+            if each is not None and each.asked.key is not None:
+                kept = [older for older in answers if older.at > each.at - REMEMBERED_FOR_MS]
+                answers = (*kept[-REMEMBERED + 1 :], each)
+        return answers
 
     def _save(self, **changed: object) -> None:
         if self._unread is not None:

@@ -103,6 +103,15 @@ def test_answers_are_kept_for_a_day_and_only_the_newest() -> None:
     assert [each.asked.key for each in journal.answers] == ["late"]
 
 
+def test_changes_that_end_together_are_closed_with_all_their_answers_in_one_step() -> None:
+    files = ForgetfulFiles()
+    journal = read(files)
+    numbers = [journal.intend("readdress", (move(),), 5, None).number for _ in range(2)]
+    journal.close(frozenset(numbers), told("first"), None, told("second"))
+    assert not read(files).open
+    assert [each.asked.key for each in read(files).answers] == ["first", "second"]
+
+
 def test_a_file_that_cannot_be_read_is_told_and_nothing_is_written_over_it(tmp_path: Path) -> None:
     (tmp_path / "journal.json").mkdir()
     journal = Journal(tmp_path, Disk())

@@ -6,6 +6,7 @@ Rules
    values goes first: its answer, having another length, proves that nothing older is to come.
 2. A slave that may not be asked for the moment is waited for.
 3. Echoes of writes prove nothing and are not looked at.
+4. A slave whose answers have come late is waited for long, whoever was being asked when they came.
 """
 
 from __future__ import annotations
@@ -112,7 +113,10 @@ class Asking:
 
     def _ask(self, request: ReadRegisters, spot: Spot, timeout: float | None) -> Ask:
         baudrate = None if spot.baudrate == self.line_rate else spot.baudrate
-        return Ask(request, self.codec, self.timeout if timeout is None else timeout, None, baudrate)
+        waits = self.timeout if timeout is None else timeout
+        if self._unanswered.tardy(spot.slave):
+            waits = max(waits, PATIENT)
+        return Ask(request, self.codec, waits, None, baudrate)
 
     def _allowed(
         self, request: ReadRegisters, spot: Spot, timeout: float | None

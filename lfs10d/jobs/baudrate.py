@@ -6,10 +6,11 @@ Rules
    is on the disk before the first write. Only the register of the rate is written, and only to one slave at a time.
 2. The first sensor is the canary: if it answers only at the old rate its register is written back, and nothing else
    is touched. Each next one is written when the one before answers at the new rate.
-3. If a later one fails, those already moved are moved back, for up to `ROLL_BACK`. One that answers at both rates
-   since the write is two sensors: they are moved back too.
+3. If a later one fails, those already moved are moved back, for up to `ROLL_BACK`; so are those that have stored the
+   new rate since an earlier change and wait for their power cycle. One that answers at both rates since the write is
+   two sensors: they are moved back too. The other of two may be deaf just then: all are looked for once more.
 4. With `power_cycle` all are written and none is expected at the new rate yet; each register must say the new rate.
-5. A sensor that is found nowhere is asked at both rates until it is found, and brought to the line's.
+5. A sensor that is found nowhere is looked for until it is found, and brought to the line's (`lfs10d.jobs.rejoin`).
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 from lfs10d.jobs.asking import PATIENT
 from lfs10d.jobs.course import Aside, LineLostError
 from lfs10d.jobs.job import Hold
-from lfs10d.jobs.readdress import ECHO_READS, TRIES, present, verified, written
+from lfs10d.jobs.readdress import ECHO_READS, TRIES, VERIFY, present, verified, written
 from lfs10d.journal import Spot
 
 if TYPE_CHECKING:
@@ -89,6 +90,12 @@ class RateWish:
     to: int
     power_cycle: bool = False
     dry_run: bool = False
+    stored: frozenset[str] = frozenset()
+    """Those that have stored the new rate since an earlier change, and would obey it at their next power-up."""
+
+    def touched(self, last: int) -> tuple[Sensor, ...]:
+        """Return the sensors that have, or may have, the new rate in mind when the `last` one was written."""
+        return tuple(each for n, each in enumerate(self.sensors) if n <= last or each.name in self.stored)
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,13 +120,6 @@ class RateVerdict:
 @dataclass(frozen=True, slots=True)
 class WriteRates:
     """The sensors are about to be written; answered with None when that is on the disk, else with why it is not."""
-
-
-@dataclass(frozen=True, slots=True)
-class CameUp:
-    """A sensor answers at the new rate."""
-
-    name: str
 
 
 def change_rate(wish: RateWish, echo_known: Callable[[], bool]) -> Generator[Step, Any, RateVerdict]:
@@ -165,8 +165,7 @@ def _one_by_one(wish: RateWish, where: dict[str, int | None]) -> Generator[Step,
         exception, rate, twins = yield from shifted(sensor, wish.old, wish.to)
         where[sensor.name] = rate
         if twins:
-            verdict = yield from rolled_back(wish.sensors[: n + 1], wish.old, wish.to, where)
-            return replace(verdict, ended=Ended.TWINS, names=(sensor.name,)) if verdict.restored else verdict
+            return (yield from _twins(wish, n, where))
         if rate == wish.to:
             continue
         if n == 0 and rate == wish.old:
@@ -175,18 +174,31 @@ def _one_by_one(wish: RateWish, where: dict[str, int | None]) -> Generator[Step,
             if back != wish.old:
                 return RateVerdict(Ended.UNVERIFIED, where, (sensor.name,), exception)
             ended = Ended.CANARY if exception is None else Ended.REFUSED
-            return RateVerdict(ended, where, (sensor.name,), exception)
-        return (yield from rolled_back(wish.sensors[: n + 1], wish.old, wish.to, where))
+            canary = RateVerdict(ended, where, (sensor.name,), exception)
+            if wish.touched(n) == (sensor,):
+                return canary
+            verdict = yield from rolled_back(wish.touched(n), wish.old, wish.to, where)
+            return canary if verdict.restored else verdict
+        return (yield from rolled_back(wish.touched(n), wish.old, wish.to, where))
     return RateVerdict(Ended.MOVED, where)
+
+
+def _twins(wish: RateWish, last: int, where: dict[str, int | None]) -> Generator[Step, Any, RateVerdict]:
+    """Bring everybody back, for the last one written is two."""
+    verdict = yield from rolled_back(wish.touched(last), wish.old, wish.to, where)
+    names = (wish.sensors[last].name,)
+    return replace(verdict, ended=Ended.TWINS, names=names) if verdict.restored else verdict
 
 
 def _all_written(wish: RateWish, where: dict[str, int | None]) -> Generator[Step, Any, RateVerdict]:
     for n, sensor in enumerate(wish.sensors):
         exception = yield from written(sensor.at(wish.old), sensor.register, sensor.code(wish.to), sensor.asking)
-        says, rate = yield from _found(sensor, (wish.to, wish.old))
+        says, rate = yield from found_at(sensor, (wish.to, wish.old))
         where[sensor.name] = rate
         if exception is not None or rate is None or says != sensor.code(wish.to):
-            return (yield from rolled_back(wish.sensors[: n + 1], wish.old, wish.to, where))
+            return (yield from rolled_back(wish.touched(n), wish.old, wish.to, where))
+        if rate == wish.to and (yield from sensor.asking.who(sensor.at(wish.old))).answers:
+            return (yield from _twins(wish, n, where))
     pending = tuple(name for name, rate in where.items() if rate != wish.to)
     return RateVerdict(Ended.PENDING if pending else Ended.MOVED, where, pending)
 
@@ -203,7 +215,7 @@ def shifted(sensor: Sensor, old: int, to: int) -> Generator[Step, Any, tuple[int
     return exception, old if found.old.answers else None, False
 
 
-def _found(sensor: Sensor, rates: Sequence[int]) -> Generator[Step, Any, tuple[int | None, int | None]]:
+def found_at(sensor: Sensor, rates: Sequence[int]) -> Generator[Step, Any, tuple[int | None, int | None]]:
     """Look for a sensor at these rates; return what its register of the rate says, and the rate it answers at."""
     for _ in range(TRIES):
         for rate in rates:
@@ -215,7 +227,7 @@ def _found(sensor: Sensor, rates: Sequence[int]) -> Generator[Step, Any, tuple[i
 
 def restored(sensor: Sensor, rate: int, other: int) -> Generator[Step, Any, int | None]:
     """Bring one sensor to `rate`, and its register; return the rate it answers at, None if it is not found."""
-    says, at = yield from _found(sensor, (other, rate))  # there first: of two of this id one may have moved
+    says, at = yield from found_at(sensor, (other, rate))  # there first: of two of this id one may have moved
     if at is None or (at == rate and says == sensor.code(rate)):
         return at
     if at == other:
@@ -251,50 +263,17 @@ def rolled_back(
                 return RateVerdict(Ended.UNVERIFIED, where, tuple(each.name for each in missing))
         if missing:
             yield Hold(missing[0].asking.clock.now + FIRST_PAUSE)
+        else:
+            missing = yield from _left_behind(sensors, other)
     return RateVerdict(Ended.ROLLED_BACK, where)
 
 
-def undo(
-    sensors: Sequence[Sensor], rate: int, other: int, *, longest_pause: float, finish: bool
-) -> Generator[Step, Any, RateVerdict]:
-    """Find every sensor after a change of rate that was cut short, and bring it to `rate`, however long it takes.
-
-    With `finish` they are left where they are if all of them answer at the `other` rate. What was not found in the
-    first look goes aside.
-    """
-    where: dict[str, int | None] = {}
-    if finish:
-        for sensor in sensors:
-            _, where[sensor.name] = yield from _found(sensor, (rate, other))
-            if where[sensor.name] == rate:
-                break
-        if len(where) == len(sensors) and all(at == other for at in where.values()):
-            return RateVerdict(Ended.MOVED, where)
-    verdict = yield from rolled_back(sensors, rate, other, where)
-    pause = min(FIRST_PAUSE, longest_pause)
-    while verdict.ended is not Ended.ROLLED_BACK:
-        yield Aside(verdict)
-        missing = [sensor for sensor in sensors if where[sensor.name] != rate]
-        yield Hold(missing[0].asking.clock.now + pause)
-        pause = min(2 * pause, longest_pause)
-        for sensor in missing:
-            where[sensor.name] = yield from restored(sensor, rate, other)
-        names = tuple(sensor.name for sensor in missing if where[sensor.name] != rate)
-        verdict = RateVerdict(Ended.UNVERIFIED if names else Ended.ROLLED_BACK, where, names)
-    return verdict
-
-
-def await_power(sensors: Sequence[Sensor], to: int, *, longest_pause: float) -> Generator[Step, Any, RateVerdict]:
-    """Ask sensors that want a power cycle at the new rate until all have come up there; each goes aside."""
-    missing = list(sensors)
-    pause = min(FIRST_PAUSE, longest_pause)
-    while missing:
-        for sensor in tuple(missing):
-            reply = yield from sensor.asking.who(sensor.at(to))
-            if reply.answers:
-                missing.remove(sensor)
-                yield Aside(CameUp(sensor.name))
-        if missing:
-            yield Hold(missing[0].asking.clock.now + pause)
-            pause = min(2 * pause, longest_pause)
-    return RateVerdict(Ended.MOVED, {sensor.name: to for sensor in sensors})
+def _left_behind(sensors: Sequence[Sensor], rate: int) -> Generator[Step, Any, list[Sensor]]:
+    """Return the sensors that somebody answers for at a rate they all have left: he was deaf after his last write."""
+    yield Hold(sensors[0].asking.clock.now + VERIFY)
+    left = []
+    for sensor in sensors:
+        reply = yield from sensor.asking.who(sensor.at(rate))
+        if reply.answers:
+            left.append(sensor)
+    return left

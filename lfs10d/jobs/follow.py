@@ -2,11 +2,13 @@
 
 Rules
 -----
-1. The first look is as patient as the verification of a write, for the daemon may have died right after that.
+1. The first look is as long as the verification of a write, for the daemon may have died right after that.
 2. Then both places are asked now and then, within the share of probes: after 1 s, 2 s, 4 s ... Anything new has the
    places looked at in full, and told.
 3. It is over when the sensor answers at the new place and the old one is silent, or when it answers at the old one
    and its register does not say the new id. A register that does may still be obeyed, at the next power cycle.
+4. A newcomer at its new place is found though somebody answers at the factory's id: that is the next newcomer,
+   unless the register there says the new id too.
 """
 
 from __future__ import annotations
@@ -15,13 +17,14 @@ from typing import TYPE_CHECKING, Any
 
 from lfs10d.jobs.course import Aside
 from lfs10d.jobs.job import Hold
-from lfs10d.jobs.readdress import Ending, Verdict, judge, told, verified
+from lfs10d.jobs.readdress import QUICK_LOOK, Ending, Verdict, judge, told, verified
 
 if TYPE_CHECKING:
     from collections.abc import Generator
 
     from lfs10d.jobs.asking import Asking
     from lfs10d.jobs.course import Step
+    from lfs10d.jobs.readdress import Found
     from lfs10d.journal import Spot
 
 FIRST_PAUSE = 1.0
@@ -32,14 +35,14 @@ DECIDED = frozenset({Ending.MOVED, Ending.LOCKED})
 
 
 def follow(
-    old: Spot, new: Spot, asking: Asking, *, longest_pause: float, before: Spot | None = None
+    old: Spot, new: Spot, asking: Asking, *, longest_pause: float, before: Spot | None = None, newcomer: bool = False
 ) -> Generator[Step, Any, Verdict]:
     """Ask until the sensor is found; each look that did not find it goes aside.
 
-    `before` is where it was before it came to `old`: it may be there still.
+    `before` is where it was before it came to `old`: it may be there still. `newcomer`: `old` is a factory's id.
     """
-    verdict = judge((yield from verified(old, new, asking)), None, None, new.slave)
-    verdict = (yield from _still_there(before, new, asking)) or verdict
+    found = yield from verified(old, new, asking, QUICK_LOOK)
+    verdict = yield from _judged(found, before, new, asking, newcomer=newcomer)
     pause = min(FIRST_PAUSE, longest_pause)
     while verdict.ending not in DECIDED:
         yield Aside(verdict)
@@ -49,15 +52,28 @@ def follow(
             at_new = yield from asking.who(new)
             at_old = yield from asking.who(old)
             appeared = at_new.answers or at_new.noise
-            still = yield from _still_there(before, new, asking)
-            if appeared or still or (at_old.answers and at_old.register != new.slave):
+            if appeared or (at_old.answers and at_old.register != new.slave):
                 break
-        verdict = still or judge((yield from told(old, new, asking)), None, None, new.slave)
+            if at_old.silent and (yield from _still_there(before, new, asking)):
+                break
+        found = yield from told(old, new, asking)
+        verdict = yield from _judged(found, before, new, asking, newcomer=newcomer)
+    return verdict
+
+
+def _judged(
+    found: Found, before: Spot | None, new: Spot, asking: Asking, *, newcomer: bool
+) -> Generator[Step, Any, Verdict]:
+    if newcomer and found.new.answers and not found.spoilt and found.old.register != new.slave:
+        return Verdict(Ending.MOVED, found.new.register)
+    verdict = judge(found, None, None, new.slave)
+    if verdict.ending is Ending.NOWHERE:
+        return (yield from _still_there(before, new, asking)) or verdict
     return verdict
 
 
 def _still_there(before: Spot | None, new: Spot, asking: Asking) -> Generator[Step, Any, Verdict | None]:
-    """Ask the place of before; return that the sensor stays there, None if it does not."""
+    """Ask the place of before, while the later ones are silent; return that the sensor stays there, None if not."""
     if before is None:
         return None
     reply = yield from asking.who(before)

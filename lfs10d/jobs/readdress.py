@@ -39,7 +39,7 @@ from lfs10d.modbus.frames import WriteRegister
 from lfs10d.reading import FaultCode
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator
+    from collections.abc import Callable, Generator, Sequence
 
     from lfs10d.jobs.asking import Asking
     from lfs10d.jobs.course import Step
@@ -51,6 +51,10 @@ PAUSE = 0.25
 """Between two rounds of questions, in s."""
 TRIES = 3
 """Questions before a place counts as silent."""
+QUICK_LOOK = (None,) * TRIES
+"""How long the last questions at the new id wait, in s (None: as usual), where looking is dear."""
+PATIENT_LOOK = (None, None, PATIENT)
+"""So right after a write: a slow sensor must not pass for silent."""
 PROBE_TIMEOUTS = (0.2, 0.2, 0.6)
 """How long the three questions at a new id wait, in s."""
 WRITE_TIMEOUT = 1.0
@@ -208,24 +212,28 @@ class Found:
     spoilt: bool = False
 
 
-def verified(old: Spot, new: Spot, asking: Asking) -> Generator[Step, Any, Found]:
+def verified(
+    old: Spot, new: Spot, asking: Asking, look: Sequence[float | None] = PATIENT_LOOK
+) -> Generator[Step, Any, Found]:
     """Ask both places until the new one answers and the old one is silent, for up to `VERIFY`, and once more."""
     until = asking.clock.now + VERIFY
     while asking.clock.now < until:
         reply = yield from asking.who(new)
         if reply.answers:
-            return (yield from told(old, new, asking))
+            return (yield from told(old, new, asking, look))
         yield from asking.who(old)
         yield Hold(asking.clock.now + PAUSE)
-    return (yield from told(old, new, asking))
+    return (yield from told(old, new, asking, look))
 
 
-def told(old: Spot, new: Spot, asking: Asking) -> Generator[Step, Any, Found]:
-    """Ask each of two places until it answers or was silent `TRIES` times."""
+def told(
+    old: Spot, new: Spot, asking: Asking, look: Sequence[float | None] = QUICK_LOOK
+) -> Generator[Step, Any, Found]:
+    """Ask each of two places until it answers or was silent `TRIES` times, at the new one as long as `look` says."""
     spoilt = 0
     at_new = SILENCE
-    for _ in range(TRIES):
-        reply = yield from asking.who(new)
+    for timeout in look:
+        reply = yield from asking.who(new, timeout)
         spoilt += reply.noise
         at_new = _nearer(at_new, reply)
         if reply.answers and not reply.noise:

@@ -14,7 +14,7 @@ from lfs10d.errors import StateError
 from lfs10d.jobs import adopt
 from lfs10d.jobs.course import Now
 from lfs10d.jobs.readdress import NOTHING_WRITTEN, Ending, Verdict, Write
-from lfs10d.journal import Move
+from lfs10d.journal import Move, Spot
 from lfs10d.profiles.library import builtin_names, load_profile
 
 if TYPE_CHECKING:
@@ -174,6 +174,8 @@ class Adoption:
                 facts = {"request": NAME, "id": asked.key, "device": name, "from": None, "to": {"slave": to}}
                 physical.tell("change_applied", facts)
             elif verdict.stays_open:
+                if verdict.ending is not Ending.NOWHERE and found.at_rate:
+                    await physical.put(partial(physical.journal.amend, change.number, (_at_rate(change),)))
                 await physical.put(partial(physical.journal.keep, change.number, told))
             else:
                 await physical.put(partial(physical.journal.close, numbers, told))
@@ -182,6 +184,12 @@ class Adoption:
                 return failed("storage_full", f"the sensor is at slave id {to} now, but that cannot be kept: {error}")
             log.warning("%s", error)
         return answer
+
+
+def _at_rate(change: OpenChange) -> Move:
+    """Return where the newcomer is since it speaks at the line's rate: where it was before another one may be now."""
+    (move,) = change.moves
+    return move.model_copy(update={"old": Spot(slave=move.old.slave, baudrate=move.new.baudrate)})
 
 
 def entry(change: OpenChange) -> dict[str, Any] | None:

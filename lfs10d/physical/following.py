@@ -18,9 +18,7 @@ from lfs10d.physical import adoption
 from lfs10d.reading import Errand
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from lfs10d.journal import Move, OpenChange
+    from lfs10d.journal import Move, OpenChange, Told
     from lfs10d.physical.place import Physical
     from lfs10d.physical.ratechange import RateChange
     from lfs10d.physical.readdressing import Readdressing
@@ -31,6 +29,7 @@ log = logging.getLogger(__name__)
 
 KEPT_PAUSE = 30.0
 """After so many s a fact that could not be put on the disk is tried again."""
+_OVERTAKEN = "the daemon ended before this was over; {device} has been told another time to move since"
 
 
 class Following:
@@ -44,7 +43,10 @@ class Following:
 
     def begin(self, busy: frozenset[int]) -> None:
         """Look for the sensors of every open change that nobody looks for now and that has none of the `busy` ids."""
+        newest = self._rates.newest()
         for change in self._physical.open:
+            if change.kind == "baudrate" and change.number != newest:
+                continue  # it ends with the newest
             if change.number not in self._followed and not change.slaves & busy:
                 talk = self._physical.talk()
                 task = asyncio.create_task(self._follow(change, talk), name=f"follow {change.number}")
@@ -97,10 +99,15 @@ class Following:
             physical.asking(slave, clock, line_rate=0),
             longest_pause=now.config.poll.probe_interval_max,
             before=None if here == move.old else move.old,
+            newcomer=change.kind == "adopt",
         )
         talk.begin(steps, clock, line_rate=now.config.line.baudrate, share=1.0, errand=Errand.PROBE)
+        ending: Ending | None = None
         while not isinstance(what := await talk.wanted(), Over):
             if isinstance(what, Verdict):
+                if what.ending is not ending and what.ending in (Ending.BOTH, Ending.GARBAGE):
+                    self._moves.tell_duplicate(move.device, move.old, move.new)
+                ending = what.ending
                 change = await self._seen(change, move, what, now.loaded.profiles[slave.profile])
             talk.go_on()
         if what.result is not None:
@@ -108,8 +115,6 @@ class Following:
 
     async def _seen(self, change: OpenChange, move: Move, verdict: Verdict, profile: Profile) -> OpenChange:
         """Answer the request of a change that is not settled by the first look."""
-        if verdict.ending in (Ending.BOTH, Ending.GARBAGE):
-            self._moves.tell_duplicate(move.device, move.old, move.new)
         if change.answered:
             return change
         return await self.answered(change, findings.readdressed(move.device, _wish(move), verdict, profile))
@@ -126,9 +131,10 @@ class Following:
     async def _found(self, change: OpenChange, move: Move, verdict: Verdict, profile: Profile) -> None:
         """Finish a change whose sensor was found."""
         if verdict.ending is Ending.MOVED:
+            self.leave(self._physical.changes_of(move.device) - {change.number})  # they end with this one
             answer = findings.readdressed(move.device, _wish(move), verdict, profile)
             await self._physical.record(move.device, move.new, newcomer=adoption.entry(change))
-            await self.close(self._physical.changes_of(move.device), change, answer)
+            await self.finish(self._physical.changes_of(move.device), change, answer)
             self._moves.tell_moved(move.device, move.old, move.new)
         else:
             why = f"{move.device} answers at slave id {move.old.slave}, and its register does not say {move.new.slave}"
@@ -137,19 +143,31 @@ class Following:
     async def drop(self, change: OpenChange, why: str) -> None:
         """Undo a change that did not take effect."""
         message = f"{why}: the change is dropped"
-        await self.close(frozenset({change.number}), change, failed("cancelled", f"the daemon ended; {message}"))
+        await self.finish(frozenset({change.number}), change, failed("cancelled", f"the daemon ended; {message}"))
         log.warning("%s", message)
         for move in change.moves:
             facts = {"device": move.device, "from": move.old.slave, "to": move.new.slave}
             self._physical.tell("change_dropped", {"key": f"slaves.{move.device}.id", **facts, "message": message})
 
-    async def close(self, numbers: Iterable[int], change: OpenChange, answer: Answer) -> None:
+    async def finish(self, numbers: frozenset[int], change: OpenChange, answer: Answer) -> None:
         """Close changes; the request of `change` is answered if it is not yet."""
-        physical = self._physical
-        told = None if change.answered else physical.told(change.asked, answer)
-        await physical.put(partial(physical.journal.close, frozenset(numbers), told))
+        told = None if change.answered else self._physical.told(change.asked, answer)
+        await self.close(numbers, change, told)
         if told is not None:
-            physical.respond(told)
+            self._physical.respond(told)
+
+    async def close(self, numbers: frozenset[int], change: OpenChange, told: Told | None) -> None:
+        """Close changes, with the answer to `change`; what others of them still owe their requests is told."""
+        physical = self._physical
+        overtaken = [
+            physical.told(each.asked, failed("cancelled", _OVERTAKEN.format(device=", ".join(each.devices))))
+            for each in physical.open
+            if each.number in numbers - {change.number} and not each.answered
+        ]
+        await physical.put(partial(physical.journal.close, numbers, told, *overtaken))
+        for each in overtaken:
+            if each is not None:
+                physical.respond(each)
 
 
 def _wish(move: Move) -> Wish:

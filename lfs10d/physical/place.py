@@ -90,7 +90,8 @@ class Physical:
         self._rates = RateChange(self)
         self._adoption = Adoption(self)
         self._following = Following(self, self._moves, self._rates)
-        self.drop, self.close, self.answered = self._following.drop, self._following.close, self._following.answered
+        self.drop, self.answered = self._following.drop, self._following.answered
+        self.close, self.finish = self._following.close, self._following.finish
         self._locating = Locating(self, repoll)
         trouble = journal.take()
         if trouble is not None:

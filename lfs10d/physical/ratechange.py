@@ -12,17 +12,15 @@ from lfs10d.commands import Answer, failed, ok, rejected
 from lfs10d.errors import StateError
 from lfs10d.jobs.baudrate import (
     UNTOUCHED,
-    CameUp,
     Ended,
     RateVerdict,
     RateWish,
     Sensor,
     WriteRates,
-    await_power,
     change_rate,
-    undo,
 )
 from lfs10d.jobs.course import Now, Over
+from lfs10d.jobs.rejoin import CameUp, Twins, await_power, undo
 from lfs10d.journal import Move
 from lfs10d.reading import Errand
 
@@ -97,7 +95,7 @@ class RateChange:
         physical.leave(earlier)
         clock = Now()
         sensors = self._sensors([slave.name for slave in now.config.slaves], clock)
-        wish = RateWish(sensors, old, to, power_cycle, dry_run)
+        wish = RateWish(sensors, old, to, power_cycle, dry_run, self._stored(to))
         talk = physical.talk()
         steps = change_rate(wish, physical.wire().echo_known)
         talk.begin(steps, clock, line_rate=0, excludes=frozenset(sensor.slave for sensor in sensors), share=1.0)
@@ -110,10 +108,22 @@ class RateChange:
 
         return await physical.carried_out(talk, asked, intend, conclude)
 
+    def _stored(self, to: int) -> frozenset[str]:
+        """Return the devices that have stored a rate and wait for their power cycle."""
+        waiting = (each.facts.get("pending", ()) for each in self._changes() if each.facts["to"] == to)
+        return frozenset().union(*waiting)
+
+    def _changes(self) -> list[OpenChange]:
+        return [change for change in self._physical.open if change.kind == "baudrate"]
+
+    def newest(self) -> int:
+        """Return the number of the newest open change of the rate, 0 if there is none: older ones end with it."""
+        return max((change.number for change in self._changes()), default=0)
+
     def unsettled(self, device: str | None = None) -> Answer | None:
         """Return the rejection of what must wait until the rate of a device, or of all, is settled."""
-        for change in self._physical.open:
-            missing = change.facts.get("pending", sorted(change.devices)) if change.kind == "baudrate" else []
+        for change in self._changes():
+            missing = change.facts.get("pending", sorted(change.devices))
             if missing and (device is None or device in missing):
                 to, names = change.facts["to"], ", ".join(missing)
                 return rejected("busy", f"the change to {to} baud is not over: {names} is still to be found there")
@@ -162,9 +172,8 @@ class RateChange:
         if change is None or verdict.ended in UNTOUCHED:
             return await physical.refused(asked, answer)
         told = physical.told(asked, answer)
-        for sensor in wish.sensors if verdict.ended is Ended.TWINS else ():
-            if sensor.name in verdict.names:
-                physical.tell("duplicate_id", {"device": sensor.name, "slave": sensor.slave, "from": sensor.slave})
+        for name in verdict.names if verdict.ended is Ended.TWINS else ():
+            self._tell_twins(name, wish.sensors)
         try:
             if verdict.ended is Ended.MOVED or (wish.to in verdict.where.values() and verdict.ended is Ended.PENDING):
                 await self._record(wish.old, wish.to)
@@ -181,6 +190,11 @@ class RateChange:
                 return failed("storage_full", f"all sensors are at {wish.to} baud, but that cannot be kept: {error}")
             log.warning("%s", error)
         return answer
+
+    def _tell_twins(self, device: str, sensors: Iterable[Sensor]) -> None:
+        """Tell that two sensors have one slave id."""
+        for slave in (sensor.slave for sensor in sensors if sensor.name == device):
+            self._physical.tell("duplicate_id", {"device": device, "slave": slave, "from": slave})
 
     async def _record(self, old: int, to: int) -> None:
         """Have the line speak at the rate its sensors were found at, on the disk first."""
@@ -205,7 +219,7 @@ class RateChange:
         names = change.facts["pending"] if waiting else [move.device for move in change.moves]
         sensors = self._sensors(names, clock)
         if waiting:
-            steps = await_power(sensors, to, longest_pause=longest)
+            steps = await_power(sensors, old, to, longest_pause=longest)
         else:
             steps = undo(sensors, old, to, longest_pause=longest, finish=not change.answered)
         if change.answered:
@@ -219,6 +233,8 @@ class RateChange:
                     await self._record(old, to)
                 pending.remove(what.name)
                 await physical.put(partial(physical.journal.amend, change.number, change.moves, pending=pending))
+            elif isinstance(what, Twins):
+                self._tell_twins(what.name, sensors)
             elif isinstance(what, RateVerdict) and not change.answered:
                 change = await physical.answered(change, _answer(old, to, what))
             talk.go_on()
@@ -232,7 +248,8 @@ class RateChange:
                 await self._record(old, to)
         elif physical.running().config.line.baudrate != old:
             await self._record(to, old)
-        await physical.close(frozenset({change.number}), change, _answer(old, to, verdict))
+        older = frozenset(each.number for each in self._changes() if each.number <= change.number)
+        await physical.finish(older, change, _answer(old, to, verdict))
         if verdict.ended is not Ended.MOVED:
             message = f"every sensor is at {old} baud: the change to {to} is dropped"
             log.warning("%s", message)

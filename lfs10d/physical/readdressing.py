@@ -97,11 +97,11 @@ class Readdressing:
         try:
             if verdict.ending is Ending.MOVED:
                 await physical.record(device, wish.new)
-                await physical.put(partial(journal.close, physical.changes_of(device), told))
+                await physical.close(physical.changes_of(device), change, told)
                 self.tell_moved(device, wish.old, wish.new)
             elif verdict.stays_open:
                 if verdict.ending is Ending.PENDING:
-                    await physical.put(partial(journal.close, physical.changes_of(device) - {change.number}, None))
+                    await physical.close(physical.changes_of(device) - {change.number}, change, None)
                 await physical.put(partial(journal.keep, change.number, told))
             else:
                 await physical.put(partial(journal.close, frozenset({change.number}), told))

@@ -191,3 +191,12 @@ def test_quiet_is_a_silence_in_which_only_others_answered_late(heard: Callable[.
     assert not quiet(heard(WHO, FaultCode.MALFORMED))
     assert not quiet(heard(WHO, unsolicited=1))
     assert not quiet(heard(WHO, answer=(3,)))
+
+
+def test_so_is_one_whose_answer_came_while_another_was_asked(pretence: Pretence, heard: Callable[..., Outcome]) -> None:
+    late = LateAnswer(WHO, 0.4)
+    pretence.unanswered.settled(heard(ReadRegisters(9, 1, 2), late=(late,)), RTU, QUICK, 1.0)
+    pretence.carry_out(pretence.asking().who(HERE))
+    pretence.carry_out(pretence.asking().who(Spot(slave=9, baudrate=9600)))
+    assert [ask.timeout for ask in pretence.asked if ask.request == WHO] == [PATIENT]
+    assert pretence.asked[-1].timeout == QUICK

@@ -10,16 +10,13 @@ import pytest
 from lfs10d.jobs.baudrate import (
     ROLL_BACK,
     UNTOUCHED,
-    CameUp,
     Ended,
     RateVerdict,
     RateWish,
     Sensor,
     WriteRates,
-    await_power,
     change_rate,
     restored,
-    undo,
 )
 from lfs10d.jobs.readdress import ECHO_READS
 from lfs10d.modbus.frames import WriteRegister
@@ -214,55 +211,6 @@ def test_a_sensor_whose_profile_has_no_register_of_the_rate_has_no_code(pretence
     assert (known.register, known.code(9600), known.code(19200)) == (4, 1, 2)
 
 
-# -- after it was cut short
-
-
-def undone(pretence: Pretence, *rates: int, finish: bool = False, **facts: Any) -> RateVerdict:  # noqa: ANN401  # passed on
-    for slave, rate in enumerate(rates, 1):
-        pretence.sensor(slave, baudrate=rate, **facts)
-    sensors = [Sensor(f"s{slave}", slave, pretence.asking()) for slave in range(1, len(rates) + 1)]
-    return pretence.carry_out(undo(sensors, *UP, longest_pause=15.0, finish=finish))
-
-
-def test_what_was_cut_short_is_undone(pretence: Pretence) -> None:
-    assert undone(pretence, 19200, 9600) == RateVerdict(Ended.ROLLED_BACK, {"s1": 9600, "s2": 9600})
-    assert pretence.aside == []
-
-
-def test_a_change_that_reached_all_is_finished_where_that_is_wanted(pretence: Pretence) -> None:
-    assert undone(pretence, 19200, 19200, finish=True) == RateVerdict(Ended.MOVED, {"s1": 19200, "s2": 19200})
-    assert pretence.writes == []
-
-
-def test_and_undone_where_it_did_not_reach_all(pretence: Pretence) -> None:
-    verdict = undone(pretence, 19200, 9600, 19200, finish=True)
-    assert verdict == RateVerdict(Ended.ROLLED_BACK, {"s1": 9600, "s2": 9600, "s3": 9600})
-
-
-def test_one_that_is_missing_is_told_once_and_waited_for_however_long_it_takes(pretence: Pretence) -> None:
-    sensor = pretence.sensor(2, baudrate=19200, silent=True)
-    pretence.later.append((300.0, lambda: setattr(sensor, "silent", False)))
-    sensors = [Sensor("s2", 2, pretence.asking())]
-    verdict = pretence.carry_out(undo(sensors, *UP, longest_pause=15.0, finish=False))
-    assert verdict == RateVerdict(Ended.ROLLED_BACK, {"s2": 9600})
-    assert all(isinstance(each, RateVerdict) and each.ended is Ended.UNVERIFIED for each in pretence.aside)
-    assert {each.names for each in pretence.aside if isinstance(each, RateVerdict)} == {("s2",)}
-
-
-# -- power cycles
-
-
-def test_each_sensor_that_comes_up_at_the_new_rate_is_told_and_the_end_is_when_all_have(pretence: Pretence) -> None:
-    sensors = line(pretence, "obeys", "obeys")
-    for at, sensor in zip((30.0, 100.0), pretence.sensors, strict=True):
-        pretence.later.append((at, partial(setattr, sensor, "baudrate", 19200)))
-    verdict = pretence.carry_out(await_power(sensors, 19200, longest_pause=4.0))
-    assert verdict == RateVerdict(Ended.MOVED, {"s1": 19200, "s2": 19200})
-    assert pretence.aside == [CameUp("s1"), CameUp("s2")]
-    assert pretence.clock.now < 100.0 + 6.0
-    assert pretence.writes == []
-
-
 # -- two sensors of one slave id
 
 
@@ -280,3 +228,39 @@ def test_the_one_of_two_that_stayed_forgets_the_rate_it_stored(pretence: Pretenc
     verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True))
     assert verdict.ended is Ended.TWINS
     assert [sensor.stored.get(4, 1) for sensor in pretence.sensors] == [1, 1]
+
+
+def test_so_with_a_power_cycle(pretence: Pretence) -> None:
+    sensors = line(pretence, "stores")
+    pretence.sensor(1)
+    verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP, power_cycle=True), lambda: True))
+    assert verdict == RateVerdict(Ended.TWINS, {"s1": 9600}, ("s1",))
+    assert [(sensor.baudrate, sensor.stored.get(4, 1)) for sensor in pretence.sensors] == [(9600, 1)] * 2
+
+
+def test_one_that_was_deaf_while_its_twin_was_brought_back_is_looked_for_once_more(pretence: Pretence) -> None:
+    sensors = line(pretence, "obeys", "ignores")
+    deaf = pretence.sensor(1, baudrate=19200, silent=True)
+    pretence.later.append((12.0, partial(vars(deaf).update, silent=False)))
+    verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True))
+    assert verdict == RateVerdict(Ended.ROLLED_BACK, {"s1": 9600, "s2": 9600})
+    assert [sensor.baudrate for sensor in pretence.sensors] == [9600] * 3
+
+
+# -- after an earlier change that waits for the power
+
+
+def test_a_first_sensor_that_stays_has_the_others_forget_what_they_stored_before(pretence: Pretence) -> None:
+    sensors = line(pretence, "stores", "stores", "obeys")
+    pretence.sensors[1].stored[4] = 2
+    verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP, stored=frozenset({"s1", "s2"})), lambda: True))
+    assert verdict == RateVerdict(Ended.CANARY, dict.fromkeys(("s1", "s2", "s3"), 9600), ("s1",))
+    assert [sensor.stored.get(4, 1) for sensor in pretence.sensors] == [1, 1, 1]
+    assert 3 not in {write.slave for write in pretence.writes}
+
+
+def test_one_of_them_that_cannot_be_made_to_forget_is_told(pretence: Pretence) -> None:
+    sensors = line(pretence, "stores", "ignores")
+    pretence.sensors[1].stored[4] = 2
+    verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP, stored=frozenset({"s2"})), lambda: True))
+    assert (verdict.ended, verdict.names) == (Ended.UNVERIFIED, ("s2",))

@@ -83,3 +83,33 @@ def test_the_longest_pause_holds_from_the_first(pretence: Pretence) -> None:
     pretence.later.append((20.0, lambda: pretence.sensor(9)))
     assert pretence.carry_out(follow(OLD, NEW, pretence.asking(), longest_pause=0.1)).ending is Ending.MOVED
     assert pretence.clock.now < 20.0 + 4.0
+
+
+def test_a_newcomer_at_its_new_place_is_found_though_the_next_one_is_at_the_factorys_id(pretence: Pretence) -> None:
+    pretence.sensor(3)
+    pretence.sensor(9)
+    follower = follow(OLD, NEW, pretence.asking(), longest_pause=4.0, newcomer=True)
+    assert pretence.carry_out(follower) == Verdict(Ending.MOVED, 9)
+
+
+def test_unless_that_has_the_new_id_stored_too(pretence: Pretence) -> None:
+    other = pretence.sensor(3, stored={5: 9})
+    pretence.sensor(9)
+    pretence.later.append((30.0, other.stored.clear))
+    follower = follow(OLD, NEW, pretence.asking(), longest_pause=4.0, newcomer=True)
+    assert pretence.carry_out(follower).ending is Ending.MOVED
+    assert next(each.ending for each in pretence.aside if isinstance(each, Verdict)) is Ending.BOTH
+    assert pretence.clock.now >= 30.0
+
+
+def test_a_newcomer_that_came_to_the_lines_rate_is_not_taken_for_one_at_its_place_before(pretence: Pretence) -> None:
+    sensor = pretence.sensor(3, stored={5: 9})
+    pretence.sensor(3, baudrate=19200)
+
+    def cycle() -> None:
+        sensor.slave = 9
+        sensor.stored.clear()
+
+    pretence.later.append((30.0, cycle))
+    verdict = pretence.carry_out(follow(OLD, NEW, pretence.asking(), longest_pause=4.0, before=BEFORE, newcomer=True))
+    assert verdict == Verdict(Ending.MOVED, 9)

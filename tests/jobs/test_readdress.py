@@ -8,10 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.jobs.asking import SILENCE, Reply
+from lfs10d.jobs.asking import PATIENT, QUICK, SILENCE, Reply
 from lfs10d.jobs.readdress import (
     ECHO_READS,
     NOTHING_WRITTEN,
+    QUICK_LOOK,
     TRIES,
     VERIFY,
     Ending,
@@ -198,6 +199,15 @@ def test_both_places_are_asked_for_five_seconds(pretence: Pretence) -> None:
     found = pretence.carry_out(verified(OLD, NEW, pretence.asking()))
     assert found == Found(SILENCE, Reply(answers=True, register=3))
     assert VERIFY <= pretence.clock.now < VERIFY + 3.0
+
+
+def test_after_a_write_the_new_id_is_waited_for_long_in_the_end(pretence: Pretence) -> None:
+    pretence.sensor(3)
+    pretence.carry_out(verified(OLD, NEW, pretence.asking()))
+    assert max(ask.timeout for ask in pretence.asked if ask.request.slave == NEW.slave) == PATIENT
+    pretence.asked.clear()
+    pretence.carry_out(verified(OLD, NEW, pretence.asking(), QUICK_LOOK))
+    assert {ask.timeout for ask in pretence.asked} == {QUICK}
 
 
 def test_a_sensor_that_takes_its_time_is_found_within_them(pretence: Pretence) -> None:

@@ -274,3 +274,12 @@ def test_no_answer_of_a_slave_that_answers_in_turn_is_taken_for_another(
                 line.answered(request, now, *late)
                 break
             late.append(heard)
+
+
+def test_a_slave_whose_answer_came_while_another_was_asked_is_tardy() -> None:
+    line = Line()
+    line.silent(WIND, 0.0)
+    assert not line.unanswered.tardy(1)
+    line.answered(OTHER, 0.3, WIND)
+    assert line.unanswered.tardy(1)
+    assert not line.unanswered.tardy(2)

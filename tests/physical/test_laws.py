@@ -1,6 +1,7 @@
 """What holds whatever the sensors are like, whoever dies when: nobody is stranded, no id is shared, all is answered.
 
-`LFS10D_EXAMPLES` is how many stories are told of each kind, 40 if it is not set.
+The same 40 stories of each kind are told every time. With `LFS10D_EXAMPLES=1000` so many are told of each, others
+each time, and one that fails is made shorter. Those that once failed are in test_tales.py.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Any
 
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from tests.physical.story import Story
@@ -16,7 +17,8 @@ from tests.physical.story import Story
 if TYPE_CHECKING:
     from tests.physical.conftest import Bench
 
-EXAMPLES = int(os.environ.get("LFS10D_EXAMPLES", "40"))
+SEARCHED = os.environ.get("LFS10D_EXAMPLES")
+"""So many stories are searched for one that fails; None: see above."""
 AILMENTS: list[tuple[str, dict[str, Any]]] = [
     ("none", {}),
     ("none", {}),
@@ -61,28 +63,28 @@ HAPPENINGS = st.one_of(
     st.tuples(st.just("unplug"), st.sampled_from([0.3, 2.0, 6.0]), st.just(0), DONE),
 )
 THREE = st.lists(st.sampled_from(AILMENTS), min_size=3, max_size=3)
-CHECKS = settings(max_examples=EXAMPLES, deadline=None, suppress_health_check=list(HealthCheck))
-
-
-def told(story: Story, steps: list[tuple[str, Any, Any, tuple[str, int]]]) -> None:
-    for step in steps:
-        story.step(*step)
-    story.mend()
-    story.settled()
+CHECKS = settings(
+    max_examples=int(SEARCHED or 40),
+    derandomize=SEARCHED is None,
+    database=None,
+    phases=[Phase.generate, *([Phase.shrink] if SEARCHED else [])],
+    deadline=None,
+    suppress_health_check=list(HealthCheck),
+)
 
 
 @given(THREE, st.lists(st.one_of(READDRESS, READDRESS, HAPPENINGS), min_size=1, max_size=6))
 @CHECKS
 def test_no_sensor_is_stranded_by_new_ids(bench: Bench, ails: list[Any], steps: list[Any]) -> None:
     bench.renew()
-    told(Story(bench, ails), steps)
+    Story(bench, ails).tell(steps)
 
 
 @given(THREE, st.lists(st.one_of(BAUDRATE, BAUDRATE, HAPPENINGS), min_size=1, max_size=4))
 @CHECKS
 def test_no_sensor_is_stranded_by_another_rate(bench: Bench, ails: list[Any], steps: list[Any]) -> None:
     bench.renew()
-    told(Story(bench, ails), steps)
+    Story(bench, ails).tell(steps)
 
 
 @given(THREE, st.lists(st.one_of(READDRESS, BAUDRATE, PLUG, ADOPT, HAPPENINGS), min_size=2, max_size=7))
@@ -90,13 +92,8 @@ def test_no_sensor_is_stranded_by_another_rate(bench: Bench, ails: list[Any], st
 def test_no_sensor_is_stranded_by_any_mix_of_changes(bench: Bench, ails: list[Any], steps: list[Any]) -> None:
     bench.renew()
     story = Story(bench, ails)
-    told(story, steps)
-    errors = [response["error"] for response in bench.responses if response["request"] == "line/adopt"]
-    if any(error and error["code"] == "duplicate_id" for error in errors):
-        return  # two were plugged in at once: that was told, and a person must part them
-    for newcomer in story.newcomers:
-        places = {slave.id for slave in story.life.running.now.config.slaves}
-        assert newcomer.slave == 1 or (newcomer.slave in places and newcomer.format.baudrate == story.rate)
+    story.tell(steps)
+    story.newcomers_known()
 
 
 @given(
@@ -110,4 +107,4 @@ def test_duplicates_are_told_and_nobody_is_stranded(
     bench: Bench, ails: list[Any], others: tuple[Any, Any], turnaround: float, steps: list[Any]
 ) -> None:
     bench.renew()
-    told(Story(bench, ails, twin=others[0], stranger=others[1], turnaround=turnaround), steps)
+    Story(bench, ails, twin=others[0], stranger=others[1], turnaround=turnaround).tell(steps)
