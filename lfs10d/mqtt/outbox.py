@@ -227,6 +227,11 @@ class Outbox:
         return self._window > 0 and self._retention.announced
 
     @property
+    def retained_out(self) -> bool:
+        """We are `announced`, and no version of a retained topic waits: who asks the broker now finds the newest."""
+        return self.announced and not self._retention
+
+    @property
     def idle(self) -> bool:
         """Nothing is under way, and nothing but the past waits."""
         return not (self._under_way or self._retention or self._messages or self._live)

@@ -179,8 +179,8 @@ class Uplink:
         self._sweep_wanted = True
         if refused:
             self.republish()
-        elif self._outbox.announced:
-            self._begin_sweep()
+        else:
+            self._sweep_if_out()
 
     def republish(self) -> None:
         """Send every retained topic once more."""
@@ -281,8 +281,7 @@ class Uplink:
             if self._announcing:
                 self._announcing = False
                 self._announced()
-            if self._sweep_wanted:
-                self._begin_sweep()
+            self._sweep_if_out()
         self._progress.set()
 
     def subscribed(self, mid: int, reasons: tuple[int, ...]) -> None:
@@ -322,6 +321,11 @@ class Uplink:
         self._link.drop("acknowledges nothing any more")
 
     # What is left over
+
+    def _sweep_if_out(self) -> None:
+        """Begin once what we clear ourselves has gone: else the broker would show it as left over."""
+        if self._sweep_wanted and self._outbox.retained_out:
+            self._begin_sweep()
 
     def _begin_sweep(self) -> None:
         self._sweep_wanted = False

@@ -302,6 +302,10 @@ def test_another_client_with_our_id_is_not_fought(mosquitto: Mosquitto, caplog: 
 # What is left over
 
 
+def swept(uplink: Uplink) -> bool:
+    return uplink.connected and uplink._sweep is None and not uplink._sweep_wanted
+
+
 def test_retained_topics_of_devices_that_are_gone_are_cleared_and_nothing_else(mosquitto: Mosquitto) -> None:
     leaves = ("state", "config", "availability", "error", "stats", "wind")
     for leaf in leaves:
@@ -486,6 +490,29 @@ def test_a_connection_of_no_use_is_made_anew(mosquitto: Mosquitto) -> None:
             uplink._acknowledges_nothing()
             assert site.changes == [True, False]
             await online(listener, 2)
+
+    asyncio.run(scenario())
+
+
+def test_what_is_cleared_just_before_a_reload_is_cleared_once(mosquitto: Mosquitto) -> None:
+    async def scenario() -> None:
+        listener = mosquitto.subscribe(f"{B}/#")
+        site = Site(mosquitto.port)
+        gone = [f"device/d{number}/state" for number in range(100)]
+        site.retained |= {topic: {"device": topic} for topic in gone}
+        async with running(site) as uplink:
+            await online(listener)
+            await until(lambda: swept(uplink), "the sweep after the connect")
+            for topic in gone:
+                del site.retained[topic]
+            uplink.publish(telemetry.retained(topic, None) for topic in gone)
+            await uplink.reload()
+            assert not swept(uplink)
+            await until(lambda: swept(uplink), "the sweep")
+            uplink.publish([sample(1)])
+            await until(lambda: seqs(listener) == {1}, "what is published after the sweep")
+        cleared = [each.topic.removeprefix(f"{B}/") for each in listener.heard if not each.payload]
+        assert sorted(cleared) == sorted(gone)
 
     asyncio.run(scenario())
 
