@@ -12,6 +12,7 @@ import click
 
 from lfs10d.cli import json_option
 from lfs10d.cli.columns import columns
+from lfs10d.cli.completion import profile_names
 from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.profiles.registers import span
 
@@ -60,7 +61,7 @@ def command(context: click.Context, *, as_json: bool) -> None:
 
 
 @command.command("show", epilog=EXAMPLES)
-@click.argument("name")
+@click.argument("name", shell_complete=profile_names)
 @json_option
 def show(name: str, *, as_json: bool) -> None:
     """Explain the profile NAME: a built-in one, or the path of a profile's YAML file."""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from lfs10d.cli import EXIT_FAILED, EXIT_UNAVAILABLE, json_option, roof
+from lfs10d.cli.completion import PORT, SlaveId, profile_names
 from lfs10d.cli.holder import instead
 from lfs10d.cli.lineoptions import LineOptions, baudrate_of, line_options, take
 from lfs10d.cli.ownline import OwnLine
@@ -64,10 +65,16 @@ def _interval(context: click.Context, parameter: click.Parameter, value: str) ->
 
 
 @click.command("read", epilog=EXAMPLES)
-@click.argument("port")
-@click.argument("slave", metavar="ID", type=click.IntRange(1, 255))
+@click.argument("port", type=PORT)
+@click.argument("slave", metavar="ID", type=SlaveId())
 @click.option(
-    "--profile", "profile_name", default="lfs10", show_default=True, metavar="NAME|FILE", help="Which device."
+    "--profile",
+    "profile_name",
+    default="lfs10",
+    show_default=True,
+    metavar="NAME|FILE",
+    shell_complete=profile_names,
+    help="Which device.",
 )
 @click.option(
     "--baudrate", callback=_rate, default="9600", show_default=True, metavar="RATE", help="The sensor's rate."

@@ -12,6 +12,7 @@ import click
 
 from lfs10d.cli import EXIT_FAILED, EXIT_UNAVAILABLE, findings, json_option, roof
 from lfs10d.cli.columns import columns
+from lfs10d.cli.completion import PORT
 from lfs10d.cli.holder import instead
 from lfs10d.cli.lineoptions import LineOptions, baudrate_of, line_options, take
 from lfs10d.cli.ownline import OwnLine
@@ -50,7 +51,7 @@ def _rates(context: click.Context, parameter: click.Parameter, value: str) -> tu
 
 
 @click.command("scan", epilog=EXAMPLES)
-@click.argument("port")
+@click.argument("port", type=PORT)
 @click.option("--ids", callback=_ids, default="1-255", show_default=True, metavar="IDS", help="Such as 1-20,255.")
 @click.option(
     "--baudrate",

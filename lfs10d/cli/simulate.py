@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from lfs10d.cli import json_option
+from lfs10d.cli.completion import profile_names
 from lfs10d.profiles.library import load_profile
 from lfs10d.quantities import seconds
 from lfs10d.simulator.build import Plan, build, slave_ids
@@ -103,7 +104,12 @@ class Wanted:
 @click.option("--stopbits", type=click.Choice(["1", "2"]), default="1", show_default=True)
 @click.option("--framing", type=click.Choice(["rtu", "ascii"]), default="rtu", show_default=True)
 @click.option("--faults", type=click.Path(path_type=Path), metavar="FILE", help="What ails whom (YAML).")
-@click.option("--profile", metavar="NAME", help="Another device than lfs10: a profile's name or file.")
+@click.option(
+    "--profile",
+    metavar="NAME",
+    shell_complete=profile_names,
+    help="Another device than lfs10: a profile's name or file.",
+)
 @click.option(
     "--turnaround",
     callback=_time,
