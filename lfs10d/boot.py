@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import string
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -40,12 +40,16 @@ def begin(directory: Path, disk: Disk, wall: float) -> Boot:
     previous = _last(path, disk)
     clock = int(wall * TICKS_PER_SECOND)
     number = clock if previous is None else max(clock, int(previous, 36) + 1)
-    boot = _text(number)
+    return keep(Boot(_text(number), previous, kept=False), directory, disk)
+
+
+def keep(boot: Boot, directory: Path, disk: Disk) -> Boot:
+    """Put the id of this life on the disk, as the last one; return it as `kept` if that was possible."""
     try:
-        disk.replace(path, f"{boot}\n".encode())
+        disk.replace(directory / FILE_NAME, f"{boot.id}\n".encode())
     except OSError:
-        return Boot(boot, previous, kept=False)
-    return Boot(boot, previous, kept=True)
+        return boot
+    return replace(boot, kept=True)
 
 
 def _last(path: Path, disk: Disk) -> str | None:

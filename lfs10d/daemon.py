@@ -15,6 +15,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from lfs10d import __version__, assembly, logs, signals
+from lfs10d.boot import keep
 from lfs10d.changefile import ChangeFile
 from lfs10d.disk import Disk
 from lfs10d.errors import StateError
@@ -78,6 +79,8 @@ class Daemon:
         self._failed = False
         self._moments = Moments(lambda: self._uplink.synchronised())  # noqa: PLW0108 - built below
         self._now = self._moments.now
+        self._boot = boot
+        self._state_directory = state_directory
         self._storage = Storage(state_directory, self._storage_told)
         self._signals = Signals(notifier, end=self._over.set, reload=self._reload, summary=self._summary)
         self._ticking: asyncio.TimerHandle | None = None
@@ -183,7 +186,11 @@ class Daemon:
             len(config.slaves), config.mqtt.host, config.mqtt.port,
         )  # fmt: skip
         self._storage.look()
-        tasks = [self._begin("clock", self._moments.watch()), self._begin("supervision", self._supervision.run())]
+        tasks = [
+            self._begin("clock", self._moments.watch()),
+            self._begin("storage", self._storage.watch()),
+            self._begin("supervision", self._supervision.run()),
+        ]
         try:
             self._physical.recall()
             self._line.start()
@@ -300,6 +307,8 @@ class Daemon:
 
     def _storage_told(self, trouble: str | None) -> None:
         if trouble is None:
+            if not self._boot.kept:
+                self._boot = keep(self._boot, self._state_directory, Disk())
             self._publish(self._station.line_recovered(FaultCode.STORAGE_FULL, self._now()))
         else:
             self._publish(self._station.line_failed(Fault(FaultCode.STORAGE_FULL, trouble), self._now()))

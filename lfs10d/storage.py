@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 log = logging.getLogger(__name__)
+
+
+LOOK_EVERY = 5.0
+"""Seconds from one look to the next while there is trouble."""
 
 
 class Storage:
@@ -37,6 +42,13 @@ class Storage:
             self._tell(None)
         elif trouble != before:
             self.failed(trouble)
+
+    async def watch(self) -> None:
+        """Look again while there is trouble, until cancelled: where nothing is stored nobody else finds its end."""
+        while True:
+            await asyncio.sleep(LOOK_EVERY)
+            if self._told is not None:
+                self.look()
 
     def backlog_failed(self, trouble: str | None) -> None:
         """Take that the backlog cannot be kept, or (None) can again."""

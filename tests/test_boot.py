@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.boot import Boot, begin
+from lfs10d.boot import Boot, begin, keep
 from lfs10d.disk import Disk
 from lfs10d.forgetful import ForgetfulFiles
 
@@ -64,3 +64,11 @@ def test_the_id_is_on_the_disk_when_the_life_begins() -> None:
     boot = begin(FOLDER, Disk(files), NOW)
     files.power_cut()
     assert begin(FOLDER, Disk(files), 0.0).previous == boot.id
+
+
+def test_an_id_that_could_not_be_kept_is_kept_when_the_disk_can_be_written() -> None:
+    life = begin(FOLDER, Disk(ReadOnly()), NOW)
+    assert keep(life, FOLDER, Disk(ReadOnly())) == life
+    files = ForgetfulFiles()
+    assert keep(life, FOLDER, Disk(files)) == Boot(life.id, None, kept=True)
+    assert begin(FOLDER, Disk(files), 0.0).previous == life.id

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 from typing import TYPE_CHECKING
 
 import pytest
 
+from lfs10d import storage as module
 from lfs10d.storage import Storage
 
 if TYPE_CHECKING:
@@ -58,3 +60,31 @@ def test_what_could_not_be_written_is_told_each_time(tmp_path: Path, told: list[
     storage.failed("changes.yaml cannot be written")
 
     assert told == ["changes.yaml cannot be written"] * 2
+
+
+def test_the_end_of_trouble_is_found_though_nobody_asks(
+    tmp_path: Path, told: list[str | None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "LOOK_EVERY", 0.001)
+    place = tmp_path / "place"
+    place.write_text("a file")
+
+    async def scenario() -> None:
+        over = asyncio.Event()
+
+        def tell(trouble: str | None) -> None:
+            told.append(trouble)
+            if trouble is None:
+                over.set()
+
+        storage = Storage(place / "state", tell)
+        storage.look()
+        place.unlink()
+        async with asyncio.timeout(10), asyncio.TaskGroup() as group:
+            watching = group.create_task(storage.watch())
+            await over.wait()
+            watching.cancel()
+
+    asyncio.run(scenario())
+    assert len(told) == 2
+    assert told[1] is None

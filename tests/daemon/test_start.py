@@ -82,7 +82,9 @@ def test_without_a_state_directory_it_measures_on_and_says_so(site: Site, view: 
     assert "--state-dir" in error["message"]
 
 
-def test_a_state_directory_that_can_be_written_again_is_found_at_a_reload(site: Site, view: View) -> None:
+def test_a_state_directory_that_can_be_written_again_is_found_at_a_reload_and_keeps_the_boot(
+    site: Site, view: View
+) -> None:
     place = site.folder / "place"
     place.write_text("a file")
     site.line()
@@ -94,6 +96,7 @@ def test_a_state_directory_that_can_be_written_again_is_found_at_a_reload(site: 
     run.reload()
 
     assert view.wait("line/error", lambda error: not error["active"])["last_code"] == "storage_full"
+    assert (place / "state" / "boot").read_text().strip() == view.newest("info")["boot"]
 
 
 @pytest.mark.parametrize("redirection", ["2>&-", "2>&- >&- <&-", "2>/dev/full", ">&- 2>/dev/full"])
