@@ -1,4 +1,4 @@
-"""Following a sensor that was written to and may answer at either of two places, until it is found. Pure; it reads.
+"""Following a sensor that was written to and may answer at either of two places, until it is found. Pure.
 
 Rules
 -----
@@ -9,6 +9,8 @@ Rules
    and its register does not say the new id. A register that does may still be obeyed, at the next power cycle.
 4. A newcomer at its new place is found though somebody answers at the factory's id: that is the next newcomer,
    unless the register there says the new id too.
+5. It writes in one case only: where somebody is at the new place, one at the old place whose register says the new id
+   has his own written back. They would meet at his next power-up.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from lfs10d.jobs.course import Aside
 from lfs10d.jobs.job import Hold
-from lfs10d.jobs.readdress import QUICK_LOOK, Ending, Verdict, judge, told, verified
+from lfs10d.jobs.readdress import QUICK_LOOK, Ending, Verdict, judge, parted, told, verified
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -42,7 +44,7 @@ def follow(
     `before` is where it was before it came to `old`: it may be there still. `newcomer`: `old` is a factory's id.
     """
     found = yield from verified(old, new, asking, QUICK_LOOK)
-    verdict = yield from _judged(found, before, new, asking, newcomer=newcomer)
+    verdict = yield from _judged(found, before, old, new, asking, newcomer=newcomer)
     pause = min(FIRST_PAUSE, longest_pause)
     while verdict.ending not in DECIDED:
         yield Aside(verdict)
@@ -57,16 +59,16 @@ def follow(
             if at_old.silent and (yield from _still_there(before, new, asking)):
                 break
         found = yield from told(old, new, asking)
-        verdict = yield from _judged(found, before, new, asking, newcomer=newcomer)
+        verdict = yield from _judged(found, before, old, new, asking, newcomer=newcomer)
     return verdict
 
 
 def _judged(
-    found: Found, before: Spot | None, new: Spot, asking: Asking, *, newcomer: bool
+    found: Found, before: Spot | None, old: Spot, new: Spot, asking: Asking, *, newcomer: bool
 ) -> Generator[Step, Any, Verdict]:
     if newcomer and found.new.answers and not found.spoilt and found.old.register != new.slave:
         return Verdict(Ending.MOVED, found.new.register)
-    verdict = judge(found, None, None, new.slave)
+    verdict = yield from parted(judge(found, None, None, new.slave), old, new.slave, asking)
     if verdict.ending is Ending.NOWHERE:
         return (yield from _still_there(before, new, asking)) or verdict
     return verdict

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from lfs10d.jobs.follow import follow
 from lfs10d.jobs.readdress import Ending, Verdict
 from lfs10d.journal import Spot
+from lfs10d.modbus.frames import WriteRegister
 
 if TYPE_CHECKING:
     from tests.jobs.conftest import Pretence
@@ -92,8 +94,18 @@ def test_a_newcomer_at_its_new_place_is_found_though_the_next_one_is_at_the_fact
     assert pretence.carry_out(follower) == Verdict(Ending.MOVED, 9)
 
 
-def test_unless_that_has_the_new_id_stored_too(pretence: Pretence) -> None:
+def test_one_at_the_old_place_that_has_stored_the_id_of_the_other_gets_its_own_back(pretence: Pretence) -> None:
     other = pretence.sensor(3, stored={5: 9})
+    pretence.later += [(30.0, partial(vars(other).update, silent=True))]
+    pretence.sensor(9)
+    assert pretence.carry_out(follow(OLD, NEW, pretence.asking(), longest_pause=4.0)).ending is Ending.MOVED
+    assert pretence.writes == [WriteRegister(3, 5, 3)]
+    assert not other.stored
+    assert {each.ending for each in pretence.aside if isinstance(each, Verdict)} == {Ending.BOTH}
+
+
+def test_a_newcomer_beside_one_that_keeps_its_id_stored_is_not_found(pretence: Pretence) -> None:
+    other = pretence.sensor(3, stored={5: 9}, manner="ignores")
     pretence.sensor(9)
     pretence.later.append((30.0, other.stored.clear))
     follower = follow(OLD, NEW, pretence.asking(), longest_pause=4.0, newcomer=True)

@@ -86,6 +86,12 @@ TWINNED: dict[str, tuple[list[Ails], tuple[Ails, Ails | None], float, list[Any]]
         0.009,
         [("baudrate", True, 0, DONE), ("baudrate", True, 0, ("sigterm", 71)), ("wait", 20.0, 0, DONE)],
     ),
+    "one of two that the daemon finds parted after a crash forgets the id of the other": (
+        [late(0.35), WELL, WELL],
+        (POWER_CYCLE, None),
+        0.0055,
+        [("readdress", "s3", 10, ("leave", 184)), ("wait", 20.0, 0, DONE)],
+    ),
     "two that meet again before the daemon could part them had one id before": (
         [late(0.35), READS_NEW, READS_NEW],
         (STORES, None),
