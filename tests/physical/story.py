@@ -108,6 +108,7 @@ class Story:
         bench = self.bench
         asked = Asked(name, {"id": len(self.asked), **parameters})
         self.asked.append(asked)
+        self.hushed |= self.by_name["s3"].deaf_until > bench.clock.now * 1e9  # its flash is not done yet
         how, after = end
         if how == "crash":
             bench.files.steps_left = bench.files.steps + after

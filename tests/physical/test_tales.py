@@ -104,6 +104,12 @@ TWINNED: dict[str, tuple[list[Ails], tuple[Ails, Ails | None], float, list[Any]]
         0.009,
         [("baudrate", False, 0, DONE)],
     ),
+    "one that is deaf since the change before has its twin taken for it": (
+        [slow(5.0), WELL, WELL],
+        (WELL, None),
+        0.005,
+        [("baudrate", False, 0, DONE), ("baudrate", False, 0, DONE)],
+    ),
     "one that is silent has its twin taken for it at a change of the id": (
         [("silent", {"first": 8.0}), WELL, WELL],
         (WELL, WELL),
