@@ -14,16 +14,17 @@ import pytest
 from lfs10d.jobs.asking import Asking
 from lfs10d.jobs.course import Aside, LineLostError, Now
 from lfs10d.jobs.job import Ask, Hold
-from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters, Request, WriteRegister
 from lfs10d.modbus.unanswered import Unanswered
 from lfs10d.profiles.library import load_profile
 from lfs10d.reading import Fault, FaultCode
+from tests.outcomes import ended
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
 
     from lfs10d.jobs.course import Step
+    from lfs10d.modbus.exchange import Outcome
     from lfs10d.profiles.schema import Profile
 
 T = TypeVar("T")
@@ -187,23 +188,14 @@ def heard(
     elif answer is None:
         fault = Fault(code, "failed")
     begins = fault is None or fault.code in (FaultCode.EXCEPTION, FaultCode.CRC)
-    plain = Outcome(
-        request=request,
+    plain = ended(
+        request,
         answer=answer,
         fault=fault,
-        asked=0.0,
-        began=0.0,
-        sent_end=0.0,
         gap=None,
         ended=took,
-        turnaround=None,
-        rtt=None,
         answered=begins,
-        late=(),
-        echoed=None,
         sent=CODEC.encode(request),
-        heard=b"",
-        unsolicited=0,
         quiet_since=took,
     )
     return replace(plain, **facts)

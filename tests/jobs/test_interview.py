@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING
 import pytest
 
 from lfs10d.jobs.interview import Finding, Interview, first_read, speaks, spoilt, strangers
-from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
 from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.reading import Fault, FaultCode
+from tests.outcomes import ended
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from lfs10d.modbus.exchange import Outcome
     from lfs10d.profiles.schema import Profile
 
 CODEC = Codec(Framing.RTU)
@@ -43,25 +44,15 @@ def outcome(
         fault = Fault(FaultCode.EXCEPTION, "refused", exception)
     elif answer is None:
         fault, rtt = Fault(code, "failed", heard=heard), None
-    sent = CODEC.encode(request)
-    return Outcome(
-        request=request,
+    return ended(
+        request,
         answer=answer,
         fault=fault,
-        asked=0.0,
-        began=0.0,
-        sent_end=0.01,
-        gap=None,
-        ended=0.1,
-        turnaround=None,
         rtt=rtt,
         answered=fault is None,
-        late=(),
-        echoed=None,
-        sent=sent,
+        sent=CODEC.encode(request),
         heard=heard,
         unsolicited=unsolicited,
-        quiet_since=0.1,
         ambiguous=ambiguous,
     )
 

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
 from lfs10d.jobs.job import Ask, Done, Later
 from lfs10d.jobs.knock import Knock
-from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
 from lfs10d.profiles.library import load_profile
 from lfs10d.reading import Fault, FaultCode
+from tests.outcomes import ended
+
+if TYPE_CHECKING:
+    from lfs10d.modbus.exchange import Outcome
 
 CODEC = Codec(Framing.RTU)
 LFS10 = load_profile("lfs10", relative_to=Path())
@@ -21,26 +25,7 @@ NOISE = Fault(FaultCode.CRC, "the check is wrong", heard=b"\x05\x03\x02")
 
 
 def outcome(request: ReadRegisters, answer: tuple[int, ...] | None, fault: Fault | None) -> Outcome:
-    return Outcome(
-        request=request,
-        answer=answer,
-        fault=fault,
-        asked=0.0,
-        began=0.0,
-        sent_end=0.01,
-        gap=0.004,
-        ended=0.05,
-        turnaround=None,
-        rtt=None,
-        answered=fault is None,
-        late=(),
-        echoed=None,
-        sent=CODEC.encode(request),
-        heard=b"" if fault is None else fault.heard,
-        unsolicited=0,
-        quiet_since=0.05,
-        ambiguous=False,
-    )
+    return ended(request, answer=answer, fault=fault, answered=fault is None, sent=CODEC.encode(request))
 
 
 class Door:

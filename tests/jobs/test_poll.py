@@ -9,37 +9,20 @@ import pytest
 
 from lfs10d.jobs.job import Ask, Done, Hold, Later
 from lfs10d.jobs.poll import Poll
-from lfs10d.modbus.exchange import LateAnswer, Outcome
+from lfs10d.modbus.exchange import LateAnswer
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
 from lfs10d.modbus.unanswered import Unanswered
 from lfs10d.profiles.library import load_profile
 from lfs10d.reading import Errand, Fault, FaultCode
 from lfs10d.roster import Device, DeviceSpec, PollRules
+from tests.outcomes import ended
 
 RTU = Codec(Framing.RTU)
 LFS10, DZB = (load_profile(name, relative_to=Path()) for name in ("lfs10", "fuling-dzb"))
 WIND, WHO = ReadRegisters(1, 0x0001, 2), ReadRegisters(1, 0x0005, 1)
 VALUE = (0x414F, 0xD70A)
 NAN = (0x7FC0, 0x0000)
-PLAIN = Outcome(
-    request=WIND,
-    answer=None,
-    fault=None,
-    asked=0.0,
-    began=0.0,
-    sent_end=0.0,
-    gap=0.01,
-    ended=0.2,
-    turnaround=None,
-    rtt=None,
-    answered=False,
-    late=(),
-    echoed=None,
-    sent=b"",
-    heard=b"",
-    unsolicited=0,
-    quiet_since=0.0,
-)
+PLAIN = ended(WIND)
 
 
 class Rig:

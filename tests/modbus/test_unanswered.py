@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.modbus.exchange import LateAnswer, Outcome
+from lfs10d.modbus.exchange import LateAnswer
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters, WriteRegister
 from lfs10d.modbus.unanswered import EQUALS_KEPT, Unanswered
 from lfs10d.reading import Fault, FaultCode
+from tests.outcomes import ended
 
 if TYPE_CHECKING:
     from lfs10d.modbus.frames import Request
@@ -22,25 +23,9 @@ WIND, WHO = ReadRegisters(1, 0x0001, 2), ReadRegisters(1, 0x0005, 1)
 WHERE = ReadRegisters(1, 0x0004, 1)
 """Of the shape of `WHO`."""
 OTHER = ReadRegisters(2, 0x0001, 2)
-PLAIN = Outcome(
-    request=WIND,
-    answer=None,
-    fault=Fault(FaultCode.TIMEOUT, "no answer"),
-    asked=0.0,
-    began=0.0,
-    sent_end=0.0,
-    gap=0.01,
-    ended=0.2,
-    turnaround=None,
-    rtt=None,
-    answered=False,
-    late=(),
-    echoed=None,
-    sent=b"",
-    heard=b"",
-    unsolicited=0,
-    quiet_since=0.0,
-)
+EXCHANGE = 0.02
+"""s between two requests at least: no two were ever sent at the same moment."""
+PLAIN = ended(WIND, fault=Fault(FaultCode.TIMEOUT, "no answer"))
 
 
 class Line:
@@ -257,7 +242,7 @@ def test_no_answer_of_a_slave_that_answers_in_turn_is_taken_for_another(
     line, now = Line(), 0.0
     backlog: list[tuple[Request, int]] = []
     for number, (step, pause) in enumerate(steps):
-        now += pause
+        now += EXCHANGE + pause
         request = WIND if line.free(WIND, now) else WHO
         if request is WIND or line.unanswered.left_alone_until(1, now) is None:
             backlog.append((request, number))
