@@ -52,9 +52,10 @@ def follow(
             yield Hold(asking.clock.now + pause)
             pause = min(2 * pause, longest_pause)
             at_new = yield from asking.who(new)
+            if not at_new.silent:
+                break  # the full look asks the old place too, and silence is dear
             at_old = yield from asking.who(old)
-            appeared = at_new.answers or at_new.noise
-            if appeared or (at_old.answers and at_old.register != new.slave):
+            if at_old.answers and at_old.register != new.slave:
                 break
             if at_old.silent and (yield from _still_there(before, new, asking)):
                 break
