@@ -29,7 +29,7 @@ def missing(model: type[BaseModel] | None, path: KeyPath) -> str:
     for found in _models_at(model, path[:-1]) if model else ():
         known = found.model_fields.get(str(path[-1]))
         if known is not None and (description := known.description):
-            return f"is missing; write here {description[0].lower()}{description[1:]}"
+            return f"is missing; write here: {description[0].lower()}{description[1:].rstrip('.')}"
     return "is missing"
 
 

@@ -103,14 +103,14 @@ def test_all_problems_are_told_at_once_in_order_of_place() -> None:
         ("", ["1:1: the file is empty"]),
         ("5", ["1:1: must be a mapping with line, slaves and mqtt, not 5"]),
         ("- a", ["1:1: must be a mapping with line, slaves and mqtt, not a list"]),
-        ("slaves: []", ["1:1: line: is missing; write here the RS485 line; at least `port`."]),
+        ("slaves: []", ["1:1: line: is missing; write here: the RS485 line; at least `port`"]),
         ("line:", ["1:6: line: must be a mapping of keys to values, not empty"]),
         (
             "line: {}",
             [
                 (
-                    "1:7: line.port: is missing; write here path of the serial port; best one below /dev/serial/by-id, "
-                    "which stays the same when replugged."
+                    "1:7: line.port: is missing; write here: path of the serial port; best one below "
+                    "/dev/serial/by-id, which stays the same when replugged"
                 )
             ],
         ),

@@ -285,7 +285,7 @@ def test_an_unknown_key_is_told_beside_its_value_that_could_not_be_read() -> Non
             ["f:1:9: inner.zzz: is not a known key; known here: number, needed, required, bare"],
         ),
         ("a: 1\ninner:\n  bare: 1\n", None),
-        ("many:\n- {bare: 1}", ["f:2:3: many[0].required: is missing; write here a number that must be there."]),
+        ("many:\n- {bare: 1}", ["f:2:3: many[0].required: is missing; write here: a number that must be there"]),
         ("bare: {}", ["f:1:7: bare.thing: is missing"]),
         ("registr: 1", ["f:1:1: registr: is not a known key; did you mean register?"]),
         ('"a\\nb": 1', None),

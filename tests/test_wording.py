@@ -57,7 +57,7 @@ def test_the_keys_of_a_place_are_those_of_its_models(path: tuple[str | int, ...]
 
 
 def test_a_missing_key_is_answered_with_what_to_write() -> None:
-    assert missing(Leaf, ("register_",)) == "is missing; write here where it lies."
+    assert missing(Leaf, ("register_",)) == "is missing; write here: where it lies"
     assert missing(Leaf, ("bare",)) == "is missing"
     assert missing(Leaf, ("other",)) == "is missing"
     assert missing(None, ("register_",)) == "is missing"

@@ -78,7 +78,7 @@ PROBLEMS = """\
 15:87: values[3].word_order: int16 fills one register
 15:108: values[3].function: must be one of
 16:5: values[4].register: is missing
-16:5: values[4].unit: is missing; write here the unit of the number
+16:5: values[4].unit: is missing; write here: the unit of the number
 16:21: values[4].type: must be one of
 17:5: values[5]: must be a mapping of keys to values, not 7
 19:42: settings[0].values.off: is no register content
