@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import json
 import struct
+import time
 from bisect import bisect_left, bisect_right
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -25,7 +26,7 @@ from lfs10d.simulator.burst import MASTER
 from lfs10d.simulator.wire import SECOND, unseal
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from lfs10d.simulator.line import Answer, Request
 
@@ -35,6 +36,18 @@ ROUNDED = 1_000_000
 """`ts` is in whole ms; in ns."""
 HELD = 20_000_000
 """An adapter holds bytes back for up to 16 ms: what ended so long before a request may be handed over after it (ns)."""
+
+
+LOOKS = 50
+
+
+def epoch_of(now: Callable[[], float], wall: Callable[[], float] = time.time) -> float:
+    """Return the wall clock at the time 0 of another clock, both in s; on a busy machine one look may take long."""
+    looks = []
+    for _ in range(LOOKS):
+        before, there, after = wall(), now(), wall()
+        looks.append((after - before, (before + after) / 2 - there))
+    return min(looks)[1]
 
 
 @dataclass

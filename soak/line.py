@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import threading
-import time
 from itertools import islice
 from typing import TYPE_CHECKING
 
@@ -14,6 +13,7 @@ from lfs10d.simulator.faults import Kind
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.troubles import stray
 from lfs10d.simulator.wire import SECOND, Format
+from soak.attestation import epoch_of
 from soak.oracle import Numbered, Sent, number_of
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ class Line:
         self._served.tell(take)
         if not done.wait(PATIENCE):
             raise RuntimeError("the simulated line does not answer")
-        origin = time.time() - self._served.now()
+        origin = epoch_of(self._served.now)
         self.settled_until = origin + max(0, settled) / SECOND
         going, staying = taken
         return answers_of(going, going + staying, self._names, origin)

@@ -17,7 +17,7 @@ from lfs10d.simulator.inturn import InTurn
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.wire import SECOND, Format
-from soak.attestation import Oracle, parsed
+from soak.attestation import Oracle, epoch_of, parsed
 from soak.troubles import KINDS
 from tests.daemon.conftest import eventually, tell
 
@@ -54,7 +54,7 @@ class Recorded:
         self.served.adapter.collect = recording  # type: ignore[method-assign]  # it is all that hands over
         site.lines.append(self.served)
         self.served.start()
-        self.epoch = time.time() - self.served.now()
+        self.epoch = epoch_of(self.served.now)
 
     @property
     def exchanges(self) -> int:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
-import time
 from typing import TYPE_CHECKING
 
 import pytest
 
 from lfs10d.outbound import check
-from soak.attestation import Oracle, parsed
+from soak.attestation import Oracle, epoch_of, parsed
 from tests.daemon.conftest import eventually, good
 
 if TYPE_CHECKING:
@@ -66,7 +65,7 @@ def test_during_a_flood_polls_go_on_and_no_number_is_wrong(
     site: Site, view: View, mosquitto: Mosquitto, program: Callable[[str], str]
 ) -> None:
     line = site.line()
-    epoch = time.time() - line.now()
+    epoch = epoch_of(line.now)
     site.write(poll={"interval": "100ms"})
     run = site.run()
     view.wait_samples("slave-1", 5, good)

@@ -12,7 +12,7 @@ from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.port import SimulatedPort, VirtualClock
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import seal
-from soak.attestation import Attested, Oracle, codes, parsed
+from soak.attestation import LOOKS, Attested, Oracle, codes, epoch_of, parsed
 
 EPOCH = 1_700_000_000
 READ = bytes((3, 0, 1, 0, 2))
@@ -192,3 +192,8 @@ def test_codes_are_those_of_the_window() -> None:
         sample(1.0, ts=(EPOCH + 3) * 1000),
     ]
     assert codes(samples, 1.0, 3.0, EPOCH) == ["timeout", "good"]
+
+
+def test_of_many_looks_at_two_clocks_the_shortest_counts() -> None:
+    ticks = iter([0.0, 5.0, 100.0, 101.0, *(float(100 * n) for n in range(2, 2 * LOOKS))])
+    assert epoch_of(lambda: 10.0, lambda: next(ticks)) == 90.5
