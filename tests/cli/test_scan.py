@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 import signal
@@ -21,6 +22,7 @@ from lfs10d.simulator.troubles import stray
 from lfs10d.simulator.wire import Format
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     from lfs10d.simulator.pty import PtyLine
@@ -140,8 +142,9 @@ def test_ascii_is_spoken_where_it_is_asked_for(lfs10d: Lfs10d, sensors: PtyLine)
     assert done.returncode == 1
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_who_ends_it_sees_what_was_found_so_far(sensors: PtyLine, number: signal.Signals) -> None:
+@contextlib.contextmanager
+def scanning(sensors: PtyLine) -> Iterator[subprocess.Popen[str]]:
+    """Give a scan of all ids that has found the one sensor there is."""
     sensors.line.add(Sensor(1))
     with subprocess.Popen(
         [sys.executable, "-m", "lfs10d", "scan", sensors.path],
@@ -153,6 +156,12 @@ def test_who_ends_it_sees_what_was_found_so_far(sensors: PtyLine, number: signal
         assert process.stderr is not None
         while not process.stderr.readline().startswith("found 1"):
             assert process.poll() is None
+        yield process
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_who_ends_it_sees_what_was_found_so_far(sensors: PtyLine, number: signal.Signals) -> None:
+    with scanning(sensors) as process:
         begun = time.monotonic()
         process.send_signal(number)
         out, err = process.communicate(timeout=10)
@@ -163,17 +172,7 @@ def test_who_ends_it_sees_what_was_found_so_far(sensors: PtyLine, number: signal
 
 
 def test_an_adapter_pulled_out_ends_it_with_what_was_found(sensors: PtyLine) -> None:
-    sensors.line.add(Sensor(1))
-    with subprocess.Popen(
-        [sys.executable, "-m", "lfs10d", "scan", sensors.path],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env={"PATH": "/usr/bin:/bin"},
-    ) as process:
-        assert process.stderr is not None
-        while not process.stderr.readline().startswith("found 1"):
-            assert process.poll() is None
+    with scanning(sensors) as process:
         sensors.stop()
         out, err = process.communicate(timeout=10)
     assert process.returncode == 69
