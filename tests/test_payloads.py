@@ -11,21 +11,9 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from lfs10d.payloads import Event, LineStats, Response, SamplePayload
-from lfs10d.telemetry import Sample
+from tests.samples import SAMPLE
 
-GOOD: dict[str, Any] = Sample(
-    device="mast-top",
-    boot="k3f9a2c7",
-    seq=1,
-    ts=1795298022003,
-    clock="synced",
-    values={"wind_speed": 12.34},
-    units={"wind_speed": "m/s"},
-    names=("wind_speed",),
-    quality="good",
-    error=None,
-    rtt_ms=18.2,
-).payload("line0")
+GOOD: dict[str, Any] = SAMPLE.payload("line0")
 
 
 def bad(**changes: object) -> dict[str, object]:

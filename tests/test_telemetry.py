@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from lfs10d.telemetry import (
     Kind,
     Publication,
-    Sample,
     device_of,
     device_topic,
     dropped,
@@ -21,24 +20,11 @@ from lfs10d.telemetry import (
     iso_time,
     retained,
 )
-
-GOOD = Sample(
-    device="mast-top",
-    boot="k3f9a2c7",
-    seq=48211,
-    ts=1795298022003,
-    clock="synced",
-    values={"wind_speed": 12.34},
-    units={"wind_speed": "m/s"},
-    names=("wind_speed",),
-    quality="good",
-    error=None,
-    rtt_ms=18.2,
-)
+from tests.samples import SAMPLE
 
 
 def test_a_sample_is_the_contract_s_line_to_the_letter() -> None:
-    line = json.dumps(GOOD.payload("line0"), separators=(",", ":"))
+    line = json.dumps(SAMPLE.payload("line0"), separators=(",", ":"))
     assert line == (
         '{"v":1,"line":"line0","device":"mast-top","boot":"k3f9a2c7","seq":48211,"ts":1795298022003,'
         '"time":"2026-11-21T21:53:42.003Z","clock":"synced","wind_speed":12.34,"unit":"m/s",'
@@ -48,7 +34,7 @@ def test_a_sample_is_the_contract_s_line_to_the_letter() -> None:
 
 def test_a_bad_sample_carries_a_null_under_every_value_name() -> None:
     bad = replace(
-        GOOD,
+        SAMPLE,
         values=None,
         names=("current", "voltage"),
         units={"current": "A", "voltage": "V"},
@@ -63,7 +49,7 @@ def test_a_bad_sample_carries_a_null_under_every_value_name() -> None:
 
 def test_several_values_have_units_by_name_and_no_unit() -> None:
     several = replace(
-        GOOD,
+        SAMPLE,
         values={"current": 1.5, "voltage": 230},
         names=("current", "voltage"),
         units={"current": "A", "voltage": "V"},
@@ -75,12 +61,12 @@ def test_several_values_have_units_by_name_and_no_unit() -> None:
 
 
 def test_one_value_without_a_unit_has_unit_null() -> None:
-    assert replace(GOOD, units={}).payload("line0")["unit"] is None
+    assert replace(SAMPLE, units={}).payload("line0")["unit"] is None
 
 
 def test_history_alone_is_marked_historical() -> None:
-    assert GOOD.payload("line0", historical=True) == {**GOOD.payload("line0"), "historical": True}
-    assert "historical" not in GOOD.payload("line0")
+    assert SAMPLE.payload("line0", historical=True) == {**SAMPLE.payload("line0"), "historical": True}
+    assert "historical" not in SAMPLE.payload("line0")
 
 
 @given(st.integers(0, 4_102_444_800_000))

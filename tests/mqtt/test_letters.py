@@ -7,21 +7,9 @@ import pytest
 from lfs10d.loss import Loss
 from lfs10d.mqtt.history import Kept
 from lfs10d.mqtt.letters import Array, Declaration, Letter, Live, Message, Retained, samples_of
-from lfs10d.telemetry import Kind, Publication, Sample, event, retained
+from lfs10d.telemetry import Kind, Publication, event, retained
+from tests.samples import SAMPLE
 
-SAMPLE = Sample(
-    device="mast-top",
-    boot="k3f9a2c7",
-    seq=1,
-    ts=1795298022003,
-    clock="synced",
-    values={"wind_speed": 12.34},
-    units={"wind_speed": "m/s"},
-    names=("wind_speed",),
-    quality="good",
-    error=None,
-    rtt_ms=18.2,
-)
 KEPT = Kept(SAMPLE, since=0.0)
 NEXT = Kept(SAMPLE, since=1.0)
 LIVE = Publication("device/mast-top/telemetry", {}, Kind.SAMPLE, retain=False, qos=1, sample=SAMPLE)
