@@ -89,6 +89,10 @@ class ConnectionInMemory(Connection):
         self.tell("acknowledged", self._last, 0)
         return self._last
 
+    def cork(self, *, on: bool) -> None:
+        """Do nothing: nothing waits."""
+        del on
+
     def subscribe(self, filters: Sequence[Filter]) -> int | None:
         """Grant everything; nobody else publishes here."""
         self._last += 1

@@ -105,7 +105,11 @@ class Dispatch:
     def _send_some(self) -> None:
         self._turn = None
         self._sending = True
+        if self._connection is not None:
+            self._connection.cork(on=True)
         emptied = self._send_a_few()
+        if self._connection is not None:
+            self._connection.cork(on=False)
         self._sending = False
         if emptied:
             self._set_alarm()

@@ -59,12 +59,17 @@ class Wire:
 
     sent: list[tuple[str, bytes, int, bool, bytes | None]] = field(default_factory=list)
     gone: bool = False
+    corked: bool = False
+
+    def cork(self, *, on: bool) -> None:
+        self.corked = on
 
     def publish(
         self, topic: str, payload: bytes, *, qos: int = 1, retain: bool = False, correlation: bytes | None = None
     ) -> int | None:
         if self.gone:
             return None
+        assert self.corked or topic.endswith("/history"), "what goes in one turn goes by one segment"
         self.sent.append((topic, payload, qos, retain, correlation))
         return len(self.sent)
 
@@ -94,6 +99,7 @@ class Desk:
         self.dispatch.wake()
         for _ in range(times):
             await asyncio.sleep(0)
+        assert not self.wire.corked, "what is handed over goes"
 
     def acknowledge(self, reason: int = 0) -> None:
         """Answer everything that was handed over."""

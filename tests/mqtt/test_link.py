@@ -141,6 +141,36 @@ def answering(*packets: bytes) -> Answer:
     return answer
 
 
+def test_what_is_published_under_the_cork_goes_by_one_segment_when_it_is_taken_off(serving: Serving) -> None:
+    segments: list[bytes] = []
+    come = asyncio.Event()
+
+    async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await reader.read(1000)
+        writer.write(b"\x20\x03\x00\x00\x00")
+        while data := await reader.read(1000):
+            segments.append(data)
+            come.set()
+
+    async def scenario() -> None:
+        async with serving(answer) as port, linked(settings_of(port)) as (link, _):
+            await link.opened(PATIENCE)
+            connection = link.standing
+            assert connection is not None
+            connection.cork(on=True)
+            for number in range(3):
+                connection.publish("t", b"%d" % number, qos=0)
+                await asyncio.sleep(0.01)
+            assert segments == []
+            connection.cork(on=False)
+            await asyncio.wait_for(come.wait(), PATIENCE)
+            assert segments == [b"".join(b"\x30\x05\x00\x01t\x00%d" % number for number in range(3))]
+            connection.abandon()
+            connection.cork(on=True)  # of a socket that is closed: nothing to be said
+
+    asyncio.run(scenario())
+
+
 def test_a_topic_that_is_no_utf_8_is_passed_over(serving: Serving, caplog: pytest.LogCaptureFixture) -> None:
     """A broker should not forward one, but this one does."""
     broker = answering(b"\x30\x05\x00\x02\xc3\x28\x00", b"\x30\x04\x00\x01t\x00")
