@@ -247,9 +247,12 @@ def restored(sensor: Sensor, rate: int, other: int) -> Generator[Step, Any, int 
 
 
 def rolled_back(
-    sensors: Sequence[Sensor], rate: int, other: int, where: dict[str, int | None]
+    sensors: Sequence[Sensor], rate: int, other: int, where: dict[str, int | None], *, once_more: bool = True
 ) -> Generator[Step, Any, RateVerdict]:
-    """Bring these sensors to `rate`, for up to `ROLL_BACK`; `where` learns where they are."""
+    """Bring these sensors to `rate`, for up to `ROLL_BACK`; `where` learns where they are.
+
+    `once_more`: all are looked for at the other rate in the end, after `VERIFY`, in which nobody is polled.
+    """
     until: float | None = None
     missing = list(sensors)
     while missing:
@@ -263,7 +266,7 @@ def rolled_back(
                 return RateVerdict(Ended.UNVERIFIED, where, tuple(each.name for each in missing))
         if missing:
             yield Hold(missing[0].asking.clock.now + FIRST_PAUSE)
-        else:
+        elif once_more:
             missing = yield from _left_behind(sensors, other)
     return RateVerdict(Ended.ROLLED_BACK, where)
 

@@ -51,7 +51,7 @@ def undo(
                 break
         if len(where) == len(sensors) and all(at == other for at in where.values()):
             return RateVerdict(Ended.MOVED, where)
-    verdict = yield from rolled_back(sensors, rate, other, where)
+    verdict = yield from rolled_back(sensors, rate, other, where, once_more=False)
     pause = min(FIRST_PAUSE, longest_pause)
     while verdict.ended is not Ended.ROLLED_BACK:
         yield Aside(verdict)
