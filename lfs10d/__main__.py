@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 LASTING = frozenset({"run", "watch", "trace", "simulate", "demo"})
 """Verbs that go on until they are told to end, which is no failure then; `read --watch` is one more."""
 
+ENDING = (signal.SIGINT, signal.SIGTERM)
+
 
 def main(arguments: Sequence[str] | None = None) -> NoReturn:
     """Run the verb that the arguments name and exit with its code."""
@@ -20,16 +22,14 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     interrupted = 0 if lasting(words) else 1
     try:
         # Also where whoever started us ignores SIGINT, as a shell does for what it puts into the background.
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        signal.signal(signal.SIGTERM, _terminated)
+        for number in ENDING:
+            signal.signal(number, _interrupted)
         from lfs10d.cli.outcome import conclude  # noqa: PLC0415  # a tenth of a second, in which a signal may come
 
         code = conclude(words, interrupted=interrupted)
     except KeyboardInterrupt:
         code = interrupted
-    # From here on a second Ctrl-C would only show where the interpreter was while it ended.
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.SIG_DFL)
+    _ignore()
     sys.exit(code)
 
 
@@ -39,9 +39,16 @@ def lasting(words: Sequence[str]) -> bool:
     return verb in LASTING or (verb == "read" and "--watch" in words)
 
 
-def _terminated(signum: int, frame: FrameType | None) -> NoReturn:
+def _interrupted(signum: int, frame: FrameType | None) -> NoReturn:
+    """End the verb, whose end takes less than 2 s; who asks for it twice meanwhile gets no other end."""
     del signum, frame
+    _ignore()
     raise KeyboardInterrupt
+
+
+def _ignore() -> None:
+    for number in ENDING:
+        signal.signal(number, signal.SIG_IGN)
 
 
 if __name__ == "__main__":

@@ -74,7 +74,8 @@ def test_a_signal_among_the_imports_ends_each_verb_with_its_code(
         """Stands in for a module that a signal comes in the middle of."""
 
         def __getattr__(self, name: str) -> object:
-            signal.raise_signal(signal.SIGTERM)
+            if name == "conclude":
+                signal.raise_signal(signal.SIGTERM)
             raise AttributeError(name)
 
     monkeypatch.setitem(sys.modules, "lfs10d.cli.outcome", Signal())
@@ -89,6 +90,24 @@ def test_sigint_is_heard_where_whoever_started_us_ignores_it(monkeypatch: pytest
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     monkeypatch.setattr(outcome, "lfs10d", verb)
     assert exit_code([]) == 1
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_second_signal_changes_nothing_of_the_end(number: signal.Signals, monkeypatch: pytest.MonkeyPatch) -> None:
+    tidied = []
+
+    @click.command(context_settings={"ignore_unknown_options": True})
+    def verb() -> None:
+        try:
+            signal.raise_signal(signal.SIGINT)
+        finally:
+            signal.raise_signal(number)
+            tidied.append(True)
+
+    monkeypatch.setattr(outcome, "lfs10d", verb)
+    assert exit_code([]) == 1
+    signal.raise_signal(number)
+    assert tidied == [True]
 
 
 def test_a_verb_that_comes_to_its_end_gives_its_own_code(monkeypatch: pytest.MonkeyPatch) -> None:
