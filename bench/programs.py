@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import contextlib
 import signal
 import subprocess
 from dataclasses import dataclass
@@ -54,8 +55,10 @@ class Weight:
 
 def weigh(pid: int) -> Weight:
     """Read a process's use from /proc."""
-    tasks = Path(f"/proc/{pid}/task")
-    nanoseconds = sum(int((task / "schedstat").read_text().split()[0]) for task in tasks.iterdir())
+    nanoseconds = 0
+    for task in Path(f"/proc/{pid}/task").iterdir():
+        with contextlib.suppress(FileNotFoundError):  # a thread that ends meanwhile
+            nanoseconds += int((task / "schedstat").read_text().split()[0])
     status = dict(line.split(":", 1) for line in Path(f"/proc/{pid}/status").read_text().splitlines() if ":" in line)
     return Weight(nanoseconds / 1e9, _megabytes(status["VmRSS"]), _megabytes(status["RssAnon"]))
 

@@ -241,7 +241,7 @@ def test_a_port_held_by_the_daemon_is_69_and_says_what_to_type(
     [
         (["0"], "0 is not in the range"),
         (["256"], "256 is not in the range"),
-        (["x"], "not a valid integer"),
+        (["x"], "not a valid slave id"),
         ([], "Missing argument 'ID'"),
         (["2", "--baudrate", "9601"], "'9601' is none of 1200"),
         (["2", "--interval", "often"], "is no duration"),
