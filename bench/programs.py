@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import contextlib
+import os
 import signal
 import subprocess
 from dataclasses import dataclass
@@ -57,7 +57,7 @@ def weigh(pid: int) -> Weight:
     """Read a process's use from /proc."""
     nanoseconds = 0
     for task in Path(f"/proc/{pid}/task").iterdir():
-        with contextlib.suppress(FileNotFoundError):  # a thread that ends meanwhile
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # a thread that ends meanwhile
             nanoseconds += int((task / "schedstat").read_text().split()[0])
     status = dict(line.split(":", 1) for line in Path(f"/proc/{pid}/status").read_text().splitlines() if ":" in line)
     return Weight(nanoseconds / 1e9, _megabytes(status["VmRSS"]), _megabytes(status["RssAnon"]))
