@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import getpass
 import os
+import secrets
 import shutil
 import socket
 import subprocess
@@ -30,6 +31,9 @@ from paho.mqtt.subscribeoptions import SubscribeOptions
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
+
+PORTS = range(12_000, 32_000)
+"""Below the kernel's own (net.ipv4.ip_local_port_range), above what is registered most."""
 
 PATIENCE = 10.0
 """Seconds after which something awaited counts as not happening; no test waits this long when all is well."""
@@ -66,10 +70,16 @@ def _program() -> Callable[[str], str]:
 
 
 def free_port() -> int:
-    """Return a TCP port of the loopback that nobody uses now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+    """Return a TCP port of the loopback that nobody uses now.
+
+    It is none of those that the kernel gives to whoever connects: a daemon that asks for a broker that is away would
+    take its port, or even connect to itself.
+    """
+    while True:
+        port = secrets.choice(PORTS)
+        with socket.socket() as probe, contextlib.suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return port
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from lfs10d.cli import EXIT_FAILED, config_option, json_option
+from lfs10d.cli import EXIT_FAILED, config_option, interruptible, json_option
 from lfs10d.cli.answers import told, verdict
 from lfs10d.cli.keyvalue import IDS, KeyValueError, content_of
 from lfs10d.cli.livelines import health
@@ -102,7 +102,7 @@ def command(**options: Any) -> int:  # noqa: ANN401  # nine options; `_Wanted` n
         return asyncio.run(mount(visited, mounting, as_json=wanted.as_json))
     content = wanted.content
     visited = login(wanted.config, "request", username=wanted.username, password_file=wanted.password_file)
-    response = asyncio.run(_ask(wanted, visited, content))
+    response = interruptible.run(_ask(wanted, visited, content))
     if response is None:
         message = f"no response to {wanted.name} within {duration_text(wanted.patience or 0)}"
         raise FailedError(f"{message}; whether it was obeyed is not known")

@@ -93,6 +93,7 @@ def test_a_scan_finds_everybody_while_polling_goes_on_and_tells_how_far_it_is(
     assert places(done["data"]["found"]) == [(9, 9600, False), (1, 19200, True), (2, 19200, True), (5, 19200, False)]
     assert not any(each["suspect"] for each in done["data"]["found"])
     assert done["data"].keys() == {"found"}
+    eventually(lambda: events(view, "scan_progress")[-1]["percent"] == 100, "the last progress")
     progress = events(view, "scan_progress")
     percents = [each["percent"] for each in progress]
     assert percents == sorted(percents)
@@ -103,7 +104,7 @@ def test_a_scan_finds_everybody_while_polling_goes_on_and_tells_how_far_it_is(
     # with other tests, and may read a request only after the rate has changed.
     assert len(list(filter(good, view.samples("slave-2")))) > before + 3
     assert view.newest("device/slave-2/availability") == "online"
-    assert activities(view) == ["polling", "scanning", "polling"]
+    eventually(lambda: activities(view) == ["polling", "scanning", "polling"], "polling again")
     assert [one["id"] for one in view.newest("devices")] == [1, 2], "nobody is added unless wanted"
 
 
@@ -121,7 +122,7 @@ def test_what_is_new_and_beyond_doubt_is_added(site: Site, view: View) -> None:
     assert data["not_added"] == []
     assert [each["id"] for each in data["found"] if each["suspect"]] == [250]
     view.wait("device/slave-5/state", good)
-    assert [each["device"] for each in events(view, "change_applied")] == ["slave-5"]
+    eventually(lambda: [each["device"] for each in events(view, "change_applied")] == ["slave-5"], "the change is told")
 
     run.ends(15)
     view.clear()
@@ -169,7 +170,10 @@ def test_two_sensors_with_one_id_are_reported(site: Site, mosquitto: Mosquitto, 
     (found,) = done["data"]["found"]
     assert (found["id"], found["duplicate"], found["known"]) == (7, True, False)
     assert done["data"]["added"] == []
-    assert [(each["slave"], each["baudrate"]) for each in events(view, "duplicate_id")] == [(7, 19200)]
+    eventually(
+        lambda: [(each["slave"], each["baudrate"]) for each in events(view, "duplicate_id")] == [(7, 19200)],
+        "two with id 7 are told",
+    )
 
 
 def test_a_pause_frees_the_port_for_another_program_and_ends_by_itself(

@@ -1,0 +1,44 @@
+"""A loop for a verb that a signal may end at any moment."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+from typing import TYPE_CHECKING, Any, Final, TypeVar
+
+if TYPE_CHECKING:
+    from collections.abc import Coroutine
+
+T = TypeVar("T")
+
+ENDING: Final = (signal.SIGINT, signal.SIGTERM)
+
+
+def run(work: Coroutine[Any, Any, T]) -> T:
+    """Run `work` to its end and return what it returns.
+
+    SIGINT and SIGTERM cancel it, once; when it has ended, KeyboardInterrupt is raised. A handler that raised it at
+    once would do so between any two steps of the loop, too, and a step lost there is waited for without an end.
+    """
+    before = {number: signal.getsignal(number) for number in ENDING}
+    with asyncio.Runner() as runner:
+        loop = runner.get_loop()
+        task = loop.create_task(work)
+
+        def interrupted() -> None:
+            for number in ENDING:
+                loop.remove_signal_handler(number)
+                before[number] = signal.SIG_IGN
+                signal.signal(number, signal.SIG_IGN)
+            task.cancel()
+
+        for number in ENDING:
+            loop.add_signal_handler(number, interrupted)
+        try:
+            return loop.run_until_complete(task)
+        except asyncio.CancelledError:
+            raise KeyboardInterrupt from None
+        finally:
+            for number in ENDING:
+                loop.remove_signal_handler(number)
+                signal.signal(number, before[number])

@@ -1,0 +1,64 @@
+"""A verb's loop: a signal ends it in order, whenever it comes."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+from typing import TYPE_CHECKING, NoReturn
+
+import pytest
+
+from lfs10d.cli import interruptible
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from types import FrameType
+
+
+def before_and_after(signum: int, frame: FrameType | None) -> NoReturn:
+    del frame
+    raise InterruptedError(signum)
+
+
+@pytest.fixture(autouse=True)
+def _the_signals_as_they_were() -> Iterator[None]:
+    before = {number: signal.signal(number, before_and_after) for number in interruptible.ENDING}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+async def three() -> int:
+    await asyncio.sleep(0)
+    return 3
+
+
+async def failing() -> None:
+    raise ValueError("no")
+
+
+def test_what_comes_to_its_end_is_returned_and_raised() -> None:
+    assert interruptible.run(three()) == 3
+    with pytest.raises(ValueError, match="no"):
+        interruptible.run(failing())
+    assert {signal.getsignal(number) for number in interruptible.ENDING} == {before_and_after}
+
+
+@pytest.mark.parametrize("number", interruptible.ENDING)
+def test_a_signal_cancels_it_once_and_it_ends_as_it_wants(number: signal.Signals) -> None:
+    course = []
+
+    async def waiting() -> None:
+        try:
+            os.kill(os.getpid(), number)
+            await asyncio.sleep(3600)
+        finally:
+            os.kill(os.getpid(), signal.SIGTERM)
+            await asyncio.sleep(0.02)
+            course.append("left")
+
+    with pytest.raises(KeyboardInterrupt):
+        interruptible.run(waiting())
+    assert course == ["left"]
+    assert {signal.getsignal(each) for each in interruptible.ENDING} == {signal.SIG_IGN}
