@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import subprocess
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.daemon.conftest import View, good
+from tests.daemon.conftest import View, eventually, good
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -130,6 +131,13 @@ def test_the_password_comes_from_its_file_and_shows_nowhere(
     assert SECRET not in run.status.read_text()
 
 
+def state_of(thread: int) -> str:
+    """Return the letter of a thread's state; it waits: `S`. Python walks the stacks of those that run at its peril."""
+    with contextlib.suppress(OSError):
+        return Path(f"/proc/{thread}/stat").read_text().rpartition(")")[2].split()[0]
+    return "gone"
+
+
 def test_a_daemon_that_is_aborted_tells_its_stacks_and_leaves_no_core_with_the_password(
     site: Site, mosquitto: Mosquitto, program: Callable[[str], str]
 ) -> None:
@@ -141,6 +149,9 @@ def test_a_daemon_that_is_aborted_tells_its_stacks_and_leaves_no_core_with_the_p
     run = site.run(program=("-c", CORES_ALLOWED), environment={"CORES": str(cores)})
     run.says("connected by MQTT 5")
     limits = Path(f"/proc/{run.process.pid}/limits").read_text().splitlines()
+    eventually(
+        lambda: all(state_of(thread) == "S" for thread in run.threads), "all threads wait, as if they were stuck"
+    )
 
     assert run.ends(signal.SIGABRT) == -signal.SIGABRT
 

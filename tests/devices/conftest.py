@@ -225,7 +225,8 @@ def _watch(made: Recording) -> None:
         until = time.monotonic() + 20
         for line in watch.stdout:
             made.watched.append(json.loads(line))
-            missing.discard(made.watched[-1].get("device", ""))
+            if made.watched[-1].get("values"):  # none in a poll that found the simulator asleep
+                missing.discard(made.watched[-1]["device"])
             if not missing or time.monotonic() > until:
                 break
         watch.send_signal(signal.SIGINT)
