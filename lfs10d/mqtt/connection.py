@@ -2,9 +2,9 @@
 
 A thread of its own, gone afterwards, does what may block: the password and the certificates are read, the name is
 resolved, the socket is connected, TLS is agreed upon, CONNECT is sent. A thread that hangs there is left to itself.
-From then on paho runs in the asyncio loop: a thread for it would wake twice for every message (see
-docs/decisions/0003-one-loop.md). Its callbacks only note what happened, to be dealt with when paho is done: to publish
-inside a callback would wait for paho itself. It keeps no queue and reconnects nothing here.
+From then on paho runs in the asyncio loop (`pump`): a thread for it would wake twice for every message. Its callbacks
+only note what happened, to be dealt with when paho is done: to publish inside a callback would wait for paho itself.
+It keeps no queue and reconnects nothing here.
 """
 
 from __future__ import annotations
@@ -25,14 +25,15 @@ from paho.mqtt.subscribeoptions import SubscribeOptions
 
 from lfs10d.mqtt.endings import (
     REFUSED_FROM,
-    SESSION_TAKEN_OVER,
     UNSUPPORTED_VERSION,
     Ended,
     Ending,
     failed,
+    gone,
     reason_in_words,
 )
 from lfs10d.mqtt.messages import RECEIVE_MAXIMUM_UNSAID, Accepted, Incoming
+from lfs10d.mqtt.pump import Pump
 from lfs10d.mqtt.settings import Version
 from lfs10d.mqtt.tls import tls_context
 
@@ -49,9 +50,6 @@ CONNECT_TIMEOUT = 5.0
 
 CONNACK_TIMEOUT = 5.0
 """Seconds from an open connection to the broker's CONNACK; amqtt 0.12 leaves a CONNECT of MQTT 5 unanswered."""
-
-UPKEEP_EVERY = 1.0
-"""Seconds between two looks at the keepalive."""
 
 RECEIVE_MAXIMUM = 64
 """Requests the broker may have under way to us: a flood waits there, not in our memory."""
@@ -70,12 +68,9 @@ class Connection:
         self._left = False
         self._abandoned = False
         self._connack: asyncio.TimerHandle | None = None
-        self._upkeep: asyncio.TimerHandle | None = None
-        self._descriptor: int | None = None  # while the loop watches the socket
-        self._writing = False
-        self._reading = False
         self._happened: deque[Callable[[], None]] = deque()
         self._client = self._build(will)
+        self._pump = Pump(self._client, read=self._deal, failed=self._read_failed)
         threading.Thread(target=self._connect, name="connect", daemon=True).start()
 
     def _build(self, will: Will | None) -> Client:
@@ -134,7 +129,7 @@ class Connection:
             if correlation is not None:
                 properties.CorrelationData = correlation
         info = self._client.publish(topic, payload, qos, retain, properties)
-        self._watch_writing()
+        self._pump.watch_writing()
         return info.mid if info.rc == MQTTErrorCode.MQTT_ERR_SUCCESS else None
 
     def cork(self, *, on: bool) -> None:
@@ -167,19 +162,19 @@ class Connection:
             )
         else:
             _, mid = self._client.subscribe([(each.topic, each.qos) for each in filters])
-        self._watch_writing()
+        self._pump.watch_writing()
         return mid
 
     def unsubscribe(self, topics: Sequence[str]) -> None:
         """End subscriptions."""
         self._client.unsubscribe(list(topics))
-        self._watch_writing()
+        self._pump.watch_writing()
 
     def leave(self) -> None:
         """Disconnect in order, which makes the broker drop the will; `ended` follows if the broker lives."""
         self._left = True
         self._client.disconnect()
-        self._watch_writing()
+        self._pump.watch_writing()
 
     def abandon(self) -> None:
         """End it at once and say nothing more; the broker publishes the will."""
@@ -190,7 +185,7 @@ class Connection:
     def _close(self) -> None:
         """Stop watching the socket and close it without a word."""
         self._cancel_connack()
-        self._unwatch()
+        self._pump.end()
         opened = self._client.socket()
         if isinstance(opened, socket.socket):
             with contextlib.suppress(OSError):
@@ -235,61 +230,17 @@ class Connection:
         elif not isinstance(opened, socket.socket):
             self._gone(None)
         else:
-            self._descriptor = opened.fileno()
-            self._loop.add_reader(self._descriptor, self._readable, opened)
-            self._keep_up()
-            self._watch_writing()
+            self._pump.begin(opened)
 
-    def _unwatch(self) -> None:
-        if self._upkeep is not None:
-            self._upkeep.cancel()
-        if self._descriptor is not None:
-            self._loop.remove_reader(self._descriptor)
-            self._loop.remove_writer(self._descriptor)
-        self._descriptor = self._upkeep = None
-        self._writing = False
-
-    def _readable(self, opened: socket.socket) -> None:
-        pending = getattr(opened, "pending", None)  # what TLS has decrypted makes no descriptor readable
-        self._reading = True
-        try:
-            self._client.loop_read()
-            while pending is not None and self._descriptor is not None and pending():
-                self._client.loop_read()
-        except Exception as caught:  # noqa: BLE001 - as above
-            self._close()
-            self._failed(failed(caught, self._settings))
-        finally:
-            self._reading = False
-        self._deal()
-        self._watch_writing()
-
-    def _watch_writing(self) -> None:
-        """Come back when the socket takes more, as long as paho has more for it."""
-        wanted = self._descriptor is not None and self._client.want_write()
-        if wanted is self._writing or self._descriptor is None:
-            return
-        self._writing = wanted
-        if wanted:
-            self._loop.add_writer(self._descriptor, self._writable)
-        else:
-            self._loop.remove_writer(self._descriptor)
-
-    def _writable(self) -> None:
-        self._client.loop_write()
-        self._watch_writing()
-
-    def _keep_up(self) -> None:
-        """Let paho send its pings, and notice that none is answered."""
-        self._upkeep = self._loop.call_later(UPKEEP_EVERY, self._keep_up)
-        self._client.loop_misc()
-        self._watch_writing()
+    def _read_failed(self, caught: Exception) -> None:
+        self._close()
+        self._failed(failed(caught, self._settings))
 
     # Callbacks of paho
 
     def _note(self, call: Callable[..., None], *values: object) -> None:
-        """Have it dealt with as soon as paho is done: in this turn of the loop by `_readable`, else in the next."""
-        if not (self._happened or self._reading):
+        """Have it dealt with as soon as paho is done: in this turn of the loop by the pump, else in the next."""
+        if not (self._happened or self._pump.reading):
             self._loop.call_soon(self._deal)
         self._happened.append(partial(call, *values))
 
@@ -298,7 +249,7 @@ class Connection:
             self._happened.popleft()()
 
     def _on_socket_close(self, _client: Client, _userdata: object, _closing: object) -> None:
-        self._unwatch()
+        self._pump.end()
 
     def _on_connect(
         self, _c: Client, _u: object, _flags: ConnectFlags, reason: ReasonCode, properties: Properties | None
@@ -357,17 +308,7 @@ class Connection:
 
     def _gone(self, reason: int | None) -> None:
         """Note the end of the connection; `reason` is that of the broker's DISCONNECT."""
-        place = self._settings.place
-        if self._left:
-            self._end(Ended(Ending.LEFT, f"{place}: disconnected"))
-        elif not self._accepted:
-            message = f"{place}: closed the connection without an answer: check mqtt.port and mqtt.tls"
-            self._end(Ended(Ending.WRONG_VERSION, message))
-        elif reason is None:
-            self._end(Ended(Ending.LOST, f"{place}: the connection is lost"))
-        else:
-            ending = Ending.TAKEN_OVER if reason == SESSION_TAKEN_OVER else Ending.LOST
-            self._end(Ended(ending, f"{place}: {reason_in_words(reason)}", reason))
+        self._end(gone(self._settings.place, left=self._left, accepted=self._accepted, reason=reason))
 
     def _failed(self, ended: Ended) -> None:
         """Note an error of our own side, or one of the socket before it was open."""

@@ -79,6 +79,22 @@ def reason_in_words(reason: int) -> str:
     return _REASONS.get(reason, f"reason code 0x{reason:02X}")
 
 
+def gone(place: str, *, left: bool, accepted: bool, reason: int | None) -> Ended:
+    """Return what the end of a connection to the broker at `place` means.
+
+    `left`: we said so; `accepted`: the broker had accepted us; `reason` is that of its DISCONNECT, None without one.
+    """
+    if left:
+        return Ended(Ending.LEFT, f"{place}: disconnected")
+    if not accepted:
+        message = f"{place}: closed the connection without an answer: check mqtt.port and mqtt.tls"
+        return Ended(Ending.WRONG_VERSION, message)
+    if reason is None:
+        return Ended(Ending.LOST, f"{place}: the connection is lost")
+    ending = Ending.TAKEN_OVER if reason == SESSION_TAKEN_OVER else Ending.LOST
+    return Ended(ending, f"{place}: {reason_in_words(reason)}", reason)
+
+
 def failed(error: BaseException, settings: BrokerSettings) -> Ended:
     """Return why no connection could be made."""
     return Ended(Ending.UNREACHABLE, f"{settings.place}: {_words(error, settings)}")

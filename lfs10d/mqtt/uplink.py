@@ -2,7 +2,7 @@
 
 After a connect: subscribe to requests and to our own availability; every retained topic; when the broker has
 them all, availability `online`; then live samples; then clear the retained topics that nobody stands behind any
-more; 10 s later the past. Nothing here blocks. Decisions are made in `Outbox`, `Reconnect` and `Sweep`.
+more; 10 s later the past. Nothing here blocks. Decisions are made in `Outbox`, `Reconnect` and `Sweep` (in `Clearing`).
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from lfs10d import telemetry
+from lfs10d.mqtt.clearing import Clearing
 from lfs10d.mqtt.connection import Connection
 from lfs10d.mqtt.dispatch import Dispatch
 from lfs10d.mqtt.earlier import EarlierLife
@@ -20,7 +21,6 @@ from lfs10d.mqtt.endings import REFUSED_FROM, reason_in_words
 from lfs10d.mqtt.inbound import inbound
 from lfs10d.mqtt.link import Link
 from lfs10d.mqtt.messages import Filter, Will
-from lfs10d.mqtt.orphans import Sweep
 from lfs10d.mqtt.outbox import Outbox
 from lfs10d.mqtt.stowage import Stowage
 from lfs10d.mqtt.topics import OFFLINE, ONLINE, Topics
@@ -73,7 +73,7 @@ class Uplink:
     ) -> None:
         self._topics = Topics(base)
         self._burst = burst
-        self._stands_behind = stands_behind
+        self._clearing = Clearing(self._topics, stands_behind=stands_behind, clear=self._clear_orphans)
         self._requested = requested
         self._changed = changed
         self._announced = announced
@@ -82,8 +82,6 @@ class Uplink:
         self._outbox = Outbox(detection=2.0 * settings.keepalive)
         line = base.rpartition("/")[2]
         self._dispatch = Dispatch(self._outbox, self._topics, line, epoch_ms=epoch_ms, stuck=self._acknowledges_nothing)
-        self._sweep: Sweep | None = None
-        self._sweep_wanted = False
         self._subscription: int | None = None
         self._farewell: int | None = None
         self._leaving = False
@@ -176,11 +174,11 @@ class Uplink:
             self._leaving = False
             self._link.renew(settings)
             return
-        self._sweep_wanted = True
+        self._clearing.wanted = True
         if refused:
             self.republish()
         else:
-            self._sweep_if_out()
+            self._clear_if_out()
 
     def republish(self) -> None:
         """Send every retained topic once more."""
@@ -253,7 +251,7 @@ class Uplink:
         self._subscription = standing.subscribe([Filter(self._topics.requests), Filter(self._topics.availability)])
         self.requests_denied = False
         self._outbox.burst(self._burst(), _ONLINE)
-        self._announcing = self._sweep_wanted = True
+        self._announcing = self._clearing.wanted = True
         self._dispatch.wake()
         self._poke()
         self._changed()
@@ -264,7 +262,8 @@ class Uplink:
         self._dispatch.lost()
         if self._earlier is not None:
             self._earlier.lost()
-        self._sweep = self._farewell = None
+        self._clearing.lost()
+        self._farewell = None
         self._drop_told = False
         self._progress.set()
         self._poke()
@@ -281,7 +280,7 @@ class Uplink:
             if self._announcing:
                 self._announcing = False
                 self._announced()
-            self._sweep_if_out()
+            self._clear_if_out()
         self._progress.set()
 
     def subscribed(self, mid: int, reasons: tuple[int, ...]) -> None:
@@ -303,8 +302,7 @@ class Uplink:
             return
         if self._earlier is not None:
             self._earlier.arrived(message)
-        now = asyncio.get_running_loop().time()
-        if message.retained and self._sweep is not None and self._sweep.heard(message.topic, message.payload, now):
+        if self._clearing.heard(message):
             return
         request = inbound(message, self._topics)
         if request is not None:
@@ -322,37 +320,9 @@ class Uplink:
 
     # What is left over
 
-    def _sweep_if_out(self) -> None:
-        """Begin once what we clear ourselves has gone: else the broker would show it as left over."""
-        if self._sweep_wanted and self._outbox.retained_out:
-            self._begin_sweep()
+    def _clear_if_out(self) -> None:
+        if self._clearing.wanted and self._outbox.retained_out:
+            self._clearing.begin(self._link.standing)
 
-    def _begin_sweep(self) -> None:
-        self._sweep_wanted = False
-        standing = self._link.standing
-        if standing is None or self._sweep is not None:
-            return
-        loop = asyncio.get_running_loop()
-        self._sweep = Sweep(self._topics, loop.time())
-        standing.subscribe(
-            [
-                Filter(topic, qos=0, retain_as_published=False, no_local=True)
-                for topic in self._topics.retained_of_devices
-            ]
-        )
-        loop.call_at(self._sweep.due, self._end_sweep, self._sweep)
-
-    def _end_sweep(self, sweep: Sweep) -> None:
-        standing = self._link.standing
-        if standing is None or sweep is not self._sweep:
-            return
-        loop = asyncio.get_running_loop()
-        if loop.time() < sweep.due:
-            loop.call_at(sweep.due, self._end_sweep, sweep)
-            return
-        self._sweep = None
-        standing.unsubscribe(self._topics.retained_of_devices)
-        orphans = sweep.orphans(self._stands_behind())
-        if orphans:
-            log.info("clearing %d retained topics of devices that are no longer configured", len(orphans))
-            self.publish(telemetry.retained(topic, None) for topic in orphans)
+    def _clear_orphans(self, topics: Iterable[str]) -> None:
+        self.publish(telemetry.retained(topic, None) for topic in topics)

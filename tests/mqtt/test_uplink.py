@@ -303,7 +303,7 @@ def test_another_client_with_our_id_is_not_fought(mosquitto: Mosquitto, caplog: 
 
 
 def swept(uplink: Uplink) -> bool:
-    return uplink.connected and uplink._sweep is None and not uplink._sweep_wanted
+    return uplink.connected and not (uplink._clearing.under_way or uplink._clearing.wanted)
 
 
 def test_retained_topics_of_devices_that_are_gone_are_cleared_and_nothing_else(mosquitto: Mosquitto) -> None:
@@ -523,9 +523,9 @@ def test_a_reload_during_a_sweep_does_not_begin_another(mosquitto: Mosquitto) ->
     async def scenario() -> None:
         listener = mosquitto.subscribe(f"{B}/device/gone/#")
         async with running(Site(mosquitto.port)) as uplink:
-            await until(lambda: uplink._sweep is not None, "the sweep after the connect")
+            await until(lambda: uplink._clearing.under_way, "the sweep after the connect")
             await uplink.reload()
-            await until(lambda: uplink._sweep is None, "its end")
+            await until(lambda: not uplink._clearing.under_way, "its end")
             await until(lambda: not listener.heard[-1].payload, "cleared")
             assert len(listener.heard) == 2
 

@@ -1,0 +1,84 @@
+"""Retained topics of devices that are gone: looked for at the broker, and cleared. A thin shell around `Sweep`."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from typing import TYPE_CHECKING
+
+from lfs10d.mqtt.messages import Filter
+from lfs10d.mqtt.orphans import Sweep
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+    from collections.abc import Set as AbstractSet
+
+    from lfs10d.mqtt.connection import Connection
+    from lfs10d.mqtt.messages import Incoming
+    from lfs10d.mqtt.topics import Topics
+
+log = logging.getLogger(__name__)
+
+
+class Clearing:
+    """`stands_behind()` returns the retained topics that are ours; `clear` is given those that nobody's are."""
+
+    def __init__(
+        self,
+        topics: Topics,
+        *,
+        stands_behind: Callable[[], AbstractSet[str]],
+        clear: Callable[[Iterable[str]], None],
+    ) -> None:
+        self.wanted = False
+        """To be begun as soon as what we clear ourselves has gone out: else the broker would show it as left over."""
+        self._topics = topics
+        self._stands_behind = stands_behind
+        self._clear = clear
+        self._standing: Connection | None = None
+        self._sweep: Sweep | None = None
+
+    @property
+    def under_way(self) -> bool:
+        """The broker is sending what it retains."""
+        return self._sweep is not None
+
+    def begin(self, standing: Connection | None) -> None:
+        """Have the broker send what it retains, unless that is under way or it is away."""
+        self.wanted = False
+        if standing is None or self._sweep is not None:
+            return
+        loop = asyncio.get_running_loop()
+        self._standing, self._sweep = standing, Sweep(self._topics, loop.time())
+        standing.subscribe(
+            [
+                Filter(topic, qos=0, retain_as_published=False, no_local=True)
+                for topic in self._topics.retained_of_devices
+            ]
+        )
+        loop.call_at(self._sweep.due, self._end, self._sweep)
+
+    def lost(self) -> None:
+        """Abandon it: the connection is gone."""
+        self._standing = self._sweep = None
+
+    def heard(self, message: Incoming) -> bool:
+        """Take a message; return whether it was one of those looked for."""
+        if not message.retained or self._sweep is None:
+            return False
+        return self._sweep.heard(message.topic, message.payload, asyncio.get_running_loop().time())
+
+    def _end(self, sweep: Sweep) -> None:
+        standing = self._standing
+        if standing is None or sweep is not self._sweep:
+            return
+        loop = asyncio.get_running_loop()
+        if loop.time() < sweep.due:
+            loop.call_at(sweep.due, self._end, sweep)
+            return
+        self._standing = self._sweep = None
+        standing.unsubscribe(self._topics.retained_of_devices)
+        orphans = sweep.orphans(self._stands_behind())
+        if orphans:
+            log.info("clearing %d retained topics of devices that are no longer configured", len(orphans))
+            self._clear(orphans)
