@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import secrets
 import shutil
 import socket
 import subprocess
@@ -23,6 +25,17 @@ if TYPE_CHECKING:
 
 SEARCH_PATH = "/usr/local/sbin:/usr/sbin:/sbin:/usr/local/bin:/usr/bin:/bin"
 PATIENCE = 10.0
+PORTS = range(12_000, 32_000)
+"""Below those that the kernel gives to whoever connects (net.ipv4.ip_local_port_range)."""
+
+
+def free_port() -> int:
+    """Return a TCP port of the loopback that is free, and stays so while the broker is away and asked for."""
+    while True:
+        port = secrets.choice(PORTS)
+        with socket.socket() as probe, contextlib.suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return port
 
 
 class Broker:
@@ -35,9 +48,7 @@ class Broker:
         executable = shutil.which("mosquitto", path=SEARCH_PATH)
         if executable is None:
             raise RuntimeError("needs mosquitto (Debian: apt install mosquitto)")
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.port = int(probe.getsockname()[1])
+        self.port = free_port()
         configuration = folder / "mosquitto.conf"
         lines = [f"listener {self.port} 127.0.0.1", "allow_anonymous true", "max_queued_messages 0"]
         configuration.write_text("\n".join(lines) + "\n")
