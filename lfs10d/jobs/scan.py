@@ -134,7 +134,7 @@ class Scan:
     def ask(self, now: float) -> Ask | Done:
         """Decide what to put on the line now."""
         if self._began is None:
-            self._began = now
+            self._now = self._began = now  # in this order: `progress` may be read meanwhile
         if self._following is None:
             return self._end()
         if now >= self._slice_until:

@@ -289,6 +289,12 @@ def test_a_line_that_never_falls_silent_is_told_and_not_spoken_on() -> None:
 # -- as a job
 
 
+def test_while_the_first_answer_is_awaited_all_of_the_time_remains() -> None:
+    scan = Scan(search(range(1, 50)))
+    scan.ask(24_000.0)
+    assert scan.progress.remaining == pytest.approx(scan.search.expected)
+
+
 def test_progress_goes_up_and_the_remaining_time_down() -> None:
     running = Scanned(line_of(3), Scan(search(range(1, 50))))
     assert running.scan.progress.remaining == pytest.approx(running.scan.search.expected)
