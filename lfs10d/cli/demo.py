@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import asyncio
-
 import click
 
+from lfs10d.cli import interruptible
 from lfs10d.quantities import seconds
 
 EXAMPLES = """\b
@@ -42,7 +41,7 @@ def command(duration: float | None, broker: str) -> int:
     try:
         from lfs10d.demo.show import show  # noqa: PLC0415  # so that Ctrl-C is heard from here on
 
-        asyncio.run(show(duration=duration, broker=broker))
+        interruptible.run(show(duration=duration, broker=broker))
     except KeyboardInterrupt:  # before, or after, the loop listens to signals
         pass
     return 0

@@ -99,7 +99,7 @@ def command(**options: Any) -> int:  # noqa: ANN401  # nine options; `_Wanted` n
     if wanted.repeat:
         mounting = wanted.mounting
         visited = login(wanted.config, "adopt", username=wanted.username, password_file=wanted.password_file)
-        return asyncio.run(mount(visited, mounting, as_json=wanted.as_json))
+        return interruptible.run(mount(visited, mounting, as_json=wanted.as_json))
     content = wanted.content
     visited = login(wanted.config, "request", username=wanted.username, password_file=wanted.password_file)
     response = interruptible.run(_ask(wanted, visited, content))

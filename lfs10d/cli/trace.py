@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 import click
 
 from lfs10d import telemetry
-from lfs10d.cli import EXIT_FAILED, config_option, json_option
+from lfs10d.cli import EXIT_FAILED, config_option, interruptible, json_option
 from lfs10d.cli.answers import verdict
 from lfs10d.cli.login import Login, login, login_options
 from lfs10d.cli.spinner import spinning
@@ -82,7 +82,7 @@ def command(config: Path, duration: float, username: str | None, password_file: 
     """
     with contextlib.suppress(KeyboardInterrupt):
         visited = login(config, "trace", username=username, password_file=password_file)
-        return asyncio.run(_trace(visited, duration, as_json=as_json))
+        return interruptible.run(_trace(visited, duration, as_json=as_json))
     return 0
 
 

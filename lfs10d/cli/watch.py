@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from lfs10d import telemetry
-from lfs10d.cli import config_option, json_option
+from lfs10d.cli import config_option, interruptible, json_option
 from lfs10d.cli.live import Live
 from lfs10d.cli.livelines import LiveLines
 from lfs10d.cli.livetable import Source, age_text, screen
@@ -68,7 +68,7 @@ def command(config: Path, username: str | None, password_file: Path | None, *, a
     with contextlib.suppress(KeyboardInterrupt):
         visited = login(config, "watch", username=username, password_file=password_file)
         files = status_places(config, visited.config.line.name, os.environ)
-        asyncio.run(_Watch(visited, files).run(_output(as_json=as_json)))
+        interruptible.run(_Watch(visited, files).run(_output(as_json=as_json)))
     return 0
 
 
