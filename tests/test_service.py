@@ -259,11 +259,15 @@ def test_when_the_daemon_ends_what_runs_and_what_comes_is_answered_cancelled() -
     run(scene())
 
 
-def test_every_request_of_a_flood_is_answered_and_the_log_has_one_line_of_it(caplog: pytest.LogCaptureFixture) -> None:
+def test_every_request_of_a_flood_is_answered_and_the_log_has_one_line_of_it(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
     async def scene() -> None:
         bench = Bench()
-        for _ in range(5 * BURST):
-            bench.ask("echo")
+        with monkeypatch.context() as patch:
+            patch.setattr(asyncio.get_running_loop(), "time", lambda: 0.0)  # all of it at one moment
+            for _ in range(5 * BURST):
+                bench.ask("echo")
         await bench.settle()
         assert len(bench.answered) == 5 * BURST
         assert len(bench.performed) == BURST
