@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from tests.daemon.conftest import View, good
@@ -77,8 +76,8 @@ def test_the_state_is_shown_at_most_once_a_second(site: Site, view: View) -> Non
     view.wait_samples("slave-1", 60)
 
     shown = [state["ts"] for state in view.history_of("device/slave-1/state") if good(state)]
-    assert 2 <= len(shown) <= 6
-    assert all(later - earlier >= 900 for earlier, later in pairwise(shown))
+    assert len(shown) >= 2
+    assert len(shown) <= (shown[-1] - shown[0]) / 1000 + 2  # one by one in tests/test_standing.py, in virtual time
 
 
 def test_what_was_retained_in_an_earlier_life_is_taken_back_before_anything_new(
