@@ -22,10 +22,8 @@ demo: $(VENV)/.demo
 	@$(BIN)/lfs10d demo
 
 # Most tests wait for brokers, ptys and daemons of their own: three workers share what the machine has.
-# They keep real time, so one may starve on a busy machine: what fails is run again, alone, and what fails twice fails.
 test: $(VENV)/.dev
-	$(BIN)/python -m pytest -n 3 --dist loadfile || \
-	  { test $$? -eq 1 && echo 'Again, alone, what failed:' && $(BIN)/python -m pytest --last-failed; }
+	$(BIN)/python -m pytest -n 3 --dist loadfile
 
 # Each pure module by its own tests alone; fails below 100 % of lines and branches.
 coverage: $(VENV)/.dev
