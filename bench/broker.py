@@ -26,11 +26,15 @@ if TYPE_CHECKING:
 SEARCH_PATH = "/usr/local/sbin:/usr/sbin:/sbin:/usr/local/bin:/usr/bin:/bin"
 PATIENCE = 10.0
 PORTS = range(12_000, 32_000)
-"""Below those that the kernel gives to whoever connects (net.ipv4.ip_local_port_range)."""
+"""Below the kernel's own (net.ipv4.ip_local_port_range), above what is registered most."""
 
 
 def free_port() -> int:
-    """Return a TCP port of the loopback that is free, and stays so while the broker is away and asked for."""
+    """Return a TCP port of the loopback that nobody uses now.
+
+    It is none of those that the kernel gives to whoever connects: a daemon that asks for a broker that is away would
+    take its port, or even connect to itself.
+    """
     while True:
         port = secrets.choice(PORTS)
         with socket.socket() as probe, contextlib.suppress(OSError):

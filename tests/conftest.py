@@ -11,9 +11,7 @@ from __future__ import annotations
 import contextlib
 import getpass
 import os
-import secrets
 import shutil
-import socket
 import subprocess
 import threading
 import time
@@ -28,12 +26,11 @@ from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 from paho.mqtt.subscribeoptions import SubscribeOptions
 
+from bench.broker import free_port
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
-
-PORTS = range(12_000, 32_000)
-"""Below the kernel's own (net.ipv4.ip_local_port_range), above what is registered most."""
 
 PATIENCE = 10.0
 """Seconds after which something awaited counts as not happening; no test waits this long when all is well."""
@@ -67,19 +64,6 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 def _program() -> Callable[[str], str]:
     """Give the function that finds a program, or fails in CI and skips elsewhere."""
     return path_of
-
-
-def free_port() -> int:
-    """Return a TCP port of the loopback that nobody uses now.
-
-    It is none of those that the kernel gives to whoever connects: a daemon that asks for a broker that is away would
-    take its port, or even connect to itself.
-    """
-    while True:
-        port = secrets.choice(PORTS)
-        with socket.socket() as probe, contextlib.suppress(OSError):
-            probe.bind(("127.0.0.1", port))
-            return port
 
 
 @pytest.fixture

@@ -17,11 +17,12 @@ from pymodbus import FramerType
 from pymodbus.server import ModbusTcpServer
 from pymodbus.simulator import DataType, SimData, SimDevice
 
+from bench.broker import free_port
 from lfs10d.profiles.library import load_profile
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.wire import Format
-from tests.conftest import eventually, free_port
+from tests.conftest import eventually
 from tests.daemon.conftest import Site, View
 from tests.devices.conftest import RTU, TANK, simulated
 
