@@ -123,7 +123,9 @@ def test_a_busy_inverter_is_no_error(rtu: Recording) -> None:
 
 
 def test_watch_shows_every_device_with_its_values(recording: Recording) -> None:
-    newest = {one["device"]: one for one in recording.watched if one.get("values")}
+    lines = [one for one in recording.watched if "device" in one]
+    assert all(one["values"] or one["error"] for one in lines)
+    newest = {one["device"]: one for one in lines if one["values"]}
     for unit in recording.units:
         profile = recording.profile(unit)
         assert tuple(newest[unit.name]["values"]) == profile.value_names

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import socket
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import pytest
@@ -22,7 +22,7 @@ PATIENCE = 5.0
 
 @dataclass
 class Client:
-    """Reads up to `takes` bytes at a time; writes what waits if `lets_go`."""
+    """Reads up to `takes` bytes at a time and writes what waits; `looks` counts how often it was looked after."""
 
     socket: socket.socket
     takes: int = 100
@@ -30,7 +30,6 @@ class Client:
     waiting: bytes = b""
     looks: int = 0
     ends_with: Exception | None = None
-    written: list[bytes] = field(default_factory=list)
 
     def loop_read(self) -> None:
         if self.ends_with is not None:
