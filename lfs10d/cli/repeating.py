@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import secrets
-import signal
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -29,24 +29,17 @@ WORDS: Final = "waiting for a sensor ..."
 
 
 async def mount(visited: Login, mounting: Mounting, *, as_json: bool) -> int:
-    """Have sensors adopted until all names are given or a signal comes; return the exit code.
+    """Have sensors adopted until all names are given or it is cancelled; return the exit code.
 
     0 if all were adopted that were named, or, without names, any. Raises BrokerError where broker or daemon is not
     there at the beginning; later they are waited for.
     """
-    over = asyncio.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        asyncio.get_running_loop().add_signal_handler(number, over.set)
     visitor = Visitor(visited)
-    work = asyncio.create_task(_Repeating(visitor, mounting, as_json=as_json).go_on())
-    end = asyncio.create_task(over.wait())
+    ended_well = True
     try:
-        await asyncio.wait({work, end}, return_when=asyncio.FIRST_COMPLETED)
-        ended_well = not work.done() or work.result()
+        with contextlib.suppress(asyncio.CancelledError):  # a signal: all are mounted
+            ended_well = await _Repeating(visitor, mounting, as_json=as_json).go_on()
     finally:
-        for task in (work, end):
-            task.cancel()
-        await asyncio.gather(work, end, return_exceptions=True)
         await visitor.leave()
         if mounting.adopted and not as_json:
             for text in summary(mounting.adopted):

@@ -7,7 +7,6 @@ import contextlib
 import json
 import secrets
 import shutil
-import signal
 import sys
 from collections import deque
 from datetime import UTC, datetime
@@ -87,9 +86,6 @@ def command(config: Path, duration: float, username: str | None, password_file: 
 
 
 async def _trace(visited: Login, duration: float, *, as_json: bool) -> int:
-    over = asyncio.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        asyncio.get_running_loop().add_signal_handler(number, over.set)
     topic = visited.topics.full(telemetry.TRACE)
     frames: deque[Any] = deque()
 
@@ -98,15 +94,9 @@ async def _trace(visited: Login, duration: float, *, as_json: bool) -> int:
             frames.append(parsed(message.payload))
 
     visitor = Visitor(visited, [Filter(topic, qos=0)], arrived)
-    show = asyncio.create_task(_show(visitor, frames, duration, as_json=as_json))
-    end = asyncio.create_task(over.wait())
     try:
-        await asyncio.wait({show, end}, return_when=asyncio.FIRST_COMPLETED)
-        return show.result() if show.done() else 0
+        return await _show(visitor, frames, duration, as_json=as_json)
     finally:
-        for task in (show, end):
-            task.cancel()
-        await asyncio.gather(show, end, return_exceptions=True)
         await visitor.leave()
 
 

@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import json
 import os
-import signal
 import sys
 import time
 from dataclasses import dataclass
@@ -108,21 +107,11 @@ class _Watch:
         )
 
     async def run(self, output: Callable[[], _Lines | _Screen]) -> None:
-        """Show until told to end; raises BrokerError where there is nothing to show."""
-        over = asyncio.Event()
-        for number in (signal.SIGINT, signal.SIGTERM):
-            asyncio.get_running_loop().add_signal_handler(number, over.set)
-        begin = asyncio.create_task(self._begin())
-        end = asyncio.create_task(over.wait())
+        """Show until cancelled; raises BrokerError where there is nothing to show."""
         try:
-            await asyncio.wait({begin, end}, return_when=asyncio.FIRST_COMPLETED)
-            if begin.done():
-                begin.result()
-                await self._show(output(), over)
+            await self._begin()
+            await self._show(output())
         finally:
-            for task in (begin, end):
-                task.cancel()
-            await asyncio.gather(begin, end, return_exceptions=True)
             await self._visitor.leave()
 
     async def _begin(self) -> None:
@@ -141,14 +130,13 @@ class _Watch:
         places = " or ".join(str(path) for path in self._files)
         raise BrokerError(f"{self._why}; and no daemon on this machine has written its status to {places}")
 
-    async def _show(self, output: _Lines | _Screen, over: asyncio.Event) -> None:
+    async def _show(self, output: _Lines | _Screen) -> None:
         with output:
-            while not over.is_set():
+            while True:
                 self._read()
                 live, source = self._best()
                 output.draw(live, source, now=time.monotonic(), wall=time.time())
-                with contextlib.suppress(TimeoutError):
-                    await asyncio.wait_for(over.wait(), EVERY)
+                await asyncio.sleep(EVERY)
 
     def _best(self) -> tuple[Live, Source]:
         """Return the better source: the broker where the daemon is online there, else a file that is being written."""
