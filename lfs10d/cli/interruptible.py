@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import asyncio
 import signal
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from lfs10d.signals import ENDING
 
 if TYPE_CHECKING:
     from collections.abc import Coroutine
 
 T = TypeVar("T")
 
-ENDING: Final = (signal.SIGINT, signal.SIGTERM)
-
 
 def run(work: Coroutine[Any, Any, T]) -> T:
     """Run `work` to its end and return what it returns.
 
-    SIGINT and SIGTERM cancel it, once; when it has ended, KeyboardInterrupt is raised. A handler that raised it at
+    SIGINT and SIGTERM cancel it, once; if it ends by that, KeyboardInterrupt is raised. A handler that raised it at
     once would do so between any two steps of the loop, too, and a step lost there is waited for without an end.
     """
     before = {number: signal.getsignal(number) for number in ENDING}

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NoReturn
 import pytest
 
 from lfs10d.cli import interruptible
+from lfs10d.signals import ENDING
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -23,7 +24,7 @@ def before_and_after(signum: int, frame: FrameType | None) -> NoReturn:
 
 @pytest.fixture(autouse=True)
 def _the_signals_as_they_were() -> Iterator[None]:
-    before = {number: signal.signal(number, before_and_after) for number in interruptible.ENDING}
+    before = {number: signal.signal(number, before_and_after) for number in ENDING}
     yield
     for number, handler in before.items():
         signal.signal(number, handler)
@@ -42,10 +43,10 @@ def test_what_comes_to_its_end_is_returned_and_raised() -> None:
     assert interruptible.run(three()) == 3
     with pytest.raises(ValueError, match="no"):
         interruptible.run(failing())
-    assert {signal.getsignal(number) for number in interruptible.ENDING} == {before_and_after}
+    assert {signal.getsignal(number) for number in ENDING} == {before_and_after}
 
 
-@pytest.mark.parametrize("number", interruptible.ENDING)
+@pytest.mark.parametrize("number", ENDING)
 def test_a_signal_cancels_it_once_and_it_ends_as_it_wants(number: signal.Signals) -> None:
     course = []
 
@@ -61,4 +62,4 @@ def test_a_signal_cancels_it_once_and_it_ends_as_it_wants(number: signal.Signals
     with pytest.raises(KeyboardInterrupt):
         interruptible.run(waiting())
     assert course == ["left"]
-    assert {signal.getsignal(each) for each in interruptible.ENDING} == {signal.SIG_IGN}
+    assert {signal.getsignal(each) for each in ENDING} == {signal.SIG_IGN}
