@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 from lfs10d import assembly
 from lfs10d.budget import timing_of
-from lfs10d.linethread import LineThread
-from lfs10d.modbus.bus import Bus
+from lfs10d.linethread import WAKING, WAKING_REALTIME, LineThread
+from lfs10d.modbus.bus import AWAKE_BEFORE, AWAKE_BEFORE_REALTIME, Bus
 from lfs10d.modbus.exchange import Echo
 from lfs10d.modbus.port import SerialPort
 from lfs10d.modbus.realtime import sharpen_timers, take_precedence, yield_precedence
@@ -138,7 +138,7 @@ class Line:
             self.poller.reconfigure(assembly.port_settings(config.line), assembly.line_rules(config.line))
         if realtime:
             wanted = self._realtime = config.line.realtime
-            self.poller.post(lambda _: _precede(wanted=wanted))
+            self.poller.post(lambda _: self._precede(wanted=wanted))
         self.poller.replace(assembly.device_specs(config, profiles), assembly.poll_rules(config.poll))
         self.wake()
 
@@ -149,7 +149,18 @@ class Line:
         if not sharpen_timers():
             log.debug("the timer slack of the line's thread cannot be set: gaps are 50 us longer than need be")
         if self._realtime:
-            _precede(wanted=True)
+            self._precede(wanted=True)
+
+    def _precede(self, *, wanted: bool) -> None:
+        """Put the thread under SCHED_FIFO and have it awake earlier, or make it an ordinary one again."""
+        refusal = take_precedence() if wanted else None
+        if refusal is not None:
+            log.warning("%s", refusal)
+        if not wanted:
+            yield_precedence()
+        early = wanted and refusal is None
+        self._thread.waking = WAKING_REALTIME if early else WAKING
+        self.poller.bus.awake_before = AWAKE_BEFORE_REALTIME if early else AWAKE_BEFORE
 
     def _take_over(self, events: list[Event]) -> None:
         self._inbox.append(events)
@@ -165,11 +176,3 @@ class Line:
     def _empty(self) -> None:
         while self._inbox:
             self._heard(self._inbox.popleft())
-
-
-def _precede(*, wanted: bool) -> None:
-    """Put the calling thread under SCHED_FIFO, or make it an ordinary one again."""
-    if not wanted:
-        yield_precedence()
-    elif (refusal := take_precedence()) is not None:
-        log.warning("%s", refusal)

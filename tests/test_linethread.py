@@ -209,3 +209,13 @@ def test_it_is_back_early_enough_for_a_turn_and_then_waits_to_the_moment(rig: Ri
     rig.thread._wait(Wait(until, listen=True))
     assert time.monotonic() >= until
     rig.poller.bus.close()
+
+
+@pytest.mark.parametrize("listen", [True, False])
+def test_how_early_it_is_back_can_be_set(rig: Rig, *, listen: bool) -> None:
+    rig.poller.bus.port.open()
+    rig.thread.waking = IDLE_MOST / 2
+    moment = time.monotonic() + IDLE_MOST / 2 + 0.05
+    rig.thread._wait(Wait(moment, listen=listen))
+    assert time.monotonic() < moment - WAKING  # as early as that it is back by default
+    rig.poller.bus.close()

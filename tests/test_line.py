@@ -1,0 +1,48 @@
+"""The line as the daemon holds it: what `line.realtime` changes. The rest is watched in tests/daemon."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING
+
+import pytest
+
+from lfs10d.configfile import load
+from lfs10d.line import Line
+from lfs10d.linethread import WAKING, WAKING_REALTIME
+from lfs10d.modbus.bus import AWAKE_BEFORE, AWAKE_BEFORE_REALTIME
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+USUAL, EARLY = (WAKING, AWAKE_BEFORE), (WAKING_REALTIME, AWAKE_BEFORE_REALTIME)
+
+
+@pytest.mark.parametrize(("refusal", "awake"), [(None, EARLY), ("not permitted", USUAL)])
+def test_the_thread_is_awake_earlier_while_it_has_precedence(
+    refusal: str | None,
+    awake: tuple[float, float],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    monkeypatch.setattr("lfs10d.line.take_precedence", lambda: refusal)
+    monkeypatch.setattr("lfs10d.line.yield_precedence", lambda: None)
+    file = tmp_path / "lfs10d.yaml"
+    file.write_text("line: {port: /dev/absent, realtime: true}\nslaves: [1]\nmqtt: {host: localhost}\n")
+    found = load(file)
+
+    async def live() -> list[tuple[float, float]]:
+        line = Line(found.config, found.profiles, heard=lambda _: None, failed=lambda _: None)
+
+        def leads() -> tuple[float, float]:
+            return line._thread.waking, line.poller.bus.awake_before
+
+        seen = [leads()]
+        line._prepare()
+        seen.append(leads())
+        line._precede(wanted=False)
+        return [*seen, leads()]
+
+    assert asyncio.run(live()) == [USUAL, awake, USUAL]
+    assert [record.getMessage() for record in caplog.records] == ([] if refusal is None else [refusal])
