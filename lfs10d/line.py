@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from lfs10d import assembly
 from lfs10d.budget import timing_of
 from lfs10d.linethread import WAKING, WAKING_REALTIME, LineThread
-from lfs10d.modbus.bus import AWAKE_BEFORE, AWAKE_BEFORE_REALTIME, Bus
+from lfs10d.modbus.bus import Bus
 from lfs10d.modbus.exchange import Echo
 from lfs10d.modbus.port import SerialPort
 from lfs10d.modbus.realtime import sharpen_timers, take_precedence, yield_precedence
@@ -158,9 +158,7 @@ class Line:
             log.warning("%s", refusal)
         if not wanted:
             yield_precedence()
-        early = wanted and refusal is None
-        self._thread.waking = WAKING_REALTIME if early else WAKING
-        self.poller.bus.awake_before = AWAKE_BEFORE_REALTIME if early else AWAKE_BEFORE
+        self._thread.waking = WAKING_REALTIME if wanted and refusal is None else WAKING
 
     def _take_over(self, events: list[Event]) -> None:
         self._inbox.append(events)

@@ -10,18 +10,15 @@ import pytest
 from lfs10d.configfile import load
 from lfs10d.line import Line
 from lfs10d.linethread import WAKING, WAKING_REALTIME
-from lfs10d.modbus.bus import AWAKE_BEFORE, AWAKE_BEFORE_REALTIME
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-USUAL, EARLY = (WAKING, AWAKE_BEFORE), (WAKING_REALTIME, AWAKE_BEFORE_REALTIME)
 
-
-@pytest.mark.parametrize(("refusal", "awake"), [(None, EARLY), ("not permitted", USUAL)])
+@pytest.mark.parametrize(("refusal", "awake"), [(None, WAKING_REALTIME), ("not permitted", WAKING)])
 def test_the_thread_is_awake_earlier_while_it_has_precedence(
     refusal: str | None,
-    awake: tuple[float, float],
+    awake: float,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
@@ -32,17 +29,13 @@ def test_the_thread_is_awake_earlier_while_it_has_precedence(
     file.write_text("line: {port: /dev/absent, realtime: true}\nslaves: [1]\nmqtt: {host: localhost}\n")
     found = load(file)
 
-    async def live() -> list[tuple[float, float]]:
+    async def live() -> list[float]:
         line = Line(found.config, found.profiles, heard=lambda _: None, failed=lambda _: None)
-
-        def leads() -> tuple[float, float]:
-            return line._thread.waking, line.poller.bus.awake_before
-
-        seen = [leads()]
+        seen = [line._thread.waking]
         line._prepare()
-        seen.append(leads())
+        seen.append(line._thread.waking)
         line._precede(wanted=False)
-        return [*seen, leads()]
+        return [*seen, line._thread.waking]
 
-    assert asyncio.run(live()) == [USUAL, awake, USUAL]
+    assert asyncio.run(live()) == [WAKING, awake, WAKING]
     assert [record.getMessage() for record in caplog.records] == ([] if refusal is None else [refusal])

@@ -36,8 +36,6 @@ AWAKE_BEFORE = 0.00025
 """Who waits for an answer is awake so long before its last byte, in s, at most a character: what came until then is
 sorted, which brings the code back into the processor's caches, and the last byte is read when it comes, not 0.2 ms
 later. The next silence begins at that moment."""
-AWAKE_BEFORE_REALTIME = 0.0004
-"""The same where the line goes before everything else, as `lfs10d.linethread.WAKING_REALTIME`."""
 
 
 class Wait(NamedTuple):
@@ -77,10 +75,7 @@ Step: TypeAlias = Wait | Outcome | PortChanged
 
 
 class Bus:
-    """One line: its port, its silence, its echo. `clock` gives monotonic s, the same as the `now` of every call.
-
-    `awake_before` is how long before the last byte of an answer, in s, somebody is to listen for it.
-    """
+    """One line: its port, its silence, its echo. `clock` gives monotonic s, the same as the `now` of every call."""
 
     def __init__(self, port: Port, rules: LineRules, clock: Callable[[], float]) -> None:
         self.port = port
@@ -88,7 +83,6 @@ class Bus:
         self.open = False
         self.timing = self._timing(port.settings)
         self.unsolicited = 0
-        self.awake_before = AWAKE_BEFORE
         self._settings = port.settings
         self._clock = clock
         self._echo = EchoLearner(rules.echo)
@@ -265,7 +259,7 @@ class Bus:
         while True:
             action = exchange.step(now)
             if isinstance(action, Listen):
-                early = min(self.awake_before, self.timing.character)
+                early = min(AWAKE_BEFORE, self.timing.character)
                 return Wait(action.until, listen=True, not_before=action.not_before - early)
             if isinstance(action, Quiet):
                 return Wait(action.until, listen=True)

@@ -133,17 +133,6 @@ def test_at_rest_it_listens(rig: Rig) -> None:
     assert rig.step() == Wait(inf, listen=True)
 
 
-@pytest.mark.parametrize(("wanted", "had"), [(0.0004, 0.0004), (1.0, T9600.character)])
-def test_how_early_an_answer_is_listened_for_can_be_set_up_to_a_character(rig: Rig, wanted: float, had: float) -> None:
-    rig.bus.awake_before = wanted
-    rig.bus.ask(READ)
-    rig.step()
-    rig.step(T9600.gap)
-    begun = rig.step(0.02, ANSWER[:4])
-    assert isinstance(begun, Wait)
-    assert begun.not_before == pytest.approx(rig.clock.now + 5 * T9600.character - had)
-
-
 def test_an_order_waits_for_silence_is_sent_and_answered(rig: Rig) -> None:
     rig.bus.ask(READ)
     assert not rig.bus.idle
