@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 
 BASE = "bench"
 DAEMON = (str(Path(sys.executable).with_name("lfs10d")),)
+AS_A_SERVICE = {"MALLOC_ARENA_MAX": "1"}
+"""What systemd/lfs10d.service puts into the environment and changes what is measured."""
 
 
 def daemon_configuration(row: Row, port: Path, broker: int) -> dict[str, object]:
@@ -47,8 +50,11 @@ def command(master: Master, row: Row, folder: Path, port: Path, broker: int, dae
 
 def start(words: list[str], errors: Path) -> subprocess.Popen[str]:
     """Start a master; what it complains of goes to a file."""
+    environment = {**os.environ, **AS_A_SERVICE}
     with errors.open("w") as complaints:
-        return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=complaints, text=True, cwd=HERE.parent)
+        return subprocess.Popen(
+            words, stdout=subprocess.PIPE, stderr=complaints, text=True, cwd=HERE.parent, env=environment
+        )
 
 
 def scratch() -> tempfile.TemporaryDirectory[str]:
