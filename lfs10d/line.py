@@ -153,12 +153,13 @@ class Line:
 
     def _precede(self, *, wanted: bool) -> None:
         """Put the thread under SCHED_FIFO and have it awake earlier, or make it an ordinary one again."""
-        refusal = take_precedence() if wanted else None
-        if refusal is not None:
-            log.warning("%s", refusal)
+        self._thread.waking = WAKING
         if not wanted:
             yield_precedence()
-        self._thread.waking = WAKING_REALTIME if wanted and refusal is None else WAKING
+        elif (refusal := take_precedence()) is not None:
+            log.warning("%s", refusal)
+        else:
+            self._thread.waking = WAKING_REALTIME
 
     def _take_over(self, events: list[Event]) -> None:
         self._inbox.append(events)
