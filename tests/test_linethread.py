@@ -219,3 +219,13 @@ def test_how_early_it_is_back_can_be_set(rig: Rig, *, listen: bool) -> None:
     rig.thread._wait(Wait(moment, listen=listen))
     assert time.monotonic() < moment - WAKING  # as early as that it is back by default
     rig.poller.bus.close()
+
+
+def test_how_early_it_listens_for_what_may_come_can_be_set(rig: Rig, far_end: FarEnd) -> None:
+    rig.poller.bus.port.open()
+    os.write(far_end.fd, b"\xff")
+    rig.thread.waking = IDLE_MOST / 2
+    moment = time.monotonic() + IDLE_MOST / 2 + 0.05
+    assert rig.thread._wait(Wait(moment + IDLE_MOST / 2, listen=True, not_before=moment))
+    assert time.monotonic() < moment - WAKING
+    rig.poller.bus.close()

@@ -113,7 +113,7 @@ def model_in(annotation: Any) -> Model | None:  # noqa: ANN401  # any annotation
     return next(filter(None, map(model_in, get_args(annotation))), None)
 
 
-def kinds_within(annotation: Any) -> Iterator[Kind]:  # noqa: ANN401
+def kinds_within(annotation: Any) -> Iterator[Kind]:  # noqa: ANN401 - an annotation is of any type
     """Yield what single values within an annotation may be."""
     if get_origin(annotation) is Annotated:
         yield from (each for each in get_args(annotation)[1:] if isinstance(each, Kind))
@@ -121,9 +121,9 @@ def kinds_within(annotation: Any) -> Iterator[Kind]:  # noqa: ANN401
         yield from kinds_within(inner)
 
 
-def _nullable(annotation: Any) -> bool:  # noqa: ANN401
+def _nullable(annotation: Any) -> bool:  # noqa: ANN401 - an annotation is of any type
     return get_origin(annotation) in {Union, UnionType} and type(None) in get_args(annotation)
 
 
-def _listed(annotation: Any) -> bool:  # noqa: ANN401
+def _listed(annotation: Any) -> bool:  # noqa: ANN401 - an annotation is of any type
     return get_origin(annotation) is tuple

@@ -94,7 +94,7 @@ class Story:
         if second == 20:  # noqa: PLR2004  # two thirds into the story
             other = Reading("slave-3", at + 0.04, values, None, rtt=0.0191, online=True, response_timeout=0.05)
         else:
-            online = 20 < second < 23 or second < 3  # noqa: PLR2004
+            online = 20 < second < 23 or second < 3  # noqa: PLR2004 - a made-up minute
             other = Reading("slave-3", at + 0.2, None, silence, rtt=None, online=online, response_timeout=0.05)
         for event in (asked, good, other):
             self._note(self._station.heard(event, _at(event.at + 0.001)))
