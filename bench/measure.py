@@ -125,7 +125,7 @@ def rates(sent: list[Sent], healthy: tuple[int, ...], seconds: float, interval: 
         if each.whole and each.slave in counts:
             counts[each.slave] += 1
             ends.append(each.ended)
-    if len(ends) < 2:  # noqa: PLR2004
+    if len(ends) < 2:  # noqa: PLR2004 - a rate needs two
         return 0.0, 0.0
     rate = len(ends) / seconds if interval else (len(ends) - 1) / (ends[-1] - ends[0])
     return rate, min(counts.values()) / seconds * len(healthy)

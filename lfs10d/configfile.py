@@ -146,7 +146,7 @@ def _mended(data: Any, wrong: Iterable[KeyPath]) -> dict[str, Any]:  # noqa: ANN
     """Return data without what is wrong, so that the rest can be checked; what must be there is made up."""
     bad = frozenset(wrong)
 
-    def keep(value: Any, path: KeyPath) -> Any:  # noqa: ANN401
+    def keep(value: Any, path: KeyPath) -> Any:  # noqa: ANN401 - YAML of any shape
         if isinstance(value, dict):
             return {key: keep(item, (*path, key)) for key, item in value.items() if not _cut(path, key, bad)}
         if isinstance(value, list) and path == ("slaves",):

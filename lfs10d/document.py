@@ -233,7 +233,7 @@ class _NodeReader:
                 return self.within(node, "map", path, self.mapping)
         raise TypeError(type(node))  # pragma: no cover  # PyYAML has no fourth kind of node
 
-    def within(self, node: Any, word: str, path: KeyPath, reader: Any) -> object:  # noqa: ANN401
+    def within(self, node: Any, word: str, path: KeyPath, reader: Any) -> object:  # noqa: ANN401 - a node of any reader
         if id(node.value) in self.open:
             raise ConfigError(
                 (Problem(self.file, *_place(node), path_text(path), "an alias may not stand for what surrounds it"),)

@@ -39,9 +39,9 @@ class OwnThread:
             try:
                 result = function(*args, **kwargs)
             except Exception as error:  # noqa: BLE001 - it is the caller's
-                outcome: Callable[[], None] = lambda error=error: future.set_exception(error)  # type: ignore[misc]  # noqa: E731
+                outcome: Callable[[], None] = lambda error=error: future.set_exception(error)  # type: ignore[misc]  # noqa: E731 - a call to be made in the loop
             else:
-                outcome = lambda: future.set_result(result)  # noqa: E731
+                outcome = lambda: future.set_result(result)  # noqa: E731 - a call to be made in the loop
             with contextlib.suppress(RuntimeError):  # the loop is closed: nobody waits any more
                 loop.call_soon_threadsafe(tell, outcome)
 

@@ -67,7 +67,7 @@ class Signals:
         except ConfigError as error:
             for problem in error.problems:
                 log.error("%s", problem)  # noqa: TRY400 - for a person; where in our code says nothing
-            log.error("the configuration is not reloaded: the running one stays")  # noqa: TRY400
+            log.error("the configuration is not reloaded: the running one stays")  # noqa: TRY400 - as above
         else:
             log.info("reloaded: %s", ", ".join(plan.applied) or "nothing changed")
             if plan.restart_required:

@@ -47,7 +47,7 @@ def device_topic(device: str, leaf: str) -> str:
 def device_of(topic: str, leaf: str) -> str | None:
     """Return the device that `device_topic` gave this topic, None where it is another leaf or no device's."""
     levels = topic.split("/")
-    return levels[1] if len(levels) == 3 and levels[0] == "device" and levels[2] == leaf else None  # noqa: PLR2004
+    return levels[1] if len(levels) == 3 and levels[0] == "device" and levels[2] == leaf else None  # noqa: PLR2004 - device/<name>/<leaf>
 
 
 class Kind(StrEnum):

@@ -26,7 +26,7 @@ PROFILES = {
 }
 
 
-def found(**sections: Any) -> list[str]:  # noqa: ANN401
+def found(**sections: Any) -> list[str]:  # noqa: ANN401 - plain data of any shape
     line = {"port": "/dev/x", **sections.pop("line", {})}
     config = Config.model_validate({"line": line, **sections})
     return [f"{path_text(each.path)}: {each.message}" for each in contradictions(config, PROFILES)]

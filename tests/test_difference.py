@@ -11,7 +11,7 @@ from lfs10d.difference import Change, difference
 from lfs10d.resolution import resolved
 
 
-def config(*, line: dict[str, Any] | None = None, **sections: Any) -> Config:  # noqa: ANN401
+def config(*, line: dict[str, Any] | None = None, **sections: Any) -> Config:  # noqa: ANN401 - plain data of any shape
     content = {"line": {"port": "/dev/x", **(line or {})}, **sections}
     return resolved(Config.model_validate(content), stem="lfs10d", host="gateway")
 

@@ -40,7 +40,7 @@ def test_a_replaced_file_is_old_or_new_whenever_the_power_fails(cut: int, surviv
 
 
 @given(st.integers(0, 2), st.booleans())
-def test_what_was_appended_is_there_once_the_call_returned(cut: int, survives: bool) -> None:  # noqa: FBT001
+def test_what_was_appended_is_there_once_the_call_returned(cut: int, survives: bool) -> None:  # noqa: FBT001 - the test's parameter
     files, disk = begun()
     files.steps_left = files.steps + cut
     try:

@@ -12,7 +12,7 @@ from lfs10d.resolution import resolved
 SMALL: dict[str, Any] = {"line": {"port": "/dev/x"}, "slaves": [2, 3, 4], "mqtt": {"host": "localhost"}}
 
 
-def complete(*, stem: str = "lfs10d", host: str = "gateway", **sections: Any) -> Config:  # noqa: ANN401
+def complete(*, stem: str = "lfs10d", host: str = "gateway", **sections: Any) -> Config:  # noqa: ANN401 - plain data of any shape
     return resolved(Config.model_validate({**SMALL, **sections}), stem=stem, host=host)
 
 

@@ -83,7 +83,7 @@ class Live:
 
     # -- from MQTT
 
-    def heard(self, topic: str, payload: Any, *, old: bool, now: float, wall: float) -> None:  # noqa: ANN401
+    def heard(self, topic: str, payload: Any, *, old: bool, now: float, wall: float) -> None:  # noqa: ANN401 - parsed JSON
         """Take a message under B; `payload` is its JSON or its bare word, `old` that it was retained before."""
         match topic.split("/"):
             case ["devices"] if isinstance(payload, list):
@@ -107,7 +107,7 @@ class Live:
     def _device(self, name: str) -> Device:
         return self._met.setdefault(name, Device(name))
 
-    def _told(self, device: Device, leaf: str, payload: Any, *, old: bool, now: float, wall: float) -> None:  # noqa: ANN401
+    def _told(self, device: Device, leaf: str, payload: Any, *, old: bool, now: float, wall: float) -> None:  # noqa: ANN401 - parsed JSON
         if leaf == "availability":
             self._available(device, payload == "online", now=None if old else now)
         elif isinstance(payload, dict):

@@ -249,10 +249,10 @@ def _lines(table: Table) -> Iterator[str]:
 
 def _draw_on_terminal(tables: list[Table]) -> None:
     # Only a terminal needs rich; importing it takes longer than the rest of the verb.
-    from rich import box  # noqa: PLC0415
-    from rich.console import Console  # noqa: PLC0415
-    from rich.table import Table as Drawing  # noqa: PLC0415
-    from rich.text import Text  # noqa: PLC0415
+    from rich import box  # noqa: PLC0415 - for a terminal only
+    from rich.console import Console  # noqa: PLC0415 - for a terminal only
+    from rich.table import Table as Drawing  # noqa: PLC0415 - for a terminal only
+    from rich.text import Text  # noqa: PLC0415 - for a terminal only
 
     console = Console()
     for number, table in enumerate(tables):

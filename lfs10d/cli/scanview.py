@@ -123,8 +123,8 @@ class _Drawn:
 
 def _bar() -> Bar:
     # Only a terminal needs rich; importing it takes longer than the rest of the verb.
-    from rich.console import Console  # noqa: PLC0415
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn  # noqa: PLC0415
+    from rich.console import Console  # noqa: PLC0415 - for a terminal only
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn  # noqa: PLC0415 - for a terminal only
 
     return Progress(
         TextColumn("{task.description}"),

@@ -39,7 +39,7 @@ async def _spin(words: str) -> None:
     await asyncio.sleep(AFTER)
     try:
         for sign in cycle("|/-\\"):
-            print(f"{ERASE}{sign} {words} {loop.time() - begun:.0f} s", end="", file=sys.stderr, flush=True)  # noqa: T201
+            print(f"{ERASE}{sign} {words} {loop.time() - begun:.0f} s", end="", file=sys.stderr, flush=True)  # noqa: T201 - this is the spinner
             await asyncio.sleep(EVERY)
     finally:
         print(ERASE, end="", file=sys.stderr, flush=True)  # noqa: T201  # click.echo would strip what clears the line

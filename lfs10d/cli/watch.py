@@ -211,7 +211,7 @@ class _Screen:
 
     def __init__(self) -> None:
         from rich.console import Console  # noqa: PLC0415  # for a terminal only
-        from rich.live import Live as Screen  # noqa: PLC0415
+        from rich.live import Live as Screen  # noqa: PLC0415 - for a terminal only
 
         self._console = Console(highlight=False, markup=False, emoji=False)
         self._screen: Screen = Screen(console=self._console, screen=True, auto_refresh=False)
@@ -228,7 +228,7 @@ class _Screen:
 
     def draw(self, live: Live, source: Source, *, now: float, wall: float) -> None:
         """Draw it anew."""
-        from rich.text import Text  # noqa: PLC0415
+        from rich.text import Text  # noqa: PLC0415 - for a terminal only
 
         size = self._console.size
         lines = screen(live, source, (size.width, size.height), now=now, wall=wall)

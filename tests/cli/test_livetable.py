@@ -35,12 +35,12 @@ def entry(name: str, slave: int, **keys: Any) -> dict[str, Any]:  # noqa: ANN401
     }
 
 
-def bad(name: str, slave: int, error: str | None = "timeout", **keys: Any) -> dict[str, Any]:  # noqa: ANN401
+def bad(name: str, slave: int, error: str | None = "timeout", **keys: Any) -> dict[str, Any]:  # noqa: ANN401 - plain data of any shape
     nothing = {"values": {"wind_speed": None}, "quality": "bad", "rtt_ms": None, "age_s": 75.0}
     return entry(name, slave, **{**nothing, "error": error, "online": False, **keys})
 
 
-def live(*entries: dict[str, Any], **line: Any) -> Live:  # noqa: ANN401
+def live(*entries: dict[str, Any], **line: Any) -> Live:  # noqa: ANN401 - plain data of any shape
     shown = Live("line0")
     shape = {"port": "/dev/ttyUSB0", "baudrate": 9600, "databits": 8, "parity": "none", "stopbits": 1, "open": True}
     status = {"ts": round(WALL * 1000), "line": {**shape, "load_pct": 34.5, "polls_per_s": 12.0, **line}}
@@ -97,7 +97,7 @@ def test_the_sensor_that_moved_is_marked_and_stands_out() -> None:
 
 
 @pytest.mark.parametrize(("online", "mark"), [(True, "+ a"), (False, "- a")])
-def test_one_that_just_came_or_went_is_marked_for_five_seconds(online: bool, mark: str) -> None:  # noqa: FBT001
+def test_one_that_just_came_or_went_is_marked_for_five_seconds(online: bool, mark: str) -> None:  # noqa: FBT001 - the test's parameter
     shown = live(entry("a", 2, online=not online))
     shown.read({"ts": round(WALL * 1000), "devices": [entry("a", 2, online=online)]}, now=10.0)
     assert [text(table(rows(shown, HERE, now=now, wall=WALL), 80)[1])[:3] for now in (14.9, 15.1)] == [mark, "  a"]

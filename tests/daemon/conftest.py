@@ -137,7 +137,7 @@ class View:
         versions = self.history_of(topic)
         return versions[-1] if versions else None
 
-    def wait(self, topic: str, claim: Callable[[Any], Any] = bool) -> Any:  # noqa: ANN401
+    def wait(self, topic: str, claim: Callable[[Any], Any] = bool) -> Any:  # noqa: ANN401 - plain data of any shape
         """Wait until the newest version of a topic is as claimed; return it."""
         deadline = time.monotonic() + PATIENCE
         while (newest := self.newest(topic)) is None or not claim(newest):
@@ -171,7 +171,7 @@ class View:
         self.listener.heard.clear()
 
 
-def _parsed(payload: bytes) -> Any:  # noqa: ANN401
+def _parsed(payload: bytes) -> Any:  # noqa: ANN401 - plain data of any shape
     if not payload:
         return None
     text = payload.decode()
@@ -220,7 +220,7 @@ class Site:
             served.start()
         return served
 
-    def write(self, **sections: Any) -> Path:  # noqa: ANN401
+    def write(self, **sections: Any) -> Path:  # noqa: ANN401 - plain data of any shape
         """Write the configuration: the defaults of these tests, and over them what is given, key by key."""
         config: dict[str, Any] = {
             "line": {"port": str(self.tty), "baudrate": 19200},

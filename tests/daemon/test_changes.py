@@ -26,7 +26,7 @@ B = "lfs10d/line0"
 def publish(mosquitto: Mosquitto, program: Callable[[str], str]) -> Callable[..., None]:
     """Give what sends a request as a person at a shell does."""
 
-    def publish(name: str, /, **parameters: Any) -> None:  # noqa: ANN401
+    def publish(name: str, /, **parameters: Any) -> None:  # noqa: ANN401 - plain data of any shape
         topic = f"{B}/request/{name}"
         command = [program("mosquitto_pub"), "-p", str(mosquitto.port), "-q", "1", "-t", topic, "-s"]
         subprocess.run(command, input=json.dumps(parameters).encode(), check=True, timeout=20)
@@ -39,7 +39,7 @@ def request_of(publish: Callable[..., None], view: View) -> Callable[..., dict[s
     """Give what sends a request and returns its response."""
     asked = 0
 
-    def request_of(name: str, /, **parameters: Any) -> dict[str, Any]:  # noqa: ANN401
+    def request_of(name: str, /, **parameters: Any) -> dict[str, Any]:  # noqa: ANN401 - plain data of any shape
         nonlocal asked
         asked += 1
         publish(name, id=asked, **parameters)
@@ -69,7 +69,7 @@ def started_again(site: Site, view: View, run: Run, slaves: tuple[int, ...] = (1
 
 def events(view: View, kind: str) -> list[dict[str, Any]]:
     """Return the events of a kind, of which one at least must come: they follow what they tell of."""
-    return eventually(lambda: [event for event in view.history_of("event") if event["type"] == kind], kind)  # type: ignore[no-any-return]
+    return eventually(lambda: [event for event in view.history_of("event") if event["type"] == kind], kind)  # type: ignore[no-any-return]  # parsed JSON
 
 
 def test_a_device_that_answers_is_added_measured_and_there_again_after_a_kill(

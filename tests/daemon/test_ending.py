@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import socket
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -12,8 +13,6 @@ import pytest
 from tests.daemon.conftest import ENDS_WITHIN, eventually, good
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from tests.conftest import Mosquitto
     from tests.daemon.conftest import Site, View
 
@@ -131,11 +130,11 @@ def test_asked_to_end_before_it_began_it_ends_with_0(site: Site) -> None:
     site.write()
     run = site.run()
     # Its handlers stand as soon as SIGHUP is ignored, which /proc tells, or caught, if nobody looked in between.
-    status = f"/proc/{run.process.pid}/status"
+    status = Path(f"/proc/{run.process.pid}/status")
 
     def hears() -> bool:
-        with open(status, encoding="ascii") as lines:  # noqa: PTH123
-            masks = [int(line.split()[1], 16) for line in lines if line.startswith(("SigIgn", "SigCgt"))]
+        lines = status.read_text(encoding="ascii").splitlines()
+        masks = [int(line.split()[1], 16) for line in lines if line.startswith(("SigIgn", "SigCgt"))]
         return any(mask & 1 << signal.SIGHUP - 1 for mask in masks)
 
     eventually(hears, "SIGHUP ends nothing any more")

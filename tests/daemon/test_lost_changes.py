@@ -36,7 +36,7 @@ def view(mosquitto: Mosquitto) -> View:
 def asked(mosquitto: Mosquitto, view: View) -> Callable[..., None]:
     """Give what sends a request and waits until it is done."""
 
-    def asked(name: str, /, **parameters: Any) -> None:  # noqa: ANN401
+    def asked(name: str, /, **parameters: Any) -> None:  # noqa: ANN401 - plain data of any shape
         mosquitto.publish(f"{B}/request/{name}", json.dumps(parameters))
         response = view.wait(f"response/{name}")
         assert response["status"] == "ok", response
@@ -44,7 +44,7 @@ def asked(mosquitto: Mosquitto, view: View) -> Callable[..., None]:
     return asked
 
 
-def started(site: Site, view: View, **options: Any) -> Run:  # noqa: ANN401
+def started(site: Site, view: View, **options: Any) -> Run:  # noqa: ANN401 - plain data of any shape
     run = site.run(**options)
     run.ready()
     view.wait("availability", lambda word: word == "online")

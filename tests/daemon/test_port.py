@@ -110,7 +110,7 @@ def test_a_port_that_another_program_holds_is_busy_until_it_is_free(site: Site, 
     ],
     ids=["file", "directory", "loop"],
 )
-def test_what_is_no_port_is_named_as_such_and_awaited(site: Site, view: View, make: Any, words: str) -> None:  # noqa: ANN401
+def test_what_is_no_port_is_named_as_such_and_awaited(site: Site, view: View, make: Any, words: str) -> None:  # noqa: ANN401 - plain data of any shape
     make(site.tty)
     site.write()
 

@@ -59,7 +59,7 @@ class Operator:
         eventually(lambda: any(_id(each) == token for each in self.responses), "the answer to the last request")
         return [each for each in self.responses if not str(_id(each)).startswith("fence-")]
 
-    def ask(self, name: str, payload: object = None, **how: Any) -> dict[str, Any]:  # noqa: ANN401
+    def ask(self, name: str, payload: object = None, **how: Any) -> dict[str, Any]:  # noqa: ANN401 - plain data of any shape
         """Send one request and return its one response."""
         before = len(self.responses)
         self.send(name, payload, **how)
@@ -78,7 +78,7 @@ def codes(heard: list[Heard]) -> list[str | None]:
     return [error and error["code"] for error in errors]
 
 
-def operator_of(site: Site, mosquitto: Mosquitto, **sections: Any) -> Operator:  # noqa: ANN401
+def operator_of(site: Site, mosquitto: Mosquitto, **sections: Any) -> Operator:  # noqa: ANN401 - plain data of any shape
     """Start the daemon and return somebody who is subscribed before anything is answered."""
     listener = mosquitto.subscribe(f"{BASE}/#")
     site.write(**sections)

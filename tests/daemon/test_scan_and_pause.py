@@ -37,7 +37,7 @@ def send(mosquitto: Mosquitto, name: str, **parameters: Any) -> None:  # noqa: A
     subprocess.run(["mosquitto_pub", "-h", "127.0.0.1", "-p", str(mosquitto.port), *topic], check=True)
 
 
-def answer(view: View, mosquitto: Mosquitto, name: str, **parameters: Any) -> dict[str, Any]:  # noqa: ANN401
+def answer(view: View, mosquitto: Mosquitto, name: str, **parameters: Any) -> dict[str, Any]:  # noqa: ANN401 - plain data of any shape
     """Send a request and return its one response."""
     before = len(view.history_of(f"response/{name}"))
     send(mosquitto, name, **parameters)

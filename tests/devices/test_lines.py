@@ -189,7 +189,7 @@ def test_nothing_was_ever_written_but_what_was_asked_and_permitted(recording: Re
 
 
 @pytest.mark.parametrize("unit", [RTU[0], RTU[3], RTU[5], RTU[7], RTU[8], RTU[10], RTU[11]], ids=lambda unit: unit.name)
-def test_one_device_is_read_by_its_profile(rtu: Recording, unit: Any) -> None:  # noqa: ANN401
+def test_one_device_is_read_by_its_profile(rtu: Recording, unit: Any) -> None:  # noqa: ANN401 - plain data of any shape
     check = ["--checksum", unit.check] if unit.check != "crc" else []
     done = rtu.lfs10d(
         "read", str(rtu.site.tty), str(unit.slave), "--profile", unit.profile, "--baudrate", "19200", "--json", *check
@@ -203,7 +203,7 @@ def test_one_device_is_read_by_its_profile(rtu: Recording, unit: Any) -> None:  
     assert set(last.values()) == set(request.answers[0].values)
 
 
-def test_one_device_is_read_in_ascii(recordings: Any) -> None:  # noqa: ANN401
+def test_one_device_is_read_in_ascii(recordings: Any) -> None:  # noqa: ANN401 - plain data of any shape
     seen: Recording = recordings("ascii-7E1")
     done = seen.lfs10d(
         "read", str(seen.site.tty), "20", "--profile", "fuling-dzb", "--baudrate", "19200", "--json", *seen.line_options
@@ -224,7 +224,7 @@ def test_a_scan_with_the_other_check_finds_those_that_are_set_to_it(rtu: Recordi
 
 
 @pytest.mark.parametrize("name", ["ascii-7E1", "ascii-8N1"])
-def test_a_scan_in_ascii_names_what_it_recognises(recordings: Any, name: str) -> None:  # noqa: ANN401
+def test_a_scan_in_ascii_names_what_it_recognises(recordings: Any, name: str) -> None:  # noqa: ANN401 - plain data of any shape
     seen: Recording = recordings(name)
     found = recognised(seen, "9-11,20,21,41", "--profile", "profiles/tank.yaml", *seen.line_options)
     assert found == {unit.slave: seen.profile(unit).name for unit in ASCII}

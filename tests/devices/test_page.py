@@ -56,7 +56,7 @@ def test_every_command_of_the_page_does_what_it_says(folder: Path, vane: Path) -
     verbs = []
     for command in COMMANDS:
         verb, *arguments = shlex.split(command)
-        ports = [str(vane) if each in {"/dev/ttyUSB0", "/tmp/vane"} else each for each in arguments]  # noqa: S108
+        ports = [str(vane) if each in {"/dev/ttyUSB0", "/tmp/vane"} else each for each in arguments]  # noqa: S108 - the page's own example
         verbs.append(verb)
         match verb:
             case "profiles":

@@ -272,7 +272,7 @@ class Bench:
             self.turn(life)
         return task.result()
 
-    def readdress(self, life: Life, device: str, to: int, *, dry_run: bool = False, id: str = "a1") -> Answer:  # noqa: A002
+    def readdress(self, life: Life, device: str, to: int, *, dry_run: bool = False, id: str = "a1") -> Answer:  # noqa: A002 - the request's own word
         """Ask for another slave id and wait for the answer."""
         return self.ask(life, life.physical.readdress(device, to, dry_run=dry_run, call=Call(id)))
 

@@ -34,7 +34,7 @@ def fresh(bench: Bench, life: Life, seconds: float = 10.0) -> dict[str, int]:
 
 @pytest.mark.parametrize("echo", [False, True])
 @pytest.mark.parametrize("manner", [None, "at_once", "echo_losing", "slow_flash", "late"])
-def test_every_sensor_and_the_port_move(bench: Bench, manner: str | None, echo: bool) -> None:  # noqa: FBT001
+def test_every_sensor_and_the_port_move(bench: Bench, manner: str | None, echo: bool) -> None:  # noqa: FBT001 - the test's parameter
     life = bench.sensors(3, 4, 5, echo=echo)
     bench.go(life, 5.0)
     for sensor in bench.line.sensors:

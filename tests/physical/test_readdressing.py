@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @pytest.mark.parametrize("echo", [False, True])
 @pytest.mark.parametrize("manner", [None, "at_once", "echo_losing", "slow_flash", "late"])
-def test_a_sensor_that_obeys_is_moved_and_polled_at_its_new_id(bench: Bench, manner: str | None, echo: bool) -> None:  # noqa: FBT001
+def test_a_sensor_that_obeys_is_moved_and_polled_at_its_new_id(bench: Bench, manner: str | None, echo: bool) -> None:  # noqa: FBT001 - the test's parameter
     life = bench.sensors(3, 4, echo=echo)
     bench.go(life, 5.0)
     if manner:

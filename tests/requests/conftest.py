@@ -200,13 +200,13 @@ def ask(powers: FakePowers) -> Ask:
 class Asked(Protocol):
     """Asks a request with parameters, and returns status, error code and param, and data."""
 
-    def __call__(self, name: str, /, **parameters: Any) -> tuple[str, Any]:  # noqa: ANN401
+    def __call__(self, name: str, /, **parameters: Any) -> tuple[str, Any]:  # noqa: ANN401 - plain data of any shape
         """Return `("ok", data)`, or the status and `(code, param)`."""
 
 
 @pytest.fixture
 def asked(ask: Ask) -> Asked:
-    def asked(name: str, /, **parameters: Any) -> tuple[str, Any]:  # noqa: ANN401
+    def asked(name: str, /, **parameters: Any) -> tuple[str, Any]:  # noqa: ANN401 - plain data of any shape
         answer = ask(name, json.dumps(parameters))
         json.dumps(answer.data, allow_nan=False)
         error = answer.error()

@@ -234,7 +234,7 @@ def test_a_declaration_elsewhere_covers_nothing() -> None:
 @pytest.mark.parametrize(
     ("killed", "missing", "lost"), [(True, 7, 0), (True, 10, 10), (False, 7, 7)], ids=["8 s", "more", "no kill"]
 )
-def test_a_kill_may_cost_8_seconds_and_nothing_else_may(killed: bool, missing: int, lost: int) -> None:  # noqa: FBT001
+def test_a_kill_may_cost_8_seconds_and_nothing_else_may(killed: bool, missing: int, lost: int) -> None:  # noqa: FBT001 - the test's parameter
     heard = [told for told in story() if not 20 < told.seq <= 20 + missing]
     ledger, _ = judged(heard, killed=killed)
     assert ledger.counts["lost"] == lost
