@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 from lfs10d.budget import ASSUMED_TURNAROUND
 from lfs10d.config import LATER_SECTIONS, default_line_name
+from lfs10d.credentials import missing_in_authorities
+from lfs10d.errors import ConfigError
 from lfs10d.kinds import quoted
 from lfs10d.quantities import duration_text
 
@@ -27,6 +29,7 @@ def advice(loaded: Loaded, budget: Budget, host: str) -> tuple[Problem, ...]:
     warnings = (
         *_load(loaded, budget),
         *_login(loaded),
+        *_files(loaded),
         *_names(loaded, host),
         *_unused(loaded),
     )
@@ -82,6 +85,27 @@ def _login(loaded: Loaded) -> Iterator[tuple[KeyPath, str]]:
         )
     if mqtt.username is not None and mqtt.tls is None:
         yield ("mqtt", "username"), "the password crosses the network unencrypted; set mqtt.tls"
+
+
+def _files(loaded: Loaded) -> Iterator[tuple[KeyPath, str]]:
+    """Look into the files of the login, as far as they can be read."""
+    mqtt = loaded.config.mqtt
+    try:
+        password = loaded.password()
+    except ConfigError:
+        password = None
+    if password is not None and password.reveal().rstrip(" \t") != password.reveal():
+        path: KeyPath = ("mqtt", "password_file") if mqtt.password_file is not None else ("mqtt",)
+        yield path, "the password ends with a space, which is part of it: remove it unless it is meant"
+    if mqtt.tls is not None and mqtt.tls.ca is not None and (missing := missing_in_authorities(mqtt.tls.ca)):
+        yield (
+            ("mqtt", "tls", "ca"),
+            (
+                f"an authority without {' and '.join(missing)} (RFC 5280, section 4.2.1), which strict clients refuse, "
+                "any Python from 3.13 on among them; lfs10d takes it: make the next one with "
+                "-addext keyUsage=critical,keyCertSign,cRLSign"
+            ),
+        )
 
 
 def _names(loaded: Loaded, host: str) -> Iterator[tuple[KeyPath, str]]:

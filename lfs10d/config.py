@@ -32,6 +32,9 @@ MINUTE, HOUR, DAY = 60.0, 3600.0, 86400.0
 PLAIN_PORT, TLS_PORT = 1883, 8883
 """Registered with IANA for MQTT and for MQTT over TLS."""
 
+LONGEST_CLIENT_ID = 200
+"""Characters; a broker need not take more than 23 (MQTT 5.0, section 3.1.3.1), all known ones do."""
+
 DEFAULT_STEM = "lfs10d"
 """The file name without suffix whose line is `line0` by default."""
 
@@ -196,7 +199,7 @@ class MqttConfig(Section):
     base_topic: Annotated[str, BaseTopic()] = Field(
         "lfs10d", description="First part of every topic; may have several levels; %H is the host name."
     )
-    client_id: Annotated[str | None, Text(200, null=True)] = Field(
+    client_id: Annotated[str | None, Text(LONGEST_CLIENT_ID, null=True)] = Field(
         None, description="Must differ between clients; %H is the host name. Default: lfs10d-<host name>-<line name>."
     )
     username: Annotated[str | None, Text(200, null=True)] = Field(None, description="Login name; null for none.")

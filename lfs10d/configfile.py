@@ -17,7 +17,7 @@ from lfs10d.document import Document, decode, parse, path_text
 from lfs10d.errors import ConfigError, Problem
 from lfs10d.kinds import quoted, shown
 from lfs10d.profiles.library import builtin_names, load_profile
-from lfs10d.resolution import resolved
+from lfs10d.resolution import resolved, unfit
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -105,11 +105,17 @@ def load(
     if files:
         found = ((keys, message) for keys, message in unreadable(config.mqtt) if not _concerns(keys, wrong))
         problems += (document.problem(keys, message) for keys, message in found)
+    complete = resolved(config, stem=path.stem, host=socket.gethostname() if host is None else host)
+    problems += (
+        document.problem(keys, message) for keys, message in unfit(config, complete) if not _concerns(keys, wrong)
+    )
+    credential = credential_file(environment)
+    if files and credential is not None and (config.mqtt.username, config.mqtt.password_file) == (None, None):
+        message = f"is missing: the systemd credential {CREDENTIAL} is a password, never sent without a user name"
+        problems.append(document.problem(("mqtt", "username"), message))
     if problems:
         # The file itself first, profile files after it.
         raise ConfigError(tuple(sorted(set(problems), key=lambda found: (found.file != document.file, found))))
-    complete = resolved(config, stem=path.stem, host=socket.gethostname() if host is None else host)
-    credential = credential_file(environment)
     loaded = Loaded(path, document, complete, profiles, _origins(document, complete, credential), credential)
     if files:
         loaded.password()

@@ -49,10 +49,10 @@ def _line(config: Config) -> Iterator[Contradiction]:
 
 def _broker(config: Config) -> Iterator[Contradiction]:
     mqtt = config.mqtt
-    if mqtt.version == "3.1.1" and mqtt.password_file is not None and mqtt.username is None:
+    if mqtt.password_file is not None and mqtt.username is None:
         path: KeyPath = ("mqtt", "password_file")
-        message = "needs mqtt.username: MQTT 3.1.1 has no password without one"
-        yield Contradiction(path, message, (path, ("mqtt", "version"), ("mqtt", "username")))
+        message = "needs mqtt.username: a password without a user name is never sent"
+        yield Contradiction(path, message, (path, ("mqtt", "username")))
     if mqtt.tls is not None and mqtt.tls.key is not None and mqtt.tls.cert is None:
         path = ("mqtt", "tls", "key")
         yield Contradiction(path, "needs mqtt.tls.cert, the certificate it belongs to", (path, ("mqtt", "tls", "cert")))

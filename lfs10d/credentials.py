@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -43,11 +44,11 @@ def readable(path: Path) -> None:
 
 
 def password_in(path: Path) -> Secret:
-    """Return the first line of a file; raises UnreadableError if there is none."""
+    """Return the first line of a file, without a byte order mark; raises UnreadableError if there is none."""
     try:
         with path.open("rb") as file:
-            content = file.read(LARGEST_PASSWORD + 2)
-        first = content.decode().partition("\n")[0].removesuffix("\r")
+            content = file.read(len(BOM_UTF8) + LARGEST_PASSWORD + 2)
+        first = content.decode("utf-8-sig").partition("\n")[0].removesuffix("\r")
     except UnicodeDecodeError:
         raise UnreadableError(f"{_named(path)} is no UTF-8 text") from None
     except (OSError, ValueError) as error:
@@ -101,6 +102,32 @@ def _unusable(tls: TlsConfig) -> Iterator[tuple[KeyPath, str]]:
         except (OSError, ValueError):
             message = f"{_named(tls.cert)} and its key cannot be used: both in PEM form, matching, no passphrase?"
             yield ("mqtt", "tls", "cert"), message
+
+
+_KEY_USAGE = b"\x06\x03\x55\x1d\x0f"
+_SUBJECT_KEY_IDENTIFIER = b"\x06\x03\x55\x1d\x0e"
+_BASIC_CONSTRAINTS_CRITICAL = b"\x06\x03\x55\x1d\x13\x01\x01\xff"
+"""Extensions of an X.509 certificate as they stand in it: DER of the object identifier, and `critical` where asked."""
+
+_STRICTLY_NEEDED = (
+    (_KEY_USAGE, "key usage"),
+    (_SUBJECT_KEY_IDENTIFIER, "a subject key identifier"),
+    (_BASIC_CONSTRAINTS_CRITICAL, "critical basic constraints"),
+)
+"""What OpenSSL's X509_V_FLAG_X509_STRICT wants of an authority (RFC 5280, section 4.2.1)."""
+
+
+def missing_in_authorities(file: str) -> tuple[str, ...]:
+    """Return what strict programs miss in a file of authorities; () for nothing, or where it cannot be read."""
+    import ssl  # noqa: PLC0415  # a megabyte, and only TLS needs it
+
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    try:
+        context.load_verify_locations(file)
+    except (OSError, ValueError):
+        return ()
+    authorities = context.get_ca_certs(binary_form=True)
+    return tuple(name for code, name in _STRICTLY_NEEDED if any(code not in each for each in authorities))
 
 
 def _named(path: Path | str) -> str:

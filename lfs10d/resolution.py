@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from lfs10d.config import TLS_PORT, default_line_name, device_name
+from lfs10d.config import LONGEST_CLIENT_ID, TLS_PORT, default_line_name, device_name
+from lfs10d.kinds import BaseTopic, RefusedError, Text, quoted
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from lfs10d.config import Config, MqttConfig, PollConfig, SlaveConfig
+    from lfs10d.kinds import Kind
+    from lfs10d.wording import KeyPath
 
 
 def resolved(config: Config, *, stem: str, host: str) -> Config:
@@ -23,6 +28,22 @@ def resolved(config: Config, *, stem: str, host: str) -> Config:
             "mqtt": _named(config.mqtt, line, host),
         }
     )
+
+
+def unfit(config: Config, complete: Config) -> Iterator[tuple[KeyPath, str]]:
+    """Yield what the host's name makes of %H where that is not allowed; `complete` is `config` resolved."""
+    kinds: tuple[tuple[str, Kind], ...] = (("base_topic", BaseTopic()), ("client_id", Text(LONGEST_CLIENT_ID)))
+    for key, kind in kinds:
+        written, value = getattr(config.mqtt, key), getattr(complete.mqtt, key)
+        if written is not None and "%H" not in written:
+            continue
+        try:
+            kind.accept(value)
+        except RefusedError:
+            yield (
+                ("mqtt", key),
+                f"is {quoted(value)} with the name of this host, and must be {kind.words}; write one without %H",
+            )
 
 
 def inherited(slave: SlaveConfig, poll: PollConfig) -> SlaveConfig:

@@ -112,3 +112,19 @@ def test_a_file_whose_name_is_no_name_for_a_line_is_told() -> None:
 )
 def test_a_loopback_is_known_by_its_name(host: str, *, here: bool) -> None:
     assert loopback(host) is here
+
+
+WITH_FILES = LINE + "slaves: [2]\nmqtt: {host: localhost, username: me, password_file: pw, tls: {ca: ca.pem}}"
+
+
+@pytest.mark.parametrize(("content", "count"), [("hunter2\n", 0), ("hunter2 \n", 1), ("\u00e4\t", 1)])
+def test_a_password_that_ends_with_a_space_is_told_and_never_shown(content: str, count: int) -> None:
+    Path("pw").write_text(content)
+    message = "the password ends with a space, which is part of it: remove it unless it is meant"
+    assert warnings(WITH_FILES) == [f"3:54: mqtt.password_file: {message}"] * count
+
+
+def test_an_authority_that_strict_clients_refuse_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("lfs10d.advice.missing_in_authorities", lambda _file: ("key usage", "a horse"))
+    (told,) = warnings(WITH_FILES)
+    assert told.startswith("3:68: mqtt.tls.ca: an authority without key usage and a horse (RFC 5280")

@@ -87,7 +87,8 @@ def test_all_problems_are_told_at_once_in_order_of_place() -> None:
         "9:3: slaves[6].id:",
         "10:14: mqtt.host:",
         "10:46: mqtt.tls.ca:",
-        "10:70: mqtt.password_file:",
+        "10:70: mqtt.password_file:",  # cannot be read
+        "10:70: mqtt.password_file:",  # and needs a user name
         "11:18: poll.interval:",
         "11:34: poll.retries:",
         "12:12: commands[0]:",
@@ -237,9 +238,10 @@ def test_a_verb_with_a_login_of_its_own_does_without_the_files() -> None:
 def test_the_systemd_credential_is_the_password_where_no_file_is_named() -> None:
     Path("credentials").mkdir()
     folder = str(Path("credentials").absolute())
+    named = SMALL.replace("localhost", "localhost, username: me")
     assert loaded(SMALL, CREDENTIALS_DIRECTORY=folder).password() is None
     Path("credentials/mqtt-password").write_text("hunter2\n")
-    found = loaded(SMALL, CREDENTIALS_DIRECTORY=folder)
+    found = loaded(named, CREDENTIALS_DIRECTORY=folder)
     password = found.password()
     assert password is not None
     assert password.reveal() == "hunter2"
@@ -250,7 +252,23 @@ def test_the_systemd_credential_is_the_password_where_no_file_is_named() -> None
     assert str(own.origins["mqtt.password_file"]) == "lfs10d.yaml:3"
     Path("credentials/mqtt-password").write_text("")
     with pytest.raises(ConfigError, match=r"mqtt-password:1:1: .* must hold the password"):
-        loaded(SMALL, CREDENTIALS_DIRECTORY=folder)
+        loaded(named, CREDENTIALS_DIRECTORY=folder)
+
+
+def test_a_credential_without_a_user_name_is_an_error_but_not_for_a_verb_that_logs_in_by_itself() -> None:
+    Path("mqtt-password").write_text("hunter2")
+    with pytest.raises(ConfigError, match=r"3:7: mqtt.username: is missing: the systemd credential mqtt-password"):
+        loaded(SMALL, CREDENTIALS_DIRECTORY=str(Path.cwd()))
+    assert loaded(SMALL, files=False, CREDENTIALS_DIRECTORY=str(Path.cwd())).config.mqtt.username is None
+
+
+def test_what_the_name_of_the_host_makes_of_a_topic_is_checked_too() -> None:
+    Path("lfs10d.yaml").write_text(SMALL.replace("localhost", 'localhost, base_topic: "site/%H", version: 4'))
+    with pytest.raises(ConfigError) as refused:
+        load(Path("lfs10d.yaml"), environment={}, host="mast#1")
+    told = [str(problem) for problem in refused.value.problems]
+    assert [line.split(": ")[1] for line in told] == ["mqtt.base_topic", "mqtt.version"]
+    assert 'is "site/mast#1" with the name of this host, and must be' in told[0]
 
 
 def test_certificates_that_cannot_be_used_are_errors_at_their_keys() -> None:
@@ -269,7 +287,8 @@ def test_tls_without_files_trusts_the_system() -> None:
 def test_the_process_lends_its_own_host_name_and_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     Path("credentials").mkdir()
     Path("credentials/mqtt-password").write_text("hunter2")
-    Path("lfs10d.yaml").write_text(SMALL)
+    # With a user name, since a password without one is an error now (contract, section 1).
+    Path("lfs10d.yaml").write_text(SMALL.replace("localhost", "localhost, username: me"))
     monkeypatch.setenv("CREDENTIALS_DIRECTORY", "credentials")
     found = load(Path("lfs10d.yaml"))
     assert found.config.mqtt.client_id == f"lfs10d-{os.uname().nodename}-line0"

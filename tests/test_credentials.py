@@ -8,7 +8,15 @@ from pathlib import Path
 import pytest
 
 from lfs10d.config import MqttConfig
-from lfs10d.credentials import UnreadableError, credential_file, password_in, readable, reason, unreadable
+from lfs10d.credentials import (
+    UnreadableError,
+    credential_file,
+    missing_in_authorities,
+    password_in,
+    readable,
+    reason,
+    unreadable,
+)
 
 
 @pytest.fixture(autouse=True)
@@ -17,7 +25,14 @@ def in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
 
 
 @pytest.mark.parametrize(
-    ("content", "password"), [("a", "a"), ("a\n", "a"), ("a b \r\nmore", "a b "), ("geh\u00e9im\n", "geh\u00e9im")]
+    ("content", "password"),
+    [
+        ("a", "a"),
+        ("a\n", "a"),
+        ("a b \r\nmore", "a b "),
+        ("\ufeffhunter2\n", "hunter2"),
+        ("geh\u00e9im\n", "geh\u00e9im"),
+    ],
 )
 def test_the_password_is_the_first_line(content: str, password: str) -> None:
     Path("pw").write_bytes(content.encode())
@@ -28,6 +43,7 @@ def test_the_password_is_the_first_line(content: str, password: str) -> None:
     ("content", "message"),
     [
         (b"", '"pw" must hold the password in its first line'),
+        (b"\xef\xbb\xbf\n", '"pw" must hold the password in its first line'),
         (b"x" * 65_536, '"pw" must hold the password in its first line'),
         (b"\xff", '"pw" is no UTF-8 text'),
         (None, '"pw" cannot be read: no such file or directory'),
@@ -91,3 +107,37 @@ def test_a_certificate_and_its_key_are_taken_but_a_passphrase_is_never_asked_for
     assert list(unreadable(MqttConfig.model_validate({"tls": tls}))) == []
     (found,) = unreadable(MqttConfig.model_validate({"tls": {**tls, "key": "locked.pem"}}))
     assert found[0] == ("mqtt", "tls", "cert")
+
+
+def test_the_longest_password_may_have_a_byte_order_mark_and_a_line_end() -> None:
+    Path("pw").write_bytes(b"\xef\xbb\xbf" + b"x" * 65_535 + b"\r\n")
+    assert len(password_in(Path("pw")).reveal()) == 65_535
+
+
+BY_MOSQUITTO_TLS = ("-new", "-x509", "-days", "2", "-extensions", "v3_ca")
+"""The authority of mosquitto-tls(7)."""
+
+
+@pytest.mark.needs("openssl")
+@pytest.mark.parametrize(
+    ("options", "missing"),
+    [
+        (BY_MOSQUITTO_TLS, ("key usage",)),
+        ((*BY_MOSQUITTO_TLS, "-addext", "keyUsage=critical,keyCertSign,cRLSign"), ()),
+        (
+            ("-new", "-x509", "-days", "2", "-extensions", "bare", "-config", "bare.cnf"),
+            ("key usage", "a subject key identifier", "critical basic constraints"),
+        ),
+    ],
+)
+def test_what_strict_clients_miss_in_an_authority_is_named(options: tuple[str, ...], missing: tuple[str, ...]) -> None:
+    Path("bare.cnf").write_text(
+        "[req]\ndistinguished_name=dn\n[dn]\n[bare]\nbasicConstraints=CA:true\nsubjectKeyIdentifier=none\n"
+    )
+    make = ["openssl", "req", *options, "-subj", "/CN=mast", "-newkey", "rsa:2048", "-noenc", "-keyout", "k"]
+    subprocess.run([*make, "-out", "ca.pem"], check=True, capture_output=True)
+    assert missing_in_authorities("ca.pem") == missing
+
+
+def test_a_file_without_authorities_misses_nothing() -> None:
+    assert missing_in_authorities("ca.pem") == ()

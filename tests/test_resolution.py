@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from lfs10d.config import Config
-from lfs10d.resolution import resolved
+from lfs10d.resolution import resolved, unfit
 
 SMALL: dict[str, Any] = {"line": {"port": "/dev/x"}, "slaves": [2, 3, 4], "mqtt": {"host": "localhost"}}
 
@@ -99,3 +99,25 @@ def test_the_host_name_stands_where_it_was_asked_for() -> None:
 )
 def test_tls_has_a_port_of_its_own(mqtt: dict[str, Any], port: int) -> None:
     assert complete(mqtt=mqtt).mqtt.port == port
+
+
+@pytest.mark.parametrize(
+    ("mqtt", "host", "wrong"),
+    [
+        ({"base_topic": "site/%H"}, "gateway", []),
+        ({"base_topic": "site/%H"}, "a+b", ["base_topic"]),
+        ({"base_topic": "%H"}, "$a", ["base_topic"]),
+        ({"base_topic": "site/%H"}, "", ["base_topic"]),
+        ({"client_id": "wind-%H"}, "a+b", []),
+        ({}, "a\tb", ["client_id"]),
+        ({"client_id": "wind"}, "a\tb", []),
+        ({"base_topic": "%H/" * 20 + "%H"}, "x" * 64, ["base_topic"]),
+    ],
+)
+def test_what_the_host_name_makes_of_a_key_must_be_allowed_as_well(
+    mqtt: dict[str, Any], host: str, wrong: list[str]
+) -> None:
+    config = Config.model_validate({**SMALL, "mqtt": mqtt})
+    found = list(unfit(config, resolved(config, stem="lfs10d", host=host)))
+    assert [path for path, _ in found] == [("mqtt", key) for key in wrong]
+    assert all("with the name of this host, and must be" in message for _, message in found)

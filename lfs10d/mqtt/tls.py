@@ -28,6 +28,10 @@ def tls_context(tls: Tls) -> ssl.SSLContext:
         context = ssl.create_default_context(cafile=tls.ca)
     except OSError as error:
         raise BrokerError(f"mqtt.tls.ca: {tls.ca}: {_words(error)}") from error
+    # From Python 3.13 on the default is RFC 5280 to the letter, which refuses authorities that 3.11 accepted, the one
+    # made by the command in mosquitto-tls(7) among them: an upgrade of the system must not lose the broker. Chain,
+    # name and dates are checked as ever; `lfs10d check` warns of such an authority.
+    context.verify_flags &= ~ssl.VERIFY_X509_STRICT
     context.sslsocket_class = _Socket
     context.minimum_version = ssl.TLSVersion.TLSv1_2
     if tls.cert is not None:

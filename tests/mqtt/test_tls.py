@@ -24,6 +24,19 @@ def test_certificate_and_name_are_checked_from_tls_1_2_on() -> None:
     assert context.minimum_version is ssl.TLSVersion.TLSv1_2
 
 
+def test_what_is_asked_of_an_authority_does_not_grow_with_python(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Python 3.13 sets X509_STRICT: the authority that 3.11 accepted must not lose the broker after an upgrade."""
+    make = ssl.create_default_context
+
+    def strict(*, cafile: str | None) -> ssl.SSLContext:
+        context = make(cafile=cafile)
+        context.verify_flags |= ssl.VERIFY_X509_STRICT
+        return context
+
+    monkeypatch.setattr(ssl, "create_default_context", strict)
+    assert not tls_context(Tls()).verify_flags & ssl.VERIFY_X509_STRICT
+
+
 def test_an_authority_and_a_certificate_of_ones_own_are_loaded(authority: Authority) -> None:
     certificate, key = authority.issue("gate")
     context = tls_context(Tls(authority.ca, certificate, key))
