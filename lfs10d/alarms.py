@@ -16,8 +16,9 @@ Each change says whether the error object must be published. Times are epoch mil
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Final, get_args
 
-from lfs10d.reading import PORT_CODES, Fault, FaultCode
+from lfs10d.reading import PORT_CODES, Fault, FaultCode, LineFaultCode
 from lfs10d.telemetry import VERSION
 
 HEARD_LIMIT = 32
@@ -25,12 +26,7 @@ HEARD_LIMIT = 32
 
 AT_ONCE = frozenset({FaultCode.CONFIG_CONFLICT})
 
-PRECEDENCE = (
-    FaultCode.PORT_LOST,
-    FaultCode.PORT_BUSY,
-    FaultCode.DUPLICATE_CLIENT,
-    FaultCode.STORAGE_FULL,
-)
+PRECEDENCE: Final[tuple[LineFaultCode, ...]] = get_args(LineFaultCode)
 """Errors of the line; what comes first is shown while several are active."""
 
 
@@ -136,18 +132,19 @@ class LineAlarm:
     def _shown(self) -> _Run | None:
         return next((self._runs[code] for code in PRECEDENCE if code in self._runs), None)
 
-    def failed(self, fault: Fault, ts: int) -> bool:
+    def failed(self, code: LineFaultCode, message: str, ts: int) -> bool:
         """Raise an error, or count it once more; return whether what is shown changed.
 
-        `fault.code` is one of PRECEDENCE. The port has one fault at a time.
+        The port has one fault at a time.
         """
         before = self._face()
-        if fault.code in PORT_CODES:
-            for code in PORT_CODES - {fault.code}:
-                self._runs.pop(code, None)
-        run = self._runs.get(fault.code)
+        fault = Fault(code, message)
+        if code in PORT_CODES:
+            for other in PORT_CODES - {code}:
+                self._runs.pop(other, None)
+        run = self._runs.get(code)
         if run is None:
-            self._runs[fault.code] = _Run(fault, ts, ts)
+            self._runs[code] = _Run(fault, ts, ts)
         else:
             run.again(fault, ts)
         return self._face() != before

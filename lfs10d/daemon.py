@@ -30,7 +30,7 @@ from lfs10d.mqtt.uplink import Uplink
 from lfs10d.physical.losing import Losing
 from lfs10d.physical.place import Physical
 from lfs10d.powers import DaemonPowers
-from lfs10d.reading import Exchanged, Fault, FaultCode, PortChanged
+from lfs10d.reading import Exchanged, FaultCode, PortChanged
 from lfs10d.recalling import Recalling
 from lfs10d.requests.table import REQUESTS
 from lfs10d.running import Running
@@ -43,9 +43,10 @@ from lfs10d.storage import Storage
 from lfs10d.store.backlog import Store
 from lfs10d.supervision import Supervision
 from lfs10d.systemd import Notifier
+from lfs10d.tasks import BackgroundTasks
 
 if TYPE_CHECKING:
-    from collections.abc import Coroutine, Iterable, Mapping
+    from collections.abc import Iterable, Mapping
     from pathlib import Path
 
     from lfs10d.boot import Boot
@@ -80,6 +81,7 @@ class Daemon:
         self._loop = asyncio.get_running_loop()
         self._over = asyncio.Event()
         self._failed = False
+        self._tasks = BackgroundTasks(on_failure=self._failed_inside)
         self._moments = Moments(lambda: self._uplink.synchronised())  # noqa: PLW0108 - built below
         self._now = self._moments.now
         self._boot = boot
@@ -189,11 +191,9 @@ class Daemon:
             len(config.slaves), config.mqtt.host, config.mqtt.port,
         )  # fmt: skip
         self._storage.look()
-        tasks = [
-            self._begin("clock", self._moments.watch()),
-            self._begin("storage", self._storage.watch()),
-            self._begin("supervision", self._supervision.run()),
-        ]
+        self._tasks.start("clock", self._moments.watch())
+        self._tasks.start("storage", self._storage.watch())
+        self._tasks.start("supervision", self._supervision.run())
         try:
             self._physical.recall()
             self._line.start()
@@ -205,8 +205,7 @@ class Daemon:
             await self._over.wait()
         finally:
             self._notifier.stopping("stopping")
-            for task in tasks:
-                task.cancel()
+            self._tasks.cancel_all()
             self._losing.stop()
             await self._physical.stop()
             await self._service.stop()
@@ -247,23 +246,15 @@ class Daemon:
 
     def _line_failed(self, error: BaseException) -> None:
         """End the daemon: its line's thread ended by a mistake."""
-        self._failed = True
         log.error("the line's thread ended", exc_info=error)
+        self._failed_inside()
+
+    def _failed_inside(self) -> None:
+        """End the daemon with exit code 1, after an internal error that is logged; its service manager restarts it."""
+        self._failed = True
         self._over.set()
 
     # -- time
-
-    def _begin(self, name: str, work: Coroutine[None, None, None]) -> asyncio.Task[None]:
-        """Have something done until the end; if it ends by a mistake, so does the daemon."""
-        task = self._loop.create_task(work, name=name)
-        task.add_done_callback(self._task_over)
-        return task
-
-    def _task_over(self, task: asyncio.Task[None]) -> None:
-        if not task.cancelled() and (error := task.exception()) is not None:
-            self._failed = True
-            log.error("the %s ended", task.get_name(), exc_info=error)
-            self._over.set()
 
     def _tick(self) -> None:
         """Publish what time alone makes known, and come back when more is due."""
@@ -321,7 +312,7 @@ class Daemon:
                 self._boot = keep(self._boot, self._state_directory, Disk())
             self._publish(self._station.line_recovered(FaultCode.STORAGE_FULL, self._now()))
         else:
-            self._publish(self._station.line_failed(Fault(FaultCode.STORAGE_FULL, trouble), self._now()))
+            self._publish(self._station.line_failed(FaultCode.STORAGE_FULL, trouble, self._now()))
 
     async def _hold(self, plan: Plan, before: Effective) -> None:
         """Put into force what holds from now on."""
@@ -351,10 +342,11 @@ class Daemon:
 
     def _told_lost(self, words: str | None) -> None:
         """Raise or clear the error of a line whose sensors all speak at another rate."""
-        code, now = FaultCode.CONFIG_CONFLICT, self._now()
-        station = self._station
-        published = station.line_recovered(code, now) if words is None else station.line_failed(Fault(code, words), now)
-        self._publish(published)
+        now = self._now()
+        if words is None:
+            self._publish(self._station.line_recovered(FaultCode.WRONG_RATE, now))
+        else:
+            self._publish(self._station.line_failed(FaultCode.WRONG_RATE, words, now))
 
     def _yield(self, conflicts: Mapping[str, str]) -> None:
         """Tell of devices that are not polled, for their slave id is another's."""
@@ -376,7 +368,7 @@ class Daemon:
             self._publish(self._station.admitting("denied" if self._uplink.requests_denied else "ok", now))
         if self._uplink.duplicate:
             message = "another client has taken our client id; give every daemon an mqtt.client_id of its own"
-            self._publish(self._station.line_failed(Fault(FaultCode.DUPLICATE_CLIENT, message), now))
+            self._publish(self._station.line_failed(FaultCode.DUPLICATE_CLIENT, message, now))
         else:
             self._publish(self._station.line_recovered(FaultCode.DUPLICATE_CLIENT, now))
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -32,6 +32,7 @@ class FaultCode(StrEnum):
     OVERRUN = "overrun"
     PORT_LOST = "port_lost"
     PORT_BUSY = "port_busy"
+    WRONG_RATE = "wrong_rate"
     CONFIG_CONFLICT = "config_conflict"
     STORAGE_FULL = "storage_full"
     DUPLICATE_CLIENT = "duplicate_client"
@@ -42,6 +43,15 @@ ALIVE_CODES = frozenset({FaultCode.EXCEPTION, FaultCode.OUT_OF_RANGE, FaultCode.
 
 PORT_CODES = frozenset({FaultCode.PORT_LOST, FaultCode.PORT_BUSY})
 """Faults of the port, not of the device."""
+
+LineFaultCode: TypeAlias = Literal[
+    FaultCode.PORT_LOST,
+    FaultCode.PORT_BUSY,
+    FaultCode.WRONG_RATE,
+    FaultCode.DUPLICATE_CLIENT,
+    FaultCode.STORAGE_FULL,
+]
+"""What can be an error of the line; while several are active the first of these is shown."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ import signal
 from typing import TYPE_CHECKING
 
 from lfs10d.errors import ConfigError
+from lfs10d.tasks import BackgroundTasks
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable
@@ -37,6 +38,7 @@ class Signals:
         self._summary = summary
         self._ready = False
         self._loop = asyncio.get_running_loop()
+        self._tasks = BackgroundTasks()
 
     def obey(self) -> None:
         """Do from now on what signals say."""
@@ -52,12 +54,9 @@ class Signals:
 
     def _hang_up(self) -> None:
         self._notifier.reloading()
-        task = self._loop.create_task(self._reload_and_tell(), name="reload")
-        task.add_done_callback(self._reloaded)
+        self._tasks.start("reload", self._reload_and_tell(), self._reloaded)
 
-    def _reloaded(self, task: asyncio.Task[None]) -> None:
-        if not task.cancelled() and (mistake := task.exception()) is not None:
-            log.error("the reload failed by a mistake of ours", exc_info=mistake)
+    def _reloaded(self, _: asyncio.Task[None]) -> None:
         if self._ready:
             self._notifier.ready(self._summary())
 

@@ -44,6 +44,8 @@ from lfs10d.telemetry import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from lfs10d.reading import LineFaultCode
+
 __all__ = ["PAUSED", "POLLING", "DaemonFacts", "DeviceFacts", "Instant", "LineFacts", "Requests", "Station"]
 
 STATS_EVERY: Final = 30.0
@@ -217,14 +219,14 @@ class Station:
             published.append(self._line_state())
         return published
 
-    def line_failed(self, fault: Fault, now: Instant) -> list[Publication]:
-        """Raise an error of the line that is not the port's: `storage_full`, `duplicate_client`."""
+    def line_failed(self, code: LineFaultCode, message: str, now: Instant) -> list[Publication]:
+        """Raise an error of the line that is not the port's: `wrong_rate`, `storage_full`, `duplicate_client`."""
         published = self._watch_clock(now)
-        if self._alarm.failed(fault, now.ts()):
+        if self._alarm.failed(code, message, now.ts()):
             published.append(self._line_error())
         return published
 
-    def line_recovered(self, code: FaultCode, now: Instant) -> list[Publication]:
+    def line_recovered(self, code: LineFaultCode, now: Instant) -> list[Publication]:
         """Clear such an error; nothing happens if it is not raised."""
         return self._watch_clock(now) + self._line_ended(frozenset({code}), now)
 
@@ -288,7 +290,8 @@ class Station:
             return published + self._line_ended(PORT_CODES, now)
         if self._activity != PAUSED:
             self._tally.lost(fault.code)
-            if self._alarm.failed(fault, ts):
+            code: LineFaultCode = FaultCode.PORT_BUSY if fault.code is FaultCode.PORT_BUSY else FaultCode.PORT_LOST
+            if self._alarm.failed(code, fault.message, ts):
                 published.append(self._line_error())
         return published + self._mask(now)
 

@@ -42,7 +42,6 @@ THIRD = replace(ONE_VALUE, name="c", slave=4)
 TIMEOUT = Fault(FaultCode.TIMEOUT, "no answer in 200 ms")
 LOST = Fault(FaultCode.PORT_LOST, "absent: plug it in")
 LOCKED = Fault(FaultCode.PORT_BUSY, "locked by minicom")
-FULL = Fault(FaultCode.STORAGE_FULL, "disk full")
 
 LINE_TOPICS = {"info", "devices", "line/state", "line/error", "line/stats"}
 

@@ -6,16 +6,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.alarms import DeviceAlarm, LineAlarm
-from lfs10d.reading import PORT_CODES, Fault, FaultCode
+from lfs10d.alarms import PRECEDENCE, DeviceAlarm, LineAlarm
+from lfs10d.reading import PORT_CODES, Fault, FaultCode, LineFaultCode
 
 TIMEOUT = Fault(FaultCode.TIMEOUT, "no answer in 200 ms")
 CRC = Fault(FaultCode.CRC, "check wrong", heard=bytes(range(40)))
 REFUSED = Fault(FaultCode.EXCEPTION, "illegal register address", exception_code=2, heard=b"\x01\x83\x02\xc0\xf1")
-LOST = Fault(FaultCode.PORT_LOST, "absent")
-BUSY = Fault(FaultCode.PORT_BUSY, "locked by minicom")
-FULL = Fault(FaultCode.STORAGE_FULL, "disk full")
-TAKEN = Fault(FaultCode.DUPLICATE_CLIENT, "another client has our id")
+LOST: tuple[LineFaultCode, str] = FaultCode.PORT_LOST, "absent"
+BUSY: tuple[LineFaultCode, str] = FaultCode.PORT_BUSY, "locked by minicom"
+WRONG: tuple[LineFaultCode, str] = FaultCode.WRONG_RATE, "3 of 3 at 19200 baud"
+FULL: tuple[LineFaultCode, str] = FaultCode.STORAGE_FULL, "disk full"
+TAKEN: tuple[LineFaultCode, str] = FaultCode.DUPLICATE_CLIENT, "another client has our id"
 
 FINE = {"v": 1, "active": False, "code": None, "last_code": None, "cleared": None}
 
@@ -120,7 +121,7 @@ def test_an_error_is_active_exactly_after_so_many_failures_in_a_row(rise_after: 
 def test_an_error_of_the_line_rises_at_once() -> None:
     alarm = LineAlarm()
     assert alarm.payload() == FINE
-    assert alarm.failed(LOST, 100) is True
+    assert alarm.failed(*LOST, 100) is True
     assert (alarm.payload()["code"], alarm.payload()["message"], alarm.payload()["also"]) == (
         "port_lost",
         "absent",
@@ -130,39 +131,39 @@ def test_an_error_of_the_line_rises_at_once() -> None:
 
 def test_the_same_error_of_the_line_again_is_counted_but_not_published() -> None:
     alarm = LineAlarm()
-    alarm.failed(LOST, 100)
-    assert alarm.failed(LOST, 300) is False
+    alarm.failed(*LOST, 100)
+    assert alarm.failed(*LOST, 300) is False
     payload = alarm.payload()
     assert (payload["since"], payload["last"], payload["count"]) == (100, 300, 2)
 
 
 def test_another_reason_for_the_same_loss_is_published() -> None:
     alarm = LineAlarm()
-    alarm.failed(LOST, 100)
-    assert alarm.failed(Fault(FaultCode.PORT_LOST, "permission denied"), 200) is True
+    alarm.failed(*LOST, 100)
+    assert alarm.failed(FaultCode.PORT_LOST, "permission denied", 200) is True
     assert alarm.payload()["message"] == "permission denied"
 
 
 def test_the_port_has_one_fault_at_a_time() -> None:
     alarm = LineAlarm()
-    alarm.failed(LOST, 100)
-    assert alarm.failed(BUSY, 200) is True
+    alarm.failed(*LOST, 100)
+    assert alarm.failed(*BUSY, 200) is True
     assert (alarm.payload()["code"], alarm.payload()["also"]) == ("port_busy", [])
 
 
-@pytest.mark.parametrize("order", [(FULL, TAKEN, LOST), (LOST, TAKEN, FULL)])
-def test_of_several_errors_of_the_line_the_port_s_is_shown(order: tuple[Fault, ...]) -> None:
+@pytest.mark.parametrize("order", [(FULL, TAKEN, WRONG, LOST), (LOST, TAKEN, FULL, WRONG)])
+def test_of_several_errors_of_the_line_the_port_s_is_shown(order: tuple[tuple[LineFaultCode, str], ...]) -> None:
     alarm = LineAlarm()
     for fault in order:
-        alarm.failed(fault, 100)
+        alarm.failed(*fault, 100)
     payload = alarm.payload()
-    assert (payload["code"], payload["also"]) == ("port_lost", ["duplicate_client", "storage_full"])
+    assert (payload["code"], payload["also"]) == ("port_lost", ["wrong_rate", "duplicate_client", "storage_full"])
 
 
 def test_when_the_foremost_error_ends_the_next_is_shown() -> None:
     alarm = LineAlarm()
-    alarm.failed(FULL, 100)
-    alarm.failed(LOST, 200)
+    alarm.failed(*FULL, 100)
+    alarm.failed(*LOST, 200)
     assert alarm.ended(PORT_CODES, 300) is True
     assert alarm.payload()["code"] == "storage_full"
     assert alarm.ended(frozenset({FaultCode.STORAGE_FULL}), 400) is True
@@ -171,8 +172,8 @@ def test_when_the_foremost_error_ends_the_next_is_shown() -> None:
 
 def test_an_error_that_hides_behind_another_ends_unseen() -> None:
     alarm = LineAlarm()
-    alarm.failed(FULL, 100)
-    alarm.failed(LOST, 200)
+    alarm.failed(*FULL, 100)
+    alarm.failed(*LOST, 200)
     assert alarm.ended(frozenset({FaultCode.STORAGE_FULL}), 300) is False
     assert (alarm.payload()["code"], alarm.payload()["also"]) == ("port_lost", [])
 
@@ -189,7 +190,7 @@ def test_an_error_that_rises_with_its_first_failure_has_happened_once_and_just_n
     payload = alarm.payload()
     assert (payload["since"], payload["last"], payload["count"]) == (100, 100, 1)
     line = LineAlarm()
-    line.failed(LOST, 100)
+    line.failed(*LOST, 100)
     payload = line.payload()
     assert (payload["since"], payload["last"], payload["count"]) == (100, 100, 1)
 
@@ -203,3 +204,12 @@ def test_an_alarm_is_active_from_its_rise_to_its_end() -> None:
     states.append(alarm.active)
     assert [state is True for state in states] == [False, True, False]
     assert None not in states
+
+
+@pytest.mark.parametrize("code", PRECEDENCE)
+def test_every_error_of_the_line_is_shown_when_it_rises_and_gone_when_it_ends(code: LineFaultCode) -> None:
+    alarm = LineAlarm()
+    assert alarm.failed(code, "so it is", 100) is True
+    assert (alarm.payload()["active"], alarm.payload()["code"], alarm.payload()["message"]) == (True, code, "so it is")
+    assert alarm.ended(frozenset({code}), 200) is True
+    assert alarm.payload() == {**FINE, "last_code": code, "cleared": 200}

@@ -11,7 +11,7 @@ from lfs10d.reading import ALIVE_CODES, PORT_CODES, Fault, FaultCode
 
 CODES = (
     "timeout crc malformed wrong_slave wrong_function exception out_of_range not_finite late collision disabled "
-    "overrun port_lost port_busy config_conflict storage_full duplicate_client"
+    "overrun port_lost port_busy wrong_rate config_conflict storage_full duplicate_client"
 )
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from lfs10d.outbound import check
 from lfs10d.reading import Errand, Exchanged, Fault, FaultCode, PortChanged, Reading
 from lfs10d.station import DeviceFacts, Instant, Station
-from tests.stations import DAEMON, FULL, LINE, LOCKED, LOST, ONE_VALUE, THIRD, TWO_VALUES, fields, good, instant
+from tests.stations import DAEMON, LINE, LOCKED, LOST, ONE_VALUE, THIRD, TWO_VALUES, fields, good, instant
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -63,7 +63,7 @@ steps = st.one_of(
 WORDS: dict[str, Callable[[Station, Instant], list[Publication]]] = {
     "tick": Station.tick,
     "burst": Station.burst,
-    "full": lambda running, now: running.line_failed(FULL, now),
+    "full": lambda running, now: running.line_failed(FaultCode.STORAGE_FULL, "disk full", now),
     "empty": lambda running, now: running.line_recovered(FaultCode.STORAGE_FULL, now),
 }
 

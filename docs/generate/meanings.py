@@ -19,6 +19,7 @@ FAULT_CODES: Final = {
     "overrun": "A poll was not made in time: the line is full. Counted only, in the statistics.",
     "port_lost": "The serial port is absent, denied or hung up.",
     "port_busy": "Another program has locked the serial port.",
+    "wrong_rate": "No sensor answers at the line's rate, but some do at another: the message says at which.",
     "config_conflict": "Two devices would have one id: this one waits, and no value is published under its name.",
     "storage_full": "The state directory cannot be written. Measuring goes on.",
     "duplicate_client": "Another client at the broker uses our client id.",

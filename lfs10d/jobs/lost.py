@@ -6,6 +6,7 @@ It says what was found and uses nothing of it: a line that speaks at the wrong r
 
 from __future__ import annotations
 
+from collections import Counter
 from math import inf
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -62,11 +63,20 @@ def seek(devices: Callable[[], Iterable[Device]], clock: Now, line_rate: int) ->
                 yield Aside(dict(found))
 
 
-def in_words(found: Found, line_rate: int, polled: int) -> str:
-    """Return what a person should know of it."""
-    rates = sorted(set(found.values()))
-    at = " and ".join(
-        f"{sum(each == rate for each in found.values())} of {polled} sensors at {rate} baud" for rate in rates
-    )
-    names = ", ".join(sorted(found))
-    return f"nobody answers at {line_rate} baud, but {at} ({names}); set line.baudrate, or move them by line/baudrate"
+def in_words(found: Found, line_rate: int, polled: int, *, filed: int) -> str:
+    """Return the message for a person: what was found, and what to do.
+
+    `filed` is `line.baudrate` of the file; it differs from the `line_rate` where line/baudrate has moved the line.
+    """
+    counts = Counter(found.values())
+    at = " and ".join(f"{counts[rate]} of {polled} at {rate}" for rate in sorted(counts))
+    what = f"no sensor answers at {line_rate} baud, but {at} baud do ({', '.join(sorted(found))})"
+    best = max(sorted(counts), key=counts.__getitem__)
+    if best == filed:
+        # The file's rate counts only once a person edits it: the move was recorded beside what the file says.
+        advice = f"set line.baudrate to {line_rate} and reload, then to {best} and reload"
+    else:
+        advice = f"set line.baudrate to {best}"
+    if len(counts) == 1:
+        return f"{what}; {advice}; then line/baudrate can move them"
+    return f"{what}; leave only those of one rate on the line; for {best}: {advice}; then line/baudrate can move them"

@@ -16,6 +16,7 @@ from lfs10d.jobs.readdress import Ending, Verdict, Wish
 from lfs10d.journal import Spot
 from lfs10d.physical import adoption
 from lfs10d.reading import Errand
+from lfs10d.tasks import BackgroundTasks
 
 if TYPE_CHECKING:
     from lfs10d.journal import Move, OpenChange, Told
@@ -39,6 +40,7 @@ class Following:
         self._physical = physical
         self._moves = moves
         self._rates = rates
+        self._tasks = BackgroundTasks()
         self._followed: dict[int, tuple[Talk, asyncio.Task[None]]] = {}
 
     def begin(self, busy: frozenset[int]) -> None:
@@ -49,15 +51,14 @@ class Following:
                 continue  # it ends with the newest
             if change.number not in self._followed and not change.slaves & busy:
                 talk = self._physical.talk()
-                task = asyncio.create_task(self._follow(change, talk), name=f"follow {change.number}")
-                task.add_done_callback(partial(self._left, change.number))
+                task = self._tasks.start(
+                    f"follow {change.number}", self._follow(change, talk), partial(self._left, change.number)
+                )
                 self._followed[change.number] = talk, task
 
     def _left(self, number: int, task: asyncio.Task[None]) -> None:
         if self._followed.get(number, (None, None))[1] is task:
             del self._followed[number]
-        if not task.cancelled() and (mistake := task.exception()) is not None:
-            log.error("an open change could not be followed, by a mistake of ours", exc_info=mistake)
 
     def leave(self, changes: frozenset[int]) -> None:
         """Stop looking for the sensors of these changes: more is to be written to them."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
 from dataclasses import replace
 from functools import partial
@@ -13,8 +12,10 @@ from lfs10d.jobs.course import Now, Over
 from lfs10d.jobs.locate import locate
 from lfs10d.journal import Spot
 from lfs10d.reading import Errand
+from lfs10d.tasks import BackgroundTasks
 
 if TYPE_CHECKING:
+    import asyncio
     from collections.abc import Callable, Mapping
 
     from lfs10d.effective import Effective
@@ -32,7 +33,8 @@ class Locating:
         self._repoll = repoll
         self._asked: dict[str, tuple[Place, ...]] = {}
         """Devices that answered nowhere when they were asked, with where that was."""
-        self._tasks: dict[str, tuple[tuple[Place, ...], Talk, asyncio.Task[None]]] = {}
+        self._tasks = BackgroundTasks()
+        self._searches: dict[str, tuple[tuple[Place, ...], Talk, asyncio.Task[None]]] = {}
 
     def contested(self) -> dict[str, tuple[Place, ...]]:
         """Return the devices that may be at one of several places; less the id that another one was verified at."""
@@ -56,11 +58,11 @@ class Locating:
             return
         contested = self.contested()
         turn = in_turn({name: places for name, places in contested.items() if self._asked.get(name) != places})
-        for name, (places, _, _) in tuple(self._tasks.items()):
+        for name, (places, _, _) in tuple(self._searches.items()):
             if contested.get(name) != places:
                 self._end(name)
         for name, places in contested.items():
-            if name in self._tasks or (name not in turn and self._asked.get(name) != places):
+            if name in self._searches or (name not in turn and self._asked.get(name) != places):
                 continue
             now = self._physical.running()
             slave = now.slave(name)
@@ -70,26 +72,23 @@ class Locating:
                 self._asked[name] = places
                 continue
             talk = self._physical.talk()
-            task = asyncio.create_task(self._locate(name, places, talk), name=f"locate {name}")
-            task.add_done_callback(partial(self._over, name))
-            self._tasks[name] = places, talk, task
+            task = self._tasks.start(f"locate {name}", self._locate(name, places, talk), partial(self._over, name))
+            self._searches[name] = places, talk, task
 
     def stop(self) -> None:
         """Ask no more."""
-        for name in tuple(self._tasks):
+        for name in tuple(self._searches):
             self._end(name)
 
     def _end(self, name: str) -> None:
-        _, talk, task = self._tasks.pop(name)
+        _, talk, task = self._searches.pop(name)
         talk.halt()
         talk.go_on()
         task.cancel()
 
     def _over(self, name: str, task: asyncio.Task[None]) -> None:
-        if name in self._tasks and self._tasks[name][-1] is task:
-            del self._tasks[name]
-        if not task.cancelled() and (mistake := task.exception()) is not None:
-            log.error("a device could not be looked for, by a mistake of ours", exc_info=mistake)
+        if name in self._searches and self._searches[name][-1] is task:
+            del self._searches[name]
 
     async def _locate(self, name: str, places: tuple[Place, ...], talk: Talk) -> None:
         physical = self._physical
@@ -128,7 +127,7 @@ class Locating:
                 changes = replace(changes, baudrate=None if spot.baudrate == filed else Rate(filed, spot.baudrate))
             return changes
 
-        self._tasks.pop(name, None)  # it is found: another configuration ends no search any more
+        self._searches.pop(name, None)  # it is found: another configuration ends no search any more
         await self._physical.learn(edit)
         self._tell(name, known, spot)
         self._repoll()

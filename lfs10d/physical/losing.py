@@ -1,16 +1,17 @@
-"""The line's error while all its sensors are lost: at which other rate they were found. Used in the asyncio loop."""
+"""Raises `wrong_rate` while no sensor answers at the line's rate but some do at another. Used in the asyncio loop."""
 
 from __future__ import annotations
 
-import asyncio
 import logging
 from typing import TYPE_CHECKING
 
 from lfs10d.jobs.course import Now, Over
 from lfs10d.jobs.lost import in_words, seek
 from lfs10d.reading import Errand
+from lfs10d.tasks import BackgroundTasks
 
 if TYPE_CHECKING:
+    import asyncio
     from collections.abc import Callable, Iterable
 
     from lfs10d.effective import Effective
@@ -35,6 +36,7 @@ class Losing:
         self._talk = talk
         self._devices = devices
         self._tell = tell
+        self._tasks = BackgroundTasks()
         self._told: str | None = None
         self._task: tuple[int, Talk, asyncio.Task[None]] | None = None
 
@@ -45,7 +47,7 @@ class Losing:
             return
         self.stop()
         talk = self._talk()
-        self._task = rate, talk, asyncio.create_task(self._look_out(rate, talk), name="lost sensors")
+        self._task = rate, talk, self._tasks.start("rate watch", self._look_out(rate, talk))
         self._say(None)
 
     def stop(self) -> None:
@@ -62,8 +64,9 @@ class Losing:
         talk.begin(seek(self._devices, clock, rate), clock, line_rate=rate, share=1.0, errand=Errand.PROBE)
         while not isinstance(found := await talk.wanted(), Over):
             if isinstance(found, dict):
-                polled = sum(slave.enabled for slave in self._running().config.slaves)
-                self._say(in_words(found, rate, polled) if found else None)
+                now = self._running()
+                polled = sum(slave.enabled for slave in now.config.slaves)
+                self._say(in_words(found, rate, polled, filed=now.said.baudrate) if found else None)
             talk.go_on()
 
     def _say(self, words: str | None) -> None:

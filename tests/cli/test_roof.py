@@ -15,6 +15,7 @@ OF_AN_EXCHANGE = [
     | {
         FaultCode.DISABLED,
         FaultCode.OVERRUN,
+        FaultCode.WRONG_RATE,
         FaultCode.CONFIG_CONFLICT,
         FaultCode.STORAGE_FULL,
         FaultCode.DUPLICATE_CLIENT,

@@ -275,6 +275,7 @@ class Site:
             assert "Traceback" not in run.log
             assert "fault of lfs10d itself" not in run.log
             assert "by a mistake" not in run.log
+            assert "internal error" not in run.log
 
 
 @pytest.fixture

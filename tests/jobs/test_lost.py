@@ -103,7 +103,23 @@ def test_a_device_whose_profile_knows_no_other_rate_is_not_asked(pretence: Prete
 
 
 def test_a_person_is_told_how_many_answer_at_which_rate_and_what_to_do() -> None:
-    assert in_words({"s4": 19200, "s3": 19200, "s5": 4800}, 9600, 8) == (
-        "nobody answers at 9600 baud, but 1 of 8 sensors at 4800 baud and 2 of 8 sensors at 19200 baud (s3, s4, s5); "
-        "set line.baudrate, or move them by line/baudrate"
+    assert in_words({"s4": 19200, "s3": 19200}, 9600, 8, filed=9600) == (
+        "no sensor answers at 9600 baud, but 2 of 8 at 19200 baud do (s3, s4); "
+        "set line.baudrate to 19200; then line/baudrate can move them"
+    )
+
+
+def test_sensors_at_two_rates_are_to_be_moved_one_rate_at_a_time() -> None:
+    assert in_words({"s4": 19200, "s3": 19200, "s5": 4800}, 9600, 8, filed=9600) == (
+        "no sensor answers at 9600 baud, but 1 of 8 at 4800 and 2 of 8 at 19200 baud do (s3, s4, s5); "
+        "leave only those of one rate on the line; for 19200: set line.baudrate to 19200; "
+        "then line/baudrate can move them"
+    )
+
+
+def test_where_a_request_has_moved_the_line_away_from_the_file_s_rate_the_file_must_be_edited_twice() -> None:
+    """The same value once more in the file is no edit; see `lfs10d.threeway`."""
+    assert in_words({"s3": 9600}, 19200, 1, filed=9600) == (
+        "no sensor answers at 19200 baud, but 1 of 1 at 9600 baud do (s3); "
+        "set line.baudrate to 19200 and reload, then to 9600 and reload; then line/baudrate can move them"
     )

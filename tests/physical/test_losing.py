@@ -38,8 +38,8 @@ def test_sensors_at_the_other_rate_are_told_after_half_a_minute_and_cleared_when
     assert told == []
     bench.go(life, 15.0)
     assert told[-1] == (
-        "nobody answers at 9600 baud, but 2 of 2 sensors at 19200 baud (s3, s4); "
-        "set line.baudrate, or move them by line/baudrate"
+        "no sensor answers at 9600 baud, but 2 of 2 at 19200 baud do (s3, s4); "
+        "set line.baudrate to 19200; then line/baudrate can move them"
     )
     for sensor in bench.line.sensors:
         sensor.format = replace(sensor.format, baudrate=9600)
