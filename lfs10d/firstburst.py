@@ -1,13 +1,16 @@
 """The first burst of a boot says that nothing is known of any device, whatever was measured meanwhile. Pure.
 
 A broker may retain what the daemon said in an earlier life; a subscriber must see it taken back before anything new.
-Until that burst is settled, newer states are held back; then they follow at once.
+Until that burst is settled, newer states are held back; then they follow at once. Every device's state in it has the
+error `starting`, a disabled one's too: whatever was retained before, a restart is no alarm.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from lfs10d.reading import FaultCode
 from lfs10d.telemetry import AVAILABILITY, ERROR, STATE, device_of
 
 if TYPE_CHECKING:
@@ -22,7 +25,7 @@ class FirstBurst:
     """`publications` are a burst from before the first reading."""
 
     def __init__(self, publications: Iterable[Publication]) -> None:
-        self._unknown = {each.topic: each for each in publications if _held(each)}
+        self._unknown = {each.topic: _starting(each) for each in publications if _held(each)}
         self.settled = False
 
     def burst(self, publications: Iterable[Publication]) -> list[Publication]:
@@ -47,3 +50,11 @@ class FirstBurst:
 
 def _held(publication: Publication) -> bool:
     return publication.sample is None and any(device_of(publication.topic, leaf) for leaf in _LEAVES)
+
+
+def _starting(publication: Publication) -> Publication:
+    """Return a state with the error `starting`, anything else as it is."""
+    payload = publication.payload
+    if device_of(publication.topic, STATE) is None or not isinstance(payload, dict):
+        return publication
+    return replace(publication, payload={**payload, "error": FaultCode.STARTING.value})

@@ -28,6 +28,7 @@ class FaultCode(StrEnum):
     NOT_FINITE = "not_finite"
     LATE = "late"
     COLLISION = "collision"
+    STARTING = "starting"
     DISABLED = "disabled"
     OVERRUN = "overrun"
     PORT_LOST = "port_lost"

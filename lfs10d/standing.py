@@ -7,7 +7,9 @@ Rules
 2. A number is published only with a good reading, and availability is `online` while one is shown: it goes
    before a good state and after a bad one.
 3. The state shows the newest sample at most once a second, but a change of quality or error at once.
-4. A disabled device has one sample that says so, and then none but those of polls that a request wants; of these
+4. Before its first sample a device's state has no value and the error `starting` (a disabled one `disabled`), which
+   is never in its error topic.
+5. A disabled device has one sample that says so, and then none but those of polls that a request wants; of these
    nothing else is shown.
 """
 
@@ -79,7 +81,8 @@ class Standing:
         self.tally = DeviceTally(facts.response_timeout)
         self._last_good: float | None = None
         self._state_from = now.mono
-        self._sample = self._form(0, now.ts(), now)
+        code = FaultCode.STARTING if facts.enabled else FaultCode.DISABLED
+        self._sample = replace(self._form(0, now.ts(), now), error=code.value)
         self._payload = self._sample.payload(line)
 
     def read(self, reading: Reading, now: Instant, *, masked: bool) -> list[Publication]:

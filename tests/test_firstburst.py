@@ -21,10 +21,21 @@ KNOWN = [
 ]
 
 
+STARTING = retained("device/mast/state", {"seq": 0, "error": "starting"})
+
+
 def test_it_says_of_the_devices_what_was_known_before_the_first_reading() -> None:
     first = FirstBurst(UNKNOWN)
 
-    assert first.burst(KNOWN) == [KNOWN[0], *UNKNOWN[1:]]
+    assert first.burst(KNOWN) == [KNOWN[0], STARTING, *UNKNOWN[2:]]
+
+
+def test_a_disabled_device_is_starting_in_it_and_disabled_right_after() -> None:
+    disabled = retained("device/mast/state", {"seq": 0, "error": "disabled"})
+    first = FirstBurst([disabled, *UNKNOWN[2:]])
+
+    assert first.burst([disabled]) == [STARTING]
+    assert first.settle([disabled]) == [disabled]
 
 
 def test_what_is_known_by_then_follows_once_it_is_settled() -> None:

@@ -71,8 +71,17 @@ def fields(payload: object, *keys: str) -> tuple[object, ...]:
 def test_a_device_is_offline_and_without_a_value_until_its_first_answer() -> None:
     shown = Watched().shown
     assert shown["availability"] == "offline"
-    assert fields(shown["state"], "wind_speed", "quality", "error", "seq") == (None, "bad", None, 0)
-    assert fields(shown["error"], "active", "last_code") == (False, None)
+    # The contract's new word: `starting` in the state, and in no error topic.
+    assert fields(shown["state"], "wind_speed", "quality", "error", "seq") == (None, "bad", "starting", 0)
+    assert fields(shown["error"], "active", "code", "last_code") == (False, None, None)
+
+
+def test_a_device_disabled_from_the_start_says_so_and_has_no_sample() -> None:
+    standing = Standing(replace(FACTS, enabled=False), line="line0", boot="k3f9a2c7", seq=0, now=instant(0))
+    state, _, availability, error, _ = standing.burst(instant(1.0))
+    assert fields(state.payload, "wind_speed", "quality", "error", "seq") == (None, "bad", "disabled", 0)
+    assert availability.payload == "offline"
+    assert fields(error.payload, "active", "last_code") == (False, None)
 
 
 def test_the_first_answer_is_available_first_and_shown_at_once() -> None:

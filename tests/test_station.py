@@ -67,13 +67,13 @@ def test_retention_and_quality_of_service_are_the_contract_s() -> None:
             assert (each.retain, each.qos) == (row.retain, row.qos), each.topic
 
 
-def test_in_the_first_burst_of_a_boot_no_device_has_a_value_a_number_or_a_fault() -> None:
+def test_in_the_first_burst_of_a_boot_every_device_is_starting_without_a_value_or_a_number() -> None:
     fresh = station()
     assert fields(shown(fresh, "device/b/state"), "output_current", "speed", "quality", "error", "seq") == (
         None,
         None,
         "bad",
-        None,
+        "starting",
         0,
     )
     assert shown(fresh, "device/b/availability") == "offline"
@@ -336,7 +336,7 @@ def test_an_added_device_is_announced_with_all_its_topics() -> None:
     ]
     assert fields(published[0].payload, "type", "device", "slave") == ("device_added", "c", 4)
     assert published[0].kind is Kind.EVENT
-    assert fields(published[1].payload, "quality", "seq", "error") == ("bad", 0, None)
+    assert fields(published[1].payload, "quality", "seq", "error") == ("bad", 0, "starting")
 
 
 def test_of_a_removed_device_every_topic_is_cleared() -> None:

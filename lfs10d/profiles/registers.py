@@ -29,11 +29,17 @@ FLOAT32_DIGITS = 6
 """Decimal digits that every normal float32 can hold (FLT_DIG); 9 always read back (FLT_DECIMAL_DIG)."""
 
 _MOST_FLOAT32_DIGITS = 9
+SMALLEST_FLOAT32 = 1e-6
+"""A float32 other than zero with a smaller magnitude is no measurement: integers read as floats look so."""
+
 _EXPONENT = 0x7F80_0000
 _MANTISSA = 0x007F_FFFF
+_SIGN = 0x8000_0000
 
 _WORD = struct.Struct(">I")
 _FLOAT32 = struct.Struct(">f")
+_SMALLEST: int = _WORD.unpack(_FLOAT32.pack(SMALLEST_FLOAT32))[0]
+"""Bits of the float32 nearest to it; magnitudes order as their bits do."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,15 +138,15 @@ class Cell:
     high: Number | None
 
     def decode(self, registers: tuple[int, ...]) -> Number | Fault:
-        """Return the number, or why there is none: `not_finite`, or `out_of_range` (subnormal too)."""
+        """Return the number, or why there is none: `not_finite`, or `out_of_range` (a tiny float32 too)."""
         bits = self._bits(registers)
         kind = self.type
         number: Number
         if kind == "float32":
             if bits & _EXPONENT == _EXPONENT:
                 return self._not_finite(bits)
-            if not bits & _EXPONENT and bits & _MANTISSA:
-                return self._subnormal(bits)
+            if bits & ~_SIGN and bits & ~_SIGN < _SMALLEST:
+                return self._tiny(bits)
             number = shortest(bits)
             if not self.linear.plain:
                 number = self.linear.of_decimal(number)
@@ -170,8 +176,12 @@ class Cell:
         what = "not a number (NaN)" if isnan(number) else "infinite"
         return Fault(FaultCode.NOT_FINITE, f"{self.name} is {what}: 0x{bits:08X}")
 
-    def _subnormal(self, bits: int) -> Fault:
-        message = f"{self.name} is a subnormal number, 0x{bits:08X}: no measurement, or another type or word order"
+    def _tiny(self, bits: int) -> Fault:
+        (number,) = _FLOAT32.unpack(_WORD.pack(bits))
+        message = (
+            f"{self.name} {number:.3g} (0x{bits:08X}) is smaller than any sensor measures: is the register an integer, "
+            "or the word order another? Look at the device's profile"
+        )
         return Fault(FaultCode.OUT_OF_RANGE, message)
 
     def _outside(self, number: Number) -> Fault:

@@ -50,9 +50,10 @@ def test_the_first_burst_says_that_nothing_is_known_and_ends_with_online(site: S
     for name in ("slave-1", "mast-top"):
         state = view.history_of(f"device/{name}/state")[0]
         assert set(state) == SAMPLE
-        assert (state["seq"], state["wind_speed"], state["quality"], state["error"]) == (0, None, "bad", None)
+        assert (state["seq"], state["wind_speed"], state["quality"], state["error"]) == (0, None, "bad", "starting")
         assert view.history_of(f"device/{name}/availability")[0] == "offline"
         assert view.history_of(f"device/{name}/error")[0]["active"] is False
+        assert view.history_of(f"device/{name}/error")[0]["last_code"] is None
 
 
 def test_samples_follow_without_a_gap_each_as_the_sensor_sent_it(site: Site, view: View) -> None:
@@ -103,7 +104,9 @@ def test_what_was_retained_in_an_earlier_life_is_taken_back_before_anything_new(
     view.wait("device/slave-1/state", good)
 
     states = view.history_of("device/slave-1/state")
-    assert (states[0]["seq"], states[0]["quality"]) == (0, "bad")
+    assert (states[0]["seq"], states[0]["quality"], states[0]["error"]) == (0, "bad", "starting")
+    assert not any(state["error"] == "starting" for state in states[1:])
+    assert not any(error["active"] for error in view.history_of("device/slave-1/error"))
     assert view.history_of("device/slave-1/availability")[:2] == ["offline", "online"]
     boots = [view.newest("info")[key] for key in ("previous_boot", "boot")]
     assert boots == sorted(boots)

@@ -149,10 +149,11 @@ def by_hand(value: Value, memory: bytes) -> Fraction | None:
     if value.type != "float32":
         raw = Fraction(int.from_bytes(straight, "big", signed=value.type.startswith("i")))
     else:
-        exponent = int.from_bytes(straight, "big") >> 23 & 0xFF
-        if exponent == 0xFF or (exponent == 0 and straight[0] & 0x7F | straight[1] | straight[2] | straight[3]):
+        if int.from_bytes(straight, "big") >> 23 & 0xFF == 0xFF:
             return None
         raw = Fraction(struct.unpack(">f", straight)[0])
+        if 0 < abs(raw) < Fraction(struct.unpack(">f", struct.pack(">f", 1e-6))[0]):
+            return None
     return raw * Fraction(repr(value.scale)) + Fraction(repr(value.offset))
 
 

@@ -24,6 +24,13 @@ WIRE_ORDER: dict[tuple[WordOrder, ByteOrder], str] = {
     ("low_first", "big"): "CDAB",
     ("low_first", "little"): "DCBA",
 }
+FIRST_MEASURABLE = 0x3586_37BD
+"""Bits of the float32 nearest to 1e-6, the smallest magnitude that is a measurement."""
+_MAGNITUDES = st.one_of(st.just(0), st.integers(FIRST_MEASURABLE, 0x7F7F_FFFF))
+MEASURABLE = st.builds(
+    lambda bits, sign: struct.unpack(">f", struct.pack(">I", bits | sign << 31))[0], _MAGNITUDES, st.integers(0, 1)
+)
+
 LAYOUTS = [
     (kind, word_order, byte_order)
     for kind, (word_order, byte_order) in product(FORMATS, WIRE_ORDER)
@@ -125,7 +132,7 @@ def test_every_layout_reads_what_an_independent_decoder_laid_out(
 ) -> None:
     bits = 16 * WORDS[kind]
     if kind == "float32":
-        number: float = data.draw(st.floats(width=32, allow_nan=False, allow_infinity=False, allow_subnormal=False))
+        number: float = data.draw(MEASURABLE)
     elif kind.startswith("u"):
         number = data.draw(st.integers(0, 2**bits - 1))
     else:
@@ -189,16 +196,32 @@ def test_what_is_no_finite_number_is_a_fault(bits: int, message: str) -> None:
     assert fault == Fault(FaultCode.NOT_FINITE, message)
 
 
-@given(mantissa=st.integers(1, 0x7F_FFFF), sign=st.sampled_from([0, 0x8000_0000]))
-def test_a_subnormal_is_out_of_range(mantissa: int, sign: int) -> None:
-    bits = mantissa | sign
+@given(magnitude=st.integers(1, FIRST_MEASURABLE - 1), sign=st.sampled_from([0, 0x8000_0000]))
+@example(magnitude=1, sign=0)  # a subnormal
+@example(magnitude=0x00E1_0000, sign=0)  # a register of 225 read as half a float: 2.07e-38
+@example(magnitude=FIRST_MEASURABLE - 1, sign=0)
+def test_a_float32_below_a_millionth_is_out_of_range_for_integers_read_as_floats_look_so(
+    magnitude: int, sign: int
+) -> None:
+    bits = magnitude | sign
     fault = cell("float32").decode((bits >> 16, bits & 0xFFFF))
     assert isinstance(fault, Fault)
     assert fault.code is FaultCode.OUT_OF_RANGE
     assert f"0x{bits:08X}" in fault.message
+    assert "integer" in fault.message
 
 
-@given(number=st.floats(width=32, allow_nan=False, allow_infinity=False, allow_subnormal=False))
+@pytest.mark.parametrize(("bits", "number"), [(FIRST_MEASURABLE, 1e-6), (0, 0.0), (FIRST_MEASURABLE + 1, 1.0000001e-6)])
+def test_zero_and_a_millionth_are_measurements(bits: int, number: float) -> None:
+    assert cell("float32").decode((bits >> 16, bits & 0xFFFF)) == number
+
+
+def test_a_small_integer_is_a_number_whatever_a_float_of_its_bits_would_be() -> None:
+    assert cell("uint32").decode((0, 1)) == 1
+    assert cell("uint16", linear=Linear.of(1e-9, 0)).decode((5,)) == 5e-9
+
+
+@given(number=MEASURABLE)
 @example(number=100.0)
 @example(number=0.0)
 @example(number=-0.0)
