@@ -93,8 +93,9 @@ class Dumper(Emitter, Serializer, SafeRepresenter, CoreSchema):
 
 
 def _text(dumper: Dumper, text: str) -> Node:
-    # PyYAML leaves what YAML 1.1 calls line breaks as they are, but for double quotes; `parse` refuses them bare.
-    style = '"' if any(character in text for character in "\x85\u2028\u2029") else None
+    # PyYAML leaves what YAML 1.1 calls line breaks as they are, but for double quotes; `parse` refuses them bare. What
+    # else does not print is escaped by `render`, which only double quotes allow.
+    style = None if text.isprintable() else '"'
     return dumper.represent_scalar(f"{TAG}str", text, style=style)
 
 
@@ -102,5 +103,9 @@ Dumper.add_representer(str, _text)
 
 
 def render(data: object) -> str:
-    """Return data as YAML that `parse` reads back as the same data (`document.parse`)."""
-    return str(yaml.dump_all([data], Dumper=lambda stream, **_: Dumper(stream)))
+    """Return data as YAML that `parse` reads back as the same data (`document.parse`).
+
+    Nothing in it turns the direction of text or moves a cursor: what does not print is escaped.
+    """
+    text = str(yaml.dump_all([data], Dumper=lambda stream, **_: Dumper(stream)))
+    return "".join(sign if sign.isprintable() or sign == "\n" else f"\\U{ord(sign):08X}" for sign in text)

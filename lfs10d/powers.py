@@ -22,7 +22,7 @@ from lfs10d.requests.request import RefusedError
 from lfs10d.scanning import Scanning
 from lfs10d.station import PAUSED, POLLING
 from lfs10d.telemetry import event
-from lfs10d.tracing import Trace
+from lfs10d.tracing import Trace, TracedDevice
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Iterable, Mapping
@@ -117,9 +117,10 @@ class DaemonPowers:
     def trace(self, duration: float) -> None:
         """Tell every frame for `duration` s from now on."""
         loaded = self._running.loaded
-        codecs = {spec.slave: spec.codec for spec in assembly.device_specs(loaded.config, loaded.profiles)}
+        specs = assembly.device_specs(loaded.config, loaded.profiles)
+        devices = {spec.slave: TracedDevice(spec.name, spec.codec, spec.profile) for spec in specs}
         until = self._now().mono + duration
-        self._trace = Trace(until, codecs, assembly.usual_codec(loaded.config.line))
+        self._trace = Trace(until, devices, assembly.usual_codec(loaded.config.line))
 
     async def scan(self, ids: tuple[int, ...], rates: tuple[int, ...], share: float) -> Scan:
         """Find out who is on the line."""

@@ -64,3 +64,10 @@ def test_what_is_rendered_reads_back_as_the_same_data(content: object) -> None:
 def test_rendering_writes_shared_data_out() -> None:
     shared = [1]
     assert "*" not in render({"a": shared, "b": shared})
+
+
+@pytest.mark.parametrize("text", ["a\u202eb", "\u2066x\u2069", "\x9b[2J", "\ufeffx", "\U000e0041", "a\tb"])
+def test_what_would_turn_or_hide_text_is_written_escaped(text: str) -> None:
+    written = render({"label": text, text: 1})
+    assert all(sign.isprintable() or sign == "\n" for sign in written)
+    assert parse(written, "x").data == {"label": text, text: 1}

@@ -13,6 +13,7 @@ import pytest
 
 from lfs10d.alarms import PRECEDENCE
 from lfs10d.modbus import refusal, verdict
+from lfs10d.modbus.frames import ReadRegisters
 from lfs10d.modbus.refusal import Facts
 from lfs10d.mqtt.endings import REFUSED_FROM, failed, reason_in_words
 from lfs10d.mqtt.settings import BrokerSettings
@@ -66,7 +67,7 @@ def test_every_counter_of_the_adapter_has_its_section(counter: str) -> None:
         verdict.late(0.6123),
         verdict.babble(0.2),
         verdict.changed_echo(),
-        verdict.refusal(2),
+        verdict.refusal(2, ReadRegisters(2, 1, 2)),
     ],
     ids=lambda said: said.message[:30],
 )

@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
+from lfs10d.cli.local_time import stamp
 from lfs10d.logs import escape
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
+    from datetime import tzinfo
 
 INDENT = "  "
 SAMPLE = frozenset({"device", "seq", "quality", "error"})
@@ -29,16 +31,16 @@ def verdict(response: Mapping[str, Any]) -> str:
     return f"{name}: {status}: {_plain(error.get('code'))}: {_plain(error.get('message'))}"
 
 
-def told(response: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what it brought, line by line."""
+def told(response: Mapping[str, Any], zone: tzinfo | None = None) -> Iterator[str]:
+    """Yield what it brought, line by line; the time of a sample is that of `zone` (None: this machine's)."""
     data = response.get("data")
     if isinstance(data, dict) and data.keys() >= SAMPLE:
-        yield _sample(data)
+        yield _sample(data, zone)
     elif data is not None:
         yield from _laid_out(data, 0)
 
 
-def _sample(sample: Mapping[str, Any]) -> str:
+def _sample(sample: Mapping[str, Any], zone: tzinfo | None) -> str:
     units = sample.get("units")
     values = []
     for name, value in sample.items():
@@ -49,7 +51,9 @@ def _sample(sample: Mapping[str, Any]) -> str:
     quality = "good" if sample["error"] is None else f"{_plain(sample['quality'])} ({_plain(sample['error'])})"
     rtt = sample.get("rtt_ms")
     answered = "" if rtt is None else f", answered in {_plain(rtt)} ms"
-    return f"{_plain(sample['device'])}: {', '.join(values)}, {quality}{answered}, at {_plain(sample.get('time'))}"
+    ts = sample.get("ts")
+    when = stamp(ts, zone) if isinstance(ts, int | float) else _plain(sample.get("time"))
+    return f"{_plain(sample['device'])}: {', '.join(values)}, {quality}{answered}, at {when}"
 
 
 def _laid_out(data: object, depth: int) -> Iterator[str]:

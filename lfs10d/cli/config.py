@@ -13,6 +13,7 @@ import click
 from lfs10d.changefile import ChangeFile
 from lfs10d.cli import config_option, json_option
 from lfs10d.cli.columns import columns
+from lfs10d.cli.json_text import json_text
 from lfs10d.config import Config, Section
 from lfs10d.configfile import Loaded, leaves, load
 from lfs10d.coreschema import render
@@ -22,6 +23,7 @@ from lfs10d.document import path_text
 from lfs10d.effective import Effective, effective, merged_data
 from lfs10d.errors import FailedError, StateError
 from lfs10d.kinds import Duration, Size
+from lfs10d.logs import escape
 from lfs10d.quantities import duration_text, size_text
 from lfs10d.statedir import state_directory
 
@@ -126,7 +128,7 @@ def _written(config: Config, path: tuple[str | int, ...], value: object) -> str:
         return duration_text(value)
     if isinstance(kind, Size) and isinstance(value, int):
         return size_text(value)
-    return json.dumps(value, ensure_ascii=False) if isinstance(value, bool | tuple) else str(value)
+    return json_text(value) if isinstance(value, bool | tuple) else escape(str(value))
 
 
 def _kind(config: Config, path: tuple[str | int, ...]) -> object:

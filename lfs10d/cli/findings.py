@@ -116,12 +116,13 @@ def usual_rate(findings: Sequence[Finding]) -> int:
 
 
 def lasting_name(port: str, by_id: Path = BY_ID) -> str:
-    """Return the name of an adapter that stays its own when others are plugged in; the given one where none is."""
+    """Return the name of an adapter that stays its own when others are plugged in; the absolute one where none is."""
     try:
         links = sorted(by_id.iterdir())
     except OSError:
-        return port
-    return next((str(link) for link in links if os.path.realpath(link) == os.path.realpath(port)), port)
+        links = []
+    lasting = (str(link) for link in links if os.path.realpath(link) == os.path.realpath(port))
+    return next(lasting, os.path.abspath(port))  # noqa: PTH100  # resolve() would follow links that may be meant
 
 
 def _entry(finding: Finding, options: LineOptions, asked: Asked) -> str:

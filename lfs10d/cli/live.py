@@ -42,6 +42,8 @@ class Device:
     error: str | None = None
     rtt_ms: float | None = None
     good_ts: float | None = None
+    since: float | None = None
+    """When its error rose, epoch ms of the daemon's clock; None while it has none."""
     trail: deque[tuple[float, float]] = field(default_factory=deque)
     turned: tuple[float, bool] | None = None
     """When it came or went last, and whether it came."""
@@ -74,6 +76,9 @@ class Live:
         self.line: dict[str, Any] = {}
         """`line/state` and `line/stats`."""
         self.line_error: str | None = None
+        self.line_error_code: str | None = None
+        self.line_error_since: float | None = None
+        """Epoch ms of the daemon's clock."""
         self.known = False
         """Something of a daemon was heard."""
         self._met: dict[str, Device] = {}
@@ -91,9 +96,16 @@ class Live:
             case ["line", "state" | "stats"] if isinstance(payload, dict):
                 self.line.update(payload)
             case ["line", "error"] if isinstance(payload, dict):
-                self.line_error = _active(payload)
+                self._line_failed(payload)
             case ["device", name, leaf]:
                 self._told(self._device(name), leaf, payload, old=old, now=now, wall=wall)
+
+    def _line_failed(self, error: Mapping[str, Any] | None) -> None:
+        """Take the line's error object; None: there is none."""
+        error = {} if error is None else error
+        self.line_error = _active(error)
+        self.line_error_code = str(error.get("code")) if self.line_error is not None else None
+        self.line_error_since = _since(error)
 
     def _list(self, entries: list[dict[str, Any]]) -> None:
         self.known = True
@@ -115,6 +127,8 @@ class Live:
                 last = _number(payload.get("last_good_ts"))
                 if last is not None and (device.good_ts is None or last > device.good_ts):
                     device.good_ts = last
+            elif leaf == "error":
+                device.since = _since(payload)
             elif leaf in {"state", "telemetry"}:
                 self._sampled(device, payload, old=old, now=now, wall=wall)
 
@@ -152,7 +166,7 @@ class Live:
         if isinstance(line, dict):
             self.line = line
             error = line.get("error")
-            self.line_error = _active(error) if isinstance(error, dict) else None
+            self._line_failed(error if isinstance(error, dict) else None)
         self.devices = {}
         entries = status.get("devices")
         for entry in entries if isinstance(entries, list) else ():
@@ -169,6 +183,8 @@ class Live:
         fresh = seq != device.seq
         device.seq = seq if isinstance(seq, int) else -1
         _sample(device, entry, values if isinstance(values, dict) else {}, units if isinstance(units, dict) else {})
+        alarm = entry.get("alarm")
+        device.since = _since(alarm) if isinstance(alarm, dict) else None
         age = _number(entry.get("age_s"))
         device.good_ts = None if age is None else ts - age * 1000
         if fresh and now is not None:
@@ -237,3 +253,8 @@ def _active(error: Mapping[str, Any]) -> str | None:
         return None
     message = error.get("message")
     return message if isinstance(message, str) and message else str(error.get("code"))
+
+
+def _since(error: Mapping[str, Any]) -> float | None:
+    """Return when an error object's error rose, epoch ms; None where there is no error."""
+    return _number(error.get("since")) if error.get("active") is True else None

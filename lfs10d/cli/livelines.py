@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from lfs10d.cli.live import Live
-from lfs10d.cli.livetable import Row, Source, header, rows, table
+from lfs10d.cli.livetable import Line, Row, Source, header, rows, table
+from lfs10d.cli.local_time import stamp, zone_name
 from lfs10d.telemetry import iso_time
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
+    from datetime import tzinfo
 
     from lfs10d.cli.live import Device
 
@@ -18,9 +20,10 @@ WIDE = 10_000
 
 
 class LiveLines:
-    """Keeps what was told last."""
+    """Keeps what was told last; text has the times of `zone` (None: this machine's), data those of UTC."""
 
-    def __init__(self) -> None:
+    def __init__(self, zone: tzinfo | None = None) -> None:
+        self._zone = zone
         self._heading: tuple[str, ...] = ()
         self._told: dict[str, tuple[object, ...]] = {}
 
@@ -28,19 +31,25 @@ class LiveLines:
         self, live: Live, source: Source, *, now: float, wall: float
     ) -> Iterator[tuple[str, dict[str, Any] | None]]:
         """Yield each new line as text and as data for JSON; a heading, which begins with #, has no data."""
-        heading = tuple("".join(text for text, _ in line) for line in header(live, source, WIDE, pace=False))
+        heading = tuple("".join(text for text, _ in line) for line in self._header(live, source, wall))
         if heading != self._heading:
             self._heading = heading
             yield from ((f"# {text}", None) for text in heading)
-        for row, device in zip(rows(live, source, now=now, wall=wall), live.devices.values(), strict=True):
+        for row, device in zip(
+            rows(live, source, now=now, wall=wall, zone=self._zone), live.devices.values(), strict=True
+        ):
             told = (device.boot, device.seq, row.state, row.value)
             if self._told.get(device.name) != told:
                 self._told[device.name] = told
-                time = iso_time(round(wall * 1000))
-                yield _text(row, time), _data(device, row, time, age=live.age(device, wall), alive=source.alive)
+                ts = round(wall * 1000)
+                data = _data(device, row, iso_time(ts), age=live.age(device, wall), alive=source.alive)
+                yield _text(row, stamp(ts, self._zone)), data
+
+    def _header(self, live: Live, source: Source, wall: float) -> list[Line]:
+        return header(live, source, WIDE, pace=False, wall=wall, zone=self._zone)
 
 
-def health(status: Mapping[str, Any]) -> Iterator[str]:
+def health(status: Mapping[str, Any], zone: tzinfo | None = None) -> Iterator[str]:
     """Yield how everything is, as the daemon tells it in its status."""
     line, broker, ts = status.get("line"), status.get("broker"), status.get("ts")
     live = Live(str(line.get("name")) if isinstance(line, dict) else "?")
@@ -48,9 +57,10 @@ def health(status: Mapping[str, Any]) -> Iterator[str]:
     connected = isinstance(broker, dict) and broker.get("connected") is True
     waiting = broker.get("depth") if isinstance(broker, dict) else None
     words = f"broker {'connected' if connected else 'away'}" + (f", {waiting} samples wait" if waiting else "")
-    source = Source(words, alive=True)
-    shown = rows(live, source, now=0.0, wall=ts / 1000 if isinstance(ts, int) else 0.0)
-    for pieces in (*header(live, source, WIDE), (), *table(shown, WIDE)):
+    wall = ts / 1000 if isinstance(ts, int) else 0.0
+    source = Source(f"{words}; times: {zone_name(wall * 1000, zone)}", alive=True)
+    shown = rows(live, source, now=0.0, wall=wall, zone=zone)
+    for pieces in (*header(live, source, WIDE, wall=wall, zone=zone), (), *table(shown, WIDE)):
         yield "".join(text for text, _ in pieces)
 
 

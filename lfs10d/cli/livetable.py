@@ -8,10 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, TypeAlias
 
+from lfs10d.cli.local_time import since_text, zone_name
 from lfs10d.logs import escape
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
+    from datetime import tzinfo
 
     from lfs10d.cli.live import Device, Live
 
@@ -33,13 +35,18 @@ _TROUBLES: Final = {
     "exception": "refuses",
     "out_of_range": "impossible value",
     "not_finite": "not a number",
+    "unavailable": "has no value now",
     "late": "answers too late",
     "collision": "line never silent",
-    "disabled": "disabled",
-    "port_lost": "port lost",
-    "port_busy": "port in use",
-    "config_conflict": "id in conflict",
+    "port_lost": "no port",
+    "port_busy": "another program has the port",
+    "config_conflict": "two devices with one id",
 }
+"""What a code says, in a word or two; the code itself stands before it, as in docs/when-it-goes-wrong.md."""
+STARTING: Final = "starting"
+"""The code of a device that was not asked yet."""
+_OF_THE_LINE: Final = frozenset({"port_lost", "port_busy", "config_conflict"})
+"""Codes that say nothing of the device itself."""
 _MARKS: Final = {"moved": ">", "came": "+", "went": "-"}
 _MARK_STYLES: Final = {"moved": "bold black on green", "came": "bold green", "went": "bold red"}
 
@@ -68,11 +75,21 @@ class Row:
     good: bool
 
 
-def rows(live: Live, source: Source, *, now: float, wall: float) -> list[Row]:
-    """Return the devices as they are to be shown."""
+@dataclass(frozen=True, slots=True)
+class _Moment:
+    """When it is shown: monotonic s, epoch s, and the zone of its times."""
+
+    now: float
+    wall: float
+    zone: tzinfo | None
+
+
+def rows(live: Live, source: Source, *, now: float, wall: float, zone: tzinfo | None = None) -> list[Row]:
+    """Return the devices as they are to be shown, times in `zone` (None: this machine's)."""
     movers = {device.name for device in live.movers(now)} if source.alive else set()
     return [
-        _row(live, device, source, now=now, wall=wall, moved=device.name in movers) for device in live.devices.values()
+        _row(live, device, source, _Moment(now, wall, zone), moved=device.name in movers)
+        for device in live.devices.values()
     ]
 
 
@@ -84,19 +101,19 @@ def _with_unit(device: Device, name: str, value: float) -> str:
     return _number(value) if len(device.values) == 1 else f"{escape(name)} {_number(value)}"
 
 
-def _row(live: Live, device: Device, source: Source, *, now: float, wall: float, moved: bool) -> Row:
-    stale = not source.alive or (device.good and live.late(device, wall))
+def _row(live: Live, device: Device, source: Source, moment: _Moment, *, moved: bool) -> Row:
+    stale = not source.alive or (device.good and live.late(device, moment.wall))
     just = "moved" if moved else ""
-    if source.alive and device.turned is not None and now - device.turned[0] < JUST:
+    if source.alive and device.turned is not None and moment.now - device.turned[0] < JUST:
         just = "came" if device.turned[1] else "went"
     values = [_with_unit(device, name, value) for name, value in device.values.items()]
-    age = live.age(device, wall) if device.enabled else None
+    age = live.age(device, moment.wall) if device.enabled else None
     return Row(
         name=escape(device.name),
         slave="" if device.slave is None else str(device.slave),
         label=escape(device.label or ""),
         value=", ".join(values) or "-",
-        state=_state(device, stale=stale),
+        state=_state(device, moment, stale=stale),
         age="" if age is None else age_text(age),
         rtt="" if device.rtt_ms is None or stale else f"{device.rtt_ms:.0f} ms",
         just=just,
@@ -110,18 +127,23 @@ def _number(value: float) -> str:
     return str(value) if isinstance(value, int) else f"{value:.2f}"
 
 
-def _state(device: Device, *, stale: bool) -> str:
-    """Return availability and what ails it, in words."""
+def _state(device: Device, moment: _Moment, *, stale: bool) -> str:
+    """Return availability and what ails it, as code and words, and since when."""
     if not device.enabled:
         return "disabled"
     if device.good:
         return "old value" if stale else "good"
-    if device.error is None:
+    if device.error is None or device.error == STARTING:
         return "not heard yet"
-    trouble = _TROUBLES.get(device.error, escape(device.error))
-    if device.online or device.error in {"port_lost", "port_busy", "config_conflict"}:
-        return trouble
-    return f"offline: {trouble}"
+    code = escape(device.error)
+    trouble = f"{code}, {_TROUBLES[code]}" if code in _TROUBLES else code
+    if not device.online and code not in _OF_THE_LINE:
+        trouble = f"offline: {trouble}"
+    return trouble + _since(device.since, moment.wall, moment.zone)
+
+
+def _since(ts: float | None, wall: float, zone: tzinfo | None) -> str:
+    return "" if ts is None else f"; since {since_text(ts, wall * 1000, zone)}"
 
 
 def age_text(seconds: float) -> str:
@@ -149,7 +171,7 @@ class _Column:
 _NAME = _Column("sensor", lambda row: row.name, least=6, most=20)
 _ID = _Column("id", lambda row: row.slave, right=True, least=3)
 _VALUE = _Column("value", lambda row: row.value, right=True, least=9, most=24)
-_STATE = _Column("state", lambda row: row.state, least=9, most=30)
+_STATE = _Column("state", lambda row: row.state, least=9, most=60)
 _AGE = _Column("age", lambda row: row.age, right=True, least=4)
 _RTT = _Column("answer", lambda row: row.rtt, right=True, least=6)
 _LABEL = _Column("label", lambda row: row.label, most=30)
@@ -222,8 +244,13 @@ def _cut(line: Line, width: int) -> Line:
     return tuple(pieces)
 
 
-def header(live: Live, source: Source, width: int, *, pace: bool = True) -> list[Line]:
-    """Return what is to be known of the line and where all this comes from; `pace`: also what changes all the time."""
+def header(
+    live: Live, source: Source, width: int, *, pace: bool = True, wall: float = 0.0, zone: tzinfo | None = None
+) -> list[Line]:
+    """Return what is to be known of the line and where all this comes from; `pace`: also what changes all the time.
+
+    `wall` (epoch s) is now: what began on another day is told with its date.
+    """
     line = live.line
     words = [f"{escape(live.name)}: {_said(line, 'port')}"]
     if "baudrate" in line:
@@ -240,7 +267,9 @@ def header(live: Live, source: Source, width: int, *, pace: bool = True) -> list
     if line.get("open") is False and live.line_error is None:
         lines.append((("the port is not open", "bold red"),))
     if live.line_error is not None:
-        lines.append(((escape(live.line_error), "bold red"),))
+        code = f"{live.line_error_code}: " if live.line_error_code != live.line_error else ""
+        trouble = escape(f"{code}{live.line_error}") + _since(live.line_error_since, wall, zone)
+        lines.append(((trouble, "bold red"),))
     return [piece for whole in lines for piece in _wrapped(whole, width)]
 
 
@@ -261,12 +290,14 @@ def _wrapped(line: Line, width: int) -> Iterable[Line]:
     yield ((current[:width], style),)
 
 
-def screen(live: Live, source: Source, size: tuple[int, int], *, now: float, wall: float) -> list[Line]:
+def screen(
+    live: Live, source: Source, size: tuple[int, int], *, now: float, wall: float, zone: tzinfo | None = None
+) -> list[Line]:
     """Return everything for a terminal of `size` columns and lines; where lines are short, the worst rows first."""
     width, height = size
-    shown = rows(live, source, now=now, wall=wall)
-    above = [*header(live, source, width), ()]
-    legend = "> moved just now   + came   - went   Ctrl-C ends"
+    shown = rows(live, source, now=now, wall=wall, zone=zone)
+    above = [*header(live, source, width, wall=wall, zone=zone), ()]
+    legend = f"> moved just now   + came   - went   times: {zone_name(wall * 1000, zone)}   Ctrl-C ends"
     room = max(1, height - len(above) - 3)
     left = len(shown) - room
     if left > 0:

@@ -6,7 +6,6 @@ import json
 import sys
 import time
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +15,7 @@ from lfs10d.cli import EXIT_FAILED, EXIT_UNAVAILABLE, json_option, roof
 from lfs10d.cli.completion import PORT, SlaveId, profile_names
 from lfs10d.cli.holder import instead
 from lfs10d.cli.lineoptions import LineOptions, baudrate_of, line_options, take
+from lfs10d.cli.local_time import clock_text, stamp
 from lfs10d.cli.ownline import OwnLine
 from lfs10d.errors import PortBusyError
 from lfs10d.modbus.frames import Checksum, Codec, describe
@@ -217,13 +217,13 @@ def _shown(wanted: _Wanted, reading: Reading) -> Iterator[str]:
 def _watched(wanted: _Wanted, reading: Reading) -> str:
     """Return a reading as one line."""
     terminal = sys.stdout.isatty()
-    now = datetime.fromtimestamp(_wall(reading), UTC)
-    stamp = f"{now.astimezone():%H:%M:%S}" if terminal else f"{now:%Y-%m-%dT%H:%M:%S}.{now.microsecond // 1000:03}Z"
+    ts = _wall(reading) * 1000
+    when = clock_text(ts) if terminal else stamp(ts)
     if reading.fault is not None:
-        return f"{stamp}  {click.style(f'{reading.fault.code}: {reading.fault.message}', fg='red')}"
+        return f"{when}  {click.style(f'{reading.fault.code}: {reading.fault.message}', fg='red')}"
     text = "  ".join(f"{name} {number}" for name, number in _numbers(wanted, reading))
     bar = _bar(wanted, reading) if terminal else ""
-    return f"{stamp}  {text:<24}  {_milliseconds(reading):>8}  {bar}".rstrip()
+    return f"{when}  {text:<24}  {_milliseconds(reading):>8}  {bar}".rstrip()
 
 
 def _bar(wanted: _Wanted, reading: Reading) -> str:

@@ -12,6 +12,7 @@ import click
 
 from lfs10d.cli import EXIT_FAILED, config_option, interruptible, json_option
 from lfs10d.cli.answers import told, verdict
+from lfs10d.cli.json_text import json_text
 from lfs10d.cli.keyvalue import IDS, KeyValueError, content_of
 from lfs10d.cli.livelines import health
 from lfs10d.cli.login import Login, login, login_options
@@ -108,7 +109,7 @@ def command(**options: Any) -> int:  # noqa: ANN401  # nine options; `_Wanted` n
         raise FailedError(f"{message}; whether it was obeyed is not known")
     done = response.get("status") == "ok"
     if wanted.as_json:
-        click.echo(json.dumps(response, indent=2, ensure_ascii=False))
+        click.echo(json_text(response, indent=2))
     else:
         click.echo(verdict(response), err=not done)
         data = response.get("data")

@@ -113,7 +113,7 @@ class _Result:
         """Return everything for JSON."""
         progress = self.scan.progress
         return {
-            "port": self.line.port,
+            "port": findings.lasting_name(self.line.port),
             "complete": self.scan.complete,
             "asked": progress.asked,
             "total": progress.total,
@@ -161,7 +161,7 @@ def _scan(result: _Result, *, as_json: bool) -> int:
             while not line.events(LOOK_EVERY):
                 pass  # until the port is open
             result.opened = True
-            with view(scan, port, quiet=as_json) as drawn:
+            with view(scan, findings.lasting_name(port), quiet=as_json) as drawn:
                 line.submit(scan)
                 while not scan.over:
                     line.events(LOOK_EVERY)

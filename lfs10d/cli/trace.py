@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import secrets
 import shutil
 import sys
+import textwrap
 from collections import deque
-from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -17,6 +16,8 @@ import click
 from lfs10d import telemetry
 from lfs10d.cli import EXIT_FAILED, config_option, interruptible, json_option
 from lfs10d.cli.answers import verdict
+from lfs10d.cli.json_text import json_text
+from lfs10d.cli.local_time import NO_CLOCK, clock_text
 from lfs10d.cli.login import Login, login, login_options
 from lfs10d.cli.spinner import spinning
 from lfs10d.cli.visitor import Visitor, parsed
@@ -28,6 +29,7 @@ from lfs10d.requests.line import LONGEST, USUAL
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from datetime import tzinfo
     from pathlib import Path
 
     from lfs10d.mqtt.messages import Incoming
@@ -35,8 +37,10 @@ if TYPE_CHECKING:
 ANSWERS_WITHIN: Final = 10.0
 LAST_FRAMES: Final = 0.5
 """s after its end in which the last frames of a trace come in."""
-ONE_LINE: Final = 96
+ONE_LINE: Final = 100
 """Columns from which the bytes stand beside their meaning, below it otherwise."""
+LEAST_WORDS: Final = 20
+"""Columns that words and bytes have on the narrowest of terminals."""
 HEX_COLUMNS: Final = 26
 """Nine bytes: the answer of a wind sensor."""
 
@@ -113,7 +117,7 @@ async def _show(visitor: Visitor, frames: deque[Any], duration: float, *, as_jso
             frame = frames.popleft()
             if not isinstance(frame, dict):
                 continue
-            for text in [json.dumps(frame, ensure_ascii=False)] if as_json else lines(frame, width):
+            for text in [json_text(frame)] if as_json else lines(frame, width):
                 click.echo(text)
         if visitor.daemon_gone:
             raise BrokerError(f"{visitor.place}: the daemon went away")
@@ -131,17 +135,16 @@ async def _begin(visitor: Visitor, duration: float) -> Mapping[str, Any]:
     return response
 
 
-def lines(frame: Mapping[str, Any], width: int) -> list[str]:
-    """Return one frame in words: on one line, or on two where the terminal is narrow."""
+def lines(frame: Mapping[str, Any], width: int, zone: tzinfo | None = None) -> list[str]:
+    """Return one frame in words, on one line, or on several where the terminal is narrow; its time is of `zone`."""
     ts, gap = frame.get("ts"), frame.get("gap_us")
-    when = "--:--:--.---"
-    if isinstance(ts, int):
-        with contextlib.suppress(OverflowError, ValueError, OSError):  # it may come from anybody
-            moment = datetime.fromtimestamp(ts / 1000, UTC).astimezone()
-            when = f"{moment:%H:%M:%S}.{moment.microsecond // 1000:03d}"
+    when = clock_text(ts, zone) if isinstance(ts, int) else NO_CLOCK
     silence = f"{gap / 1000:8.2f} ms" if isinstance(gap, int | float) else " " * 11
     sign = ">" if frame.get("direction") == "tx" else "<"
     text, data = escape(str(frame.get("text", ""))), escape(str(frame.get("hex", "")))
     if width >= ONE_LINE:
         return [f"{when} {silence} {sign} {data:{HEX_COLUMNS}}  {text}"]
-    return [f"{when} {silence} {sign} {text}", f"{'':26}{data}"]
+    indent = " " * (len(when) + len(silence) + 4)
+    words, *more = textwrap.wrap(text, max(LEAST_WORDS, width - len(indent))) or [""]
+    bytes_ = textwrap.wrap(data, max(LEAST_WORDS, width - len(indent)))
+    return [f"{when} {silence} {sign} {words}", *(indent + each for each in (*more, *bytes_))]

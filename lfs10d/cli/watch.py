@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import json
 import os
 import sys
 import time
@@ -15,6 +14,7 @@ import click
 
 from lfs10d import telemetry
 from lfs10d.cli import config_option, interruptible, json_option
+from lfs10d.cli.json_text import json_text
 from lfs10d.cli.live import Live
 from lfs10d.cli.livelines import LiveLines
 from lfs10d.cli.livetable import Source, age_text, screen
@@ -100,7 +100,7 @@ class _Watch:
         self._status: _Status | None = None
         topics = visited.topics
         once = [telemetry.DEVICES, telemetry.LINE_STATE, telemetry.LINE_ERROR, telemetry.LINE_STATS]
-        leaves = (telemetry.STATE, telemetry.TELEMETRY, telemetry.AVAILABILITY, telemetry.STATS)
+        leaves = (telemetry.STATE, telemetry.TELEMETRY, telemetry.AVAILABILITY, telemetry.STATS, telemetry.ERROR)
         filters = [*once, *(telemetry.device_topic("+", leaf) for leaf in leaves)]
         self._visitor = Visitor(
             visited, [Filter(topics.full(each), qos=0, retain_as_published=False) for each in filters], self._arrived
@@ -201,7 +201,7 @@ class _Lines:
         """Print what is new."""
         for plain, data in self._lines.news(live, source, now=now, wall=wall):
             if self._as_json and data is not None:
-                click.echo(json.dumps(data, ensure_ascii=False))
+                click.echo(json_text(data))
             elif not self._as_json:
                 click.echo(plain)
 

@@ -263,7 +263,7 @@ class Exchange:
             answer, found = attempt.codec.decode(catch.body), None
             if catch.body[1] & EXCEPTION_FLAG:
                 (exception,) = answer
-                found = verdict.refusal(exception)
+                found = verdict.refusal(exception, attempt.request)
         fault = None
         if found is not None:
             answer = None

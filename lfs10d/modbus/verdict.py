@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from lfs10d.modbus.frames import BROADCAST, EXCEPTION_FLAG, EXCEPTION_NAMES, Codec, ReadRegisters, Request
+from lfs10d.modbus.frames import (
+    BROADCAST,
+    EXCEPTION_FLAG,
+    EXCEPTION_NAMES,
+    READ_INPUT_REGISTERS,
+    Codec,
+    ReadRegisters,
+    Request,
+)
 from lfs10d.reading import FaultCode
 
 if TYPE_CHECKING:
@@ -80,10 +88,18 @@ def changed_echo() -> Verdict:
     return Verdict(FaultCode.COLLISION, message)
 
 
-def refusal(code: int) -> Verdict:
-    """Judge an exception answer."""
+def refusal(code: int, request: Request) -> Verdict:
+    """Judge an exception answer; the message names the registers that were asked."""
     name = EXCEPTION_NAMES.get(code, "of the device's own")
-    return Verdict(FaultCode.EXCEPTION, f"exception {code:02X} {name}")
+    return Verdict(FaultCode.EXCEPTION, f"exception {code:02X} {name}, {_asking(request)}")
+
+
+def _asking(request: Request) -> str:
+    """Return what was asked: `reading 2 registers at 0x0001`."""
+    if isinstance(request, ReadRegisters):
+        kind = "input register" if request.function == READ_INPUT_REGISTERS else "register"
+        return f"reading {request.count} {kind}{'s' * (request.count > 1)} at 0x{request.address:04X}"
+    return f"writing 0x{request.value:04X} to 0x{request.address:04X}"
 
 
 def stranger(request: Request, codec: Codec, heard: bytes) -> Verdict | None:

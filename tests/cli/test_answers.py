@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import UTC
 from typing import Any
 
 import pytest
@@ -16,7 +17,7 @@ SAMPLE = {
     "device": "mast-top",
     "boot": "k3f9a2c7",
     "seq": 5,
-    "ts": 1,
+    "ts": 1_795_298_022_003,
     "time": "2026-11-21T21:53:42.003Z",
     "clock": "synced",
     "wind_speed": 12.34,
@@ -50,20 +51,24 @@ def test_how_it_ended_is_one_line(response: dict[str, Any], words: str) -> None:
 @pytest.mark.parametrize(
     ("sample", "words"),
     [
-        (SAMPLE, "mast-top: wind_speed 12.34 m/s, good, answered in 18.2 ms, at 2026-11-21T21:53:42.003Z"),
+        (
+            {**SAMPLE, "ts": None},
+            "mast-top: wind_speed 12.34 m/s, good, answered in 18.2 ms, at 2026-11-21T21:53:42.003Z",
+        ),
+        (SAMPLE, "mast-top: wind_speed 12.34 m/s, good, answered in 18.2 ms, at 2026-11-21 21:53:42.003 UTC"),
         (
             {**SAMPLE, "wind_speed": None, "quality": "bad", "error": "timeout", "rtt_ms": None},
-            "mast-top: wind_speed no value, bad (timeout), at 2026-11-21T21:53:42.003Z",
+            "mast-top: wind_speed no value, bad (timeout), at 2026-11-21 21:53:42.003 UTC",
         ),
         (
             {key: value for key, value in SAMPLE.items() if key not in {"unit", "wind_speed"}}
             | {"units": {"speed": "rpm", "output_current": "A"}, "speed": 1450, "output_current": 1.5},
-            "mast-top: speed 1450 rpm, output_current 1.5 A, good, answered in 18.2 ms, at 2026-11-21T21:53:42.003Z",
+            "mast-top: speed 1450 rpm, output_current 1.5 A, good, answered in 18.2 ms, at 2026-11-21 21:53:42.003 UTC",
         ),
     ],
 )
 def test_a_sample_is_one_line_with_every_value_and_its_unit(sample: dict[str, Any], words: str) -> None:
-    assert list(told({"data": sample})) == [words]
+    assert list(told({"data": sample}, UTC)) == [words]
 
 
 def test_what_belongs_together_is_indented() -> None:

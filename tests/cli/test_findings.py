@@ -144,3 +144,10 @@ def test_an_adapter_is_called_by_the_name_that_lasts(tmp_path: Path) -> None:
     assert lasting_name(str(port), links) == str(port)
     (links / "usb-FTDI-port0").symlink_to(port)
     assert lasting_name(str(port), links) == str(links / "usb-FTDI-port0")
+
+
+def test_a_relative_port_is_called_by_its_absolute_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "line0").symlink_to("/dev/null")
+    assert lasting_name("line0", tmp_path / "none") == str(tmp_path / "line0")
+    assert lasting_name("../x/ttyUSB0", tmp_path / "none") == str(tmp_path.parent / "x/ttyUSB0")

@@ -342,3 +342,18 @@ def test_a_message_is_kept_as_plain_data() -> None:
     assert heard.live.line_error == "port_busy"
     heard.tell("line/error", {"active": False, "code": None})
     assert heard.live.line_error is None
+
+
+def test_since_when_a_device_and_the_line_fail_is_known_from_their_errors() -> None:
+    heard = Heard("a")
+    assert (heard.device("a").since, heard.live.line_error_since) == (None, None)
+    raised = {"active": True, "code": "timeout", "message": "no answer in 200 ms", "since": 1_795_298_000_000}
+    heard.tell("device/a/error", raised)
+    heard.tell("line/error", {**raised, "code": "port_lost"})
+    assert heard.device("a").since == heard.live.line_error_since == 1_795_298_000_000
+    assert (heard.live.line_error_code, heard.live.line_error) == ("port_lost", "no answer in 200 ms")
+    cleared = {"active": False, "code": None, "last_code": "timeout", "cleared": 1}
+    heard.tell("device/a/error", cleared)
+    heard.tell("line/error", cleared)
+    now = heard.live
+    assert [heard.device("a").since, now.line_error_since, now.line_error_code, now.line_error] == [None] * 4

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import UTC
 from typing import Any
 
 from lfs10d.cli.live import Live
@@ -36,7 +37,7 @@ class Pipe:
 
     def __init__(self) -> None:
         self.live = Live("line0")
-        self.lines = LiveLines()
+        self.lines = LiveLines(UTC)
         self.data: list[dict[str, Any]] = []
 
     def read(self, told: dict[str, Any], source: Source = HERE) -> list[str]:
@@ -50,7 +51,7 @@ def test_a_heading_says_where_it_comes_from_and_each_value_is_a_line() -> None:
     assert Pipe().read(status()) == [
         "# line0: /dev/x",
         "# live from broker localhost:1883",
-        "2026-11-21T21:53:20.000Z  a  2  4.50 m/s  good  answer 18 ms",
+        "2026-11-21 21:53:20.000 UTC  a  2  4.50 m/s  good  answer 18 ms",
     ]
 
 
@@ -58,14 +59,14 @@ def test_only_what_is_new_is_told() -> None:
     pipe = Pipe()
     pipe.read(status(1))
     assert pipe.read(status(1)) == []
-    assert pipe.read(status(2)) == ["2026-11-21T21:53:20.000Z  a  2  4.50 m/s  good  answer 18 ms"]
+    assert pipe.read(status(2)) == ["2026-11-21 21:53:20.000 UTC  a  2  4.50 m/s  good  answer 18 ms"]
 
 
 def test_a_failure_is_told_with_the_age_of_the_last_value() -> None:
     pipe = Pipe()
     pipe.read(status(1))
     (line,) = pipe.read(status(2, None))
-    assert line == "2026-11-21T21:53:20.000Z  a  2  -  offline: no answer  last value 75s ago  went"
+    assert line == "2026-11-21 21:53:20.000 UTC  a  2  -  offline: timeout, no answer  last value 75s ago  went"
 
 
 def test_when_the_source_changes_a_new_heading_says_so_and_nothing_is_called_good_any_more() -> None:
@@ -74,7 +75,7 @@ def test_when_the_source_changes_a_new_heading_says_so_and_nothing_is_called_goo
     assert pipe.read(status(1), GONE) == [
         "# line0: /dev/x",
         "# NOT LIVE: the daemon is offline",
-        "2026-11-21T21:53:20.000Z  a  2  4.50 m/s  old value  last value 0.4s ago",
+        "2026-11-21 21:53:20.000 UTC  a  2  4.50 m/s  old value  last value 0.4s ago",
     ]
 
 
@@ -102,16 +103,16 @@ def test_programs_are_told_the_same_as_data() -> None:
 
 
 def test_health_is_the_line_the_broker_and_every_device() -> None:
-    told = list(health(status(broker={"connected": False, "depth": 12, "dropped": 0})))
+    told = list(health(status(broker={"connected": False, "depth": 12, "dropped": 0}), UTC))
     assert told == [
         "line0: /dev/x, load 5.0 %",
-        "broker away, 12 samples wait",
+        "broker away, 12 samples wait; times: UTC",
         "",
         "  sensor  id     value state      age answer label",
         "  a        2  4.50 m/s good      0.4s  18 ms Mast",
     ]
-    assert "broker connected" in list(health(status(broker={"connected": True, "depth": 0})))
+    assert "broker connected; times: UTC" in list(health(status(broker={"connected": True, "depth": 0}), UTC))
 
 
 def test_health_of_nothing_says_so() -> None:
-    assert list(health({}))[:2] == ["?: ?", "broker away"]
+    assert list(health({}, UTC))[:2] == ["?: ?", "broker away; times: UTC"]

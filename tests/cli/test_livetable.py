@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import UTC, timedelta, timezone
 from typing import Any
 
 import pytest
@@ -48,6 +49,7 @@ def live(*entries: dict[str, Any], **line: Any) -> Live:  # noqa: ANN401 - plain
     return shown
 
 
+AN_HOUR_AGO = {"active": True, "code": "timeout", "since": (WALL - 3600) * 1000}
 SITE = (
     entry("slave-2", 2),
     entry("mast-top", 3, label="Mast, 10 m", values={"wind_speed": 12.3}),
@@ -65,21 +67,21 @@ def texts(lines: list[Line]) -> list[str]:
 
 
 def states(*entries: dict[str, Any], source: Source = HERE) -> list[str]:
-    return [row.state for row in rows(live(*entries), source, now=0.0, wall=WALL)]
+    return [row.state for row in rows(live(*entries), source, now=0.0, wall=WALL, zone=UTC)]
 
 
 def test_a_site_at_80_columns() -> None:
-    assert texts(screen(live(*SITE), HERE, (80, 24), now=0.0, wall=WALL)) == [
+    assert texts(screen(live(*SITE), HERE, (80, 24), now=0.0, wall=WALL, zone=UTC)) == [
         "line0: /dev/ttyUSB0, 9600 baud 8N1, load 34.5 %, 12.0 polls/s",
         "live from broker localhost:1883",
         "",
-        "  sensor    id     value state               age answer label",
-        "  slave-2    2  4.50 m/s good               0.4s  18 ms",
-        "  mast-top   3 12.30 m/s good               0.4s  18 ms Mast, 10 m",
-        "  north      4         - offline: no answer  75s",
+        "  sensor    id     value state                        age answer label",
+        "  slave-2    2  4.50 m/s good                        0.4s  18 ms",
+        "  mast-top   3 12.30 m/s good                        0.4s  18 ms Mast, 10 m",
+        "  north      4         - offline: timeout, no answer  75s",
         "  off        5         - disabled",
         "",
-        "> moved just now   + came   - went   Ctrl-C ends",
+        "> moved just now   + came   - went   times: UTC   Ctrl-C ends",
     ]
 
 
@@ -107,15 +109,20 @@ def test_one_that_just_came_or_went_is_marked_for_five_seconds(online: bool, mar
     ("device", "state"),
     [
         (entry("a", 2), "good"),
-        (bad("a", 2), "offline: no answer"),
-        (bad("a", 2, online=True), "no answer"),
-        (bad("a", 2, "crc", online=True), "garbled answer"),
-        (bad("a", 2, "exception", online=True), "refuses"),
-        (bad("a", 2, "port_lost"), "port lost"),
-        (bad("a", 2, "port_busy"), "port in use"),
-        (bad("a", 2, "config_conflict"), "id in conflict"),
+        (bad("a", 2), "offline: timeout, no answer"),
+        (bad("a", 2, online=True), "timeout, no answer"),
+        (bad("a", 2, "crc", online=True), "crc, garbled answer"),
+        (bad("a", 2, "exception", online=True), "exception, refuses"),
+        (bad("a", 2, "port_lost"), "port_lost, no port"),
+        (bad("a", 2, "port_busy"), "port_busy, another program has the port"),
+        (bad("a", 2, "config_conflict"), "config_conflict, two devices with one id"),
         (bad("a", 2, "something new"), "offline: something new"),
         (bad("a", 2, None), "not heard yet"),
+        (bad("a", 2, "starting"), "not heard yet"),
+        (bad("a", 2, alarm={"active": False, "code": None}), "offline: timeout, no answer"),
+        (bad("a", 2, alarm=AN_HOUR_AGO), "offline: timeout, no answer; since 20:53"),
+        (bad("a", 2, alarm={**AN_HOUR_AGO, "since": 0}), "offline: timeout, no answer; since 1 Jan 00:00"),
+        (bad("a", 2, alarm={**AN_HOUR_AGO, "since": "yesterday"}), "offline: timeout, no answer"),
         (bad("a", 2, None, enabled=False), "disabled"),
         (entry("a", 2, enabled=False), "disabled"),
         (entry("a", 2, age_s=6.1), "old value"),
@@ -161,13 +168,13 @@ def test_an_age_has_its_unit(seconds: float, words: str) -> None:
 @pytest.mark.parametrize(
     ("width", "head"),
     [
-        (80, "  sensor    id     value state               age answer label"),
-        (66, "  sensor    id     value state               age answer label"),
-        (62, "  sensor    id     value state               age answer label"),
-        (61, "  sensor    id     value state               age answer"),
-        (54, "  sensor    id     value state               age"),
-        (47, "  sensor    id     value state"),
-        (42, "  sensor       value state"),
+        (80, "  sensor    id     value state                        age answer label"),
+        (75, "  sensor    id     value state                        age answer label"),
+        (71, "  sensor    id     value state                        age answer label"),
+        (70, "  sensor    id     value state                        age answer"),
+        (63, "  sensor    id     value state                        age"),
+        (56, "  sensor    id     value state"),
+        (51, "  sensor       value state"),
         (20, "  sensor       value"),
     ],
 )
@@ -181,10 +188,13 @@ def test_names_too_long_for_their_column_show_that_they_are_cut() -> None:
 
 
 def test_a_line_error_is_told_in_words_above_all() -> None:
-    shown = live(
-        bad("a", 2, "port_lost"), open=False, error={"active": True, "code": "port_lost", "message": "no such file"}
-    )
-    assert (("no such file", "bold red"),) in header(shown, HERE, 80)
+    lost = {"active": True, "code": "port_lost", "message": "no such file", "since": (WALL - 3600) * 1000}
+    shown = live(bad("a", 2, "port_lost"), open=False, error=lost)
+    east = timezone(timedelta(hours=1), "CET")
+    assert (("port_lost: no such file; since 21:53", "bold red"),) in header(shown, HERE, 80, wall=WALL, zone=east)
+    assert (("port_lost: no such file; since 21 Nov 21:53", "bold red"),) in header(shown, HERE, 80, zone=east)
+    wordless = live(open=False, error={"active": True, "code": "port_lost"})
+    assert (("port_lost", "bold red"),) in header(wordless, HERE, 80)
     assert (("the port is not open", "bold red"),) in header(live(open=False), HERE, 80)
 
 

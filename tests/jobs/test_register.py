@@ -263,7 +263,8 @@ def test_a_register_that_cannot_be_read_is_written_and_the_refusal_told() -> Non
     rig = Rig()
     access = rig.do(write(address=0x0999))
     assert (access.end, access.sent, access.before) == (End.REFUSED, True, None)
-    assert access.fault == Fault(FaultCode.EXCEPTION, "exception 02 illegal register address", 2, access.fault.heard)  # type: ignore[union-attr]  # equal to a Fault it is one
+    words = "exception 02 illegal register address, writing 0x000A to 0x0999"
+    assert access.fault == Fault(FaultCode.EXCEPTION, words, 2, access.fault.heard)  # type: ignore[union-attr]  # equal to a Fault it is one
 
 
 def test_a_register_that_can_be_written_but_not_read_is_not_verified() -> None:

@@ -83,7 +83,7 @@ def test_an_exception_is_a_fault_with_its_code() -> None:
     assert outcome.fault is not None
     assert outcome.fault.code is FaultCode.EXCEPTION
     assert outcome.fault.exception_code == 2
-    assert outcome.fault.message == "exception 02 illegal register address"
+    assert outcome.fault.message == "exception 02 illegal register address, reading 2 registers at 0x0001"
     assert outcome.turnaround == pytest.approx(0.02 - SENT_END)
     assert (outcome.answered, outcome.ambiguous) == (True, False)
 

@@ -82,8 +82,20 @@ def test_the_other_faults_have_words() -> None:
         "the line did not fall silent in 200 ms, nothing was sent: a second master, a babbling device or noise"
     )
     assert verdict.changed_echo().code is FaultCode.COLLISION
-    assert verdict.refusal(2).message == "exception 02 illegal register address"
-    assert verdict.refusal(0x55).message == "exception 55 of the device's own"
+
+
+@pytest.mark.parametrize(
+    ("request_", "words"),
+    [
+        (ReadRegisters(1, 1, 2), "reading 2 registers at 0x0001"),
+        (ReadRegisters(1, 0x1F4, 1), "reading 1 register at 0x01F4"),
+        (ReadRegisters(1, 0, 10, 4), "reading 10 input registers at 0x0000"),
+        (WriteRegister(1, 5, 9), "writing 0x0009 to 0x0005"),
+    ],
+)
+def test_an_exception_names_the_registers_that_were_asked(request_: Request, words: str) -> None:
+    assert verdict.refusal(2, request_).message == f"exception 02 illegal register address, {words}"
+    assert verdict.refusal(0x55, request_).message == f"exception 55 of the device's own, {words}"
 
 
 @pytest.mark.parametrize(("seconds", "words"), [(0.2, "200 ms"), (0.0036458, "3.6 ms"), (1.0, "1000 ms")])
@@ -148,7 +160,7 @@ def test_a_right_frame_of_somebody_else_is_a_stranger(heard: bytes, *, spoke: bo
 
 def test_the_remaining_faults_have_their_codes() -> None:
     assert verdict.babble(0.2).code is FaultCode.COLLISION
-    assert verdict.refusal(2).code is FaultCode.EXCEPTION
+    assert verdict.refusal(2, WIND).code is FaultCode.EXCEPTION
     assert verdict.changed_echo() == (
         FaultCode.COLLISION,
         "our own request came back changed: another device sent at the same time, or noise",

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from tests.daemon.conftest import Site, View
     from tests.daemon.verbs.conftest import Shell
 
+CLOCK = r"\d\d:\d\d:\d\d\.\d{3} [A-Z]+"
+
 
 def test_trace_shows_each_frame_in_words_and_ends_by_itself(site: Site, mosquitto: Mosquitto) -> None:
     del mosquitto
@@ -25,12 +27,17 @@ def test_trace_shows_each_frame_in_words_and_ends_by_itself(site: Site, mosquitt
     lines = done.stdout.splitlines()
     assert any(
         re.fullmatch(
-            r"\d\d:\d\d:\d\d\.\d{3} +[\d.]+ ms > 02 03 00 01 00 02 95 F8 +read 2 registers at 0x0001 of slave 2", line
+            CLOCK + r" +[\d.]+ ms > 02 03 00 01 00 02 95 F8 +mast-top: read 2 registers at 0x0001 of slave 2",
+            line,
         )
         for line in lines
     )
     assert any(
-        re.fullmatch(r"\d\d:\d\d:\d\d\.\d{3} +< 02 03 04 .{17} +slave 2 answers \w{4} \w{4}", line) for line in lines
+        re.fullmatch(
+            CLOCK + r" +< 02 03 04 .{17} +mast-top: slave 2 answers \w{4} \w{4}: wind_speed [\d.]+ m/s",
+            line,
+        )
+        for line in lines
     )
 
 
@@ -38,7 +45,8 @@ def test_trace_on_a_terminal_of_80_columns_puts_the_bytes_below(site: Site, mosq
     del mosquitto
     running(site)
     tracing = shell.terminal("trace", "--for", "5m")
-    tracing.says("read 2 registers at 0x0001 of slave 2\n                          02 03 00 01 00 02 95 F8")
+    indent = " " * len("12:00:00.000 UTC     3.65 ms > ")
+    tracing.says(f"mast-top: read 2 registers at 0x0001 of slave 2\n{indent}02 03 00 01 00 02 95 F8")
     assert tracing.ends(signal.SIGINT) == 0
     assert all(len(line) <= 80 for line in tracing.text.splitlines())
 
