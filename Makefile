@@ -5,7 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: demo test coverage check format docs bench soak clean
+.PHONY: demo test test-oldest coverage check format docs bench soak clean
 
 $(VENV)/.demo: pyproject.toml
 	@echo 'Setting up $(VENV), once; this takes a moment.'
@@ -24,6 +24,21 @@ demo: $(VENV)/.demo
 # Most tests wait for brokers, ptys and daemons of their own: three workers share what the machine has.
 test: $(VENV)/.dev
 	$(BIN)/python -m pytest -n 3 --dist loadfile
+
+# The ranges of pyproject.toml begin with versions that work: the lowest of each, in an environment of its own.
+OLDEST := $(VENV)/oldest
+TESTED_OLDEST := tests/mqtt tests/modbus tests/test_config.py tests/test_configfile.py tests/test_contradictions.py \
+  tests/test_document.py tests/test_kinds.py tests/test_resolution.py
+
+$(OLDEST)/.installed: pyproject.toml tests/oldest.py
+	@$(PYTHON) -m venv --clear $(OLDEST)
+	@$(PYTHON) -m tests.oldest >$(OLDEST)/requirements.txt
+	@$(OLDEST)/bin/pip install --quiet --requirement $(OLDEST)/requirements.txt
+	@$(OLDEST)/bin/pip install --quiet --no-deps --editable .
+	@touch $@
+
+test-oldest: $(OLDEST)/.installed
+	$(OLDEST)/bin/python -m pytest -q -n 3 --dist load $(TESTED_OLDEST)
 
 # Each pure module by its own tests alone; fails below 100 % of lines and branches.
 coverage: $(VENV)/.dev
