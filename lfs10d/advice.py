@@ -72,7 +72,7 @@ def loopback(host: str) -> bool:
 
 def _login(loaded: Loaded) -> Iterator[tuple[KeyPath, str]]:
     mqtt = loaded.config.mqtt
-    if loopback(mqtt.host):
+    if all(loopback(host) for host, _ in mqtt.nodes):
         return
     certificate = mqtt.tls is not None and mqtt.tls.cert is not None
     if mqtt.username is None and not certificate:
@@ -118,7 +118,7 @@ def _names(loaded: Loaded, host: str) -> Iterator[tuple[KeyPath, str]]:
                 ("line",),
                 f"the file's name {quoted(stem)} is no name for a line, so line.name is {config.line.name}; set it",
             )
-    if loopback(config.mqtt.host):
+    if all(loopback(host) for host, _ in config.mqtt.nodes):
         return
     if not any(document.holds(path) for path in (("line", "name"), ("mqtt", "base_topic"))):
         yield (

@@ -20,12 +20,14 @@ from lfs10d.kinds import (
     Duration,
     FilePath,
     Flag,
-    Host,
+    Hosts,
     Name,
     Size,
     Text,
     Whole,
+    node_text,
     shown,
+    split_node,
 )
 
 MINUTE, HOUR, DAY = 60.0, 3600.0, 86400.0
@@ -188,9 +190,15 @@ class TlsConfig(Section):
 class MqttConfig(Section):
     """The broker and who we are there."""
 
-    host: Annotated[str, Host()] = Field("localhost", description="Host name or address of the broker.")
+    host: Annotated[str | tuple[str, ...], Hosts()] = Field(
+        "localhost",
+        description="Host name or address of the broker; or a list of its nodes, tried in turn until one accepts us, "
+        "then kept until it is gone.",
+    )
     port: Annotated[int, Whole(1, 65535)] = Field(
-        PLAIN_PORT, description=f"Port of the broker. Default: {PLAIN_PORT}, {TLS_PORT} with tls."
+        PLAIN_PORT,
+        description="Port of the broker, of each node that has none of its own. "
+        f"Default: {PLAIN_PORT}, {TLS_PORT} with tls.",
     )
     version: Annotated[Literal["5", "3.1.1"], Choice((5, "3.1.1"), meaning={5: "5", "5": "5"})] = Field(
         "5",
@@ -212,6 +220,18 @@ class MqttConfig(Section):
     keepalive: Annotated[float, Duration(1, 65535)] = Field(
         20.0, description="Longest silence before the connection is tried; whole seconds, rounded up."
     )
+
+    @property
+    def nodes(self) -> tuple[tuple[str, int], ...]:
+        """The broker's nodes in turn, host and port; one where `host` is no list."""
+        if isinstance(self.host, str):
+            return ((self.host, self.port),)
+        return tuple((host, self.port if port is None else port) for host, port in map(split_node, self.host))
+
+    @property
+    def broker(self) -> str:
+        """The broker in words: `localhost:1883`, its nodes joined by commas."""
+        return ", ".join(node_text(host, port) for host, port in self.nodes)
 
 
 class StoreConfig(Section):

@@ -154,11 +154,9 @@ def _mended(data: Any, wrong: Iterable[KeyPath]) -> dict[str, Any]:  # noqa: ANN
 
     def keep(value: Any, path: KeyPath) -> Any:  # noqa: ANN401 - YAML of any shape
         if isinstance(value, dict):
-            return {key: keep(item, (*path, key)) for key, item in value.items() if not _cut(path, key, bad)}
+            return {key: keep(item, (*path, key)) for key, item in value.items() if not _cut(path, key, item, bad)}
         if isinstance(value, list) and path == ("slaves",):
             return [keep(item, (*path, index)) for index, item in enumerate(value)]
-        if isinstance(value, list) and any(step[: len(path)] == path for step in bad):
-            return []
         return value
 
     mended: dict[str, Any] = keep(data, ())
@@ -170,8 +168,12 @@ def _mended(data: Any, wrong: Iterable[KeyPath]) -> dict[str, Any]:  # noqa: ANN
     return mended
 
 
-def _cut(path: KeyPath, key: str | int, bad: frozenset[KeyPath]) -> bool:
-    return not isinstance(key, str) or (*path, key) in bad
+def _cut(path: KeyPath, key: str | int, item: object, bad: frozenset[KeyPath]) -> bool:
+    """Tell whether a key is left out: what it is, or what a list that is one value holds, is wrong."""
+    place = (*path, key)
+    if not isinstance(key, str) or place in bad:
+        return True
+    return isinstance(item, list) and place != ("slaves",) and any(step[: len(place)] == place for step in bad)
 
 
 def _concerns(key: KeyPath, wrong: frozenset[KeyPath]) -> bool:

@@ -186,9 +186,9 @@ class Daemon:
         sys.setswitchinterval(SWITCH_INTERVAL)
         config = self._running.now.config
         log.info(
-            "lfs10d %s, boot %s: %s on %s at %d baud, %d slaves, broker %s:%d",
+            "lfs10d %s, boot %s: %s on %s at %d baud, %d slaves, broker %s",
             __version__, self._facts.boot, config.line.name, config.line.port, config.line.baudrate,
-            len(config.slaves), config.mqtt.host, config.mqtt.port,
+            len(config.slaves), config.mqtt.broker,
         )  # fmt: skip
         self._storage.look()
         self._tasks.start("clock", self._moments.watch())
@@ -269,8 +269,9 @@ class Daemon:
         self._ticking = self._loop.call_at(self._station.due() + TICK_SLACK, self._tick)
 
     def _summary(self) -> str:
-        broker = "connected" if self._uplink.connected else "away"
-        return f"{self._station.summary(self._now())}, broker {broker}"
+        broker = "broker" if len(self._running.now.config.mqtt.nodes) == 1 else self._uplink.place
+        state = f"{broker} connected" if self._uplink.connected else "broker away"
+        return f"{self._station.summary(self._now())}, {state}"
 
     # -- the files
 

@@ -12,8 +12,9 @@ import unicodedata
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
+from pydantic import TypeAdapter
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from lfs10d.quantities import duration_text, seconds, size, size_text
@@ -276,6 +277,76 @@ class Host(Kind):
         if not isinstance(value, str) or self.pattern.fullmatch(value) is None:
             raise RefusedError(f"must be {self.words}")
         return value
+
+
+@dataclass(frozen=True)
+class Node(Host):
+    """One node of several: a host, with its port where it is not everybody's. A wrong one is never shown."""
+
+    @property
+    def words(self) -> str:
+        """Its form."""
+        return (
+            'a host name or address, with a port or without, such as broker-b, "broker-b:8884" or "[2001:db8::7]:1883"'
+        )
+
+    def accept(self, value: object) -> str:
+        """Take text that fits."""
+        if isinstance(value, str):
+            host, port = split_node(value)
+            if self.pattern.fullmatch(host) and (port is None or 1 <= port <= LAST_PORT):
+                return value
+        raise RefusedError(f"must be {self.words} (no mqtt://, no login)")
+
+
+LAST_PORT = 65_535
+
+_NODE = re.compile(
+    r"\[(?P<six>[^\[\]]*:[^\[\]]*)\](:(?P<port6>[0-9]{1,5}))?|(?P<host>[^:\[\]]*)(:(?P<port>[0-9]{1,5}))?"
+)
+
+
+def split_node(text: str) -> tuple[str, int | None]:
+    """Return host and port (None: not given) of one node as it is written; a host that is none stays as it is."""
+    found = _NODE.fullmatch(text)
+    if found is None:
+        return text, None  # an IPv6 address without brackets, or nonsense
+    port = found["port6"] or found["port"]
+    return found["six"] or found["host"], None if port is None else int(port)
+
+
+def node_text(host: str, port: int) -> str:
+    """Return a node as it is written, an IPv6 address in brackets (RFC 3986, section 3.2.2)."""
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+
+
+@dataclass(frozen=True)
+class Hosts(Kind):
+    """One host, or a list of nodes. A wrong one is never shown: it may hold a login."""
+
+    most: int = 16
+
+    @property
+    def words(self) -> str:
+        """Its form."""
+        return f"{Host().words}; or a list of 1 to {self.most}, each with a port of its own where it needs one"
+
+    def accept(self, value: object) -> str | tuple[str, ...]:
+        """Take one host or several nodes."""
+        if not isinstance(value, list | tuple):
+            return Host().accept(value)
+        nodes = tuple(Node().accept(each) for each in value)
+        if not 1 <= len(nodes) <= self.most or len({split_node(each) for each in nodes}) < len(nodes):
+            raise RefusedError(f"must be a list of 1 to {self.most} nodes, each once")
+        return nodes
+
+    def _validated(self, value: object) -> object:
+        if isinstance(value, list | tuple):
+            _NODES.validate_python(tuple(value))  # its errors have the places of wrong nodes
+        return super()._validated(value)
+
+
+_NODES: TypeAdapter[tuple[str, ...]] = TypeAdapter(tuple[Annotated[str, Node()], ...])
 
 
 @dataclass(frozen=True)

@@ -294,6 +294,17 @@ def mosquitto(tmp_path: Path) -> Iterator[Mosquitto]:
     broker.close()
 
 
+@pytest.fixture
+def second_mosquitto(tmp_path: Path) -> Iterator[Mosquitto]:
+    """Give another mosquitto, which knows nothing of the first."""
+    folder = tmp_path / "second-mosquitto"
+    folder.mkdir()
+    broker = Mosquitto(path_of("mosquitto"), folder)
+    broker.start()
+    yield broker
+    broker.close()
+
+
 @dataclass(frozen=True)
 class Authority:
     """A certificate authority of this test run's own, made by the openssl command."""

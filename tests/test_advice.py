@@ -128,3 +128,13 @@ def test_an_authority_that_strict_clients_refuse_is_told(monkeypatch: pytest.Mon
     monkeypatch.setattr("lfs10d.advice.missing_in_authorities", lambda _file: ("key usage", "a horse"))
     (told,) = warnings(WITH_FILES)
     assert told.startswith("3:68: mqtt.tls.ca: an authority without key usage and a horse (RFC 5280")
+
+
+@pytest.mark.parametrize(
+    ("hosts", "count"),
+    [("localhost", 0), ("[localhost, 127.0.0.1]", 0), ("[localhost, broker]", 1), ("[broker, b]", 1)],
+)
+def test_a_broker_is_remote_where_one_of_its_nodes_is(hosts: str, count: int) -> None:
+    told = warnings(LINE + f"slaves: [2]\nmqtt: {{host: {hosts}, base_topic: site}}")
+    assert len(told) == count
+    assert all(": the broker is remote and needs no login" in each for each in told)

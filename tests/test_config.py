@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import BaseModel, ValidationError
 
-from lfs10d.config import Config, default_line_name, device_name
+from lfs10d.config import Config, MqttConfig, default_line_name, device_name
 from lfs10d.kinds import Duration, Kind, Name, RefusedError
 
 if TYPE_CHECKING:
@@ -161,3 +161,13 @@ def test_every_default_is_what_the_kind_of_its_key_would_take(model: type[BaseMo
     for name, (default, kind) in kinds.items():
         written = "auto" if default is None and isinstance(kind, Duration) and kind.auto else default
         assert kind.accept(written) == default, name
+
+
+def test_one_host_is_one_node() -> None:
+    mqtt = MqttConfig.model_validate({"host": "gate", "port": 1884})
+    assert (mqtt.nodes, mqtt.broker) == ((("gate", 1884),), "gate:1884")
+
+
+def test_a_list_of_hosts_is_a_list_of_nodes() -> None:
+    mqtt = MqttConfig.model_validate({"host": ["gate", "[::1]:9"], "port": 1884})
+    assert (mqtt.nodes, mqtt.broker) == ((("gate", 1884), ("::1", 9)), "gate:1884, [::1]:9")

@@ -398,3 +398,28 @@ def test_any_text_is_a_configuration_or_problems_with_their_places(text: str) ->
         assert str(problem).isprintable()
         assert problem.line >= 1
         assert problem.column >= 1
+
+
+@pytest.mark.parametrize(
+    ("hosts", "told"),
+    [
+        ('[a, "b:0", "c d"]', ["3:18: mqtt.host[1]: must be a host name", "3:25: mqtt.host[2]: must be a host name"]),
+        ("[a, {b: 1}]", ["3:18: mqtt.host[1]: must be a host name"]),
+        ("[]", ["3:14: mqtt.host: must be a list of 1 to 16 nodes, each once"]),
+        ("[a, a]", ["3:14: mqtt.host: must be a list of 1 to 16 nodes, each once"]),
+        ('["mqtt://me:hunter2@a"]', ["3:15: mqtt.host[0]: must be a host name"]),
+        ("a:1884", ["3:14: mqtt.host: must be a host name or address, such as localhost or 192.0.2.7 (no mqtt://, no"]),
+    ],
+)
+def test_a_wrong_node_is_told_at_its_place_beside_all_else(hosts: str, told: list[str]) -> None:
+    found = problems(SMALL.replace("localhost", hosts) + "log: {level: loud}\n")
+    assert len(found) == len(told) + 1
+    assert all(line.startswith(beginning) for line, beginning in zip(found, told, strict=False))
+    assert "hunter2" not in "".join(found)
+    assert found[-1].startswith("4:14: log.level:")
+
+
+def test_nodes_have_the_port_of_the_section_where_they_have_none_of_their_own() -> None:
+    mqtt = loaded(SMALL.replace("localhost", '[a, b:1884, "[::1]"], tls: {}')).config.mqtt
+    assert mqtt.nodes == (("a", 8883), ("b", 1884), ("::1", 8883))
+    assert mqtt.broker == "a:8883, b:1884, [::1]:8883"

@@ -16,14 +16,18 @@ from lfs10d.kinds import (
     FilePath,
     Flag,
     Host,
+    Hosts,
     Kind,
     Name,
+    Node,
     RefusedError,
     Size,
     Text,
     Whole,
+    node_text,
     quoted,
     shown,
+    split_node,
 )
 
 DURATION = Duration(0.02, 86400.0, zero="as fast as can be", auto="learned")
@@ -41,6 +45,8 @@ KINDS: tuple[Kind, ...] = (
     Text(5, null=True),
     FilePath(),
     Host(),
+    Hosts(),
+    Node(),
     BaseTopic(),
 )
 
@@ -67,6 +73,8 @@ KINDS: tuple[Kind, ...] = (
         (FilePath(null=True), None, None),
         (Host(), "broker.local", "broker.local"),
         (Host(), "192.0.2.7", "192.0.2.7"),
+        (Hosts(), "192.0.2.7", "192.0.2.7"),
+        (Hosts(), ["a", "a:1884"], ("a", "a:1884")),
         (Host(), "fe80::1%eth0", "fe80::1%eth0"),
         (BaseTopic(), "site/%H/wind", "site/%H/wind"),
     ],
@@ -183,3 +191,61 @@ def test_pydantic_validates_by_the_kind_alone_and_keeps_braces_in_the_message() 
     assert Model.model_validate({"name": "a"}).name == "a"
     with pytest.raises(ValidationError, match=r'not text "\{x\}"'):
         Model.model_validate({"name": "{x}"})
+
+
+@pytest.mark.parametrize(
+    ("text", "host", "port"),
+    [
+        ("broker-a", "broker-a", None),
+        ("broker-b:8884", "broker-b", 8884),
+        ("192.0.2.7:1", "192.0.2.7", 1),
+        ("2001:db8::7", "2001:db8::7", None),
+        ("::1", "::1", None),
+        ("[2001:db8::7]", "2001:db8::7", None),
+        ("[2001:db8::7]:1883", "2001:db8::7", 1883),
+        ("[fe80::1%eth0]:65535", "fe80::1%eth0", 65535),
+    ],
+)
+def test_a_node_may_have_a_port_of_its_own(text: str, host: str, port: int | None) -> None:
+    assert Node().accept(text) == text
+    assert split_node(text) == (host, port)
+    if port is not None:
+        assert node_text(host, port) == text
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", ":1883", "a:", "a:0", "a:65536", "a:123456", "a:b", "mqtt://a", "me:hunter2@a", "a b"),
+        *("[a]:1", "[::1", "::1]:1", "[]:1", "[::1]1883", "[[::1]]:1"),
+    ],
+)
+def test_a_wrong_node_is_refused_and_never_shown(text: str) -> None:
+    with pytest.raises(RefusedError) as refused:
+        Node().accept(text)
+    assert str(refused.value) == f"must be {Node().words} (no mqtt://, no login)"
+
+
+@pytest.mark.parametrize("value", [[], ["a", "b", "a"], ["a", "[::1]", "::1"], [f"a{count}" for count in range(17)]])
+def test_nodes_are_at_least_one_not_many_and_each_once(value: list[str]) -> None:
+    with pytest.raises(RefusedError, match="must be a list of 1 to 16 nodes, each once"):
+        Hosts().accept(value)
+
+
+def test_a_wrong_node_in_a_list_is_found_by_its_place() -> None:
+    class Model(BaseModel):
+        host: Annotated[str | tuple[str, ...], Hosts()]
+
+    with pytest.raises(ValidationError) as refused:
+        Model.model_validate({"host": ["a", "b:0", 7]})
+    assert [each["loc"] for each in refused.value.errors()] == [("host", 1), ("host", 2)]
+
+
+def test_a_list_of_nodes_stays_as_it_is_written() -> None:
+    class Model(BaseModel):
+        host: Annotated[str | tuple[str, ...], Hosts()]
+
+    for host in (["a", "a:1884"], ("a",)):
+        assert Model.model_validate({"host": host}).host == tuple(host)
+    assert Hosts().accept(["a", "a:1884"]) == ("a", "a:1884")
+    assert Model.model_validate({"host": "a"}).host == "a"

@@ -99,7 +99,7 @@ def _lines(loaded: Loaded, found: Budget) -> Iterator[str]:
     character = f"{line.databits}{line.parity[0].upper()}{line.stopbits}"
     yield f"{loaded.path}: valid"
     yield f"line    {line.name}: {line.port}, {line.baudrate} baud {character} {line.framing}"
-    yield f"broker  {mqtt.host}:{mqtt.port}, topics below {mqtt.base_topic}/{line.name}"
+    yield f"broker  {mqtt.broker}, topics below {mqtt.base_topic}/{line.name}"
     disabled = sum(not slave.enabled for slave in loaded.config.slaves)
     yield f"slaves  {len(loaded.config.slaves)}" + (f", {disabled} of them disabled" if disabled else "")
     yield ""

@@ -52,11 +52,13 @@ class Ending(StrEnum):
     """What happened, as far as the next attempt depends on it."""
 
     UNREACHABLE = "unreachable"
-    """No CONNECT was sent: name, network, TLS, password file."""
+    """Nobody is there: no name, no route, no answer, or the port is closed."""
+    CLOSED = "closed"
+    """The broker closed the connection during TLS, without a word."""
     WRONG_VERSION = "wrong_version"
     """The broker refuses this version of MQTT, or sent no CONNACK at all, which old brokers do instead."""
     REFUSED = "refused"
-    """The CONNACK says no for another reason."""
+    """The CONNACK says no for another reason, or there is no TLS, or our own password or certificate is of no use."""
     LOST = "lost"
     """The connection was there and is gone."""
     TAKEN_OVER = "taken_over"
@@ -97,7 +99,17 @@ def gone(place: str, *, left: bool, accepted: bool, reason: int | None) -> Ended
 
 def failed(error: BaseException, settings: BrokerSettings) -> Ended:
     """Return why no connection could be made."""
-    return Ended(Ending.UNREACHABLE, f"{settings.place}: {_words(error, settings)}")
+    return Ended(_ending(error), f"{settings.place}: {_words(error, settings)}")
+
+
+def _ending(error: BaseException) -> Ending:
+    match error:
+        case ssl.SSLEOFError() | ssl.SSLZeroReturnError() | ConnectionResetError() | BrokenPipeError():
+            return Ending.CLOSED
+        case OSError() if not isinstance(error, ssl.SSLError):
+            return Ending.UNREACHABLE
+        case _:
+            return Ending.REFUSED
 
 
 def _words(error: BaseException, settings: BrokerSettings) -> str:

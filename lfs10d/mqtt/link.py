@@ -40,24 +40,25 @@ class Link:
         connect: type[Connection] = Connection,
     ) -> None:
         self._settings = settings
+        self._nodes = settings.nodes
         self._events = events
         self._will = will
         self._chance = chance
         self._connect = connect
-        self._reconnect = Reconnect(settings.version, chance)
+        self._reconnect = Reconnect(settings.version, chance, len(self._nodes))
         self._connection: Connection | None = None
         self._accepted: Accepted | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._wanted = False
-        self._told: str | None = None
+        self._told: dict[str, str] = {}
         self._warned_version = False
         self._waiters: list[asyncio.Future[Accepted]] = []
         self._over: asyncio.Event = asyncio.Event()
 
     @property
     def settings(self) -> BrokerSettings:
-        """What is spoken to now."""
-        return self._settings
+        """What is spoken to: where there are several nodes, the one that is connected or tried next."""
+        return self._nodes[self._reconnect.node]
 
     @property
     def standing(self) -> Connection | None:
@@ -81,7 +82,7 @@ class Link:
         self._try()
 
     async def opened(self, within: float) -> Accepted:
-        """Wait for the connection; raise BrokerError when the first round fails or `within` seconds are over."""
+        """Wait for the connection; raise BrokerError when no node accepts us or `within` seconds are over."""
         if self._accepted is not None:
             return self._accepted
         waiter = asyncio.get_running_loop().create_future()
@@ -89,7 +90,7 @@ class Link:
         try:
             return await asyncio.wait_for(waiter, within)
         except TimeoutError:
-            raise BrokerError(f"{self._settings.place}: no answer within {within:g} s") from None
+            raise BrokerError(f"{self.settings.place}: no answer within {within:g} s") from None
         finally:
             self._waiters.remove(waiter)
 
@@ -114,7 +115,7 @@ class Link:
         """End the connection that stands without a word, as lost."""
         if self._connection is not None:
             self._connection.abandon()
-            self.ended(Ended(Ending.LOST, f"{self._settings.place}: {why}"))
+            self.ended(Ended(Ending.LOST, f"{self.settings.place}: {why}"))
 
     def missed(self) -> None:
         """Note that the broker had published our will before we came back."""
@@ -123,7 +124,8 @@ class Link:
     def renew(self, settings: BrokerSettings) -> None:
         """Begin anew with other settings, after `leave`."""
         self._settings = settings
-        self._reconnect = Reconnect(settings.version, self._chance)
+        self._nodes = settings.nodes
+        self._reconnect = Reconnect(settings.version, self._chance, len(self._nodes))
         self._warned_version = False
         self.start()
 
@@ -132,7 +134,8 @@ class Link:
 
     def _try(self) -> None:
         self._timer = None
-        self._connection = self._connect(self._settings, self._reconnect.version, self, will=self._will)
+        self._reconnect.begun(self._now())
+        self._connection = self._connect(self.settings, self._reconnect.version, self, will=self._will)
 
     # Events of the connection
 
@@ -140,13 +143,13 @@ class Link:
         """Tell that it stands."""
         self._accepted = accepted
         self._reconnect.accepted(self._now())
-        place = self._settings.place
+        place = self.settings.place
         if accepted.version is not self._settings.version and not self._warned_version:
             self._warned_version = True
             log.warning("%s: refuses MQTT 5; connected by MQTT %s, which hides reason codes", place, accepted.version)
         else:
             log.info("%s: connected by MQTT %s", place, accepted.version)
-        self._told = None
+        self._told.clear()
         self._answer_waiters(accepted)
         self._events.accepted(accepted)
 
@@ -155,25 +158,28 @@ class Link:
         stood, self._accepted = self._accepted is not None, None
         self._connection = None
         self._over.set()
-        now = self._now()
+        now, place = self._now(), self.settings.place
         self._reconnect.ended(ended, now)
         if self._wanted:
-            self._tell(ended, self._reconnect.due - now)
+            self._tell(ended, place, self._reconnect.due - now)
             self._timer = asyncio.get_running_loop().call_at(self._reconnect.due, self._try)
         if stood:
             self._events.ended(ended)
 
-    def _tell(self, ended: Ended, delay: float) -> None:
+    def _tell(self, ended: Ended, place: str, delay: float) -> None:
         if self._reconnect.version is not self._settings.version:
             log.debug("%s; trying MQTT %s", ended.message, self._reconnect.version)
             return
-        level = logging.DEBUG if ended.message == self._told else logging.WARNING
-        self._told = ended.message
+        level = logging.DEBUG if ended.message == self._told.get(place) else logging.WARNING
+        self._told[place] = ended.message
         if self._reconnect.duplicate:
             log.log(level, "%s; is another client using our id %s? trying again in %.0f s",
                     ended.message, self._settings.client_id, delay)  # fmt: skip
         else:
-            log.log(level, "%s; trying again until it works", ended.message)
+            others = f"{self.settings.place} is next" if self.settings.place != place else "trying again until it works"
+            log.log(level, "%s; %s", ended.message, others)
+        if len(self._told) < len(self._nodes):
+            return  # the others have not been tried
         self._answer_waiters(BrokerError(ended.message))
 
     def _answer_waiters(self, answer: Accepted | BrokerError) -> None:

@@ -1,11 +1,17 @@
-"""When the next connection is tried, and in which version. Pure: time and chance are arguments.
+"""When the next connection is tried, to which node, and in which version. Pure: time and chance are arguments.
 
-- A connection that held is renewed at once; then after 1, 2, 4 ... 30 s, each shortened by chance by up to a
-  quarter, so that a hundred gateways do not come back in step.
+- A connection that held is renewed at once, with the same node. A node that is not there (no name, no route, no
+  answer, port closed) is tried every second, shortened by chance by up to a quarter, so that a hundred gateways do
+  not come back in step: when it returns we are back. A node that refuses us, or drops us before a connection has
+  held, is tried after 1, 2, 4 ... 30 s, shortened likewise.
+- Where there are several nodes, each has its own time. After a failure the next in turn whose time has come is tried
+  at once; the one that accepts us is kept.
 - Each round begins with the configured version. A broker that refuses 5, or does not answer, is asked in
   3.1.1 at once: some old brokers say nothing. A refusal is not remembered, because a broker may be replaced by a
   better one. But one that has spoken 5 and says nothing now is stalled, or still starting behind a forwarder: it is
   asked in 5 again, for 3.1.1 would last as long as that connection and hide every reason code.
+- One that has accepted us and now says nothing, or closes the connection without a word, is for 10 min taken for one
+  that is not there; after that, for one that refuses us.
 - Taken over by a client with our id, we wait 60 s, doubling to 1 h, until a connection has held for 2 h. Not
   every broker says so (by 3.1.1 none can, mosquitto 2.0.11 does not). So the third connection in a row that
   does not hold is taken for that, if no attempt failed between them and the broker itself ended those before:
@@ -14,7 +20,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from lfs10d.mqtt.endings import Ending
@@ -25,9 +31,12 @@ if TYPE_CHECKING:
 
     from lfs10d.mqtt.endings import Ended
 
+AWAY_EVERY = 1.0
+"""Seconds from the beginning of one attempt to the next where a node is not there."""
+
 FIRST_DELAY = 1.0
 LONGEST_DELAY = 30.0
-"""Seconds between two attempts."""
+"""Seconds between two attempts where a node refuses us."""
 
 JITTER = 0.25
 """The part of a delay that chance may take away."""
@@ -43,38 +52,68 @@ TAKEN_OVER_FORGOTTEN = 7200.0
 SHORT_MOST = 3
 """This many connections in a row that the broker ended before they held are another client with our id."""
 
-SILENT_MOST = 20
-"""This many times in a row, about ten minutes, a broker that has spoken 5 may say nothing before 3.1.1 is tried."""
+SILENT_FOR = 600.0
+"""Seconds for which a node that has accepted us may say nothing before it is taken for another broker."""
+
+
+_WORDLESS = frozenset({Ending.WRONG_VERSION, Ending.CLOSED})
+"""The connection was made, and ended without a reason code."""
+
+
+@dataclass(slots=True)
+class _Node:
+    """What is known of one node; `due` is the earliest time of its next attempt."""
+
+    due: float = float("-inf")
+    delay: float = FIRST_DELAY
+    accepted: bool = False
+    """It has accepted us once."""
+    spoke_five: bool = False
+    silent_since: float | None = None
+    """It has said nothing, or closed without a word, since then."""
 
 
 @dataclass(slots=True)
 class Reconnect:
-    """The policy; `chance()` is uniform in 0..1."""
+    """The policy; `chance()` is uniform in 0..1, `nodes` is how many there are."""
 
     configured: Version
     chance: Callable[[], float]
+    nodes: int = 1
     version: Version = Version.V5
     """What is tried next."""
+    node: int = 0
+    """Which node is tried next, or is connected: 0 is the first."""
     due: float = float("-inf")
     """When it is tried, monotonic seconds."""
     duplicate: bool = False
     """Another client uses our id."""
-    _delay: float = FIRST_DELAY
     _takeover: float = TAKEN_OVER_FIRST
+    _begun: float = float("-inf")
     _since: float | None = None
     _short: int = 0
     _unproved: bool = False
-    _silent: int | None = None
-    """How often in a row a broker that has spoken 5 said nothing; None: it never has."""
+    _all: list[_Node] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.version = self.configured
+        self._all = [_Node() for _ in range(self.nodes)]
+
+    @property
+    def _current(self) -> _Node:
+        return self._all[self.node]
+
+    def begun(self, now: float) -> None:
+        """Note that an attempt begins."""
+        self._begun = now
 
     def accepted(self, now: float) -> None:
         """Note that the connection stands."""
         self._since = now
+        self._current.accepted = True
+        self._current.silent_since = None
         if self.version is Version.V5:
-            self._silent = 0
+            self._current.spoke_five = True
 
     def missed(self) -> None:
         """Note that the broker had published our will: it lives, and ended the last connection itself."""
@@ -93,25 +132,34 @@ class Reconnect:
         since, self._since = self._since, None
         if since is not None:
             self._lost(ended, now - since, now)
-        elif version is Version.V5 and self._refuses_five(ended):
+        else:
+            self._failed(ended, version, now)
+
+    def _failed(self, ended: Ended, version: Version, now: float) -> None:
+        absent = self._absent(ended, now)
+        if version is Version.V5 and ended.ending is Ending.WRONG_VERSION and not (absent and self._current.spoke_five):
+            self._current.spoke_five = False
             self.version = Version.V311
             self.due = now
+            return
+        self._short = 0
+        self._unproved = False
+        if absent:
+            self._current.delay = FIRST_DELAY
+            self._current.due = max(now, self._begun + AWAY_EVERY * self._shortened())
         else:
-            self._short = 0
-            self._unproved = False
-            self._later(now)
+            self._back_off(now)
+        self._choose(now)
 
-    def _refuses_five(self, ended: Ended) -> bool:
-        """Tell whether 3.1.1 is worth a try, and count the silence of a broker that can do better."""
-        if ended.ending is not Ending.WRONG_VERSION:
-            return False
-        if self._silent is None or ended.reason is not None:
-            return True
-        self._silent += 1
-        if self._silent <= SILENT_MOST:
-            return False
-        self._silent = None
-        return True
+    def _absent(self, ended: Ended, now: float) -> bool:
+        """Tell whether the node is away, rather than refusing us."""
+        node = self._current
+        if ended.ending not in _WORDLESS or ended.reason is not None:
+            node.silent_since = None
+            return ended.ending is Ending.UNREACHABLE
+        if node.silent_since is None:
+            node.silent_since = now
+        return node.accepted and now - node.silent_since <= SILENT_FOR
 
     def _lost(self, ended: Ended, life: float, now: float) -> None:
         if life >= TAKEN_OVER_FORGOTTEN:
@@ -125,11 +173,22 @@ class Reconnect:
             self.due = now + self._takeover
             self._takeover = min(2 * self._takeover, TAKEN_OVER_LONGEST)
         elif life >= HELD:
-            self._delay = FIRST_DELAY
-            self.due = now
+            self._current.delay = FIRST_DELAY
+            self._current.due = self.due = now
         else:
-            self._later(now)
+            self._back_off(now)
+            self._choose(now)
 
-    def _later(self, now: float) -> None:
-        self.due = now + self._delay * (1 - JITTER * self.chance())
-        self._delay = min(2 * self._delay, LONGEST_DELAY)
+    def _back_off(self, now: float) -> None:
+        node = self._current
+        node.due = now + node.delay * self._shortened()
+        node.delay = min(2 * node.delay, LONGEST_DELAY)
+
+    def _shortened(self) -> float:
+        return 1 - JITTER * self.chance()
+
+    def _choose(self, now: float) -> None:
+        """Take the next node in turn whose time has come, else the one whose time comes first."""
+        in_turn = [(self.node + step) % self.nodes for step in range(1, self.nodes + 1)]
+        self.node = min(in_turn, key=lambda each: max(now, self._all[each].due))
+        self.due = max(now, self._all[self.node].due)

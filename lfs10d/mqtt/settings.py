@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING
+
+from lfs10d.kinds import node_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -39,6 +41,8 @@ def no_password() -> Secret | None:
 class BrokerSettings:
     """`password` is asked at each connect, in a thread that may block; its errors are the connect's.
 
+    Where `others` are given, hosts and ports, they are tried in turn after `host` and `port`.
+
     `keepalive` is in whole seconds (MQTT 5.0, section 3.1.2.10).
     """
 
@@ -50,14 +54,17 @@ class BrokerSettings:
     password: Callable[[], Secret | None] = field(default=no_password, repr=False)
     tls: Tls | None = None
     keepalive: int = 20
+    others: tuple[tuple[str, int], ...] = ()
 
     @classmethod
     def of(cls, config: MqttConfig, *, client_id: str, password: Callable[[], Secret | None]) -> BrokerSettings:
         """Return the settings of section `mqtt`; a verb that is no daemon gives a client id of its own."""
         tls = config.tls
+        (host, port), *others = config.nodes
         return cls(
-            host=config.host,
-            port=config.port,
+            host=host,
+            port=port,
+            others=tuple(others),
             client_id=client_id,
             version=Version(config.version),
             username=config.username,
@@ -69,4 +76,10 @@ class BrokerSettings:
     @property
     def place(self) -> str:
         """The broker as messages name it: `broker localhost:1883`."""
-        return f"broker {self.host}:{self.port}"
+        return f"broker {node_text(self.host, self.port)}"
+
+    @property
+    def nodes(self) -> tuple[BrokerSettings, ...]:
+        """The settings of each node, in turn."""
+        hosts = ((self.host, self.port), *self.others)
+        return tuple(replace(self, host=host, port=port, others=()) for host, port in hosts)

@@ -104,6 +104,11 @@ class Uplink:
         return self._link.version
 
     @property
+    def place(self) -> str:
+        """The node that is connected or tried next, as messages name it: `broker localhost:1883`."""
+        return self._link.settings.place
+
+    @property
     def duplicate(self) -> bool:
         """Another client takes our id away: `duplicate_client`."""
         return self._link.duplicate

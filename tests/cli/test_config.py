@@ -157,3 +157,15 @@ def test_half_the_truth_is_never_told(state: str, arguments: list[str]) -> None:
             Path("state", FILE_NAME).mkdir(parents=True)
     with pytest.raises(StateError):
         CliRunner().invoke(command, ["-c", "lfs10d.yaml", *arguments], catch_exceptions=False, standalone_mode=False)
+
+
+def test_a_list_of_nodes_is_shown_and_merged_as_one_would_write_it() -> None:
+    text = TEXT.replace("host: broker", 'host: [a, "b:8884", "[::1]"]')
+    assert text != TEXT
+    rows = {line.split()[0]: line.split()[1:] for line in config(text=text).splitlines()}
+    assert rows["mqtt.host"] == ['["a",', '"b:8884",', '"[::1]"]', "lfs10d.yaml:4"]
+    merged = config("--merged", text=text)
+    before = load(Path("lfs10d.yaml"), environment={}, host="gateway").config
+    Path("lfs10d.yaml").write_text(merged)
+    assert load(Path("lfs10d.yaml"), environment={}, host="gateway").config == before
+    assert json.loads(config("--json", text=text))["config"]["mqtt"]["host"] == ["a", "b:8884", "[::1]"]

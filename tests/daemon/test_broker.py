@@ -260,3 +260,36 @@ def test_a_second_daemon_with_our_client_id_is_told_of(site: Site, mosquitto: Mo
         lambda: "duplicate_client" in run.status.read_text() if run.status.exists() else "", "status.json"
     )
     assert status
+
+
+def test_a_gateway_moves_to_another_node_with_its_backlog_its_requests_and_its_will(
+    site: Site, mosquitto: Mosquitto, second_mosquitto: Mosquitto
+) -> None:
+    site.line()
+    nodes = [f"127.0.0.1:{broker.port}" for broker in (mosquitto, second_mosquitto)]
+    site.write(mqtt={"host": nodes}, poll={"interval": "100ms"})
+    run = site.run()
+    before, after = View(mosquitto.subscribe()), View(second_mosquitto.subscribe())
+    before.wait("availability", "online".__eq__)
+    before.wait_samples("slave-1", 20)
+
+    mosquitto.kill()
+    killed = time.monotonic()
+    after.wait("availability", "online".__eq__)
+    assert time.monotonic() - killed < 3.0
+    for topic in ("info", "devices", "line/state", "device/slave-1/config"):
+        after.wait(topic)
+    after.wait_samples("slave-1", 20)
+
+    def all_of_it() -> bool:
+        """Tell whether nothing is missing."""
+        seen = {one["seq"] for view in (before, after) for one in view.samples("slave-1")}
+        return seen == set(range(1, max(seen) + 1))
+
+    eventually(all_of_it, "all samples at one of the two", within=PATIENCE + 10)
+    status = f"broker {nodes[1]} connected"
+    eventually(lambda: [one for one in run.manager.all("STATUS=") if status in one], status)
+    second_mosquitto.publish("lfs10d/line0/request/health", "{}")
+    after.wait("response/health")
+    run.process.kill()
+    after.wait("availability", "offline".__eq__)

@@ -21,8 +21,8 @@ def certificate_error() -> ssl.SSLCertVerificationError:
     return error
 
 
-def tls_error(reason: str | None) -> ssl.SSLError:
-    error = ssl.SSLError(1, "x")
+def tls_error(reason: str | None, kind: type[ssl.SSLError] = ssl.SSLError) -> ssl.SSLError:
+    error = kind(1, "x")
     error.reason = reason  # type: ignore[assignment]  # None where OpenSSL gives none
     return error
 
@@ -47,7 +47,7 @@ def tls_error(reason: str | None) -> ssl.SSLError:
 )
 def test_a_failed_attempt_names_the_broker_and_the_cause(error: Exception, words: str) -> None:
     ended = failed(error, SETTINGS)
-    assert ended.ending is Ending.UNREACHABLE
+    assert ended.ending in {Ending.UNREACHABLE, Ending.CLOSED, Ending.REFUSED}
     assert ended.message.startswith(f"broker gate.example:8883: {words}")
 
 
@@ -63,3 +63,23 @@ def test_a_reason_code_says_what_to_do() -> None:
 
 def test_an_unknown_reason_code_is_shown_as_the_number_it_is() -> None:
     assert reason_in_words(0xA2) == "reason code 0xA2"
+
+
+@pytest.mark.parametrize(
+    ("error", "ending"),
+    [
+        (socket.gaierror(-2, "Name or service not known"), Ending.UNREACHABLE),
+        (ConnectionRefusedError(errno.ECONNREFUSED, "Connection refused"), Ending.UNREACHABLE),
+        (TimeoutError("timed out"), Ending.UNREACHABLE),
+        (OSError(errno.EHOSTUNREACH, "No route to host"), Ending.UNREACHABLE),
+        (ConnectionResetError(errno.ECONNRESET, "reset"), Ending.CLOSED),
+        (tls_error("UNEXPECTED_EOF_WHILE_READING", ssl.SSLEOFError), Ending.CLOSED),
+        (tls_error("WRONG_VERSION_NUMBER"), Ending.REFUSED),
+        (certificate_error(), Ending.REFUSED),
+        (BrokerError("mqtt.tls.ca: /x: no such file"), Ending.REFUSED),
+        (UnicodeError("label too long"), Ending.REFUSED),
+    ],
+)
+def test_a_broker_that_is_not_there_is_told_from_one_that_refuses_us(error: Exception, ending: Ending) -> None:
+    """The first is tried every second, the other with back-off."""
+    assert failed(error, SETTINGS).ending is ending

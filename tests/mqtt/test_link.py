@@ -259,6 +259,71 @@ def test_a_dropped_connection_is_made_anew(mosquitto: Mosquitto) -> None:
     asyncio.run(scenario())
 
 
+BACK_WITHIN = 3.0
+"""Seconds from a broker's return to our connection."""
+
+
+def test_a_broker_that_was_away_for_long_has_us_back_within_3_s(
+    mosquitto: Mosquitto, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As many attempts as fit into 10 min fail, in a second: only the return is in real time."""
+
+    async def scenario() -> None:
+        async with linked(settings_of(mosquitto.port)) as (link, witness):
+            await link.opened(PATIENCE)
+            monkeypatch.setattr("lfs10d.mqtt.reconnect.AWAY_EVERY", 0.01)
+            mosquitto.kill()
+            await witness.until(lambda: "ended" in witness.told)
+            await asyncio.sleep(1.0)
+            monkeypatch.setattr("lfs10d.mqtt.reconnect.AWAY_EVERY", 1.0)
+            mosquitto.start()
+            returned = time.monotonic()
+            await witness.until(lambda: witness.told == ["accepted", "ended", "accepted"])
+            assert time.monotonic() - returned < BACK_WITHIN
+
+    asyncio.run(scenario())
+
+
+def test_of_several_nodes_the_one_that_accepts_us_is_kept_until_it_is_gone(
+    mosquitto: Mosquitto, second_mosquitto: Mosquitto, unused_port: int, caplog: pytest.LogCaptureFixture
+) -> None:
+    first, second = ("127.0.0.1", mosquitto.port), ("127.0.0.1", second_mosquitto.port)
+
+    async def scenario() -> None:
+        async with linked(settings_of(unused_port, others=(first, second))) as (link, witness):
+            await link.opened(PATIENCE)
+            assert link.settings.port == mosquitto.port
+            mosquitto.kill()
+            await witness.until(lambda: len(witness.acceptances) == 2)
+            assert link.settings.port == second_mosquitto.port
+            mosquitto.start()
+            await asyncio.sleep(1.5)
+            assert link.settings.port == second_mosquitto.port
+            second_mosquitto.kill()
+            await witness.until(lambda: len(witness.acceptances) == 3)
+            assert link.settings.port == mosquitto.port
+
+    caplog.set_level(logging.INFO, "lfs10d.mqtt.link")
+    asyncio.run(scenario())
+    told = [record.getMessage() for record in caplog.records if record.name == "lfs10d.mqtt.link"]
+    places = {port: f"broker 127.0.0.1:{port}" for port in (unused_port, mosquitto.port, second_mosquitto.port)}
+    refused = f"{places[unused_port]}: connection refused: is the broker running, and mqtt.port right?"
+    assert told[:2] == [
+        f"{refused}; {places[mosquitto.port]} is next",
+        f"{places[mosquitto.port]}: connected by MQTT 5",
+    ]
+
+
+def test_a_verb_gives_up_when_no_node_accepts_it(unused_port: int) -> None:
+    async def scenario() -> None:
+        settings = settings_of(unused_port, others=(("localhost", unused_port),))
+        async with linked(settings) as (link, _):
+            with pytest.raises(BrokerError, match=f"broker localhost:{unused_port}: connection refused"):
+                await link.opened(PATIENCE)
+
+    asyncio.run(scenario())
+
+
 # 3.1.1
 
 

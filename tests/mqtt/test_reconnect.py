@@ -7,17 +7,27 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lfs10d.mqtt.endings import UNSUPPORTED_VERSION, Ended, Ending
-from lfs10d.mqtt.reconnect import HELD, SHORT_MOST, SILENT_MOST, TAKEN_OVER_FIRST, TAKEN_OVER_FORGOTTEN, Reconnect
+from lfs10d.mqtt.reconnect import (
+    AWAY_EVERY,
+    HELD,
+    SHORT_MOST,
+    SILENT_FOR,
+    TAKEN_OVER_FIRST,
+    TAKEN_OVER_FORGOTTEN,
+    Reconnect,
+)
 from lfs10d.mqtt.settings import Version
 
 UNREACHABLE = Ended(Ending.UNREACHABLE, "")
 WRONG_VERSION = Ended(Ending.WRONG_VERSION, "")
+REFUSED = Ended(Ending.REFUSED, "", 0x87)
+CLOSED = Ended(Ending.CLOSED, "")
 LOST = Ended(Ending.LOST, "")
 TAKEN_OVER = Ended(Ending.TAKEN_OVER, "")
 
 
-def fresh(version: Version = Version.V5) -> Reconnect:
-    return Reconnect(version, lambda: 0.0)
+def fresh(version: Version = Version.V5, nodes: int = 1) -> Reconnect:
+    return Reconnect(version, lambda: 0.0, nodes)
 
 
 def live(policy: Reconnect, start: float, seconds: float, ended: Ended = LOST) -> None:
@@ -29,30 +39,54 @@ def test_the_first_attempt_is_at_once() -> None:
     assert fresh().due < 0.0
 
 
-def test_attempts_that_fail_are_1_2_4_up_to_30_s_apart() -> None:
+@pytest.mark.parametrize("took", [0.0, 0.4, 1.0, 5.0])
+def test_a_broker_that_is_away_is_tried_every_second_for_ever(took: float) -> None:
+    """So that we are back within 3 s of its return (contract, section 3); an attempt may have taken 5 s itself."""
+    policy = fresh()
+    now = 100.0
+    for _ in range(100):
+        policy.begun(now)
+        policy.ended(UNREACHABLE, now + took)
+        assert policy.due == max(now + AWAY_EVERY, now + took)
+        now = policy.due
+
+
+def test_attempts_that_are_refused_are_1_2_4_up_to_30_s_apart() -> None:
     policy = fresh()
     delays = []
     for _ in range(7):
-        policy.ended(UNREACHABLE, 100.0)
+        policy.ended(REFUSED, 100.0)
         delays.append(policy.due - 100.0)
     assert delays == [1.0, 2.0, 4.0, 8.0, 16.0, 30.0, 30.0]
 
 
-@given(st.floats(0, 1))
-def test_chance_shortens_a_delay_by_at_most_a_quarter(chance: float) -> None:
+@pytest.mark.parametrize("ended", [UNREACHABLE, REFUSED])
+@given(chance=st.floats(0, 1))
+def test_chance_shortens_a_delay_by_at_most_a_quarter(ended: Ended, chance: float) -> None:
     policy = Reconnect(Version.V5, lambda: chance)
-    policy.ended(UNREACHABLE, 0.0)
+    policy.begun(0.0)
+    policy.ended(ended, 0.0)
     assert 0.75 <= policy.due <= 1.0
 
 
-def test_a_connection_that_held_is_renewed_at_once_and_starts_from_1_s_again() -> None:
+def test_a_connection_that_held_is_renewed_at_once_and_refusals_start_from_1_s_again() -> None:
     policy = fresh()
     for _ in range(5):
-        policy.ended(UNREACHABLE, 0.0)
+        policy.ended(REFUSED, 0.0)
     live(policy, 100.0, HELD)
     assert policy.due == 100.0 + HELD
-    policy.ended(UNREACHABLE, 111.0)
+    policy.ended(REFUSED, 111.0)
     assert policy.due == 112.0
+
+
+def test_a_broker_that_dropped_us_and_then_went_away_has_refused_nothing() -> None:
+    policy = fresh()
+    for _ in range(5):
+        live(policy, 100.0, 0.5)
+    policy.begun(200.0)
+    policy.ended(UNREACHABLE, 200.0)
+    live(policy, 201.0, 0.5)
+    assert policy.due == 202.5
 
 
 def test_a_connection_that_does_not_hold_is_not_renewed_at_once() -> None:
@@ -76,6 +110,7 @@ def test_each_round_begins_with_5_again() -> None:
     assert policy.version is Version.V5
     policy.ended(WRONG_VERSION, 100.0)
     assert (policy.version, policy.due) == (Version.V311, 100.0)
+    policy.begun(100.0)
     policy.ended(WRONG_VERSION, 100.0)
     assert (policy.version, policy.due) == (Version.V5, 101.0)
 
@@ -83,9 +118,10 @@ def test_each_round_begins_with_5_again() -> None:
 def test_a_broker_that_has_spoken_5_and_says_nothing_now_is_asked_in_5_again() -> None:
     policy = fresh()
     live(policy, 0.0, HELD)
-    for delay in (1.0, 2.0, 4.0):
-        policy.ended(WRONG_VERSION, 100.0)
-        assert (policy.version, policy.due) == (Version.V5, 100.0 + delay)
+    for now in (100.0, 200.0, 300.0):
+        policy.begun(now)
+        policy.ended(WRONG_VERSION, now)
+        assert (policy.version, policy.due) == (Version.V5, now + AWAY_EVERY)
 
 
 def test_a_broker_that_has_spoken_5_and_refuses_it_in_so_many_words_is_asked_in_3_1_1_at_once() -> None:
@@ -98,24 +134,102 @@ def test_a_broker_that_has_spoken_5_and_refuses_it_in_so_many_words_is_asked_in_
 def test_a_broker_that_spoke_5_and_says_nothing_for_long_is_taken_for_another_one() -> None:
     policy = fresh()
     live(policy, 0.0, HELD)
-    for _ in range(SILENT_MOST):
-        policy.ended(WRONG_VERSION, 100.0)
+    for now in (100.0, 400.0, 100.0 + SILENT_FOR):
+        policy.ended(WRONG_VERSION, now)
         assert policy.version == Version.V5
-    policy.ended(WRONG_VERSION, 200.0)
-    assert (policy.version, policy.due) == (Version.V311, 200.0)
-    live(policy, 200.0, HELD)
-    policy.ended(WRONG_VERSION, 300.0)
-    assert (policy.version, policy.due) == (Version.V311, 300.0)
+    policy.ended(WRONG_VERSION, 800.0)
+    assert (policy.version, policy.due) == (Version.V311, 800.0)
+    for delay in (1.0, 2.0):
+        policy.ended(WRONG_VERSION, 800.0)
+        assert (policy.version, policy.due) == (Version.V5, 800.0 + delay)
+        policy.ended(WRONG_VERSION, 800.0)
+        assert policy.version is Version.V311
 
 
-def test_the_silence_of_a_broker_that_has_spoken_5_is_forgotten_when_it_speaks_again() -> None:
+@pytest.mark.parametrize("between", ["accepted", "gone"])
+def test_the_silence_of_a_broker_is_forgotten_when_it_speaks_or_is_gone(between: str) -> None:
     policy = fresh()
     live(policy, 0.0, HELD)
-    for _ in range(SILENT_MOST):
-        policy.ended(WRONG_VERSION, 100.0)
-    live(policy, 200.0, HELD)
-    policy.ended(WRONG_VERSION, 300.0)
+    policy.ended(WRONG_VERSION, 100.0)
+    if between == "accepted":
+        live(policy, 200.0, HELD)
+    else:
+        policy.ended(UNREACHABLE, 200.0)
+    policy.ended(WRONG_VERSION, 1000.0)
     assert policy.version is Version.V5
+
+
+def test_a_broker_that_closes_without_a_word_is_away_if_it_has_accepted_us_before() -> None:
+    policy = fresh()
+    policy.ended(CLOSED, 100.0)
+    policy.ended(CLOSED, 100.0)
+    assert policy.due == 102.0
+    live(policy, 200.0, HELD)
+    for now in (300.0, 600.0, 900.0):
+        policy.begun(now)
+        policy.ended(CLOSED, now)
+        assert policy.due == now + AWAY_EVERY
+    for delay in (1.0, 2.0, 4.0):
+        policy.ended(CLOSED, 901.0)
+        assert policy.due == 901.0 + delay
+
+
+# Several nodes
+
+
+def test_nodes_are_tried_in_turn_at_once_until_all_have_failed() -> None:
+    policy = fresh(nodes=3)
+    tried = []
+    for _ in range(7):
+        now = max(policy.due, 0.0)
+        tried.append((now, policy.node))
+        policy.begun(now)
+        policy.ended(UNREACHABLE, now)
+    assert tried == [(0.0, 0), (0.0, 1), (0.0, 2), (1.0, 0), (1.0, 1), (1.0, 2), (2.0, 0)]
+
+
+def test_the_node_that_accepts_us_is_kept_and_left_only_when_it_is_gone() -> None:
+    policy = fresh(nodes=2)
+    policy.ended(UNREACHABLE, 0.0)
+    live(policy, 0.0, 100.0)
+    assert (policy.node, policy.due) == (1, 100.0)
+    live(policy, 100.0, 100.0)
+    assert policy.node == 1
+    policy.ended(UNREACHABLE, 200.0)
+    assert (policy.node, policy.due) == (0, 200.0)
+
+
+def test_a_node_that_refuses_us_does_not_delay_the_others() -> None:
+    policy = fresh(nodes=2)
+    at: dict[int, list[float]] = {0: [], 1: []}
+    while len(at[1]) < 10:
+        now = max(policy.due, 0.0)
+        at[policy.node].append(now)
+        policy.begun(now)
+        policy.ended(UNREACHABLE if policy.node else REFUSED, now)
+    assert at[1] == [float(second) for second in range(10)]
+    assert at[0] == [0.0, 1.0, 3.0, 7.0]
+
+
+def test_each_node_is_asked_in_3_1_1_before_the_next() -> None:
+    policy = fresh(nodes=2)
+    tried = []
+    for _ in range(5):
+        tried.append((policy.node, policy.version))
+        policy.ended(WRONG_VERSION, 0.0)
+    assert tried == [(0, Version.V5), (0, Version.V311), (1, Version.V5), (1, Version.V311), (0, Version.V5)]
+
+
+def test_a_node_on_which_a_connection_does_not_hold_is_left() -> None:
+    policy = fresh(nodes=2)
+    live(policy, 0.0, 0.5)
+    assert (policy.node, policy.due) == (1, 0.5)
+
+
+def test_taken_over_it_waits_whatever_other_nodes_there_are() -> None:
+    policy = fresh(nodes=2)
+    live(policy, 0.0, 100.0, TAKEN_OVER)
+    assert policy.due == 100.0 + TAKEN_OVER_FIRST
 
 
 def test_3_1_1_where_configured_is_the_only_one_tried() -> None:

@@ -33,3 +33,16 @@ def test_a_password_is_not_shown() -> None:
     settings = BrokerSettings("gate", 1883, "me", password=lambda: Secret("hunter2"))
     assert "password" not in repr(settings)
     assert no_password() is None
+
+
+def test_a_list_of_hosts_gives_each_node_its_settings() -> None:
+    config = MqttConfig.model_validate({"host": ["a", "b:8884", "[2001:db8::7]"], "port": 8883, "username": "u"})
+    settings = BrokerSettings.of(config, client_id="me", password=no_password)
+    nodes = settings.nodes
+    assert [node.place for node in nodes] == ["broker a:8883", "broker b:8884", "broker [2001:db8::7]:8883"]
+    assert {(node.username, node.client_id, node.others) for node in nodes} == {("u", "me", ())}
+
+
+def test_one_host_is_the_only_node() -> None:
+    settings = BrokerSettings("gate", 1883, "me")
+    assert settings.nodes == (settings,)
