@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from lfs10d.admission import Admission, Answered, Ignored, Ticket, Waiting
 from lfs10d.commands import Answer, Call, failed, rejected
 from lfs10d.logs import escape
+from lfs10d.requests import audit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -110,7 +111,7 @@ class Service:
         repeats = self._admission.done(ticket, answer, asyncio.get_running_loop().time())
         quiet = self._requests[ticket.name].form.klass == "always" and answer.status == "ok"
         level = logging.DEBUG if quiet else logging.INFO
-        log.log(level, "request %s: %s", ticket.name, _in_short(answer))
+        log.log(level, "%s", audit.line(ticket.name, ticket.call, answer))
         for call, where in ((ticket.call, whence), *repeats):
             self._tell(where, call, answer, ticket.memory.took)
 
@@ -123,6 +124,7 @@ class Service:
         if answer is None:
             return
         if tell:
+            log.info("%s", audit.line(name, call, answer))
             topic = call.topic or f"response/{name}"
             self._tell(_Whence(topic, call.correlation, name), call, answer, 0.0)
         for again, where in repeats:

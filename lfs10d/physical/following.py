@@ -14,8 +14,9 @@ from lfs10d.jobs.course import Now, Over
 from lfs10d.jobs.follow import follow
 from lfs10d.jobs.readdress import Ending, Verdict, Wish
 from lfs10d.journal import Spot
-from lfs10d.physical import adoption
+from lfs10d.physical import adoption, asked
 from lfs10d.reading import Errand
+from lfs10d.requests import audit
 from lfs10d.tasks import BackgroundTasks
 
 if TYPE_CHECKING:
@@ -137,6 +138,8 @@ class Following:
             await self._physical.record(move.device, move.new, newcomer=adoption.entry(change))
             await self.finish(self._physical.changes_of(move.device), change, answer)
             self._moves.tell_moved(move.device, move.old, move.new)
+            if change.answered and change.asked is not None:  # else its answer is in the log
+                log.info("%s: found", audit.line(change.asked.name, asked.call_of(change.asked), answer))
         else:
             why = f"{move.device} answers at slave id {move.old.slave}, and its register does not say {move.new.slave}"
             await self.drop(change, why)

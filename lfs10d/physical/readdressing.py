@@ -116,7 +116,6 @@ class Readdressing:
 
     def tell_moved(self, device: str, old: Spot, new: Spot) -> None:
         """Tell that a sensor has another slave id now."""
-        log.info("%s answers at slave id %d now, not at %d any more", device, new.slave, old.slave)
         self._physical.tell("readdressed", {"device": device, "from": old.slave, "to": new.slave})
 
     def tell_duplicate(self, device: str, old: Spot, new: Spot) -> None:
