@@ -6,11 +6,12 @@ import asyncio
 import json
 import secrets
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from lfs10d.cli import EXIT_FAILED, config_option, interruptible, json_option
+from lfs10d.cli import EXIT_FAILED, config_option, interruptible, json_option, request_words
 from lfs10d.cli.answers import told, verdict
 from lfs10d.cli.json_text import json_text
 from lfs10d.cli.keyvalue import IDS, KeyValueError, content_of
@@ -18,17 +19,21 @@ from lfs10d.cli.livelines import health
 from lfs10d.cli.login import Login, login, login_options
 from lfs10d.cli.mounting import Mounting
 from lfs10d.cli.repeating import ADOPT, mount
+from lfs10d.cli.requested_scan import SCAN, scan
 from lfs10d.cli.spinner import spinning
-from lfs10d.cli.visitor import Visitor
+from lfs10d.cli.visitor import RETAINED_WITHIN, Visitor, parsed
 from lfs10d.commands import LARGEST
-from lfs10d.errors import FailedError
+from lfs10d.configfile import load
+from lfs10d.errors import ConfigError, FailedError
 from lfs10d.kinds import Name
+from lfs10d.mqtt.messages import Filter
+from lfs10d.profiles.library import builtin_names
 from lfs10d.quantities import duration_text, seconds
 from lfs10d.requests.table import REQUESTS
+from lfs10d.telemetry import DEVICES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
     from click.shell_completion import CompletionItem
 
@@ -36,11 +41,11 @@ USUAL_TIMEOUT = 10.0
 """Seconds after which the response no longer comes."""
 PATIENT = frozenset({"line/scan", "line/baudrate", "line/adopt", "device/readdress"})
 """Requests that take as long as they take: scans and physical changes."""
-CANCELLABLE = frozenset({"line/scan"})
-"""Those of them that a request can end."""
 
 EXAMPLES = """\b
 Examples:
+  lfs10d request --list                            every request with its parameters
+  lfs10d request device/options --help             what one of them takes
   lfs10d request health                            how the daemon, the line and every sensor are
   lfs10d request device/read device=mast-top       poll one sensor now
   lfs10d request line/trace for=1m                 the frames of a minute, on topic trace
@@ -72,9 +77,59 @@ def _complete(context: click.Context, parameter: click.Parameter, incomplete: st
     return [CompletionItem(name) for name in sorted(REQUESTS) if name.startswith(incomplete)]
 
 
-@click.command("request", epilog=EXAMPLES)
+def _complete_parameter(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    from click.shell_completion import CompletionItem  # noqa: PLC0415  # only when a shell asks
+
+    del parameter
+    name, given = context.params.get("name") or "", context.params.get("parameters") or ()
+    known = {"device": configured_devices(context.params.get("config")), "profile": builtin_names()}
+    return [CompletionItem(word) for word in request_words.completions(name, given, incomplete, known)]
+
+
+def configured_devices(file: object) -> tuple[str, ...]:
+    """Return the names of the devices in a configuration file; none where it cannot be read."""
+    try:
+        return tuple(slave.name for slave in load(Path(str(file)), files=False).config.slaves)
+    except ConfigError:
+        return ()
+
+
+class _Command(click.Command):
+    """Knows which request its help is asked for, which click sees only after `--help`."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse what was typed."""
+        ctx.meta[__name__] = next((word for word in args if word in REQUESTS), None)
+        return super().parse_args(ctx, args)
+
+    def format_help(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the help of the request that was named, or of the verb."""
+        name = ctx.meta.get(__name__)
+        if name is None:
+            super().format_help(ctx, formatter)
+        else:
+            formatter.write("\n".join(request_words.help_of(name)) + "\n")
+
+
+def _list(context: click.Context, parameter: click.Parameter, wanted: bool) -> None:  # noqa: FBT001  # as click calls it
+    del parameter
+    if wanted and not context.resilient_parsing:
+        for text in request_words.listing():
+            click.echo(text)
+        context.exit()
+
+
+@click.command("request", cls=_Command, epilog=EXAMPLES)
 @click.argument("name", callback=_name, shell_complete=_complete)
-@click.argument("parameters", nargs=-1, metavar="[KEY=VALUE]...")
+@click.argument("parameters", nargs=-1, metavar="[KEY=VALUE]...", shell_complete=_complete_parameter)
+@click.option(
+    "--list",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_list,
+    help="Print every request with its parameters.",
+)
 @config_option
 @click.option(
     "--timeout",
@@ -92,9 +147,9 @@ def _complete(context: click.Context, parameter: click.Parameter, incomplete: st
 def command(**options: Any) -> int:  # noqa: ANN401  # nine options; `_Wanted` names and types them
     """Send the request NAME to the running daemon; print its response.
 
-    NAME is one such as device/read. Each VALUE is read as the request wants it: text, a number, true, a duration, or
-    JSON. Exit code 0 if it was carried out, 1 if not or if nothing was answered in time, 69 if the broker or the
-    daemon is away.
+    NAME is one such as device/read; --list prints them all, NAME --help what one takes. Each VALUE is read as the
+    request wants it: text, a number, true, a duration, or JSON; a device may be given by its slave id. Exit code 0 if
+    it was carried out, 1 if not or if nothing was answered in time, 69 if the broker or the daemon is away.
     """
     wanted = _Wanted(**options)
     if wanted.repeat:
@@ -103,6 +158,8 @@ def command(**options: Any) -> int:  # noqa: ANN401  # nine options; `_Wanted` n
         return interruptible.run(mount(visited, mounting, as_json=wanted.as_json))
     content = wanted.content
     visited = login(wanted.config, "request", username=wanted.username, password_file=wanted.password_file)
+    if wanted.name == SCAN:
+        return interruptible.run(scan(visited, content, wanted.patience, as_json=wanted.as_json))
     response = interruptible.run(_ask(wanted, visited, content))
     if response is None:
         message = f"no response to {wanted.name} within {duration_text(wanted.patience or 0)}"
@@ -181,16 +238,22 @@ class _Wanted:
 
 
 async def _ask(wanted: _Wanted, visited: Login, content: dict[str, Any]) -> dict[str, Any] | None:
-    visitor = Visitor(visited)
+    told: list[object] = []
+    by_id = request_words.is_slave_id(content.get("device"))
+    filters = [Filter(visited.topics.full(DEVICES), qos=0, retain_as_published=False)] if by_id else []
+    visitor = Visitor(visited, filters, lambda message: told.append(parsed(message.payload)))
     try:
         async with spinning(f"{wanted.name} ..."):
             await visitor.enter()
             await visitor.find_daemon()
+            if by_id:
+                await visitor.until(lambda: bool(told), RETAINED_WITHIN)
+                device = request_words.named_device(content["device"], told[-1] if told else None)
+                content = {**content, "device": device}
             return await visitor.ask(wanted.name, content, wanted.patience)
     except asyncio.CancelledError:  # Ctrl-C, SIGTERM
         if visitor.asked:
-            ends = "; `lfs10d request line/cancel` ends it" if wanted.name in CANCELLABLE else ""
-            click.echo(f"lfs10d: {wanted.name} was sent and is not called back by this{ends}", err=True)
+            click.echo(f"lfs10d: {wanted.name} was sent and is not called back by this", err=True)
         raise
     finally:
         await visitor.leave()

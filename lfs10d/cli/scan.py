@@ -127,7 +127,7 @@ class _Result:
         """Print what was found, or what it means that nobody was."""
         found = self.scan.found
         if found:
-            _show_table([findings.row(finding) for finding in found])
+            show_table([findings.row(finding) for finding in found])
             click.echo()
             click.echo("# To poll them, save this as lfs10d.yaml, then: lfs10d run -c lfs10d.yaml")
             for text in findings.snippet(found, self.line, asked=self.asked):
@@ -182,7 +182,8 @@ def _scan(result: _Result, *, as_json: bool) -> int:
     return 0 if scan.found else EXIT_FAILED
 
 
-def _show_table(rows: list[tuple[str, ...]]) -> None:
+def show_table(rows: list[tuple[str, ...]]) -> None:
+    """Print what was found."""
     if not sys.stdout.isatty():
         for text in columns(findings.HEAD, rows, right=findings.RIGHT):
             click.echo(text)

@@ -38,7 +38,7 @@ def view(scan: Scan, port: str, *, quiet: bool) -> Iterator[View]:
     if not terminal:
         yield _Lines(scan, quiet=quiet)
         return
-    bar = _bar()
+    bar = progress_bar()
     with bar:
         yield _Drawn(scan, bar)
 
@@ -121,7 +121,8 @@ class _Drawn:
         )
 
 
-def _bar() -> Bar:
+def progress_bar() -> Bar:
+    """Return a bar for standard error; what adds a task gives it `remaining`, in words."""
     # Only a terminal needs rich; importing it takes longer than the rest of the verb.
     from rich.console import Console  # noqa: PLC0415 - for a terminal only
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn  # noqa: PLC0415 - for a terminal only

@@ -139,6 +139,17 @@ class Visitor:
             raise BrokerError(f"{self.place}: the daemon went away before it answered {name}")
         return self._response
 
+    def send(self, name: str, content: dict[str, Any]) -> None:
+        """Send a request whose response nobody waits for: what was asked for before may still be answered."""
+        connection = self._link.standing
+        if connection is not None:
+            connection.publish(self.topics.full(f"request/{name}"), json.dumps(content).encode())
+
+    @property
+    def response(self) -> dict[str, Any] | None:
+        """What was answered to what was asked last; None while nothing was."""
+        return self._response
+
     @property
     def _answered(self) -> bool:
         return self._response is not None

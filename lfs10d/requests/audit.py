@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from lfs10d.logs import escape
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from lfs10d.commands import Answer, Call
 
@@ -54,7 +54,7 @@ def _polled(data: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in data.items() if key != "device"}
 
 
-_CHANGES = {
+_CHANGES: Mapping[str, Callable[[Mapping[str, Any]], tuple[object, object]]] = {
     "device/add": lambda data: (None, _polled(data)),
     "device/remove": lambda data: (_polled(data), None),
     "device/options": lambda data: (data.get("from"), data.get("to")),

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from tests.cli.conftest import Lfs10d
 
 
@@ -34,3 +36,22 @@ def test_a_slave_id_that_is_no_number_is_called_no_slave_id(lfs10d: Lfs10d) -> N
     wrong = lfs10d("read", "/dev/x", "two")
     assert wrong.returncode == 2
     assert "Invalid value for 'ID': 'two' is not a valid slave id." in wrong.stderr
+
+
+@pytest.mark.parametrize(
+    ("typed", "completed"),
+    [
+        ("lfs10d request device/options -c lfs10d.yaml int", ["plain,interval="]),
+        ("lfs10d request -c lfs10d.yaml device/read device=s", ["plain,device=slave-2", "plain,device=slave-3"]),
+        ("lfs10d request -c lfs10d.yaml device/read device = s", ["plain,slave-2", "plain,slave-3"]),
+        ("lfs10d request -c none.yaml device/read device=s", [""]),
+        ("lfs10d request line/baudrate to=19", ["plain,to=19200"]),
+    ],
+)
+def test_keys_and_devices_of_a_request_are_completed(
+    lfs10d: Lfs10d, small: Path, typed: str, completed: list[str]
+) -> None:
+    assert small.exists()
+    place = str(len(typed.split()) - 1)
+    found = lfs10d(_LFS10D_COMPLETE="bash_complete", COMP_WORDS=typed, COMP_CWORD=place)
+    assert found.stdout.splitlines() == completed

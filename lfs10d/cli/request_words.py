@@ -1,0 +1,158 @@
+"""Requests and their parameters as a person reads and types them: list, help, what the Tab key completes. Pure."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import textwrap
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Final, get_args, get_origin
+
+from lfs10d.kinds import Choice, Duration, Flag, Kind
+from lfs10d.quantities import duration_text
+from lfs10d.requests.table import REQUESTS
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator, Mapping, Sequence
+
+    from pydantic.fields import FieldInfo
+
+WIDTH: Final = 79
+"""Columns of a line, so that none is broken on a terminal of 80."""
+CLASSES: Final = ("always", "polling", "sensors", "registers")
+"""Classes of requests, as they are listed."""
+_SLAVE_IDS: Final = frozenset(map(str, range(1, 256)))
+KEEPING: Final = frozenset({"device/options"})
+"""Requests that leave as it is what is not given."""
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One parameter: what may be written for it, and what holds without (None: it must be given)."""
+
+    key: str
+    words: str
+    usual: str | None
+    meaning: str
+    values: tuple[str, ...]
+    """What it may be, where that is a few words."""
+
+
+def parameters(name: str) -> tuple[Parameter, ...]:
+    """Return the parameters of a request in order; none for one that is not known."""
+    known = REQUESTS.get(name)
+    if known is None:
+        return ()
+    fields = known.form.parameters.model_fields.items()
+    return tuple(_parameter(field.alias or key, field, keeping=name in KEEPING) for key, field in fields)
+
+
+def _parameter(key: str, field: FieldInfo, *, keeping: bool) -> Parameter:
+    kinds = [each for each in field.metadata if isinstance(each, Kind)] or list(_kinds_within(field.annotation))
+    words = kinds[0].words if kinds else "text"
+    if not any(isinstance(each, Kind) for each in field.metadata):
+        words += ", or null"
+    values: tuple[str, ...] = ()
+    match kinds:
+        case [Choice() as choice, *_]:
+            values = tuple(map(str, choice.values))
+        case [Flag(), *_]:
+            values = ("true", "false")
+    usual = None if field.is_required() else "as it is" if keeping else _usual(field.default, kinds)
+    return Parameter(key, words, usual, field.description or "", values)
+
+
+def _kinds_within(annotation: Any) -> Iterator[Kind]:  # noqa: ANN401  # any annotation
+    """Yield what single values within an annotation may be: `Annotated[int, Whole(1, 255)] | None`."""
+    if get_origin(annotation) is Annotated:
+        yield from (each for each in get_args(annotation)[1:] if isinstance(each, Kind))
+    for inner in get_args(annotation):
+        yield from _kinds_within(inner)
+
+
+def _usual(value: object, kinds: Sequence[Kind]) -> str:
+    if isinstance(value, float) and any(isinstance(kind, Duration) for kind in kinds):
+        return duration_text(value)
+    return value if isinstance(value, str) else json.dumps(value)
+
+
+def does(name: str) -> str:
+    """Return in a sentence what a request does."""
+    return " ".join((inspect.getdoc(REQUESTS[name].perform) or "").partition("\n\n")[0].split()).replace("`", "")
+
+
+def listing() -> Iterator[str]:
+    """Yield every request with its parameters, those in brackets that may be left out."""
+    for name in sorted(REQUESTS, key=lambda name: (CLASSES.index(REQUESTS[name].form.klass), name)):
+        keys = [each.key if each.usual is None else f"[{each.key}]" for each in parameters(name)]
+        yield f"{name}  ({REQUESTS[name].form.klass})"
+        yield from _block(does(name))
+        if keys:
+            yield from _block(f"parameters: {', '.join(keys)}")
+    yield ""
+    yield "Classes: `commands` in the configuration says which are obeyed; always needs no leave."
+    yield "What each parameter may be: lfs10d request NAME --help"
+
+
+def help_of(name: str) -> Iterator[str]:
+    """Yield what a request does and what each of its parameters may be."""
+    yield f"Usage: lfs10d request {name} [KEY=VALUE]..."
+    yield ""
+    yield from _block(f"{does(name)} Class {REQUESTS[name].form.klass}.", "  ")
+    yield ""
+    known = parameters(name)
+    yield "Parameters:" if known else "It takes no parameters."
+    for each in known:
+        usual = "required" if each.usual is None else f"default {each.usual or 'none'}"
+        yield f"  {each.key}"
+        yield from _block(f"{each.words.replace('`', '')}; {usual}")
+        if each.meaning:
+            yield from _block(each.meaning.replace("`", ""))
+
+
+def _block(text: str, indent: str = "      ") -> list[str]:
+    return textwrap.wrap(text, WIDTH, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False)
+
+
+# What is typed
+
+
+def named_device(text: str, devices: object) -> str:
+    """Return the name of the device that a person calls so, by its name or by its slave id.
+
+    `devices` is what the daemon tells on topic `devices`. A name comes before an id; what nobody has is returned as
+    it is, and the daemon says so.
+    """
+    entries = [each for each in devices if isinstance(each, dict)] if isinstance(devices, list) else []
+    if any(each.get("name") == text for each in entries) or not is_slave_id(text):
+        return text
+    return next((str(each["name"]) for each in entries if each.get("id") == int(text) and "name" in each), text)
+
+
+def is_slave_id(text: object) -> bool:
+    """Whether a person who writes this for a device may mean its slave id."""
+    return isinstance(text, str) and text in _SLAVE_IDS
+
+
+def completions(name: str, given: Sequence[str], begun: str, known: Mapping[str, Collection[str]]) -> list[str]:
+    """Return what may stand in place of `begun`, the word that is being typed after the words `given`.
+
+    `known` are the values of some keys, of `device` for example. Shells give `device=mast` as one word, or (bash) as
+    the words `device`, `=` and `mast`.
+    """
+    keys = {each.key: each for each in parameters(name)}
+    key, equals, value = begun.partition("=")
+    if equals:
+        return [f"{key}={each}" for each in _values(keys.get(key), known) if each.startswith(value)]
+    *_, before, last = ("", "", *given)
+    key = before if last == "=" else last
+    if key in keys and (last == "=" or not begun):
+        return [each for each in _values(keys[key], known) if each.startswith(begun)]
+    used = {word.partition("=")[0] for word in given}
+    return [f"{each}=" for each in keys if each.startswith(begun) and each not in used]
+
+
+def _values(parameter: Parameter | None, known: Mapping[str, Collection[str]]) -> Collection[str]:
+    if parameter is None:
+        return ()
+    return parameter.values or known.get(parameter.key, ())

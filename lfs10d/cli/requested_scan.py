@@ -1,0 +1,171 @@
+"""`lfs10d request line/scan`: the daemon scans while it polls; here is how far it is, and what it found as a table."""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Protocol
+
+import click
+
+from lfs10d.cli import EXIT_FAILED, findings
+from lfs10d.cli.answers import told, verdict
+from lfs10d.cli.json_text import json_text
+from lfs10d.cli.scan import show_table
+from lfs10d.cli.scanview import TELL_EVERY, progress_bar, span
+from lfs10d.cli.visitor import Visitor, parsed
+from lfs10d.errors import FailedError
+from lfs10d.logs import escape
+from lfs10d.mqtt.messages import Filter
+from lfs10d.profiles.library import builtin_names, load_profile
+from lfs10d.quantities import duration_text
+from lfs10d.telemetry import EVENT
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from rich.progress import Progress as Bar
+
+    from lfs10d.cli.login import Login
+    from lfs10d.mqtt.messages import Incoming
+
+SCAN: Final = "line/scan"
+CANCEL: Final = "line/cancel"
+ENDS_WITHIN: Final = 1.4
+"""s for a scan to end when it is told to; the verb itself must end within 2 s."""
+
+
+async def scan(visited: Login, content: dict[str, Any], patience: float | None, *, as_json: bool) -> int:
+    """Have the daemon scan and show how far it is; return the exit code. Being cancelled ends the scan, too."""
+    with _view(quiet=as_json) as shown:
+
+        def arrived(message: Incoming) -> None:
+            event = parsed(message.payload)
+            if isinstance(event, dict) and event.get("type") == "scan_progress":
+                shown.heard(event)
+
+        visitor = Visitor(visited, [Filter(visited.topics.full(EVENT))], arrived)
+        cancelled = False
+        try:
+            await visitor.enter()
+            await visitor.find_daemon()
+            response = await visitor.ask(SCAN, content, patience)
+        except asyncio.CancelledError:  # Ctrl-C, SIGTERM
+            if not visitor.asked:
+                raise
+            cancelled = True
+            visitor.send(CANCEL, {"id": secrets.token_hex(6)})
+            await visitor.until(lambda: visitor.response is not None, ENDS_WITHIN)
+            response = visitor.response
+        finally:
+            await visitor.leave()
+    if response is None:
+        if cancelled:
+            raise FailedError(f"{CANCEL} was sent, and the daemon has not said yet that the scan is over")
+        raise FailedError(f"no response to {SCAN} within {duration_text(patience or 0)}; whether it scans is not known")
+    return show(response, as_json=as_json)
+
+
+def show(response: Mapping[str, Any], *, as_json: bool) -> int:
+    """Print what a scan found; return the exit code."""
+    done = response.get("status") == "ok"
+    if as_json:
+        click.echo(json_text(response, indent=2))
+        return 0 if done else EXIT_FAILED
+    click.echo(verdict(response), err=not done)
+    data = response.get("data")
+    found = data.get("found") if isinstance(data, dict) else None
+    if isinstance(data, dict) and isinstance(found, list):
+        rows = [row(each) for each in found if isinstance(each, dict)]
+        if rows:
+            show_table(rows)
+        else:
+            click.echo("Nobody was found.")
+        rest = {key: value for key, value in data.items() if key != "found"}
+        for text in told({"data": rest}) if rest else ():
+            click.echo(text)
+    return 0 if done else EXIT_FAILED
+
+
+def row(entry: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return what the daemon tells of one that was found as a row of the table of `lfs10d scan`."""
+    rtt = entry.get("rtt_ms")
+    answers_in = f"{rtt:.0f} ms" if isinstance(rtt, int | float) else "-"
+    cells = (str(entry.get("id")), str(entry.get("baudrate")), answers_in, _what(entry), "; ".join(_remarks(entry)))
+    return tuple(escape(cell) for cell in cells)
+
+
+def _what(entry: Mapping[str, Any]) -> str:
+    profile = entry.get("profile")
+    if not isinstance(profile, str):
+        return "no profile fits"
+    return load_profile(profile, relative_to=Path()).title if profile in builtin_names() else profile
+
+
+def _remarks(entry: Mapping[str, Any]) -> Iterator[str]:
+    if isinstance(entry.get("device"), str):
+        yield f"polled as {entry['device']}"
+    if entry.get("duplicate") is True:
+        yield "DUPLICATE? garbled answers: two sensors with this id?"
+    if entry.get("suspect") is True:
+        yield "SUSPECT: others answer too, so it may be no sensor of its own"
+    if entry.get("id") == findings.FACTORY_ID and isinstance(entry.get("profile"), str):
+        yield "the factory id"
+
+
+# While it lasts
+
+
+class _View(Protocol):
+    def heard(self, progress: Mapping[str, Any]) -> None:
+        """Take an event `scan_progress`."""
+
+
+@contextmanager
+def _view(*, quiet: bool) -> Iterator[_View]:
+    """Give what shows the progress on standard error; `quiet`: only on a terminal, where it leaves nothing behind."""
+    if not sys.stderr.isatty():
+        yield _Lines(quiet=quiet)
+        return
+    with progress_bar() as bar:
+        yield _Drawn(bar)
+
+
+def _figures(progress: Mapping[str, Any]) -> tuple[float, float]:
+    """Return percent and s to go; what comes from the broker may be anything."""
+    percent, remaining = (
+        float(value) if isinstance(value, int | float) and 0 <= value <= most else 0.0
+        for value, most in ((progress.get("percent"), 100.0), (progress.get("remaining_s"), 1e6))
+    )
+    return percent, remaining
+
+
+class _Lines:
+    def __init__(self, *, quiet: bool) -> None:
+        self._quiet = quiet
+        self._next = TELL_EVERY
+
+    def heard(self, progress: Mapping[str, Any]) -> None:
+        """Print a line now and then."""
+        percent, remaining = _figures(progress)
+        if not self._quiet and self._next <= percent < 100.0:  # noqa: PLR2004  # of a hundred percent
+            self._next = percent + TELL_EVERY
+            click.echo(f"{percent:.0f} %, about {span(remaining)} to go", err=True)
+
+
+class _Drawn:
+    def __init__(self, bar: Bar) -> None:
+        self._bar = bar
+        self._task = bar.add_task("line/scan", total=100.0, remaining="?")
+        bar.refresh()
+
+    def heard(self, progress: Mapping[str, Any]) -> None:
+        """Move the bar."""
+        percent, remaining = _figures(progress)
+        where = f"{progress.get('baudrate')} baud, id {progress.get('slave')!s:>3}"
+        self._bar.update(
+            self._task, completed=percent, description=escape(where), remaining=span(remaining), refresh=True
+        )
