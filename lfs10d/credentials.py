@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 CREDENTIAL = "mqtt-password"
 """Name of the systemd credential (LoadCredential=) that holds the broker's password."""
 
+RUN = Path("/run/credentials")
+"""Where systemd puts the credentials of each unit while it runs, readable by root and the service alone."""
+KEPT = Path("/etc/lfs10d")
+
 LARGEST_PASSWORD = 65_535
 """Bytes: binary data of MQTT 5.0, section 1.5.6."""
 
@@ -63,6 +67,33 @@ def credential_file(environment: Mapping[str, str]) -> Path | None:
     folder = environment.get("CREDENTIALS_DIRECTORY")
     path = Path(folder, CREDENTIAL) if folder else None
     return path if path is not None and path.exists() else None
+
+
+def service_password(unit: str, run: Path = RUN, kept: Path = KEPT) -> tuple[Secret | None, str]:
+    """Return the password that systemd hands to a service, for a verb that its administrator calls.
+
+    It lies in `run` while the service runs, and in `kept`, where docs/installation.md puts it, always. Without one the
+    text says where it was looked for and why it was not read; empty where there is none.
+    """
+    why: list[str] = []
+    for path in (run / unit / CREDENTIAL, kept / CREDENTIAL):
+        try:
+            return password_in(path), ""
+        except UnreadableError as error:
+            if _is_there(path):
+                why.append(str(error))
+    return None, "; ".join(why)
+
+
+def _is_there(path: Path) -> bool:
+    """Whether there is such a file, or may be: a folder that we may not look into."""
+    try:
+        path.stat()
+    except PermissionError:
+        return True
+    except OSError:
+        return False
+    return True
 
 
 def unreadable(mqtt: MqttConfig) -> Iterator[tuple[KeyPath, str]]:

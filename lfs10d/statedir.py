@@ -36,6 +36,13 @@ def in_system_folder(file: Path) -> bool:
     return Path(os.path.abspath(file)).parent == SYSTEM_FOLDER  # noqa: PTH100  # resolve() would follow links
 
 
+def service_unit(file: Path) -> str | None:
+    """Return the systemd unit that runs the daemon of a configuration file; None where it is no service's."""
+    if not in_system_folder(file):
+        return None
+    return "lfs10d.service" if file.stem == DEFAULT_STEM else f"lfs10d@{file.stem}.service"
+
+
 def _service(file: Path) -> str:
     return "lfs10d" if file.stem == DEFAULT_STEM else f"lfs10d-{file.stem}"
 

@@ -15,6 +15,7 @@ from lfs10d.credentials import (
     password_in,
     readable,
     reason,
+    service_password,
     unreadable,
 )
 
@@ -141,3 +142,37 @@ def test_what_strict_clients_miss_in_an_authority_is_named(options: tuple[str, .
 
 def test_a_file_without_authorities_misses_nothing() -> None:
     assert missing_in_authorities("ca.pem") == ()
+
+
+def test_the_password_of_a_service_is_what_systemd_hands_to_it_else_what_is_kept_for_it() -> None:
+    unit, run, kept = "lfs10d@roof.service", Path("run"), Path("etc")
+    assert service_password(unit, run, kept) == (None, "")
+    kept.mkdir()
+    (kept / "mqtt-password").write_text("kept\n")
+    found, why = service_password(unit, run, kept)
+    assert (found and found.reveal(), why) == ("kept", "")
+    (run / unit).mkdir(parents=True)
+    (run / unit / "mqtt-password").write_text("handed over\n")
+    found, why = service_password(unit, run, kept)
+    assert (found and found.reveal(), why) == ("handed over", "")
+
+
+def test_a_password_of_a_service_that_cannot_be_read_is_named_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    unit, run, kept = "lfs10d.service", Path("run"), Path("etc")
+    (run / unit).mkdir(parents=True)
+    (run / unit / "mqtt-password").touch()
+    assert service_password(unit, run, kept) == (
+        None,
+        '"run/lfs10d.service/mqtt-password" must hold the password in its first line',
+    )
+
+    def denied(*_: object, **__: object) -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "open", denied)
+    monkeypatch.setattr(Path, "stat", denied)
+    _, why = service_password(unit, run, kept)
+    assert why == (
+        '"run/lfs10d.service/mqtt-password" cannot be read: permission denied; '
+        '"etc/mqtt-password" cannot be read: permission denied'
+    )

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from lfs10d.errors import StateError
-from lfs10d.statedir import prepare, state_directory, status_file, status_places
+from lfs10d.statedir import prepare, service_unit, state_directory, status_file, status_places
 
 
 @pytest.mark.parametrize(
@@ -71,3 +71,15 @@ def test_a_state_directory_that_cannot_be_written_says_what_to_do(tmp_path: Path
         prepare(file)
     with pytest.raises(StateError, match="cannot be written: "):
         prepare(Path("/proc/lfs10d"))
+
+
+@pytest.mark.parametrize(
+    ("file", "unit"),
+    [
+        ("/etc/lfs10d/lfs10d.yaml", "lfs10d.service"),
+        ("/etc/lfs10d/roof.yaml", "lfs10d@roof.service"),
+        ("/home/me/lfs10d.yaml", None),
+    ],
+)
+def test_a_file_of_the_system_has_its_unit(file: str, unit: str | None) -> None:
+    assert service_unit(Path(file)) == unit

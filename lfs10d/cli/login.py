@@ -6,21 +6,29 @@ import logging
 import secrets
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
 from lfs10d.configfile import load
-from lfs10d.credentials import UnreadableError, password_in
+from lfs10d.credentials import UnreadableError, password_in, service_password
+from lfs10d.errors import ConfigError
 from lfs10d.mqtt.settings import BrokerSettings
 from lfs10d.mqtt.topics import Topics
 from lfs10d.secret import leave_no_core
+from lfs10d.statedir import service_unit
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from lfs10d.config import Config
+    from lfs10d.configfile import Loaded
     from lfs10d.secret import Secret
+
+
+DENIED: Final = "permission denied"
+"""What the system says of a file that is not for us, in the words of `lfs10d.credentials.reason`."""
+REMEDY: Final = "call it as root or as a member of the service's group, or give --username and --password-file"
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +38,8 @@ class Login:
     config: Config
     settings: BrokerSettings
     topics: Topics
+    lacking: str = ""
+    """Why there is no password where the configuration names a user, in words; empty where there is one."""
 
 
 def login_options(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -44,28 +54,56 @@ def login_options(function: Callable[..., Any]) -> Callable[..., Any]:
     return name(password(function))
 
 
-def login(file: Path, verb: str, *, username: str | None, password_file: Path | None) -> Login:
+def login(file: Path, verb: str, *, username: str | None, password_file: Path | None, needed: bool = True) -> Login:
     """Return whom to visit with a client id of our own; raises ConfigError.
 
-    A name without a password file logs in without a password: that of the configuration belongs to its own name.
+    A name without a password file logs in without a password: that of the configuration belongs to its own name. Else
+    the service's own login is used, as far as whoever calls may read it: its password file, or the credential that
+    systemd hands to it. Where a password file is not `needed`, one that may not be read is done without.
     """
     leave_no_core()
     own = username is not None or password_file is not None
-    loaded = load(file, files=not own)
+    loaded, lacking = _loaded(file, own=own, needed=needed)
     given = None if password_file is None else _password(password_file)
     mqtt = loaded.config.mqtt
     if username is not None:
         mqtt = mqtt.model_copy(update={"username": username})
     elif given is not None and mqtt.username is None:
         raise click.UsageError("--password-file needs a name: give --username")
+    known = (given,) if own or lacking else None
+    if not own and mqtt.username is not None and mqtt.password_file is None and loaded.credential is None:
+        found, lacking = _service_password(file)
+        known = (found,)
     settings = BrokerSettings.of(
         mqtt,
         client_id=f"lfs10d-{verb}-{secrets.token_hex(4)}",  # 23 characters are what every broker takes by 3.1.1
-        password=(lambda: given) if own else loaded.password,
+        password=loaded.password if known is None else lambda: known[0],
     )
     # The verb itself tells what a person must know.
     logging.getLogger("lfs10d").addHandler(logging.NullHandler())
-    return Login(loaded.config, settings, Topics.of(mqtt.base_topic, loaded.config.line.name))
+    return Login(loaded.config, settings, Topics.of(mqtt.base_topic, loaded.config.line.name), lacking)
+
+
+def _loaded(file: Path, *, own: bool, needed: bool) -> tuple[Loaded, str]:
+    """Return the configuration, and why its password file is done without; ConfigError where it cannot be."""
+    try:
+        return load(file, files=not own), ""
+    except ConfigError as error:
+        denied = [str(each) for each in error.problems if each.path == "mqtt.password_file" and DENIED in each.message]
+        if not denied:
+            raise
+        if needed or len(denied) < len(error.problems):
+            click.echo(f"lfs10d: {REMEDY}", err=True)
+            raise
+        return load(file, files=False), f"{'; '.join(denied)}; {REMEDY}"
+
+
+def _service_password(file: Path) -> tuple[Secret | None, str]:
+    unit = service_unit(file)
+    if unit is None:
+        return None, ""
+    password, why = service_password(unit)
+    return password, f"the password of {unit} was not read: {why}; {REMEDY}" if why else ""
 
 
 def _password(file: Path) -> Secret:

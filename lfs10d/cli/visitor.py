@@ -28,6 +28,8 @@ CONNECTS_WITHIN: Final = 15.0
 RETAINED_WITHIN: Final = 1.0
 """s after a subscription in which what is retained must have come; brokers send it at once."""
 LEAVES_WITHIN: Final = 0.3
+REFUSALS: Final = ("not authorized", "user name")
+"""What a broker that wants a password says, in the words of `lfs10d.mqtt.endings`."""
 NOBODY_LISTENS: Final = 0x10
 """PUBACK of a message without a subscriber (MQTT 5.0, section 3.4.2.1)."""
 
@@ -43,6 +45,7 @@ class Visitor:
     ) -> None:
         self.topics = login.topics
         self.place = login.settings.place
+        self._lacking = login.lacking
         self.availability: str | None = None
         """What our daemon said last, or its will; None: nothing."""
         self.ended_by: str | None = None
@@ -87,7 +90,12 @@ class Visitor:
     async def enter(self, within: float = CONNECTS_WITHIN) -> None:
         """Connect and subscribe; raises BrokerError, FailedError where the broker does not let us hear."""
         self._link.start()
-        await self._link.opened(within)
+        try:
+            await self._link.opened(within)
+        except BrokerError as error:
+            if self._lacking and any(word in str(error) for word in REFUSALS):
+                raise BrokerError(f"{error}; {self._lacking}") from None
+            raise
         await self._subscribe(self._filters)
 
     async def leave(self) -> None:

@@ -65,7 +65,7 @@ def command(config: Path, username: str | None, password_file: Path | None, *, a
     value is one line. Exit code 69 if there is neither a broker with this daemon nor a status file.
     """
     with contextlib.suppress(KeyboardInterrupt):
-        visited = login(config, "watch", username=username, password_file=password_file)
+        visited = login(config, "watch", username=username, password_file=password_file, needed=False)
         files = status_places(config, visited.config.line.name, os.environ)
         interruptible.run(_Watch(visited, files).run(_output(as_json=as_json)))
     return 0

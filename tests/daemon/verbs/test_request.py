@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.daemon.conftest import eventually
 from tests.daemon.verbs.conftest import BASE, running, typed
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from tests.conftest import Mosquitto
-    from tests.daemon.conftest import Site
+    from tests.daemon.conftest import Site, View
     from tests.daemon.verbs.conftest import Shell
 
 
@@ -209,3 +210,38 @@ def test_ctrl_c_ends_a_request_with_1_and_no_traceback(site: Site, mosquitto: Mo
         somebody.wait_for(f"{BASE}/request/health", len([*shell.running]))
         assert asking.ends(number) == 1
         assert asking.text.strip() == "lfs10d: health was sent and is not called back by this"
+
+
+def test_a_device_may_be_given_by_its_slave_id(site: Site, mosquitto: Mosquitto) -> None:
+    del mosquitto
+    running(site)
+    done = typed(site, "request", "device/read", "device=2", "--json")
+    assert json.loads(done.stdout)["data"]["device"] == "mast-top"
+    nobody = typed(site, "request", "device/read", "device=99")
+    assert "unknown_device: there is no device 99" in nobody.stderr
+
+
+def test_a_scan_by_request_shows_its_progress_and_a_table(site: Site, mosquitto: Mosquitto, shell: Shell) -> None:
+    del mosquitto
+    running(site)
+    done = typed(site, "request", "line/scan", "ids=1-4", "baudrates=[19200]")
+    assert done.returncode == 0
+    _, head, first, second = done.stdout.splitlines()
+    assert head.split() == ["id", "baud", "answers", "in", "what", "it", "is", "remark"]
+    assert re.fullmatch(r" 1  19200 +\d+ ms  LFS10 .* polled as slave-1; the factory id", first)
+    assert re.fullmatch(r" 2  19200 +\d+ ms  LFS10 .* polled as mast-top", second)
+    assert re.search(r"^\d+ %, about \d+ s to go$", done.stderr, re.MULTILINE)
+    drawn = shell.terminal("request", "line/scan", "ids=1-4", "baudrates=[19200]")
+    drawn.says("baud, id ")
+    drawn.says("polled as")
+
+
+def test_ctrl_c_ends_the_scan_too_and_shows_what_was_found(
+    site: Site, mosquitto: Mosquitto, shell: Shell, view: View
+) -> None:
+    del mosquitto
+    running(site)
+    scanning = shell.pipe("request", "line/scan")
+    eventually(lambda: any(each["type"] == "scan_progress" for each in view.history_of("event")), "the scan has begun")
+    assert scanning.ends(signal.SIGINT) == 1
+    assert "line/scan: failed: cancelled: the scan was ended after" in scanning.text
