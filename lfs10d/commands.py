@@ -31,6 +31,7 @@ Identifier: TypeAlias = str | int
 RequestClass: TypeAlias = Literal["always", "polling", "sensors", "registers"]
 Status: TypeAlias = Literal["ok", "rejected", "failed"]
 ErrorCode: TypeAlias = Literal[
+    "not_recognised",
     "invalid_json",
     "invalid_param",
     "unknown_request",

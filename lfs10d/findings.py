@@ -35,6 +35,17 @@ _READDRESSED: Mapping[Ending, tuple[ErrorCode, str]] = {
     ),
     Ending.LOST_BEFORE: ("line_error", "the port was lost; nothing was written"),
     Ending.UNWRITTEN: ("storage_full", "{why}; nothing was written"),
+    Ending.TWINS: (
+        "duplicate_id",
+        (
+            "two sensors seem to have slave id {old}: {why}; nothing was written, for both would move. Take one of "
+            "them off the line. A repeater or noise looks alike; try again"
+        ),
+    ),
+    Ending.UNRECOGNISED: (
+        "not_recognised",
+        "what answers at slave id {old} is not recognised as {device}: {why}; nothing was written",
+    ),
     Ending.BOTH: (
         "duplicate_id",
         (

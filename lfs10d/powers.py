@@ -181,12 +181,12 @@ class DaemonPowers:
         return await self.physical.baudrate(to, power_cycle=power_cycle, dry_run=dry_run, call=call)
 
     async def adopt(
-        self, *, name: str | None, label: str | None, factory: int | None, to: int | None, call: Call
+        self, *, name: str | None, label: str | None, profile: str, factory: int | None, to: int | None, call: Call
     ) -> Answer:
         """Take in a factory-new sensor."""
         if self.physical is None:
             return rejected("busy", "the daemon is starting")
-        return await self.physical.adopt(Newcomer(name, label, factory, to), call)
+        return await self.physical.adopt(Newcomer(name, label, factory, to, profile), call)
 
     async def knock(self, slave: int, profile: Profile) -> Knock:
         """Ask one slave id whether anybody is there."""

@@ -35,6 +35,8 @@ def test_a_dry_run_is_ok_and_says_that_it_was_one() -> None:
         (Ending.DEAF, "line_error"),
         (Ending.LOST_BEFORE, "line_error"),
         (Ending.UNWRITTEN, "storage_full"),
+        (Ending.TWINS, "duplicate_id"),
+        (Ending.UNRECOGNISED, "not_recognised"),
         (Ending.BOTH, "duplicate_id"),
         (Ending.GARBAGE, "duplicate_id"),
         (Ending.REFUSED, "refused"),

@@ -23,6 +23,8 @@ RIGHT = (0, 1, 2)
 DEFAULT_PROFILE = "lfs10"
 DEFAULT_BAUDRATE = 9600
 FACTORY_ID = 1
+ILLEGAL_FUNCTION = 1
+"""The exception of a device that does not know the function (Modbus Application Protocol V1.1b3, section 7)."""
 BY_ID = Path("/dev/serial/by-id")
 
 
@@ -41,8 +43,9 @@ def what(finding: Finding) -> str:
         return "something that gives no right answer"
     if finding.exception is not None:
         name = EXCEPTION_NAMES.get(finding.exception, "of its own")
-        return f"a device no profile fits (exception {finding.exception:02X} {name})"
-    return "a device no profile fits"
+        how = "refuses" if finding.exception == ILLEGAL_FUNCTION else "answers"
+        return f"unknown device, {how} function 03 (exception {finding.exception:02X} {name})"
+    return "unknown device, answers function 03"
 
 
 def value_text(finding: Finding) -> str:

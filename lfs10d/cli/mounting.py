@@ -28,8 +28,12 @@ PATIENCE: Final = 10.0
 """s for which a sensor that did not obey is left alone."""
 FOLLOWED: Final = 3.0
 """s until it is asked again whether the daemon has found the sensor that it follows."""
-PASSING: Final = frozenset({"timeout", "duplicate_id", "busy", "line_error", "rate_limited", "cancelled"})
+PASSING: Final = frozenset(
+    {"timeout", "duplicate_id", "not_recognised", "busy", "line_error", "rate_limited", "cancelled"}
+)
 """Rejections that come to an end by themselves, or by what the person does on the line."""
+HOPELESS: Final = frozenset({"storage_full", "internal"})
+"""Failures that would come again."""
 FIRST: Final = "Plug in a sensor. Ctrl-C when all are mounted."
 NEXT: Final = "Plug in the next one."
 
@@ -150,7 +154,7 @@ class Mounting:
         if code in {"not_verified", "power_cycle_needed"} and isinstance(device, str):
             self._awaited.add(device)
         self._lost = self._lost or code == "cancelled"
-        return Turn(trouble=self._once(_message(error)), pause=PATIENCE, ends=code == "storage_full")
+        return Turn(trouble=self._once(_message(error)), pause=PATIENCE, ends=code in HOPELESS)
 
     def _adopt(self, device: str, slave: object) -> Adopted:
         self._told, self._crowded = None, False

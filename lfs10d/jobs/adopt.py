@@ -2,10 +2,12 @@
 
 Rules
 -----
-1. It is looked for at the line's rate first, then at each other rate of its profile. Where it is found at several, or
-   garbage is heard, there is more than one: plug in one at a time.
-2. A new id is free if not one byte is heard there, at no rate. The candidates are tried in order.
-3. One intent, on the disk before the first write, covers all. First the rate is written, while the sensor still has
+1. It is looked for at the line's rate first, then at its factory's and at each other rate of its profile. Where
+   something answers at several, or garbage is heard, there is more than one: plug in one at a time.
+2. What answers must be recognised as a sensor of the profile, and must be there alone (`lfs10d.jobs.recognition`):
+   nothing is ever written to another device.
+3. A new id is free if not one byte is heard there, at no rate. The candidates are tried in order.
+4. One intent, on the disk before the first write, covers all. First the rate is written, while the sensor still has
    its factory id: cut short there, it is found again by the same request. Then it is given its id, verified as in
    `lfs10d.jobs.readdress`.
 """
@@ -19,10 +21,10 @@ from lfs10d.jobs.baudrate import Sensor, restored, shifted
 from lfs10d.jobs.course import Aside, LineLostError
 from lfs10d.jobs.readdress import (
     ECHO_READS,
-    TRIES,
     Ending,
     Verdict,
     Write,
+    alone,
     free,
     judge,
     parted,
@@ -30,6 +32,7 @@ from lfs10d.jobs.readdress import (
     verified,
     written,
 )
+from lfs10d.jobs.recognition import recognised
 from lfs10d.journal import Spot
 
 if TYPE_CHECKING:
@@ -61,6 +64,8 @@ class Adopted:
     to: int | None = None
     at_rate: bool = True
     """False: it ended with the write of the rate; its id is as it was."""
+    rate_code: int | None = None
+    """What its register of the rate held when it was recognised."""
 
 
 def adopt(wish: Newcomer, asking: Asking, echo_known: Callable[[], bool]) -> Generator[Step, Any, Adopted]:
@@ -78,7 +83,7 @@ def adopt(wish: Newcomer, asking: Asking, echo_known: Callable[[], bool]) -> Gen
         return Adopted(Verdict(Ending.LOST_BEFORE))
     try:
         if old.baudrate != wish.line_rate:
-            verdict = yield from _at_line_rate(old, wish.line_rate, asking)
+            verdict = yield from _at_line_rate(old, wish.line_rate, asking.knowing(old.baudrate, looked.rate_code))
             if verdict is not None:
                 return Adopted(verdict, old, to, at_rate=False)
         here = Spot(slave=old.slave, baudrate=wish.line_rate)
@@ -99,6 +104,9 @@ def _looked_before(wish: Newcomer, asking: Asking, echo_known: Callable[[], bool
     to = yield from _free_id(wish, asking)
     if to is None:
         return Adopted(Verdict(Ending.TAKEN, at=old.baudrate), old, next(iter(wish.candidates), None))
+    refusal = yield from alone(old, to, asking)
+    if refusal is not None:
+        return Adopted(refusal, old, to)
     for _ in range(ECHO_READS):
         if echo_known():
             break
@@ -108,23 +116,25 @@ def _looked_before(wish: Newcomer, asking: Asking, echo_known: Callable[[], bool
     again = yield from present(old, asking)
     if not again.answers or not (yield from asking.settle(old)):
         return Adopted(Verdict(Ending.ABSENT), old, to)
-    return Adopted(newcomer.verdict, old, to)
+    return Adopted(newcomer.verdict, old, to, rate_code=newcomer.rate_code)
 
 
 def _newcomer(wish: Newcomer, asking: Asking) -> Generator[Step, Any, Adopted]:
-    """Find the one sensor at the factory id; `FREE` if there is just one."""
+    """Find the one sensor at the factory id; `FREE` if there is just one, and it is recognised."""
     found: list[Adopted] = []
     for rate in wish.rates:
         spot = Spot(slave=wish.factory, baudrate=rate)
         reply = yield from present(spot, asking)
         if reply.silent:
             continue
-        noise = 0
-        for _ in range(TRIES):  # the winds of two differ, though both say the same id
-            noise += (yield from asking.values(spot)).noise
-        clear = reply.register is not None and noise < TRIES
-        verdict = Verdict(Ending.FREE if clear else Ending.BOTH, reply.register, reply.exception, rate)
-        found.append(Adopted(verdict, spot))
+        ending, why, code = Ending.BOTH, "", None
+        if reply.answers:
+            recognition = yield from recognised(spot, reply, asking)
+            why, code = recognition.why or "", recognition.rate_code
+            if not recognition.spoilt:  # the winds of two differ, though both say the same id
+                ending = Ending.UNRECOGNISED if why else Ending.FREE
+        verdict = Verdict(ending, reply.register, reply.exception, rate, why)
+        found.append(Adopted(verdict, spot, rate_code=code))
     if not found:
         return Adopted(Verdict(Ending.ABSENT))
     if len(found) > 1:

@@ -11,10 +11,10 @@ Rules
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from lfs10d.jobs.interview import shortest_answer
+from lfs10d.jobs.interview import shortest_answer, strangers
 from lfs10d.jobs.job import Ask, Hold
 from lfs10d.modbus.frames import ReadRegisters
 from lfs10d.reading import FaultCode
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from lfs10d.modbus.exchange import Outcome
     from lfs10d.modbus.frames import Codec
     from lfs10d.modbus.unanswered import Unanswered
+    from lfs10d.profiles.blocks import Block
     from lfs10d.profiles.schema import Profile
 
 QUICK = 0.2
@@ -42,13 +43,15 @@ class Reply:
     """What one place said.
 
     `answers`: a right frame of its own, with `register` as the content of its id register, or `exception`.
-    `noise`: other bytes came. Neither: silence.
+    `noise`: other bytes came. Neither: silence. `words` are the registers of an answered read of values; replies are
+    compared without them.
     """
 
     answers: bool = False
     noise: bool = False
     register: int | None = None
     exception: int | None = None
+    words: tuple[int, ...] | None = field(default=None, compare=False)
 
     @property
     def silent(self) -> bool:
@@ -83,12 +86,41 @@ class Asking:
             return allowed
         return self._reply((yield self._ask(identity, spot, timeout)))
 
-    def values(self, spot: Spot, timeout: float | None = None) -> Generator[Step, Outcome, Reply]:
-        """Ask a place for its values, whatever they are; a late answer to an older such question counts."""
+    def knowing(self, baudrate: int, code: int | None) -> Asking:
+        """Return the same with the content of the rate's register for a rate that the profile has no code for.
+
+        A sensor that came at such a rate can so be brought back to it.
+        """
+        register = self.profile.baudrate
+        if register is None or code is None or baudrate in register.codes:
+            return self
+        known = register.model_copy(update={"codes": {**register.codes, baudrate: code}})
+        profile = self.profile.model_copy(update={"baudrate": known})
+        return Asking(profile, self.codec, self._unanswered, self.clock, line_rate=self.line_rate)
+
+    def values(
+        self, spot: Spot, timeout: float | None = None, *, block: Block | None = None
+    ) -> Generator[Step, Outcome, Reply]:
+        """Ask a place for its values, whatever they are (the first `block` of the profile, or this one).
+
+        A late answer to an older such question counts.
+        """
         until = self._unanswered.left_alone_until(spot.slave, self.clock.now)
         if until is not None:
             yield Hold(until)
-        return self._reply((yield self._ask(self._values_of(spot), spot, timeout)), values=True)
+        return self._reply((yield self._ask(self._values_of(spot, block), spot, timeout)), values=True)
+
+    def listen(self, silent: Spot, timeout: float, before: int) -> Generator[Step, Outcome, tuple[Reply, bool]]:
+        """Ask a place that is expected to be silent directly behind another question; return what was received there.
+
+        The second says that a right frame of slave `before` came which answers no older request to it: another device
+        of that id, or a repeater.
+        """
+        asked = replace(self._ask(self._values_of(silent), silent, timeout), at_once=True)
+        outcome: Outcome = yield asked
+        late = {late.request.slave for late in outcome.late}
+        extra = before in strangers(outcome, self.codec) - late
+        return self._reply(outcome, values=True), extra
 
     def settle(self, spot: Spot) -> Generator[Step, Outcome, bool]:
         """Ask until no answer to an older question can come from a place; whether that could be reached."""
@@ -107,8 +139,8 @@ class Asking:
             yield Hold(until)
         return not self._unanswered.earlier(spot.slave)
 
-    def _values_of(self, spot: Spot) -> ReadRegisters:
-        block = self.profile.reads()[0]
+    def _values_of(self, spot: Spot, block: Block | None = None) -> ReadRegisters:
+        block = block or self.profile.reads()[0]
         return ReadRegisters(spot.slave, block.address, block.count, block.function)
 
     def _ask(self, request: ReadRegisters, spot: Spot, timeout: float | None) -> Ask:
@@ -149,7 +181,9 @@ class Asking:
         fault = outcome.fault
         if fault is None and outcome.answer is not None:
             extra = outcome.unsolicited >= shortest_answer(self.codec)
-            return Reply(answers=True, noise=extra, register=None if values else outcome.answer[0])
+            if values:
+                return Reply(answers=True, noise=extra, words=outcome.answer)
+            return Reply(answers=True, noise=extra, register=outcome.answer[0])
         if fault is not None and fault.code is FaultCode.EXCEPTION and not outcome.ambiguous:
             return Reply(answers=True, exception=fault.exception_code)
         return Reply(noise=not quiet(outcome))

@@ -147,6 +147,8 @@ class Course:
         self._advance(outcome)
         following = self._following
         if isinstance(following, Ask):
+            if following.at_once:
+                return Again()
             stays = following.baudrate == asked.baudrate not in (None, self._line_rate)
             if stays and now + following.timeout <= self._slice_until:
                 return Again()

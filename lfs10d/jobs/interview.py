@@ -4,7 +4,9 @@ Rules
 -----
 1. Profiles are tried in order; each by the register of its slave id, where it has one, and its first read. What was
    answered once is not asked again. Nothing is ever written.
-2. A profile fits that reads believable values, and whose id register holds a possible id. The right id is enough.
+2. A profile fits that reads believable values. One with a register of its slave id fits only if all agree: that
+   register holds a possible id, the values are believable, and the register of the rate, where it has one, holds one
+   of its codes. Values that collide do not disagree, where the id is the right one: then two such devices share it.
 3. An answer is any right frame of the slave, an exception too. Silence is asked again, `SILENCES` times in all.
 4. Where bytes came that make no right frame, or a second frame behind the right one, the read is repeated, `TRIES`
    times in all. Spoilt `SPOILT` times, two devices probably share the id (`ALL_SPOILT` where no right answer came).
@@ -97,6 +99,16 @@ def shortest_answer(codec: Codec) -> int:
     return codec.size(_EXCEPTION_BODY)
 
 
+def rate_fits(profile: Profile, code: int | None, baudrate: int) -> bool:
+    """Whether the register of the rate holds what a device of this profile can hold; always where it has none.
+
+    A device may speak at a rate that the profile has no code for (the factory's may be such): then any content fits.
+    """
+    if profile.baudrate is None:
+        return True
+    return code is not None and (baudrate not in profile.baudrate.codes or code in profile.baudrate.codes.values())
+
+
 def first_read(profile: Profile, slave: int) -> ReadRegisters:
     """Return what a device of this profile is asked first: its id, or else its first values."""
     if profile.slave_id is not None:
@@ -138,7 +150,7 @@ class Interview:
         self._finding = replace(self._finding, **changes)  # type: ignore[arg-type]  # replace checks the names
 
     def _fits(self, profile: Profile) -> Generator[ReadRegisters, Outcome, bool]:
-        sure = False
+        sure, number = False, None
         if profile.slave_id is not None:
             said = yield from self._hear(first_read(profile, self._slave))
             if said is None or said.answer is None:
@@ -146,17 +158,25 @@ class Interview:
             (number,) = said.answer
             if not profile.ids[0] <= number <= profile.ids[1]:
                 return False
-            self._note(id_register=number)
             sure = number == self._slave
         block = profile.reads()[0]
         outcome = yield from self._hear(_read_of(block, self._slave))
-        if outcome is None or outcome.answer is None:
-            return sure
-        values = profile.decode(block, outcome.answer)
-        if isinstance(values, Fault):
-            return sure
-        self._note(values=values)
+        values: Mapping[str, Number] | Fault = {}
+        if outcome is not None and outcome.answer is not None:
+            values = profile.decode(block, outcome.answer)
+        elif outcome is not None or not (sure and self._finding.duplicate):
+            return False
+        if isinstance(values, Fault) or not (yield from self._rate_agrees(profile)):
+            return False
+        self._note(values=values, id_register=number)
         return True
+
+    def _rate_agrees(self, profile: Profile) -> Generator[ReadRegisters, Outcome, bool]:
+        if profile.slave_id is None or profile.baudrate is None:
+            return True
+        said = yield from self._hear(ReadRegisters(self._slave, profile.baudrate.register, 1, READ_HOLDING_REGISTERS))
+        code = None if said is None or said.answer is None else said.answer[0]
+        return rate_fits(profile, code, self._finding.baudrate)
 
     def _hear(self, request: ReadRegisters) -> Generator[ReadRegisters, Outcome, Outcome | None]:
         """Ask one read, again where rules 3 and 4 say so; return the outcome that is to be believed."""

@@ -20,7 +20,8 @@ class Ask:
     """Put this request on the line now.
 
     `timeout` (s) runs from the request's last bit to the answer's first byte; `patience` is the slave's learned
-    p99 of it, None where it is not known. `baudrate` None means the line's own rate.
+    p99 of it, None where it is not known. `baudrate` None means the line's own rate. `at_once`: nobody else is asked
+    between the job's exchange before and this one, so that what comes late is received here.
     """
 
     request: Request
@@ -28,6 +29,7 @@ class Ask:
     timeout: float
     patience: float | None = None
     baudrate: int | None = None
+    at_once: bool = False
 
 
 @dataclass(frozen=True, slots=True)

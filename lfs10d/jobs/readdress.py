@@ -3,8 +3,9 @@
 Rules
 -----
 1. Before anything is written: the new id is silent in three questions at the line's rate and at each other rate of
-   the profile, not one byte is heard; the sensor answers at its old id, and nothing older can come from there; how
-   the adapter echoes is known.
+   the profile, not one byte is heard; the sensor answers at its old id, it is there alone
+   (`lfs10d.jobs.recognition`: two of one id would both move), and nothing older can come from there; how the adapter
+   echoes is known.
 2. The intent is on the disk before the write. There is one write, to one slave, and no other register is written. Only
    where two had the old id and the one that stayed has stored the new one is its old id written back: it would come
    to the other's at its next power-up.
@@ -34,6 +35,7 @@ from typing import TYPE_CHECKING, Any
 from lfs10d.jobs.asking import PATIENT, SILENCE, Reply
 from lfs10d.jobs.course import Aside, LineLostError
 from lfs10d.jobs.job import Ask, Hold
+from lfs10d.jobs.recognition import one_alone
 from lfs10d.journal import Spot
 from lfs10d.modbus.frames import WriteRegister
 from lfs10d.reading import FaultCode
@@ -71,6 +73,8 @@ class Ending(StrEnum):
     DEAF = "deaf"
     LOST_BEFORE = "lost_before"
     UNWRITTEN = "unwritten"
+    TWINS = "twins"
+    UNRECOGNISED = "unrecognised"
     FREE = "free"
     MOVED = "moved"
     BOTH = "both"
@@ -82,7 +86,16 @@ class Ending(StrEnum):
 
 
 NOTHING_WRITTEN = frozenset(
-    {Ending.TAKEN, Ending.ABSENT, Ending.DEAF, Ending.LOST_BEFORE, Ending.UNWRITTEN, Ending.FREE}
+    {
+        Ending.TAKEN,
+        Ending.ABSENT,
+        Ending.DEAF,
+        Ending.LOST_BEFORE,
+        Ending.UNWRITTEN,
+        Ending.TWINS,
+        Ending.UNRECOGNISED,
+        Ending.FREE,
+    }
 )
 STAYS_OPEN = frozenset({Ending.GARBAGE, Ending.PENDING, Ending.NOWHERE})
 """With these the sensor may yet appear at either place; so it may where its register says the new id."""
@@ -92,7 +105,8 @@ STAYS_OPEN = frozenset({Ending.GARBAGE, Ending.PENDING, Ending.NOWHERE})
 class Verdict:
     """How it ended; `register` and `exception` are what the sensor said, `at` the rate where somebody was heard.
 
-    `why` is what kept the intent from the disk; `stays_open`: the sensor may yet appear at either place.
+    `why` is what kept the intent from the disk, how two sensors show, or why it is not recognised. `stays_open`: the
+    sensor may yet appear at either place.
     """
 
     ending: Ending
@@ -155,9 +169,11 @@ def looked_before(
     """Find out whether it may be written at all (rule 1); return why not, and what the sensor said."""
     before = yield from present(wish.old, asking)
     if before.register is None:
-        return Verdict(Ending.ABSENT, exception=before.exception), before
-    others = sorted(set(wish.rates) - {wish.old.baudrate})
-    for rate in (wish.old.baudrate, *others):
+        return absent(before), before
+    refusal = yield from alone(wish.old, wish.to, asking)
+    if refusal is not None:
+        return refusal, before
+    for rate in sorted(set(wish.rates) - {wish.old.baudrate}):
         if not (yield from free(Spot(slave=wish.to, baudrate=rate), asking)):
             return Verdict(Ending.TAKEN, at=rate), before
     for _ in range(ECHO_READS):
@@ -171,6 +187,23 @@ def looked_before(
     if not again.answers or not (yield from asking.settle(wish.old)):
         return Verdict(Ending.ABSENT), before
     return None, before
+
+
+def absent(reply: Reply) -> Verdict:
+    """Return what it means that no id was read at a place: nothing there, a refusal, or answers that collide."""
+    if reply.noise and not reply.answers:
+        return Verdict(Ending.TWINS, why="answers collide there")
+    return Verdict(Ending.ABSENT, exception=reply.exception)
+
+
+def alone(old: Spot, to: int, asking: Asking) -> Generator[Step, Any, Verdict | None]:
+    """Find out whether one sensor is at a place and nothing at the slave id `to`; return what is wrong, if anything."""
+    look = yield from one_alone(old, Spot(slave=to, baudrate=old.baudrate), asking)
+    if look.twins is not None:
+        return Verdict(Ending.TWINS, why=look.twins)
+    if not look.answers:
+        return Verdict(Ending.ABSENT, exception=look.exception)
+    return Verdict(Ending.TAKEN, at=old.baudrate) if look.taken else None
 
 
 def present(spot: Spot, asking: Asking) -> Generator[Step, Any, Reply]:

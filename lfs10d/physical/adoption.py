@@ -5,9 +5,9 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lfs10d.assembly import DEFAULT_PROFILE
 from lfs10d.commands import Answer, failed, ok, rejected
 from lfs10d.config import SlaveConfig, default_device_name
 from lfs10d.errors import StateError
@@ -15,12 +15,12 @@ from lfs10d.jobs import adopt
 from lfs10d.jobs.course import Now
 from lfs10d.jobs.readdress import NOTHING_WRITTEN, Ending, Verdict, Write
 from lfs10d.journal import Move, Spot
-from lfs10d.profiles.library import builtin_names, load_profile
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from lfs10d.commands import ErrorCode
+    from lfs10d.config import LineConfig
     from lfs10d.effective import Effective
     from lfs10d.journal import Asked, OpenChange
     from lfs10d.physical.place import Physical
@@ -38,13 +38,24 @@ CANDIDATES = 8
 
 _WORDS: Mapping[Ending, tuple[ErrorCode, str]] = {
     Ending.TAKEN: ("address_in_use", "somebody is heard at slave id {to}, who is not configured; see line/scan"),
-    Ending.ABSENT: ("timeout", "nobody answers at slave id {old}; is the new sensor connected and powered?"),
+    Ending.ABSENT: ("timeout", "nobody answers at slave id {old}{refusal}; is the new sensor connected and powered?"),
     Ending.DEAF: (
         "line_error",
         "whether the adapter returns our own bytes is not clear yet; try again, or set line.echo to on or off",
     ),
     Ending.LOST_BEFORE: ("line_error", "the port was lost; nothing was written"),
     Ending.UNWRITTEN: ("storage_full", "{why}; nothing was written"),
+    Ending.UNRECOGNISED: (
+        "not_recognised",
+        (
+            "at slave id {old}, at {at} baud, a device answers that is not recognised as {title}: {why}. Nothing was "
+            "written. If it is another kind of sensor, name its profile; else take it off the line"
+        ),
+    ),
+    Ending.TWINS: (
+        "duplicate_id",
+        "two sensors seem to have slave id {old}: {why}; nothing was written. Connect one at a time",
+    ),
     Ending.BOTH: ("duplicate_id", "more than one sensor is heard at slave id {old}; connect one at a time"),
     Ending.GARBAGE: ("duplicate_id", "at slave id {to} several answer at once since the write; take the other off"),
     Ending.REFUSED: ("refused", "the sensor at {old} refused the write{refusal}; perhaps its {lock} overrules it"),
@@ -71,12 +82,16 @@ _WORDS: Mapping[Ending, tuple[ErrorCode, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class Newcomer:
-    """What a request wants: the sensor at `factory` (None: as the profile says) at id `to` (None: the next free)."""
+    """What a request wants: the sensor at `factory` (None: as the profile says) at id `to` (None: the next free).
+
+    `profile` is the configuration's word for its profile.
+    """
 
     name: str | None = None
     label: str | None = None
     factory: int | None = None
     to: int | None = None
+    profile: str = DEFAULT_PROFILE
 
     @property
     def slaves(self) -> frozenset[int]:
@@ -93,30 +108,31 @@ class Adoption:
     async def perform(self, wanted: Newcomer, asked: Asked) -> Answer:
         """Take in a factory-new sensor; see `lfs10d.jobs.adopt`."""
         physical = self._physical
+        profile = await physical.profile(wanted.profile)
         now = physical.running()
-        wish = self._wish(wanted, now)
+        wish = self._wish(wanted, profile, now)
         if isinstance(wish, Answer):
             return await physical.refused(asked, wish)
-        slave = SlaveConfig(id=wish.factory)
+        slave = SlaveConfig(id=wish.factory, profile=wanted.profile)
         clock = Now()
         talk = physical.talk()
-        steps = adopt.adopt(wish, physical.asking(slave, clock, line_rate=0), physical.wire().echo_known)
+        asking = physical.asking(slave, clock, line_rate=0, profile=profile)
+        steps = adopt.adopt(wish, asking, physical.wire().echo_known)
         ids = frozenset({wish.factory, *wish.candidates})
         talk.begin(steps, clock, line_rate=now.config.line.baudrate, excludes=ids)
 
         async def conclude(result: Any, change: OpenChange | None) -> Answer:  # noqa: ANN401 - a course's
             found = result or adopt.Adopted(Verdict(Ending.LOST_BEFORE))
-            return await self._conclude(wanted, wish, found, change, asked)
+            return await self._conclude(wanted, wish, profile, found, change, asked)
 
         return await physical.carried_out(talk, asked, lambda write: self._intend(wanted, write, asked), conclude)
 
-    def _wish(self, wanted: Newcomer, now: Effective) -> adopt.Newcomer | Answer:
+    def _wish(self, wanted: Newcomer, profile: Profile, now: Effective) -> adopt.Newcomer | Answer:
         """Return what the line is asked, or why it need not be."""
-        profile = _profile()
-        rates = tuple(profile.baudrate.codes) if profile.baudrate else ()
         line_rate = now.config.line.baudrate
-        if profile.factory is None or line_rate not in rates or now.config.line.framing not in profile.framings:
-            return rejected("not_allowed", f"{profile.title}: none can speak on this line")
+        if profile.factory is None or (unfit := _unfit(profile, now.config.line)) is not None:
+            why = f"profile {profile.name} does not say how a new one comes" if profile.factory is None else unfit
+            return rejected("not_allowed", f"{profile.title}: {why}", param="profile")
         factory = wanted.factory or profile.factory.id
         taken = {slave.id: f"is that of {slave.name}" for slave in now.config.slaves}
         for slave in now.config.slaves:
@@ -141,19 +157,22 @@ class Adoption:
         if not candidates and wanted.to is not None:
             message = f"name: the default {default_device_name(wanted.to)} is taken; give it another name"
             return rejected("invalid_param", message, param="name")
-        others = (rate for rate in rates if rate != line_rate)
-        return adopt.Newcomer(factory, tuple(candidates), line_rate, (line_rate, *others))
+        codes = profile.baudrate.codes if profile.baudrate else ()
+        rates = tuple(dict.fromkeys((line_rate, profile.factory.baudrate, *codes)))
+        return adopt.Newcomer(factory, tuple(candidates), line_rate, rates)
 
     def _intend(self, wanted: Newcomer, write: Write, asked: Asked) -> OpenChange:
         name = wanted.name or default_device_name(write.new.slave)
         move = Move(device=name, old=write.old, new=write.new, register_before=write.register_before)
         moment = self._physical.now().ts()
-        return self._physical.journal.intend("adopt", (move,), moment, asked, label=wanted.label)
+        facts = {"label": wanted.label, "profile": wanted.profile}
+        return self._physical.journal.intend("adopt", (move,), moment, asked, **facts)
 
     async def _conclude(
         self,
         wanted: Newcomer,
         wish: adopt.Newcomer,
+        profile: Profile,
         found: adopt.Adopted,
         change: OpenChange | None,
         asked: Asked,
@@ -161,7 +180,9 @@ class Adoption:
         physical, verdict = self._physical, found.verdict
         old, to = wish.factory, found.to or 0
         name = wanted.name or default_device_name(to)
-        answer = _answer(name, old, to, verdict, written=change is not None)
+        answer = _answer(name, old, to, verdict, profile, written=change is not None)
+        if verdict.ending is Ending.TWINS:
+            physical.tell("duplicate_id", {"slave": old, "baudrate": found.old.baudrate if found.old else None})
         if change is None or verdict.ending in NOTHING_WRITTEN:
             return await physical.refused(asked, answer)
         told = physical.told(asked, answer)
@@ -198,30 +219,45 @@ def entry(change: OpenChange) -> dict[str, Any] | None:
         return None
     label = change.facts.get("label")
     said: dict[str, Any] = {"id": change.moves[0].new.slave}
-    return said if label is None else {**said, "label": label}
+    if label is not None:
+        said["label"] = label
+    if _word(change) != DEFAULT_PROFILE:
+        said["profile"] = _word(change)
+    return said
+
+
+def _word(change: OpenChange) -> str:
+    """Return the configuration's word for the profile of a newcomer; an older journal has no such word."""
+    return str(change.facts.get("profile", DEFAULT_PROFILE))
 
 
 def newcomer(change: OpenChange, move: Move) -> SlaveConfig | None:
     """Return the newcomer of an open change as it would be configured; None if it has none."""
-    return SlaveConfig(id=move.new.slave, name=move.device) if change.kind == "adopt" else None
+    if change.kind != "adopt":
+        return None
+    return SlaveConfig(id=move.new.slave, name=move.device, profile=_word(change))
 
 
-def _profile() -> Profile:
-    """Return the profile that a device has by default: newcomers are of its kind."""
-    return load_profile(builtin_names()[0], relative_to=Path())
+def _unfit(profile: Profile, line: LineConfig) -> str | None:
+    """Return why no newcomer of a profile can be adopted on a line; None if one can."""
+    if profile.slave_id is None:
+        return f"profile {profile.name} does not say how its slave id is set"
+    if line.framing not in profile.framings:
+        return f"it does not speak {line.framing}"
+    at_factory = profile.factory is not None and profile.factory.baudrate == line.baudrate
+    if not at_factory and (profile.baudrate is None or line.baudrate not in profile.baudrate.codes):
+        return f"it cannot be set to the {line.baudrate} baud of this line"
+    return None
 
 
-def _lock() -> str:
-    slave_id = _profile().slave_id
-    return (slave_id and slave_id.locked_by) or "address switch"
-
-
-def _answer(name: str, old: int, to: int, verdict: Verdict, *, written: bool) -> Answer:
+def _answer(name: str, old: int, to: int, verdict: Verdict, profile: Profile, *, written: bool) -> Answer:
     if verdict.ending is Ending.MOVED:
         return ok({"device": name, "slave": to, "from": old})
     code, text = _WORDS[verdict.ending]
     refusal = "" if verdict.exception is None else f" (exception {verdict.exception:02X})"
-    message = text.format(old=old, to=to, why=verdict.why, refusal=refusal, lock=_lock())
+    lock = (profile.slave_id and profile.slave_id.locked_by) or "address switch"
+    title = profile.title
+    message = text.format(old=old, to=to, at=verdict.at, why=verdict.why, refusal=refusal, lock=lock, title=title)
     facts: dict[str, Any] = {} if verdict.exception is None else {"exception_code": verdict.exception}
     if not written:
         return rejected(code, message, param=None, **facts)

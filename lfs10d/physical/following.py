@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from lfs10d import findings
 from lfs10d.commands import Answer, failed
-from lfs10d.errors import StateError
+from lfs10d.errors import ConfigError, StateError
 from lfs10d.jobs.course import Now, Over
 from lfs10d.jobs.follow import follow
 from lfs10d.jobs.readdress import Ending, Verdict, Wish
@@ -78,9 +78,10 @@ class Following:
     async def _follow(self, change: OpenChange, talk: Talk) -> None:
         try:
             await (self._rates.follow if change.kind == "baudrate" else self._follow_move)(change, talk)
-        except StateError as error:
+        except (StateError, ConfigError) as error:
             log.warning("%s", error)
             await asyncio.sleep(KEPT_PAUSE)
+            self._followed.pop(change.number, None)  # else it would count as looked for
             asyncio.get_running_loop().call_soon(self._physical.follow)
         finally:
             talk.go_on()
@@ -92,13 +93,14 @@ class Following:
         if slave is None:
             await self.drop(change, f"{move.device} is no longer configured")
             return
+        profile = await physical.profile(slave.profile)
         now = physical.running()
         clock = Now()
         here = Spot(slave=move.old.slave, baudrate=move.new.baudrate)
         steps = follow(
             here,
             move.new,
-            physical.asking(slave, clock, line_rate=0),
+            physical.asking(slave, clock, line_rate=0, profile=profile),
             longest_pause=now.config.poll.probe_interval_max,
             before=None if here == move.old else move.old,
             newcomer=change.kind == "adopt",
@@ -110,10 +112,10 @@ class Following:
                 if what.ending is not ending and what.ending in (Ending.BOTH, Ending.GARBAGE):
                     self._moves.tell_duplicate(move.device, move.old, move.new)
                 ending = what.ending
-                change = await self._seen(change, move, what, now.loaded.profiles[slave.profile])
+                change = await self._seen(change, move, what, profile)
             talk.go_on()
         if what.result is not None:
-            await self._found(change, move, what.result, now.loaded.profiles[slave.profile])
+            await self._found(change, move, what.result, profile)
 
     async def _seen(self, change: OpenChange, move: Move, verdict: Verdict, profile: Profile) -> OpenChange:
         """Answer the request of a change that is not settled by the first look."""

@@ -25,6 +25,7 @@ from lfs10d.physical.ratechange import RateChange
 from lfs10d.physical.readdressing import Readdressing
 from lfs10d.physical.reserving import Reserving
 from lfs10d.physical.talk import Talk
+from lfs10d.profiles.library import load_profile
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Coroutine, Iterator, Mapping
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from lfs10d.journal import Asked, Journal, OpenChange, Spot, Told
     from lfs10d.physical.adoption import Newcomer
     from lfs10d.physical.talk import Wire
+    from lfs10d.profiles.schema import Profile
     from lfs10d.requests.request import Edit
 
 log = logging.getLogger(__name__)
@@ -85,6 +87,7 @@ class Physical:
         self.ending = False
         self._reserving = Reserving(lambda: journal.open)
         self._writing: asyncio.Future[Any] | None = None
+        self._underway: Asked | None = None
         self._act = act
         self._moves = Readdressing(self)
         self._rates = RateChange(self)
@@ -193,11 +196,29 @@ class Physical:
         """Return what a course on the line is talked with by."""
         return Talk(self.wire())
 
-    def asking(self, slave: SlaveConfig, clock: Now, line_rate: int | None = None) -> Asking:
-        """Return how a device is asked; with a `line_rate` that no line has, its rate is told each time."""
+    async def profile(self, word: str) -> Profile:
+        """Return a profile by the configuration's word for it; raises ConfigError where it cannot be read.
+
+        That of a newcomer need not be any configured device's.
+        """
         now = self.running()
+        known = now.loaded.profiles.get(word)
+        if known is not None:
+            return known
+        folder = now.file.path.parent.absolute()
+        return await aside(partial(load_profile, word, relative_to=folder), "profile")
+
+    def asking(
+        self, slave: SlaveConfig, clock: Now, line_rate: int | None = None, profile: Profile | None = None
+    ) -> Asking:
+        """Return how a device is asked; with a `line_rate` that no line has, its rate is told each time.
+
+        `profile` is a newcomer's; a configured device has its own.
+        """
+        now = self.running()
+        profiles = now.loaded.profiles if profile is None else {slave.profile: profile}
         alone = now.config.model_copy(update={"slaves": (slave,)})
-        (spec,) = assembly.device_specs(alone, now.loaded.profiles)
+        (spec,) = assembly.device_specs(alone, profiles)
         rate = now.config.line.baudrate if line_rate is None else line_rate
         return Asking(spec.profile, spec.codec, self.wire().unanswered, clock, line_rate=rate)
 
@@ -213,6 +234,7 @@ class Physical:
         The end of the daemon cuts short what is under way on the line, but not the conclusion.
         """
         change: OpenChange | None = None
+        self._underway = asked
         try:
             while not isinstance(what := await talk.wanted(), Over):
                 why = None
@@ -225,12 +247,14 @@ class Physical:
         except asyncio.CancelledError:
             talk.halt()
             talk.go_on()
+            self._underway = None
             return await self._cut_short(asked)
         try:
             return await asyncio.shield(concluded)
         except asyncio.CancelledError:
             return await concluded
         finally:
+            self._underway = None
             talk.go_on()
 
     async def _cut_short(self, asked: Asked) -> Answer:
@@ -286,7 +310,9 @@ class Physical:
         """Take note of another configuration: open changes of devices that are gone are closed."""
         devices = {slave.name for slave in before.slaves} - {slave.name for slave in after.slaves}
         for change in self.journal.open:
-            if change.devices <= devices:
+            if self._underway is not None and change.asked == self._underway:
+                continue  # its own request ends and answers it
+            if change.devices and change.devices <= devices:
                 self.leave(frozenset({change.number}))
                 with contextlib.suppress(StateError):
                     await self.drop(change, f"{', '.join(sorted(change.devices))} was removed")

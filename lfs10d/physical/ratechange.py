@@ -133,7 +133,7 @@ class RateChange:
         """Return why the line need not even be asked; None if it must be."""
         config, profiles = now.config, now.loaded.profiles
         able = [slave for slave in config.slaves if to in _rates(profiles[slave.profile].baudrate)]
-        if config.slaves and not able:
+        if not able and any(profiles[slave.profile].baudrate for slave in config.slaves):
             return rejected("invalid_param", f"to: no sensor of this line can speak at {to} baud", param="to")
         unable = [slave.name for slave in config.slaves if slave not in able]
         if unable:

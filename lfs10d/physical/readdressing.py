@@ -91,6 +91,8 @@ class Readdressing:
         physical = self._physical
         journal = physical.journal
         answer = findings.readdressed(device, wish, verdict, profile)
+        if verdict.ending is Ending.TWINS:
+            self.tell_duplicate(device, wish.old, wish.old)
         if change is None or verdict.ending in NOTHING_WRITTEN:
             return await physical.refused(asked, answer)
         told = physical.told(asked, answer)

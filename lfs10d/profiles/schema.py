@@ -90,10 +90,10 @@ class RateRegister(Registered):
 
 
 class Factory(Fact):
-    """How a new device comes: its slave id and baud rate."""
+    """How a new device comes: its slave id and baud rate. `line/adopt` looks for it there."""
 
     id: SlaveId = Field(description="Its slave id.")
-    baudrate: Rate = Field(description="Its baud rate.")
+    baudrate: Rate = Field(description="Its baud rate; it need not be among the rates that can be set.")
 
 
 def _ids(ids: tuple[int, int]) -> tuple[int, int]:
@@ -149,7 +149,7 @@ class Profile(Facts):
     busy_exceptions: Annotated[tuple[Annotated[int, Whole(1, 255)], ...], Field(strict=False)] = Field(
         BUSY_EXCEPTIONS, description="Exception codes that mean: ask again later."
     )
-    factory: Factory | None = Field(None, description="How a new one comes.")
+    factory: Factory | None = Field(None, description="How a new one comes; `line/adopt` needs it.")
     slave_id: IdRegister | None = Field(None, description="Where its slave id is set.")
     baudrate: RateRegister | None = Field(None, description="Where its baud rate is set.")
     values: Annotated[tuple[Value, ...], Field(strict=False)] = Field(

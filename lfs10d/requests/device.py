@@ -81,7 +81,7 @@ class Options(Parameters):
 async def add(parameters: NewDevice, powers: Powers, call: Call) -> Answer:
     """Poll one more slave; with `probe` only if it answers."""
     try:
-        profile = await _profile(parameters.profile, powers.effective())
+        profile = await profile_of(parameters.profile, powers.effective())
         _check_new(parameters, profile, powers.effective(), powers.reserved())
         if parameters.probe:
             await _knock(parameters.slave, profile, powers)
@@ -100,8 +100,11 @@ async def add(parameters: NewDevice, powers: Powers, call: Call) -> Answer:
     return ok({"device": slave.name, **data})
 
 
-async def _profile(word: str, now: Effective) -> Profile:
-    """Return a profile by its name or file. A file is one that is used already, or lies beside the configuration."""
+async def profile_of(word: str, now: Effective) -> Profile:
+    """Return a profile by its name or file. A file is one that is used already, or lies beside the configuration.
+
+    Raises RefusedError for anything else.
+    """
     known = now.loaded.profiles.get(word)
     if known is not None:
         return known

@@ -113,11 +113,11 @@ class Powers(Protocol):
         ...
 
     async def adopt(
-        self, *, name: str | None, label: str | None, factory: int | None, to: int | None, call: Call
+        self, *, name: str | None, label: str | None, profile: str, factory: int | None, to: int | None, call: Call
     ) -> Answer:
-        """Give a factory-new sensor at id `factory` the id `to` and the line's rate, and poll it.
+        """Give a factory-new sensor of a `profile` at id `factory` the id `to` and the line's rate, and poll it.
 
-        None is the profile's factory id, and the next free id.
+        None is the profile's factory id, and the next free id. `profile` is a word that can be loaded.
         """
         ...
 

@@ -8,8 +8,9 @@ from pydantic import Field
 
 from lfs10d.admission import Form
 from lfs10d.commands import Answer, Parameters
-from lfs10d.kinds import Choice, Flag, Name, Text, Whole
-from lfs10d.requests.request import Powers, Request
+from lfs10d.kinds import Choice, FilePath, Flag, Name, Text, Whole
+from lfs10d.requests import device
+from lfs10d.requests.request import Powers, RefusedError, Request
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -49,18 +50,32 @@ async def baudrate(parameters: Baudrate, powers: Powers, call: Call) -> Answer:
 
 
 class Adopt(Parameters):
-    """What the new sensor is to be called, where it is and which slave id it is to get."""
+    """What the new sensor is to be called, what it is, where it is and which slave id it is to get."""
 
     name: Annotated[str, Name()] | None = None
     label: Annotated[str | None, Text(200, null=True)] = None
-    factory: Annotated[int, Whole(1, 255)] | None = Field(default=None, alias="from")
-    to: Annotated[int, Whole(1, 255)] | None = None
+    profile: Annotated[str, FilePath()] = "lfs10"
+    factory: Annotated[int, Whole(1, 255)] | None = Field(
+        default=None, alias="from", description="Without: the factory id of the profile."
+    )
+    to: Annotated[int, Whole(1, 255)] | None = Field(default=None, description="Without: the next free id from 2.")
 
 
 async def adopt(parameters: Adopt, powers: Powers, call: Call) -> Answer:
     """Take in a factory-new sensor."""
     wanted = parameters
-    return await powers.adopt(name=wanted.name, label=wanted.label, factory=wanted.factory, to=wanted.to, call=call)
+    try:
+        await device.profile_of(wanted.profile, powers.effective())
+    except RefusedError as error:
+        return error.answer
+    return await powers.adopt(
+        name=wanted.name,
+        label=wanted.label,
+        profile=wanted.profile,
+        factory=wanted.factory,
+        to=wanted.to,
+        call=call,
+    )
 
 
 REQUESTS: Mapping[str, Request] = {

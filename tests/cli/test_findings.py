@@ -45,9 +45,13 @@ def test_a_bare_count_has_no_unit() -> None:
 @pytest.mark.parametrize(
     ("finding", "text"),
     [
-        (STRANGER, "a device no profile fits (exception 02 illegal register address)"),
-        (Finding(9, 9600, answers=True, exception=99), "a device no profile fits (exception 63 of its own)"),
-        (Finding(9, 9600, answers=True), "a device no profile fits"),
+        (STRANGER, "unknown device, answers function 03 (exception 02 illegal register address)"),
+        (Finding(9, 9600, answers=True, exception=99), "unknown device, answers function 03 (exception 63 of its own)"),
+        (
+            Finding(9, 9600, answers=True, exception=1),
+            "unknown device, refuses function 03 (exception 01 illegal function)",
+        ),
+        (Finding(9, 9600, answers=True), "unknown device, answers function 03"),
         (Finding(9, 9600, duplicate=True), "something that gives no right answer"),
         (Finding(9, 9600, answers=True, profile=LFS10), "LFS10 wind speed sensor, no believable value"),
         (sensor(9, duplicate=True), "LFS10 wind speed sensor"),

@@ -162,3 +162,16 @@ def test_a_health_of_another_form_tells_nothing(answer: object) -> None:
 def test_an_answer_of_another_form_ends_it() -> None:
     assert begun().heard({"status": "rejected", "error": 5}).ends
     assert begun().heard({"status": "ok", "data": None, "error": None}).trouble == "None: None"
+
+
+def test_an_internal_error_ends_it_for_it_would_come_again() -> None:
+    # It asked every 10 s for ever before.
+    turn = begun().heard(no("internal", "failed"))
+    assert (turn.trouble, turn.ends) == ("internal: it is internal", True)
+
+
+def test_a_device_that_is_not_recognised_is_told_once_and_waited_for_to_be_unplugged() -> None:
+    mounting = begun()
+    assert mounting.heard(no("not_recognised")) == Turn(trouble="not_recognised: it is not_recognised", pause=AGAIN)
+    assert mounting.heard(no("not_recognised")) == Turn()
+    assert mounting.heard(ok("slave-3", 3)).adopted == NAMED

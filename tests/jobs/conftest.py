@@ -48,12 +48,14 @@ class Mimic:
     """With this code it refuses to be read."""
     stored: dict[int, int] = field(default_factory=dict)
     """What its registers say that is not so yet."""
+    codes: dict[int, int] = field(default_factory=lambda: dict(RATE_CODES))
+    """The rate of each content of its rate register."""
 
     def read(self, request: ReadRegisters) -> tuple[int, ...]:
         """Return the registers."""
         if request.address == 1:
             return self.wind
-        true = {4: {rate: code for code, rate in RATE_CODES.items()}[self.baudrate], 5: self.slave}
+        true = {4: {rate: code for code, rate in self.codes.items()}[self.baudrate], 5: self.slave}
         return (self.stored.get(request.address, true[request.address]),)
 
     def take(self, request: WriteRegister) -> int | None:
@@ -63,7 +65,7 @@ class Mimic:
             if request.address == 5:
                 self.slave = request.value
             else:
-                self.baudrate = RATE_CODES[request.value]
+                self.baudrate = self.codes[request.value]
         elif self.manner == "vanishes":
             self.silent = True
         elif self.manner in ("stores", "refuses_and_stores"):

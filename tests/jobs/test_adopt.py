@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from lfs10d.jobs.adopt import Adopted, Newcomer, adopt
 from lfs10d.jobs.readdress import Ending, Verdict, Write
+from lfs10d.jobs.recognition import READS
 from lfs10d.journal import Spot
-from lfs10d.modbus.frames import WriteRegister
+from lfs10d.modbus.frames import ReadRegisters, WriteRegister
+from tests.jobs.conftest import Mimic
 
 if TYPE_CHECKING:
     from tests.jobs.conftest import Pretence
@@ -145,3 +147,56 @@ def test_two_newcomers_that_part_when_brought_to_the_lines_rate_are_told(pretenc
     found = adopted(pretence)
     assert (found.verdict.ending, found.verdict.stays_open, found.at_rate) == (Ending.BOTH, False, False)
     assert [sensor.baudrate for sensor in sensors] == [19200, 19200]
+
+
+@pytest.mark.parametrize(
+    ("facts", "why"),
+    [
+        ({"exception": 2}, "it refuses register 0x0005 (exception 02)"),
+        ({"stored": {5: 700}}, "its register 0x0005 says 700, not 1"),
+        ({"stored": {4: 9}}, "its register 0x0004 says 9, which is no rate"),
+    ],
+)
+def test_a_device_that_is_not_recognised_is_not_written_to(pretence: Pretence, facts: dict[str, Any], why: str) -> None:
+    pretence.sensor(1, baudrate=19200, **facts)
+    found = adopted(pretence)
+    assert (found.verdict.ending, found.verdict.why, found.verdict.at) == (Ending.UNRECOGNISED, why, 19200)
+    assert pretence.writes == pretence.aside == []
+
+
+class Changing(Mimic):
+    """Its values become impossible after a few reads."""
+
+    reads = 0
+
+    def read(self, request: ReadRegisters) -> tuple[int, ...]:
+        self.reads += request.address == 1
+        return (0x4974, 0x2400) if request.address == 1 and self.reads > READS else super().read(request)
+
+
+def test_two_that_show_only_after_one_was_recognised_are_not_written_to(pretence: Pretence) -> None:
+    pretence.sensors.append(Changing(1))
+    found = adopted(pretence)
+    assert (found.verdict.ending, found.to) == (Ending.TWINS, 2)
+    assert pretence.writes == []
+
+
+def test_a_newcomer_that_is_gone_before_the_write_is_not_written_to(pretence: Pretence) -> None:
+    sensor = pretence.sensor(1)
+    assert pretence.carry_out(adopt(WISH, pretence.asking(), lambda: vanish(sensor))).verdict == Verdict(Ending.ABSENT)
+    assert pretence.writes == []
+
+
+def vanish(sensor: Mimic) -> bool:
+    sensor.silent = True
+    return True
+
+
+def test_one_that_came_at_a_rate_without_a_code_is_brought_back_to_it(pretence: Pretence) -> None:
+    sensors = [pretence.sensor(1, baudrate=4800), pretence.sensor(1, baudrate=4800, manner="stores")]
+    for sensor in sensors:
+        sensor.codes = {0: 4800, 1: 9600, 2: 19200}
+    found = adopted(pretence, Newcomer(1, (2,), 9600, (9600, 4800, 19200)))
+    assert (found.verdict.ending, found.verdict.stays_open) == (Ending.BOTH, False)
+    assert [sensor.baudrate for sensor in sensors] == [4800, 4800]
+    assert WriteRegister(1, 4, 0) in pretence.writes

@@ -35,6 +35,7 @@ values:
   - {name: level, register: 1, type: uint16, unit: "1", source: none}
 slave_id: {register: 5, source: none}
 """
+WITHOUT_RATE = parse_profile(NARROW, "narrow.yaml")
 
 
 def test_a_profile_without_a_register_of_the_id_cannot_be_asked(pretence: Pretence) -> None:
@@ -200,3 +201,27 @@ def test_so_is_one_whose_answer_came_while_another_was_asked(pretence: Pretence,
     pretence.carry_out(pretence.asking().who(Spot(slave=9, baudrate=9600)))
     assert [ask.timeout for ask in pretence.asked if ask.request == WHO] == [PATIENT]
     assert pretence.asked[-1].timeout == QUICK
+
+
+def test_listening_asks_a_silent_place_behind_the_exchange_before(pretence: Pretence) -> None:
+    silent = Spot(slave=9, baudrate=9600)
+    assert pretence.carry_out(pretence.asking().listen(silent, 0.3, 3)) == (Reply(), False)
+    assert pretence.asked == [Ask(ReadRegisters(9, 1, 2), RTU, 0.3, at_once=True)]
+
+
+def test_a_second_block_of_values_can_be_asked(pretence: Pretence) -> None:
+    pretence.sensor(3)
+    block = load_profile("fuling-dzb", relative_to=Path()).reads()[1]
+    pretence.carry_out(pretence.asking().values(Spot(slave=4, baudrate=9600), block=block))
+    assert pretence.requests == [ReadRegisters(4, 0x5000, 2)]
+
+
+def test_a_rate_without_a_code_is_known_by_what_the_register_held(pretence: Pretence) -> None:
+    asking = pretence.asking()
+    for same in (asking.knowing(4800, None), asking.knowing(9600, 7), pretence.asking(WITHOUT_RATE).knowing(4800, 7)):
+        assert same.profile in (asking.profile, WITHOUT_RATE)
+    knowing = asking.knowing(4800, 7)
+    assert knowing.profile.baudrate is not None
+    assert knowing.profile.baudrate.codes == {9600: 1, 19200: 2, 4800: 7}
+    assert knowing.clock is asking.clock
+    assert pretence.carry_out(knowing.values(Spot(slave=3, baudrate=9600))).silent

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -212,3 +213,11 @@ def test_a_port_lost_after_the_end_changes_nothing_about_it(answer: Outcome) -> 
     made.cut_off(1.2)
     assert made.ask(1.3) == Hold()
     assert told == [Over("moved")]
+
+
+def test_a_question_that_belongs_behind_the_one_before_it_is_asked_at_once(answer: Outcome) -> None:
+    made, _ = course(steps_of(HERE, replace(HERE, at_once=True), HERE))
+    assert made.ask(1.0) == HERE
+    assert made.heard(answer, 1.1) == Again()
+    assert made.ask(1.1) == replace(HERE, at_once=True)
+    assert made.heard(answer, 1.2) == Later(1.2)

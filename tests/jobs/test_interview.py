@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from lfs10d.jobs.interview import Finding, Interview, first_read, speaks, spoilt, strangers
+from lfs10d.jobs.interview import Finding, Interview, first_read, rate_fits, speaks, spoilt, strangers
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
 from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.reading import Fault, FaultCode
@@ -92,9 +92,9 @@ def lfs10(slave: int = 3, wind: tuple[int, int] = WIND) -> Callable[[ReadRegiste
     return registers({1: wind[0], 2: wind[1], 4: 1, 5: slave})
 
 
-def test_an_lfs10_is_recognised_by_two_reads() -> None:
+def test_an_lfs10_is_recognised_by_its_id_its_value_and_its_rate() -> None:
     finding, asked = interview(lfs10())
-    assert asked == [ReadRegisters(3, 5, 1), ReadRegisters(3, 1, 2)]
+    assert asked == [ReadRegisters(3, 5, 1), ReadRegisters(3, 1, 2), ReadRegisters(3, 4, 1)]
     assert finding == Finding(
         3, 9600, answers=True, rtt=0.02, profile=LFS10, values={"wind_speed": 12.99}, id_register=3
     )
@@ -103,15 +103,49 @@ def test_an_lfs10_is_recognised_by_two_reads() -> None:
 def test_what_is_known_already_is_not_asked_again() -> None:
     first = outcome(ReadRegisters(3, 5, 1), (3,))
     finding, asked = interview(lfs10(), first=first)
-    assert asked == [ReadRegisters(3, 1, 2)]
+    assert asked == [ReadRegisters(3, 1, 2), ReadRegisters(3, 4, 1)]
     assert finding is not None
     assert finding.profile is LFS10
 
 
-def test_the_right_id_is_enough_where_the_value_is_no_number() -> None:
-    finding, _ = interview(lfs10(wind=NOT_A_NUMBER))
+@pytest.mark.parametrize(
+    "content",
+    [
+        {1: NOT_A_NUMBER[0], 2: NOT_A_NUMBER[1], 4: 1, 5: 3},
+        {1: 12, 2: 0, 4: 1, 5: 3},
+        {1: WIND[0], 2: WIND[1], 4: 9, 5: 3},
+        {1: WIND[0], 2: WIND[1], 5: 3},
+        {4: 1, 5: 3},
+        {1: WIND[0], 2: WIND[1], 4: 1, 5: 700},
+    ],
+)
+def test_where_id_value_and_rate_do_not_all_agree_it_is_an_unknown_device(content: dict[int, int]) -> None:
+    # The right id alone was enough before: a device of integers that holds its id at 0x0005 was named an LFS10.
+    finding, _ = interview(registers(content))
     assert finding is not None
-    assert (finding.profile, dict(finding.values)) == (LFS10, {})
+    assert (finding.answers, finding.profile, dict(finding.values)) == (True, None, {})
+
+
+def test_at_a_rate_without_a_code_the_content_of_its_register_says_nothing() -> None:
+    assert rate_fits(LFS10, 9, 4800)
+    assert not rate_fits(LFS10, 9, 9600)
+    assert not rate_fits(LFS10, None, 4800)
+    assert rate_fits(LD_E, None, 9600)
+
+
+def test_two_lfs10_whose_values_collide_are_named_as_such() -> None:
+    finding, _ = interview(garbled([True] * 5))
+    assert finding is not None
+    assert (finding.profile, finding.id_register, finding.duplicate) == (LFS10, 3, True)
+
+
+def test_two_devices_whose_values_collide_and_whose_id_is_not_the_right_one_are_unknown() -> None:
+    def device(request: ReadRegisters) -> Outcome:
+        return lfs10(slave=2)(request) if request.address != 1 else garbled([True])(request)
+
+    finding, _ = interview(device)
+    assert finding is not None
+    assert (finding.profile, finding.duplicate) == (None, True)
 
 
 def test_another_possible_id_needs_a_believable_value() -> None:

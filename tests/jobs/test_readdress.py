@@ -93,6 +93,27 @@ def test_one_that_keeps_the_new_id_stored_leaves_the_change_open(pretence: Prete
     assert pretence.carry_out(parted(before, OLD, 9, pretence.asking())) == before
 
 
+@pytest.mark.parametrize("dry_run", [False, True])
+def test_two_sensors_of_one_id_are_not_written_to(pretence: Pretence, *, dry_run: bool) -> None:
+    pretence.sensor(3)
+    pretence.sensor(3, wind=(0, 0))
+    wish = Wish(OLD, 9, (9600, 19200), dry_run)
+    assert carried_out(pretence, wish) == Verdict(Ending.TWINS, why="answers collide there")
+    assert pretence.writes == pretence.aside == []
+
+
+def test_two_whose_ids_collide_already_are_two(pretence: Pretence) -> None:
+    pretence.noise.add((3, 9600))
+    assert carried_out(pretence) == Verdict(Ending.TWINS, why="answers collide there")
+
+
+def test_one_that_gives_its_id_and_no_value_is_not_written_to(pretence: Pretence) -> None:
+    sensor = pretence.sensor(3)
+    pretence.later.append((0.01, lambda: setattr(sensor, "exception", 4)))
+    assert carried_out(pretence) == Verdict(Ending.ABSENT, exception=4)
+    assert pretence.writes == []
+
+
 def test_a_dry_run_looks_and_writes_nothing(pretence: Pretence) -> None:
     pretence.sensor(3)
     assert carried_out(pretence, Wish(OLD, 9, (9600, 19200), dry_run=True)) == Verdict(Ending.FREE, 3)

@@ -130,6 +130,9 @@ class Life:
         self.poller = Poller(bus, schedule, self._heard, bench.clock)
         self.physical.recall()
 
+    def effective(self) -> Effective:
+        return self.running.now
+
     async def readdress(self, device: str, to: int, *, dry_run: bool, call: Call) -> Answer:
         """Perform a request, as the daemon's powers do; so do the next two."""
         return await self.physical.readdress(device, to, dry_run=dry_run, call=call)
@@ -138,9 +141,9 @@ class Life:
         return await self.physical.baudrate(to, power_cycle=power_cycle, dry_run=dry_run, call=call)
 
     async def adopt(
-        self, *, name: str | None, label: str | None, factory: int | None, to: int | None, call: Call
+        self, *, name: str | None, label: str | None, profile: str, factory: int | None, to: int | None, call: Call
     ) -> Answer:
-        return await self.physical.adopt(Newcomer(name, label, factory, to), call)
+        return await self.physical.adopt(Newcomer(name, label, factory, to, profile), call)
 
     def request(self, name: str, **parameters: Any) -> None:  # noqa: ANN401 - any JSON
         """Let a request come in by MQTT; its response comes to `bench.responses`."""
@@ -292,7 +295,7 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
         del name
         return call()
 
-    for module in ("physical.place", "running"):
+    for module in ("physical.place", "running", "requests.device"):
         monkeypatch.setattr(f"lfs10d.{module}.aside", at_once)
     loop = Loop()
     loop.set_exception_handler(_mistake)

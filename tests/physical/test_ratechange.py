@@ -175,3 +175,53 @@ def test_the_rate_of_now_is_not_called_settled_while_sensors_may_come_up_at_anot
     assert change(bench, life, power_cycle=True).status == "ok"
     answer = change(bench, life, to=9600)
     assert (answer.status, answer.code) == ("rejected", "busy")
+
+
+SLAVES = {
+    "none": "[]",
+    "disabled": "[{id: 3, name: s3, enabled: false}]",
+    "foreign": "[{id: 3, profile: eh600}]",
+    "mixed": "[{id: 3, name: s3}, {id: 4, profile: eh600}]",
+}
+
+
+@pytest.mark.parametrize("dry_run", [False, True])
+@pytest.mark.parametrize(
+    ("slaves", "code"), [("none", None), ("disabled", None), ("foreign", "not_allowed"), ("mixed", "not_allowed")]
+)
+def test_whatever_is_configured_there_is_one_answer_and_it_is_true(
+    bench: Bench, slaves: str, code: str | None, *, dry_run: bool
+) -> None:
+    bench.sensors(3, names=False)
+    bench.file.write_text(bench.file.read_text().replace("slaves: []", f"slaves: {SLAVES[slaves]}"))
+    bench.cut()
+    life = bench.begin()
+    bench.go(life, 3.0)
+    life.request("line/baudrate", id="b1", to=19200, dry_run=dry_run)
+    bench.go(life, 30.0)
+    (response,) = bench.responses  # two before where no slave was configured, the first of them false
+    error = response["error"]
+    assert (response["status"], error and error["code"]) == ("ok" if code is None else "rejected", code)
+    moved = code is None and not dry_run
+    assert life.running.now.config.line.baudrate == (19200 if moved else 9600)
+    assert not life.physical.open
+    bench.cut()
+    assert bench.begin().running.now.config.line.baudrate == (19200 if moved else 9600)
+
+
+def test_a_device_removed_while_its_change_is_carried_out_has_one_answer(bench: Bench) -> None:
+    life = bench.sensors(3, 4)
+    bench.go(life, 3.0)
+    life.request("device/readdress", id="r1", device="s3", to=9)
+    while not life.physical.open:
+        bench.turn(life)
+    bench.ask(life, removed(life, "s3"))
+    bench.go(life, 60.0)
+    assert len(bench.responses) == 1
+    assert not life.physical.open
+
+
+async def removed(life: Life, device: str) -> Answer:
+    """Take a device out of the configuration, as `device/remove` does."""
+    await life.running.change(lambda now: now.changes.removing(device, now.said))
+    return Answer("ok")

@@ -7,9 +7,19 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from lfs10d.simulator.sensor import Sensor
+from lfs10d.simulator.wind import Wind
 
 if TYPE_CHECKING:
     from tests.physical.conftest import Bench
+
+
+def calm(bench: Bench) -> None:
+    """Let the sensor 3 measure no wind at all."""
+    bench.line.sensor(3).source = lambda _: 0.0
+
+
+def writes(bench: Bench) -> list[bytes]:
+    return [request.body for request in bench.line.log if request.body[1:2] == b"\x06"]
 
 
 @pytest.mark.parametrize("echo", [False, True])
@@ -67,7 +77,8 @@ def test_one_that_does_not_obey_stays_and_the_answer_says_why(
 @pytest.mark.parametrize("manner", ["power_cycle", "stores_but_ignores"])
 def test_two_sensors_that_part_are_told_and_do_not_meet_again_at_a_power_cycle(bench: Bench, manner: str) -> None:
     life = bench.sensors(3, 4)
-    twin = bench.line.add(Sensor(3))
+    calm(bench)  # two that answer bit-identically cannot be told apart before
+    twin = bench.line.add(Sensor(3, source=lambda _: 0.0))
     twin.ail(manner)
     bench.go(life, 3.0)
     answer = bench.readdress(life, "s3", 9)
@@ -79,3 +90,33 @@ def test_two_sensors_that_part_are_told_and_do_not_meet_again_at_a_power_cycle(b
     bench.go(life, 30.0)
     assert sorted(sensor.slave for sensor in bench.line.sensors) == [3, 4, 9]
     assert not life.physical.open
+
+
+@pytest.mark.parametrize("dry_run", [False, True])
+@pytest.mark.parametrize("turnaround", [0.005, 0.0055, 0.009, 0.0145, 0.02, 0.04, 0.1, 0.3])
+def test_of_two_sensors_of_one_id_neither_is_moved(bench: Bench, turnaround: float, *, dry_run: bool) -> None:
+    life = bench.sensors(3, 4)
+    twin = bench.line.add(Sensor(3, turnaround=turnaround))
+    bench.go(life, 3.0)
+    answer = bench.readdress(life, "s3", 9, dry_run=dry_run)
+    assert (answer.status, answer.code) == ("rejected", "duplicate_id")
+    assert writes(bench) == []
+    assert (twin.slave, life.place("s3"), life.physical.open) == (3, 3, ())
+    assert life.told("duplicate_id") == [{"device": "s3", "slave": 3, "from": 3}]
+
+
+def test_two_whose_values_take_turns_are_not_moved(bench: Bench) -> None:
+    life = bench.sensors(3, 4)
+    turns = iter(range(10_000))
+    bench.line.sensor(3).source = lambda _: 3.0 + 9.5 * (next(turns) % 2)
+    bench.go(life, 3.0)
+    assert bench.readdress(life, "s3", 9).code == "duplicate_id"
+    assert writes(bench) == []
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_sensor_in_gusty_wind_is_one(bench: Bench, seed: int) -> None:
+    life = bench.sensors(3, 4)
+    bench.line.sensor(3).source = Wind(seed, mean=20.0)
+    bench.go(life, 3.0)
+    assert bench.readdress(life, "s3", 9).status == "ok"

@@ -82,9 +82,9 @@ class FakePowers:
         return ok({"to": to})
 
     async def adopt(
-        self, *, name: str | None, label: str | None, factory: int | None, to: int | None, call: Call
+        self, *, name: str | None, label: str | None, profile: str, factory: int | None, to: int | None, call: Call
     ) -> Answer:
-        self.done.append(("adopt", name, label, factory, to, call.id))
+        self.done.append(("adopt", name, label, profile, factory, to, call.id))
         return ok({"device": name})
 
     def start(self) -> None:

@@ -25,7 +25,10 @@ def test_a_change_of_rate_is_handed_on_with_its_call(ask: Ask, powers: FakePower
 def test_a_newcomer_is_handed_on_with_its_call(ask: Ask, powers: FakePowers) -> None:
     assert ask("line/adopt", '{"id":7,"name":"north","label":"Mast, 10 m","from":5,"to":9}').status == "ok"
     assert ask("line/adopt").status == "ok"
-    assert powers.done == [("adopt", "north", "Mast, 10 m", 5, 9, 7), ("adopt", None, None, None, None, None)]
+    assert powers.done == [
+        ("adopt", "north", "Mast, 10 m", "lfs10", 5, 9, 7),
+        ("adopt", None, None, "lfs10", None, None, None),
+    ]
 
 
 @pytest.mark.parametrize(
