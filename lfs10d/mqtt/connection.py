@@ -1,10 +1,10 @@
-"""One connection to the broker from its beginning to its end; the only importer of paho.
+"""One connection to the broker from its beginning to its end.
 
 A thread of its own, gone afterwards, does what may block: the password and the certificates are read, the name is
 resolved, the socket is connected, TLS is agreed upon, CONNECT is sent. A thread that hangs there is left to itself.
 From then on paho runs in the asyncio loop (`pump`): a thread for it would wake twice for every message. Its callbacks
 only note what happened, to be dealt with when paho is done: to publish inside a callback would wait for paho itself.
-It keeps no queue and reconnects nothing here.
+It keeps no queue and reconnects nothing here. What paho does not do, `pahoclient` adds.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from collections import deque
 from functools import partial
 from typing import TYPE_CHECKING
 
-from paho.mqtt.client import Client, ConnectFlags, DisconnectFlags, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode, MQTTProtocolVersion
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 from paho.mqtt.subscribeoptions import SubscribeOptions
 
 from lfs10d.mqtt.endings import (
+    KEEP_ALIVE_TIMEOUT,
     REFUSED_FROM,
     UNSUPPORTED_VERSION,
     Ended,
@@ -33,6 +33,7 @@ from lfs10d.mqtt.endings import (
     reason_in_words,
 )
 from lfs10d.mqtt.messages import RECEIVE_MAXIMUM_UNSAID, Accepted, Incoming
+from lfs10d.mqtt.pahoclient import LARGEST_PACKET, BoundedClient
 from lfs10d.mqtt.pump import Pump
 from lfs10d.mqtt.settings import Version
 from lfs10d.mqtt.tls import tls_context
@@ -40,6 +41,7 @@ from lfs10d.mqtt.tls import tls_context
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from paho.mqtt.client import Client, ConnectFlags, DisconnectFlags, MQTTMessage
     from paho.mqtt.reasoncodes import ReasonCode
 
     from lfs10d.mqtt.messages import Events, Filter, Will
@@ -73,10 +75,10 @@ class Connection:
         self._pump = Pump(self._client, read=self._deal, failed=self._read_failed)
         threading.Thread(target=self._connect, name="connect", daemon=True).start()
 
-    def _build(self, will: Will | None) -> Client:
+    def _build(self, will: Will | None) -> BoundedClient:
         settings = self._settings
         five = self._version is Version.V5
-        client = Client(
+        client = BoundedClient(
             CallbackAPIVersion.VERSION2,
             settings.client_id,
             clean_session=None if five else True,
@@ -98,6 +100,7 @@ class Connection:
         if five:
             properties = _properties(PacketTypes.CONNECT)
             properties.ReceiveMaximum = RECEIVE_MAXIMUM
+            properties.MaximumPacketSize = LARGEST_PACKET
             client.connect_async(
                 settings.host, settings.port, settings.keepalive, clean_start=True, properties=properties
             )
@@ -205,7 +208,7 @@ class Connection:
                 self._client.tls_set_context(tls_context(settings.tls))
             self._client.reconnect()
         except Exception as caught:  # noqa: BLE001 - whatever a broker provokes ends this connection and no more
-            self._post(self._failed, failed(caught, self._settings))
+            self._post(self._failed, caught)
         else:
             self._post(self._watch)
 
@@ -228,13 +231,13 @@ class Connection:
         if self._abandoned:
             self._close()
         elif not isinstance(opened, socket.socket):
-            self._gone(None)
+            self._gone(None, self._client.trouble)
         else:
             self._pump.begin(opened)
 
     def _read_failed(self, caught: Exception) -> None:
         self._close()
-        self._failed(failed(caught, self._settings))
+        self._failed(caught)
 
     # Callbacks of paho
 
@@ -259,7 +262,11 @@ class Connection:
     def _on_disconnect(
         self, _c: Client, _u: object, flags: DisconnectFlags, reason: ReasonCode, _p: Properties | None
     ) -> None:
-        self._note(self._gone, reason.value if flags.is_disconnect_packet_from_server else None)
+        if flags.is_disconnect_packet_from_server:
+            self._note(self._gone, reason.value, None)
+        else:
+            unanswered = reason.value == KEEP_ALIVE_TIMEOUT
+            self._note(self._gone, None, "no answer to a ping" if unanswered else self._client.trouble)
 
     def _on_publish(self, _c: Client, _u: object, mid: int, reason: ReasonCode, _p: Properties) -> None:
         self._note(self._acknowledged, mid, reason.value)
@@ -306,16 +313,17 @@ class Connection:
             )
         )
 
-    def _gone(self, reason: int | None) -> None:
-        """Note the end of the connection; `reason` is that of the broker's DISCONNECT."""
-        self._end(gone(self._settings.place, left=self._left, accepted=self._accepted, reason=reason))
+    def _gone(self, reason: int | None, cause: BaseException | str | None) -> None:
+        """Note the end of the connection; `reason` is that of the broker's DISCONNECT, `cause` another one."""
+        place, left, accepted = self._settings.place, self._left, self._accepted
+        self._end(gone(place, left=left, accepted=accepted, reason=reason, cause=cause))
 
-    def _failed(self, ended: Ended) -> None:
+    def _failed(self, caught: Exception) -> None:
         """Note an error of our own side, or one of the socket before it was open."""
         if self._opened:
-            self._gone(None)
+            self._gone(None, caught)
         else:
-            self._end(ended)
+            self._end(failed(caught, self._settings))
 
     def _end(self, ended: Ended) -> None:
         events, self._events = self._events, None

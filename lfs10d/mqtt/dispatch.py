@@ -7,6 +7,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections import deque
+from dataclasses import dataclass, field
+from itertools import islice
 from typing import TYPE_CHECKING
 
 from lfs10d import telemetry
@@ -14,14 +17,18 @@ from lfs10d.mqtt.encoding import array, encode, packet_size
 from lfs10d.mqtt.endings import NO_MATCHING_SUBSCRIBERS, REFUSED_FROM, reason_in_words
 from lfs10d.mqtt.letters import Array, Declaration, Message
 from lfs10d.mqtt.outbox import IN_FLIGHT_MOST
+from lfs10d.mqtt.past import ARRAY_BYTES
+from lfs10d.mqtt.refusals import Refusal, refusal_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from lfs10d.mqtt.connection import Connection
+    from lfs10d.mqtt.endings import Ended
     from lfs10d.mqtt.letters import Letter, Live, Retained
     from lfs10d.mqtt.messages import Accepted
     from lfs10d.mqtt.outbox import Outbox
+    from lfs10d.mqtt.suspects import Culprit
     from lfs10d.mqtt.topics import Topics
 
 log = logging.getLogger(__name__)
@@ -34,6 +41,34 @@ SAMPLES_AT_ONCE = 16
 
 ACKNOWLEDGED_WITHIN = 60.0
 """Seconds after which a broker that answers pings but acknowledges nothing is given up."""
+
+
+UNPROVED_MOST = 64
+"""Messages of QoS 0 that are remembered until a later message is acknowledged: then the broker has them too."""
+
+NOT_AUTHORIZED = 0x87
+"""Reason code of a publication that the broker's rules deny (MQTT 5.0, section 2.4)."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Sent:
+    """One message on its way, the `number`th of this connection: `size` bytes of payload, sent `at` (monotonic s)."""
+
+    letter: Letter
+    at: float
+    size: int
+    qos: int
+    number: int
+
+
+@dataclass(slots=True)
+class _Assembly:
+    """A history array that is being serialised; `size` is its bytes so far, `most` its greatest."""
+
+    letter: Array
+    most: int
+    parts: list[bytes] = field(default_factory=list)
+    size: int = 1
 
 
 class Dispatch:
@@ -55,8 +90,12 @@ class Dispatch:
         self._stuck = stuck
         self._connection: Connection | None = None
         self._accepted: Accepted | None = None
-        self._sent: dict[int, tuple[Letter, float]] = {}
-        self._assembly: tuple[Array, list[bytes]] | None = None
+        self._sent: dict[int, _Sent] = {}
+        self._number = 0
+        self._acknowledged = 0
+        self._unproved: deque[_Sent] = deque(maxlen=UNPROVED_MOST)
+        self._swallowed: dict[str, int] = {}
+        self._assembly: _Assembly | None = None
         self._turn: asyncio.Handle | None = None
         self._sending = False
         self._alarm: asyncio.TimerHandle | None = None
@@ -68,15 +107,46 @@ class Dispatch:
         self._accepted = accepted
         self._outbox.connected(self._now(), window=min(IN_FLIGHT_MOST, accepted.receive_maximum))
 
-    def lost(self) -> None:
+    def lost(self, ended: Ended) -> None:
         """Put back what is not acknowledged, and stop."""
+        outbox, sent = self._outbox, self._swallowed or self.under_way
+        culprit = None
+        if ended.by_message or self._swallowed:
+            culprit = outbox.suspects.ended(sent, certain=ended.reason is not None)
         self._connection = self._accepted = self._assembly = None
         self._sent.clear()
+        self._unproved.clear()
+        self._swallowed = {}
+        self._number = self._acknowledged = 0
         for handle in (self._turn, self._alarm):
             if handle is not None:
                 handle.cancel()
         self._turn = self._alarm = None
-        self._outbox.lost(self._now())
+        outbox.lost(self._now(), culprit, denied=ended.reason == NOT_AUTHORIZED)
+        if culprit is not None:
+            self._report(culprit, ended)
+
+    @property
+    def under_way(self) -> dict[str, int]:
+        """What the broker may have got last: topics under `B`, each with the bytes of its largest message."""
+        found: dict[str, int] = {}
+        for each in (*self._sent.values(), *self._unproved):
+            found[each.letter.topic] = max(each.size, found.get(each.letter.topic, 0))
+        return found
+
+    @property
+    def explains_end(self) -> bool:
+        """Something is under way that was so when the connection before ended: it may be why this one does."""
+        return self._outbox.suspects.explain(self.under_way)
+
+    def _report(self, culprit: Culprit, ended: Ended) -> None:
+        topic = self._topics.full(culprit.topic)
+        if self._outbox.passes_over(culprit.topic):
+            log.warning("%s; again with a message of %d bytes to %s under way: nothing is sent there for an hour",
+                        ended.message, culprit.size, topic)  # fmt: skip
+        else:
+            log.warning("%s; again with a message of %d bytes to %s under way: it is sent in smaller parts",
+                        ended.message, culprit.size, topic)  # fmt: skip
 
     def wake(self) -> None:
         """Send what there is to send: some at once, the rest soon."""
@@ -85,19 +155,40 @@ class Dispatch:
 
     def acknowledged(self, mid: int, reason: int) -> None:
         """Note the broker's answer to a message."""
-        letter, _ = self._sent.pop(mid, (None, 0.0))
-        if letter is None:
+        sent = self._sent.pop(mid, None)
+        if sent is None:
             return
+        if sent.qos:
+            self._prove(sent)
+        else:
+            self._unproved.append(sent)  # it was written, that is all
         if reason < REFUSED_FROM:
-            self._outbox.settled(letter, self._now(), heard=reason != NO_MATCHING_SUBSCRIBERS)
-        elif self._outbox.refused(letter, reason):
-            log.warning(
-                "the broker refuses %s: %s; nothing more is sent there until a reload",
-                self._topics.full(letter.topic),
-                reason_in_words(reason),
-            )
+            self._outbox.settled(sent.letter, self._now(), heard=reason != NO_MATCHING_SUBSCRIBERS)
+        else:
+            self._refused(sent, reason)
         if self._outbox.waits:
             self.wake()
+
+    def _prove(self, acknowledged: _Sent) -> None:
+        """Note that the broker took this message, and all before it, without ending the connection."""
+        suspects = self._outbox.suspects
+        self._acknowledged = max(self._acknowledged, acknowledged.number)
+        suspects.acknowledged(acknowledged.letter.topic, acknowledged.size)
+        while self._unproved and self._unproved[0].number < acknowledged.number:
+            proved = self._unproved.popleft()
+            suspects.acknowledged(proved.letter.topic, proved.size)
+
+    def _refused(self, sent: _Sent, reason: int) -> None:
+        letter, refusal = sent.letter, refusal_of(reason)
+        topic, words = self._topics.full(letter.topic), reason_in_words(reason)
+        if refusal is Refusal.UNFIT:
+            if self._outbox.unfit(letter):
+                log.warning(
+                    "the broker refuses a message of %d bytes to %s: %s; it is dropped", sent.size, topic, words
+                )
+        elif self._outbox.refused(letter, reason, self._now()):
+            again = "in a second, then less often" if refusal is Refusal.LATER else "after the next connect or a reload"
+            log.warning("the broker refuses %s: %s; it is tried again %s", topic, words, again)
 
     def _now(self) -> float:
         return asyncio.get_running_loop().time()
@@ -123,7 +214,7 @@ class Dispatch:
             if letter is None:
                 return True
             if isinstance(letter, Array):
-                self._assembly = (letter, [])
+                self._assembly = _Assembly(letter, self._room(letter))
                 asyncio.get_running_loop().call_soon(self._assemble, letter)
             else:
                 self._send_encoded(letter)
@@ -150,12 +241,27 @@ class Dispatch:
             self._encoded = payload, encode(payload)
         return self._encoded[1]
 
+    def _room(self, letter: Array) -> int:
+        """Return how many bytes the payload of an array may have."""
+        accepted = self._accepted
+        if accepted is None or accepted.maximum_packet_size is None:
+            return ARRAY_BYTES
+        around = packet_size(self._topics.full(letter.topic), b"", version=accepted.version)
+        # The remaining length may take three bytes more than that of an empty payload.
+        return min(ARRAY_BYTES, accepted.maximum_packet_size - around - 3)
+
     def _assemble(self, letter: Array) -> None:
-        if self._assembly is None or self._assembly[0] is not letter:
+        assembly = self._assembly
+        if assembly is None or assembly.letter is not letter:
             return  # the connection is another one now, and the samples wait again
-        parts = self._assembly[1]
+        parts = assembly.parts
         for kept in letter.samples[len(parts) : len(parts) + SAMPLES_AT_ONCE]:
-            parts.append(encode(kept.sample.payload(self._line, historical=True)))
+            part = encode(kept.sample.payload(self._line, historical=True))
+            assembly.size += len(part) + 1  # the comma, or the bracket behind it
+            if parts and assembly.size > assembly.most:
+                letter = self._outbox.shorten(letter, len(parts))
+                break
+            parts.append(part)
         if len(parts) < len(letter.samples):
             asyncio.get_running_loop().call_soon(self._assemble, letter)
         else:
@@ -171,6 +277,8 @@ class Dispatch:
             retain, qos = letter.publication.retain, letter.publication.qos
         if isinstance(letter, Message):
             correlation = letter.correlation
+        if self._outbox.suspects.goes_alone(letter.topic):
+            qos = 1  # its acknowledgement clears it
         limit = self._accepted.maximum_packet_size
         if limit is not None:
             size = packet_size(topic, payload, version=self._accepted.version, qos=qos, correlation=correlation)
@@ -179,7 +287,8 @@ class Dispatch:
                 return
         mid = self._connection.publish(topic, payload, qos=qos, retain=retain, correlation=correlation)
         if mid is not None:  # else it is under way until `lost`, which follows
-            self._sent[mid] = (letter, self._now())
+            self._number += 1
+            self._sent[mid] = _Sent(letter, self._now(), len(payload), qos, self._number)
 
     def _unfit(self, letter: Letter, why: str) -> None:
         if self._outbox.unfit(letter):
@@ -188,7 +297,7 @@ class Dispatch:
 
     def _set_alarm(self) -> None:
         """Come back when time alone brings something to send, or shows that the broker is stuck."""
-        times = [at + ACKNOWLEDGED_WITHIN for _, at in list(self._sent.values())[:1]]
+        times = [sent.at + ACKNOWLEDGED_WITHIN for sent in islice(self._sent.values(), 1)]
         due = self._outbox.due()
         if due is not None:
             times.append(due)
@@ -203,8 +312,11 @@ class Dispatch:
 
     def _alarmed(self) -> None:
         self._alarm = None
-        oldest = next((at for _, at in self._sent.values()), None)
-        if oldest is not None and self._now() - oldest >= ACKNOWLEDGED_WITHIN:
+        oldest = next(iter(self._sent.values()), None)
+        if oldest is not None and self._now() - oldest.at >= ACKNOWLEDGED_WITHIN:
+            # A broker acknowledges in order: what it acknowledged something later than, it has swallowed.
+            swallowed = (sent for sent in self._sent.values() if sent.number < self._acknowledged)
+            self._swallowed = {sent.letter.topic: sent.size for sent in swallowed}
             self._stuck()
         else:
             self.wake()

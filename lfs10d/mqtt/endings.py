@@ -17,9 +17,19 @@ NO_MATCHING_SUBSCRIBERS = 0x10
 """The broker took a message that nobody listens to (MQTT 5.0, section 3.4.2.1)."""
 
 UNSUPPORTED_VERSION = 0x84
+KEEP_ALIVE_TIMEOUT = 0x8D
 SESSION_TAKEN_OVER = 0x8E
 REFUSED_FROM = 0x80
 """Reason codes from here on are refusals (MQTT 5.0, section 2.4)."""
+
+NOT_FOR_A_MESSAGE = frozenset(
+    {0x00, 0x04, *range(0x88, 0x8C), KEEP_ALIVE_TIMEOUT, SESSION_TAKEN_OVER}
+    | {0x93, 0x96, 0x97, 0x98, 0x9A, 0x9B, 0x9C, 0x9D, 0x9F, 0xA0}
+)
+"""Reasons of a DISCONNECT that speak of the broker or of the connection, never of one message (section 3.14.2.1)."""
+
+CERTIFICATE_ALERTS = ("certificate", "unknown ca", "access denied", "handshake failure")
+"""Alerts that a broker sends which does not accept our certificate, or misses it (RFC 8446, section 6.2)."""
 
 _REASONS = {
     0x81: "the broker calls our packet malformed",
@@ -32,12 +42,15 @@ _REASONS = {
     0x89: "the broker is busy",
     0x8A: "the broker has banned this client",
     0x8B: "the broker is shutting down",
-    0x8D: "the broker heard nothing from us for too long",
+    KEEP_ALIVE_TIMEOUT: "the broker heard nothing from us for too long",
     SESSION_TAKEN_OVER: "another client has connected with our client id: give each its own mqtt.client_id",
+    0x83: "a reason of the broker's own, see its log",
+    0x90: "the broker does not take this topic",
     0x93: "more messages under way than the broker permits",
     0x95: "a packet was too large for the broker",
     0x96: "the broker calls our rate of messages too high",
     0x97: "a quota of the broker is used up",
+    0x99: "the broker does not take this payload",
     0x98: "an administrator of the broker ended it",
     0x9A: "the broker keeps no retained messages, which lfs10d needs",
     0x9B: "the broker does not offer QoS 1, which lfs10d needs",
@@ -74,6 +87,8 @@ class Ended:
     ending: Ending
     message: str
     reason: int | None = None
+    by_message: bool = False
+    """The broker ended it, and a message of ours may be why."""
 
 
 def reason_in_words(reason: int) -> str:
@@ -81,20 +96,44 @@ def reason_in_words(reason: int) -> str:
     return _REASONS.get(reason, f"reason code 0x{reason:02X}")
 
 
-def gone(place: str, *, left: bool, accepted: bool, reason: int | None) -> Ended:
+def gone(
+    place: str, *, left: bool, accepted: bool, reason: int | None = None, cause: BaseException | str | None = None
+) -> Ended:
     """Return what the end of a connection to the broker at `place` means.
 
-    `left`: we said so; `accepted`: the broker had accepted us; `reason` is that of its DISCONNECT, None without one.
+    `left`: we said so; `accepted`: the broker had accepted us; `reason` is that of its DISCONNECT, None without one;
+    `cause` is why we ended it or could not go on, None: the broker closed it without a word.
     """
     if left:
         return Ended(Ending.LEFT, f"{place}: disconnected")
+    refused = _refused_certificate(cause)
+    if refused is not None:
+        return Ended(Ending.REFUSED, f"{place}: {refused}")
     if not accepted:
         message = f"{place}: closed the connection without an answer: check mqtt.port and mqtt.tls"
+        if cause is not None and not isinstance(cause, ConnectionResetError):
+            message += f" ({_words_of_loss(cause)})"
         return Ended(Ending.WRONG_VERSION, message)
     if reason is None:
-        return Ended(Ending.LOST, f"{place}: the connection is lost")
+        by_broker = cause is None or isinstance(cause, ConnectionResetError | BrokenPipeError | ssl.SSLError)
+        return Ended(Ending.LOST, f"{place}: the connection is lost: {_words_of_loss(cause)}", by_message=by_broker)
     ending = Ending.TAKEN_OVER if reason == SESSION_TAKEN_OVER else Ending.LOST
-    return Ended(ending, f"{place}: {reason_in_words(reason)}", reason)
+    by_message = reason not in NOT_FOR_A_MESSAGE
+    return Ended(ending, f"{place}: {reason_in_words(reason)}", reason, by_message=by_message)
+
+
+def _words_of_loss(cause: BaseException | str | None) -> str:
+    match cause:
+        case None:
+            return "the broker closed it and did not say why"
+        case ssl.SSLError():
+            return f"TLS: {_reason_of_tls(cause)}"
+        case OSError(strerror=str(said)):
+            return said.lower()
+        case BaseException():
+            return f"{type(cause).__name__}: {cause}"
+        case _:
+            return cause
 
 
 def failed(error: BaseException, settings: BrokerSettings) -> Ended:
@@ -138,5 +177,21 @@ def _words_of_tls(error: ssl.SSLError) -> str:
         return f"the certificate is not accepted: {cause}: check mqtt.host, mqtt.tls.ca and the clock"
     if error.reason == "WRONG_VERSION_NUMBER":
         return "no TLS: it does not speak TLS on this port: check mqtt.port and mqtt.tls"
-    reason = (error.reason or "TLS error").replace("_", " ").lower()
-    return f"no TLS: {reason}: check mqtt.port and mqtt.tls"
+    return _refused_certificate(error) or f"no TLS: {_reason_of_tls(error)}: check mqtt.port and mqtt.tls"
+
+
+def _reason_of_tls(error: ssl.SSLError) -> str:
+    return (error.reason or "TLS error").replace("_", " ").lower()
+
+
+def _refused_certificate(cause: object) -> str | None:
+    """Return what to do if the broker's alert says that it does not accept our certificate, else None.
+
+    By TLS 1.3 such an alert comes when the handshake is over for us (RFC 8446, section 4.4.2.4).
+    """
+    if not isinstance(cause, ssl.SSLError):
+        return None
+    reason = _reason_of_tls(cause)
+    if "alert" not in reason or not any(word in reason for word in CERTIFICATE_ALERTS):
+        return None
+    return f"the broker does not accept mqtt.tls.cert: {reason}: check mqtt.tls.cert and mqtt.tls.key"

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+    from collections.abc import Set as AbstractSet
 
     from lfs10d.loss import Key
     from lfs10d.telemetry import Sample
@@ -45,6 +46,9 @@ class Kept:
         return replace(self, sample=right, shift=shift)
 
 
+NONE: AbstractSet[str] = frozenset()
+
+
 def _seq(kept: Kept) -> int:
     return kept.sample.seq
 
@@ -75,11 +79,29 @@ class History:
         for kept in many:
             self.add(kept)
 
-    def take(self, most: int) -> tuple[Kept, ...]:
-        """Take up to `most` samples of the key that holds the oldest, in order of seq; () where none waits."""
-        if not self._shelves:
+    def put_back(self, taken: tuple[Kept, ...]) -> None:
+        """Put back samples of one key that were taken last: before all others of it, if that is their place."""
+        shelf = self._shelves.get(taken[0].key)
+        if shelf is None or _seq(taken[-1]) > _seq(shelf[0]):
+            self.extend(taken)
+            return
+        shelf[:0] = taken
+        self._count += len(taken)
+        self._repeated += sum(kept.repeated for kept in taken)
+
+    def waits(self, passed_over: AbstractSet[str] = NONE) -> bool:
+        """Tell whether a sample waits of a device that is not `passed_over`."""
+        return any(device not in passed_over for device, _ in self._shelves)
+
+    def take(self, most: int, passed_over: AbstractSet[str] = NONE) -> tuple[Kept, ...]:
+        """Take up to `most` samples of the key that holds the oldest, in order of seq; () where none waits.
+
+        Those of devices that are `passed_over` stay.
+        """
+        keys = [key for key in self._shelves if key[0] not in passed_over]
+        if not keys:
             return ()
-        key = min(self._shelves, key=lambda each: self._shelves[each][0].since)
+        key = min(keys, key=lambda each: self._shelves[each][0].since)
         shelf = self._shelves[key]
         taken = tuple(shelf[:most])
         del shelf[:most]

@@ -27,7 +27,8 @@ log = logging.getLogger(__name__)
 class Link:
     """`events.accepted` and `events.ended` come in turn, once for each connection that stood.
 
-    `connect` begins a connection; in virtual time it is one to a broker in memory.
+    `explained()` tells whether a message of ours may be why the broker ends the connection that stands. `connect`
+    begins a connection; in virtual time it is one to a broker in memory.
     """
 
     def __init__(
@@ -37,6 +38,7 @@ class Link:
         *,
         will: Will | None = None,
         chance: Callable[[], float] = random.random,
+        explained: Callable[[], bool] = lambda: False,
         connect: type[Connection] = Connection,
     ) -> None:
         self._settings = settings
@@ -44,6 +46,7 @@ class Link:
         self._events = events
         self._will = will
         self._chance = chance
+        self._explained = explained
         self._connect = connect
         self._reconnect = Reconnect(settings.version, chance, len(self._nodes))
         self._connection: Connection | None = None
@@ -159,7 +162,7 @@ class Link:
         self._connection = None
         self._over.set()
         now, place = self._now(), self.settings.place
-        self._reconnect.ended(ended, now)
+        self._reconnect.ended(ended, now, explained=stood and ended.by_message and self._explained())
         if self._wanted:
             self._tell(ended, place, self._reconnect.due - now)
             self._timer = asyncio.get_running_loop().call_at(self._reconnect.due, self._try)

@@ -3,7 +3,7 @@
 The rules (contract, section 3):
 
 1. Classes in order: retained topics; responses and events, and live samples, in turn where both wait, so that a flood
-   of requests delays no sample; traces; the past. Within a class the oldest goes first.
+   of requests delays no sample; traces; the past; what clears a retained topic. Within a class the oldest goes first.
 2. Of a retained topic only the newest version waits, and no second version goes while the first is under way.
    After a connect the whole burst goes first; its `last` (availability) only when all of it is settled, and
    everything else only after that.
@@ -12,19 +12,22 @@ The rules (contract, section 3):
 4. A letter leaves for ever when it is settled (PUBACK). A connection lost puts all that was under way back.
 5. At most `capacity` samples wait in memory. Beyond that those go first that are only repeated, then the oldest,
    which are declared.
-6. A refused letter is dead, and so is its topic until `reload()`. What does not fit the broker's limits is dead
-   alone; an array is first cut smaller. A dead sample is declared like an evicted one.
+6. What the broker refuses waits, and its topic is passed over until it is tried again, see `refusals`; the others go
+   on. Only a message that is wrong in itself is dead; an array is first cut smaller. A dead sample is declared like
+   an evicted one.
+7. What ends the connection each time is found (`suspects`), and treated like that, for an hour.
 
-====================  =========================  ============================  =========================
-letter                settled                    connection lost               refused or too large
-====================  =========================  ============================  =========================
-`Retained`            gone                       gone (the burst renews it),   gone
+====================  =========================  ============================  ====================  ===============
+letter                settled                    connection lost               refused               unfit
+====================  =========================  ============================  ====================  ===============
+`Retained`            gone                       gone (the burst renews it),   the newest waits      gone
                                                  a clearing one waits again
-`Message`             gone                       waits again (QoS 0: gone)     gone
-`Live`, `Array`       kept 10 s for a second     waits again                   declared
+`Message`             gone                       waits again (QoS 0: gone)     waits (trace: gone)   gone
+`Live`                kept 10 s for a second     waits again                   waits with the past   declared
                       sending
-`Declaration`         gone                       waits again                   waits for `reload()`
-====================  =========================  ============================  =========================
+`Array`               as `Live`                  waits again                   waits again           cut or declared
+`Declaration`         gone                       waits again                   waits again           waits again
+====================  =========================  ============================  ====================  ===============
 """
 
 from __future__ import annotations
@@ -35,13 +38,18 @@ from typing import TYPE_CHECKING
 
 from lfs10d import telemetry
 from lfs10d.mqtt.history import Kept
-from lfs10d.mqtt.letters import Array, Letter, Live, Message, Retained, samples_of
+from lfs10d.mqtt.letters import Array, Declaration, Letter, Live, Message, Retained, samples_of
 from lfs10d.mqtt.past import Past
+from lfs10d.mqtt.refusals import BANNED_FOR, Refusals
 from lfs10d.mqtt.retention import Retention
+from lfs10d.mqtt.suspects import Suspects
 from lfs10d.telemetry import Kind, Publication
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
+    from collections.abc import Set as AbstractSet
+
+    from lfs10d.mqtt.suspects import Culprit
 
 CAPACITY = 10_000
 """Samples that wait in memory (contract, section 3)."""
@@ -54,9 +62,6 @@ MESSAGES_MOST = 1000
 
 IN_FLIGHT_MOST = 20
 """Letters under way; mosquitto's own default for `max_inflight_messages`."""
-
-TRANSIENT_REASONS = frozenset({0x91, 0x97})
-"""Packet identifier in use, quota exceeded (MQTT 5.0, section 3.4.2.1): say nothing about the topic."""
 
 
 class Outbox:
@@ -71,8 +76,14 @@ class Outbox:
         self._live: deque[Live] = deque()
         self._traces: deque[Message] = deque(maxlen=MESSAGES_MOST)
         self._message_went = False
-        self._refused: set[str] = set()
+        self._refusals = Refusals()
+        self._refused = self._refusals.topics
+        self._passed_over: deque[Message] = deque(maxlen=MESSAGES_MOST)
         self._unfit: set[str] = set()
+        self._alone: Letter | None = None
+        self._alone_went = False
+        self.suspects = Suspects()
+        """What may have ended the last connection."""
         self.past = Past(capacity=capacity, detection=detection)
         """What is no longer live."""
 
@@ -108,17 +119,42 @@ class Outbox:
         """Begin to send: at most `window` letters under way at once. `burst` is to follow."""
         self._window = window
         self.past.connected(now)
+        self._lift(self._refusals.connected(now))
 
-    def lost(self, now: float) -> None:
-        """Put back what was under way (rule 4), and remember to repeat what was acknowledged lately."""
+    def lost(self, now: float, culprit: Culprit | None = None, *, denied: bool = False) -> None:
+        """Put back what was under way (rule 4), and remember to repeat what was acknowledged lately.
+
+        `culprit` is what ended the connection (rule 7); `denied`: the broker said that we may not publish it.
+        """
         self._window = 0
+        self._alone = None
         self._traces.clear()
         self._retention.lost()
         self.past.lost(now)
         under_way, self._under_way = list(self._under_way), {}
+        if culprit is not None:
+            under_way = self._condemn(culprit, under_way, now, denied=denied)
         for letter in reversed(under_way):
             self._put_back(letter)
         self._make_room()
+
+    def _condemn(self, culprit: Culprit, under_way: list[Letter], now: float, *, denied: bool) -> list[Letter]:
+        """Do away with what ended the connection; return what else was under way."""
+        guilty = [letter for letter in under_way if letter.topic == culprit.topic]
+        arrays = [letter for letter in guilty if isinstance(letter, Array) and len(letter.samples) > 1]
+        if arrays and not denied:
+            self.past.cut_for(arrays[0], now + BANNED_FOR)
+            self.suspects.cut(culprit)
+            return under_way
+        self._refusals.ban(culprit.topic, now)
+        for letter in guilty:
+            if isinstance(letter, Live):
+                self.past.history.add(letter.kept)
+            elif isinstance(letter, Array) and not denied:
+                self.past.dead(letter)
+            elif isinstance(letter, Array | Declaration):
+                self.past.put_back(letter)
+        return [letter for letter in under_way if letter.topic != culprit.topic]
 
     def _put_back(self, letter: Letter) -> None:
         match letter:
@@ -136,14 +172,28 @@ class Outbox:
 
     def next(self, now: float) -> Letter | None:
         """Take what goes next; it is under way until settled, refused, unfit or lost. None: nothing goes now."""
+        if self._alone is not None:
+            return self._next_alone()
         if len(self._under_way) >= self._window:
             return None
         letter = self._next(now)
-        if letter is not None:
-            self._under_way[letter] = None
-        return letter
+        if letter is None:
+            return None
+        self._under_way[letter] = None
+        if not self.suspects.goes_alone(letter.topic):
+            return letter
+        self._alone, self._alone_went = letter, False
+        return self._next_alone()
+
+    def _next_alone(self) -> Letter | None:
+        """Return what goes alone as soon as nothing else is under way, once."""
+        if self._alone_went or len(self._under_way) > 1:
+            return None
+        self._alone_went = True
+        return self._alone
 
     def _next(self, now: float) -> Letter | None:
+        self._lift_due(now)
         retained = self._retention.next(self._refused)
         if retained is not None or self._retention.first:
             return retained
@@ -156,35 +206,70 @@ class Outbox:
                 if letter.topic not in self._refused:
                     self._message_went = queue is self._messages
                     return letter
-                self.past.dead(letter)
+                self._wait_for_topic(letter)
         self._repeat(now)
-        return self.past.next(now, self._refused, self.past.dead)
+        return self.past.next(now, self._refused) or self._retention.next_clearing(self._refused)
+
+    def _wait_for_topic(self, letter: Message | Live) -> None:
+        """Let a letter wait until its topic is passed over no longer; a sample may go with the past."""
+        if isinstance(letter, Live):
+            self.past.history.add(letter.kept)
+        elif letter.publication.kind is not Kind.TRACE:
+            self._passed_over.append(letter)
+
+    def _lift_due(self, now: float) -> None:
+        due = self._refusals.due()
+        if due is not None and due <= now:
+            self._lift(self._refusals.lift(now))
+
+    def _lift(self, topics: AbstractSet[str]) -> None:
+        """Try these topics again."""
+        if not topics:
+            return
+        self._retention.lifted(topics)
+        again = [message for message in self._passed_over if message.topic in topics]
+        self._messages.extendleft(reversed(again))
+        self._passed_over = deque((each for each in self._passed_over if each.topic not in topics), MESSAGES_MOST)
+        self.past.lifted()
 
     @property
     def waits(self) -> bool:
         """Something may go, now or later; False: nothing before something is added."""
+        if self._alone is not None:
+            return True
         return bool(self._retention or self._messages or self._live or self._traces) or self.due() is not None
 
     def due(self) -> float | None:
         """Return when `next` may have something though nothing happens before; None: not by time alone."""
-        return self.past.due(self._refused) if self._window else None
+        if self._alone is not None or len(self._under_way) >= self._window:
+            return None
+        times = (self.past.due(self._refused), self._refusals.due())
+        return min((each for each in times if each is not None), default=None)
 
     # What became of it
 
     def settled(self, letter: Letter, now: float, *, heard: bool = True) -> None:
         """Note that the broker has it; `heard`: it did not say that nobody listens."""
         self._over(letter)
+        self._refusals.accepted(letter.topic)
         self._repeat(now)
         self.past.settled(letter, now, heard=heard)
 
-    def refused(self, letter: Letter, reason: int) -> bool:
-        """Note that the broker refused it with reason code >= 0x80; return True if its topic is to be reported."""
+    def refused(self, letter: Letter, reason: int, now: float) -> bool:
+        """Note that the broker refused it, not as `UNFIT` (`refusals`); return True if its topic is to be reported."""
         self._over(letter)
-        self.past.dead(letter)
-        if reason in TRANSIENT_REASONS or letter.topic in self._refused:
-            return False
-        self._refused.add(letter.topic)
-        return True
+        told = self._refusals.refused(letter.topic, reason, now)
+        match letter:
+            case Retained():
+                self._retention.refused(letter)
+            case Message() | Live():
+                self._wait_for_topic(letter)
+            case Array():
+                self.past.refused(letter)
+            case _:
+                self.past.put_back(letter)
+        self._make_room()
+        return told
 
     def unfit(self, letter: Letter) -> bool:
         """Note that it can never be sent as it is; return True if its topic is to be reported.
@@ -201,15 +286,30 @@ class Outbox:
         self._unfit.add(letter.topic)
         return True
 
-    def reload(self) -> bool:
+    def passes_over(self, topic: str) -> bool:
+        """Tell whether nothing is sent to a topic now, because the broker refuses it."""
+        return topic in self._refused
+
+    def shorten(self, array: Array, count: int) -> Array:
+        """Return an array of its first `count` samples, under way in its place; the others wait again."""
+        shorter = self.past.shorten(array, count)
+        self._under_way = {shorter if letter is array else letter: None for letter in self._under_way}
+        if self._alone is array:
+            self._alone = shorter
+        return shorter
+
+    def reload(self, now: float) -> bool:
         """Try again what was refused before, and report anew; return True if a topic was refused."""
-        refused = bool(self._refused)
-        self._refused.clear()
+        lifted = self._refusals.reload(now)
         self._unfit.clear()
-        return refused
+        self.past.reload()
+        self._lift(lifted)
+        return bool(lifted)
 
     def _over(self, letter: Letter) -> None:
         del self._under_way[letter]
+        if letter is self._alone:
+            self._alone = None
         if isinstance(letter, Retained):
             self._retention.over(letter)
         self.past.over(letter)

@@ -11,6 +11,7 @@ The rules (contract, section 3):
 3. While the broker has been away for more than 3 s, what waits here is handed to the store, at first at once, then
    every 5 s; and whenever half of the memory is taken, which happens where the broker is too slow.
    What the store cannot take waits in memory.
+4. Devices whose history the broker refuses are passed over: their samples wait where they are, the others go on.
 
 So everything in the store is older than everything in memory.
 """
@@ -28,7 +29,7 @@ from lfs10d.mqtt.losses import Losses
 from lfs10d.mqtt.stored import AGAIN_WITHIN, Stored
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
     from collections.abc import Set as AbstractSet
 
     from lfs10d.loss import Loss
@@ -36,6 +37,9 @@ if TYPE_CHECKING:
 
 ARRAY_MOST = 100
 """Samples in one history array (contract, section 3)."""
+
+ARRAY_BYTES = 8000
+"""Bytes of one history array at most (contract, section 3)."""
 
 ARRAY_EVERY = 0.1
 """Seconds from one history array to the next: the bounded rate of the contract, 1000 samples a second."""
@@ -64,6 +68,7 @@ class Past:
         self._open_from = 0.0
         self._array_at = 0.0
         self._array_most = ARRAY_MOST
+        self._limit, self._limit_until = ARRAY_MOST, float("-inf")
         self._under_way: Array | Declaration | None = None
         self._acknowledged: deque[tuple[float, Kept]] = deque(maxlen=capacity)
         self._unheard: deque[tuple[float, Kept]] = deque(maxlen=capacity)
@@ -83,7 +88,7 @@ class Past:
         """Note that the broker is there."""
         self._connected = True
         self._open_from = self._array_at = now + PAST_AFTER
-        self._array_most = ARRAY_MOST
+        self._array_most = self._limit if now < self._limit_until else ARRAY_MOST
         self.losses.connected()
 
     def lost(self, now: float) -> None:
@@ -108,8 +113,8 @@ class Past:
 
     # What goes
 
-    def next(self, now: float, refused: AbstractSet[str], dead: Callable[[Letter], None]) -> Array | Declaration | None:
-        """Take what goes next, after `repeat`; None: nothing. `dead` is told what the broker would refuse."""
+    def next(self, now: float, refused: AbstractSet[str]) -> Array | Declaration | None:
+        """Take what goes next, after `repeat`; None: nothing. Topics that are `refused` are passed over."""
         if now < self._open_from or self._under_way is not None:
             return None
         if telemetry.EVENT not in refused:
@@ -119,19 +124,26 @@ class Past:
                 return self._under_way
         if now < self._array_at:
             return None
-        while samples := self._take():
-            array = Array(samples)
-            if array.topic not in refused:
-                self._array_at = now + ARRAY_EVERY
-                self._under_way = array
-                return array
-            dead(array)
-        return None
+        samples = self._take(_devices(refused))
+        if not samples:
+            return None
+        self._array_at = now + ARRAY_EVERY
+        self._under_way = Array(samples)
+        return self._under_way
 
-    def _take(self) -> tuple[Kept, ...]:
+    def _take(self, passed_over: AbstractSet[str]) -> tuple[Kept, ...]:
         if self.stored.page:
-            return self.stored.page.take(self._array_most)
-        return () if self.stored.more else self.history.take(self._array_most)
+            samples = self.stored.page.take(self._array_most, passed_over)
+            if samples:
+                return samples
+            self.stored.leave()
+        return () if self.stored.more else self.history.take(self._array_most, passed_over)
+
+    def lifted(self) -> None:
+        """Try again what was passed over: topics are refused no longer."""
+        array = self._under_way
+        rows = samples_of(array) if isinstance(array, Array) else ()
+        self.stored.read_again(kept.row for kept in rows if kept.row is not None)
 
     def repeat(self, now: float) -> bool:
         """Once the past is open, let what rule 2 says wait once more; return True if it does."""
@@ -153,7 +165,7 @@ class Past:
         declared = self.losses.due() if telemetry.EVENT not in refused else None
         times = [] if declared is None else [declared]
         again = self._acknowledged if self._repeat else self._unheard
-        in_memory = not self.stored.more and (self.history or again)
+        in_memory = not self.stored.more and (again or self.history.waits(_devices(refused)))
         if self.stored.page or in_memory:
             times.append(self._array_at)
         return max(self._open_from, min(times)) if times else None
@@ -190,7 +202,28 @@ class Past:
         """Let an array that is too large wait again, to go in halves, and so those after it on this connection."""
         self._array_most = len(array.samples) // 2
         self._array_at = 0.0
-        (self.history if array.samples[0].row is None else self.stored.page).extend(array.samples)
+        self.refused(array)
+
+    def cut_for(self, array: Array, until: float) -> None:
+        """Let the arrays after this one, which ended its connection, have half as many samples `until` then."""
+        self._limit, self._limit_until = len(array.samples) // 2, until
+
+    def reload(self) -> None:
+        """Try arrays of any length again."""
+        self._limit_until = float("-inf")
+
+    def shorten(self, array: Array, count: int) -> Array:
+        """Return an array of its first samples to be under way in its place; the others wait again."""
+        self._wait(array.samples[count:])
+        self._under_way = shorter = Array(array.samples[:count])
+        return shorter
+
+    def refused(self, array: Array) -> None:
+        """Let an array that the broker refused wait again."""
+        self._wait(array.samples)
+
+    def _wait(self, samples: tuple[Kept, ...]) -> None:
+        (self.history if samples[0].row is None else self.stored.page).put_back(samples)
 
     def put_back(self, letter: Array | Declaration) -> None:
         """Let what was under way wait again; what is in the store does so anyway."""
@@ -245,6 +278,12 @@ class Past:
         self._spilling = []
         self._spill_at = now + SPILL_EVERY
 
+    @property
+    def beyond(self) -> int:
+        """The id of the last row that the store may not evict: it is in the page or under way, or one before it is."""
+        under_way = isinstance(self._under_way, Array) and self._under_way.samples[0].row is not None
+        return 0 if self.stored.left and not (self.stored.page or under_way) else self.stored.after
+
     def page_due(self) -> float | None:
         """Return when the next page of the store is wanted; None: none is."""
         wanted = self._connected and self.stored.more and not self.stored.page
@@ -273,3 +312,11 @@ class Past:
         oldest = self.history.oldest()
         if oldest is not None:
             yield oldest
+
+
+def _devices(refused: AbstractSet[str]) -> AbstractSet[str]:
+    """Return the devices whose history is refused."""
+    if not refused:
+        return refused
+    topics = (topic.split("/") for topic in refused)
+    return {levels[1] for levels in topics if levels[0] == "device" and levels[-1] == telemetry.HISTORY}

@@ -15,7 +15,8 @@
 - Taken over by a client with our id, we wait 60 s, doubling to 1 h, until a connection has held for 2 h. Not
   every broker says so (by 3.1.1 none can, mosquitto 2.0.11 does not). So the third connection in a row that
   does not hold is taken for that, if no attempt failed between them and the broker itself ended those before:
-  then it had published our will when we came back. A broker that was restarted has not.
+  then it had published our will when we came back. A broker that was restarted has not. Nor is it that where the
+  broker gave another reason, or where the same message was under way at the end before.
 """
 
 from __future__ import annotations
@@ -125,13 +126,16 @@ class Reconnect:
         if self._since is not None and now - self._since >= self._takeover:
             self.duplicate = False
 
-    def ended(self, ended: Ended, now: float) -> None:
-        """Note how the connection or the attempt ended, and decide on the next."""
+    def ended(self, ended: Ended, now: float, *, explained: bool = False) -> None:
+        """Note how the connection or the attempt ended, and decide on the next.
+
+        `explained`: a message of ours may be why the broker ended it.
+        """
         version, self.version = self.version, self.configured
         self.held(now)
         since, self._since = self._since, None
         if since is not None:
-            self._lost(ended, now - since, now)
+            self._lost(ended, now - since, now, explained=explained or ended.reason is not None)
         else:
             self._failed(ended, version, now)
 
@@ -161,10 +165,10 @@ class Reconnect:
             node.silent_since = now
         return node.accepted and now - node.silent_since <= SILENT_FOR
 
-    def _lost(self, ended: Ended, life: float, now: float) -> None:
+    def _lost(self, ended: Ended, life: float, now: float, *, explained: bool) -> None:
         if life >= TAKEN_OVER_FORGOTTEN:
             self._takeover = TAKEN_OVER_FIRST
-        self._unproved = life < HELD
+        self._unproved = life < HELD and not explained
         if not self._unproved:
             self._short = 0
         suspect = self._unproved and self._short >= SHORT_MOST - 1

@@ -45,10 +45,14 @@ class Stored:
     """The id of the last row that was taken."""
     turn: int = 0
     """Counts the rewinds: a page asked for before one is of no use after it."""
+    left: bool = False
+    """Rows before `after` were passed over: they are neither in the page nor under way."""
     _acknowledged: deque[tuple[float, tuple[int, ...]]] = field(default_factory=deque)
     _again: set[int] = field(default_factory=set)
     _released: set[int] = field(default_factory=set)
     _release_at: float = float("-inf")
+    _taken: frozenset[int] = frozenset()
+    """Rows that need not be read again before `rewind`."""
 
     @property
     def depth(self) -> int:
@@ -79,7 +83,7 @@ class Stored:
         self.more = len(rows) >= most
         for row in rows:
             self.after = row.id
-            if row.id not in self._released:
+            if row.id not in self._released and row.id not in self._taken:
                 repeated = row.repeated or row.id in self._again
                 self.page.add(Kept(row.sample, 0.0, repeated, row.shift, row.id))
 
@@ -90,10 +94,26 @@ class Stored:
         for _, rows in self._acknowledged:
             self._again.update(rows)
         self._acknowledged.clear()
+        self._begin(frozenset())
+
+    def _begin(self, taken: frozenset[int]) -> None:
+        self._taken = taken
+        self.left = False
         self.page.clear()
         self.after = 0
         self.more = self.rows > 0
         self.turn += 1
+
+    def leave(self) -> None:
+        """Pass over what is left of the page: the broker refuses it for now. It stays in the store."""
+        self.page.clear()
+        self.left = True
+
+    def read_again(self, under_way: Iterable[int]) -> None:
+        """Begin with the oldest row again if any was passed over; what the broker has or is getting is left out."""
+        if self.left:
+            lately = (row for _, rows in self._acknowledged for row in rows)
+            self._begin(frozenset((*under_way, *lately)))
 
     # Out
 

@@ -240,7 +240,7 @@ class Stowage:
                 entries,
                 losses=self._past.undeclared(),
                 now=self._epoch_ms(),
-                beyond=stored.after,
+                beyond=self._past.beyond,
                 delivered=stored.delivered,
             )
         except StoreError:

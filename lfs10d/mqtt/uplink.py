@@ -78,7 +78,13 @@ class Uplink:
         self._changed = changed
         self._announced = announced
         self._announcing = False
-        self._link = Link(settings, self, will=Will(self._topics.availability, OFFLINE.encode()), connect=connect)
+        self._link = Link(
+            settings,
+            self,
+            will=Will(self._topics.availability, OFFLINE.encode()),
+            explained=lambda: self._dispatch.explains_end,
+            connect=connect,
+        )
         self._outbox = Outbox(detection=2.0 * settings.keepalive)
         line = base.rpartition("/")[2]
         self._dispatch = Dispatch(self._outbox, self._topics, line, epoch_ms=epoch_ms, stuck=self._acknowledges_nothing)
@@ -173,7 +179,7 @@ class Uplink:
 
     async def reload(self, settings: BrokerSettings | None = None) -> None:
         """Try again what the broker refused, clear what nobody stands behind; connect anew if given settings."""
-        refused = self._outbox.reload()
+        refused = self._outbox.reload(asyncio.get_running_loop().time())
         if settings is not None:
             await self._part()
             self._leaving = False
@@ -264,7 +270,7 @@ class Uplink:
     def ended(self, ended: Ended) -> None:
         """Keep what is not acknowledged."""
         log.debug("%s", ended.message)
-        self._dispatch.lost()
+        self._dispatch.lost(ended)
         if self._earlier is not None:
             self._earlier.lost()
         self._clearing.lost()

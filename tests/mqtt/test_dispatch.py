@@ -12,10 +12,10 @@ import pytest
 
 from lfs10d import telemetry
 from lfs10d.mqtt.dispatch import ACKNOWLEDGED_WITHIN, LETTERS_AT_ONCE, SAMPLES_AT_ONCE, Dispatch
-from lfs10d.mqtt.endings import NO_MATCHING_SUBSCRIBERS
+from lfs10d.mqtt.endings import NO_MATCHING_SUBSCRIBERS, Ended, Ending, reason_in_words
 from lfs10d.mqtt.messages import Accepted
 from lfs10d.mqtt.outbox import Outbox
-from lfs10d.mqtt.past import PAST_AFTER
+from lfs10d.mqtt.past import ARRAY_BYTES, PAST_AFTER
 from lfs10d.mqtt.settings import Version
 from lfs10d.mqtt.topics import Topics
 from lfs10d.telemetry import Kind, Publication, Sample
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from lfs10d.mqtt.connection import Connection
 
 ONLINE = telemetry.retained("availability", "online")
+LOST = Ended(Ending.LOST, "broker b:1: the connection is lost")
+BY_MESSAGE = Ended(Ending.LOST, "broker b:1: the connection is lost: closed", by_message=True)
+DENIED = Ended(Ending.LOST, "broker b:1: not authorized", 0x87, by_message=True)
 
 
 class VirtualSelector(selectors.SelectSelector):
@@ -105,6 +108,11 @@ class Desk:
         """Answer everything that was handed over."""
         for mid in range(1, len(self.wire.sent) + 1):
             self.dispatch.acknowledged(mid, reason)
+
+    def accept(self, topic: str) -> None:
+        """Acknowledge what was handed over for one topic last."""
+        mid = max(mid for mid, each in enumerate(self.topics, 1) if each == f"b/line0/{topic}")
+        self.dispatch.acknowledged(mid, 0)
 
     def add(self, *publications: Publication) -> None:
         for publication in publications:
@@ -193,8 +201,15 @@ def test_an_array_is_serialised_in_slices_and_goes_by_itself_when_its_time_has_c
         await desk.turn(2 + 100 // SAMPLES_AT_ONCE)
         assert desk.topics == ["b/line0/availability", "b/line0/device/a/history"]
         told = json.loads(desk.wire.sent[1][1])
-        assert [each["seq"] for each in told] == list(range(1, 101))
+        assert [each["seq"] for each in told] == list(range(1, len(told) + 1))
         assert all(each["historical"] for each in told)
+        size = len(desk.wire.sent[1][1])
+        assert ARRAY_BYTES - size / len(told) < size <= ARRAY_BYTES
+        for _ in range(20):
+            await asyncio.sleep(0.2)
+            desk.acknowledge()
+        rest = [json.loads(payload) for topic, payload, *_ in desk.wire.sent if topic.endswith("history")]
+        assert [each["seq"] for array in rest for each in array] == list(range(1, 101))
 
     in_virtual_time(scenario())
 
@@ -222,7 +237,7 @@ def test_an_array_whose_connection_is_lost_while_it_is_serialised_waits_again() 
         await desk.connect()
         await asyncio.sleep(PAST_AFTER)
         await desk.turn(1)
-        desk.dispatch.lost()
+        desk.dispatch.lost(LOST)
         await desk.turn()
         assert desk.topics == ["b/line0/availability"]
         assert desk.outbox.depth == 100
@@ -253,7 +268,7 @@ def test_what_is_lost_is_declared_with_the_wall_clock() -> None:
         await desk.connect()
         desk.add(sample(1))
         await desk.turn()
-        desk.acknowledge(0x97)
+        desk.acknowledge(0x99)
         await asyncio.sleep(PAST_AFTER + 1)
         assert json.loads(desk.wire.sent[-1][1]) == {
             "v": 1, "type": "dropped", "ts": 7, "device": "a", "boot": "k", "from_seq": 1, "to_seq": 1, "count": 1,
@@ -283,7 +298,7 @@ def test_what_the_connection_does_not_take_any_more_waits_for_the_next() -> None
         desk.wire.gone = True
         desk.add(sample(1))
         await desk.turn()
-        desk.dispatch.lost()
+        desk.dispatch.lost(LOST)
         desk.wire.gone = False
         await desk.connect()
         await desk.turn()
@@ -298,5 +313,205 @@ def test_an_answer_to_nothing_is_passed_over() -> None:
         await desk.connect()
         desk.dispatch.acknowledged(4711, 0x87)
         assert desk.outbox.announced
+
+    in_virtual_time(scenario())
+
+
+# What the broker refuses, or ends the connection for
+
+
+async def again(desk: Desk, ended: Ended) -> None:
+    """End the connection and make another, on which nothing but the burst is acknowledged yet."""
+    desk.dispatch.lost(ended)
+    desk.wire = Wire()
+    connection: Connection = desk.wire  # type: ignore[assignment]  # as much of one as is used
+    desk.dispatch.connected(connection, desk.accepted)
+    desk.outbox.burst([], ONLINE)
+    await desk.turn()
+    desk.accept("availability")
+
+
+TELEMETRY = "b/line0/device/a/telemetry"
+
+
+@pytest.mark.parametrize(
+    ("reason", "words"),
+    [
+        (
+            0x97,
+            f"refuses {TELEMETRY}: a quota of the broker is used up; it is tried again in a second, then less often",
+        ),
+        (0x87, f"refuses {TELEMETRY}: {reason_in_words(0x87)}; it is tried again after the next connect or a reload"),
+        (0xC4, f"refuses {TELEMETRY}: reason code 0xC4; it is tried again after the next connect or a reload"),
+        (0x95, f"refuses a message of 9 bytes to {TELEMETRY}: a packet was too large for the broker; it is dropped"),
+    ],
+)
+def test_a_refusal_is_told_once_with_what_becomes_of_it(
+    reason: int, words: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def scenario() -> None:
+        desk = Desk()
+        await desk.connect()
+        for seq in (1, 2):
+            desk.add(sample(seq))
+            await desk.turn()
+        desk.acknowledge(reason)
+        assert desk.outbox.dropped == (2 if reason == 0x95 else 0)
+
+    in_virtual_time(scenario())
+    assert [each for each in caplog.messages if "refuses" in each] == [f"the broker {words}"]
+
+
+def test_what_was_under_way_at_two_ends_is_named_with_its_size_and_the_rest_goes_on(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async def scenario() -> None:
+        desk = Desk()
+        await desk.connect()
+        for _ in range(2):
+            desk.add(telemetry.event("scan_progress", 0))
+            await desk.turn()
+            assert desk.dispatch.under_way.keys() == {"event"}
+            await again(desk, BY_MESSAGE)
+        desk.add(telemetry.event("scan_progress", 0), sample(1))
+        await desk.turn()
+        assert desk.topics[1:] == ["b/line0/device/a/telemetry"]
+
+    in_virtual_time(scenario())
+    [told] = [each for each in caplog.messages if "under way" in each]
+    assert told == (
+        "broker b:1: the connection is lost: closed; again with a message of 37 bytes to b/line0/event under way: "
+        "nothing is sent there for an hour"
+    )
+
+
+def test_an_array_that_ends_connections_is_sent_in_smaller_parts(caplog: pytest.LogCaptureFixture) -> None:
+    async def scenario() -> None:
+        desk = Desk()
+        desk.add(*(sample(seq) for seq in range(1, 9)))
+        await asyncio.sleep(5.0)
+        await desk.connect()
+        for _ in range(3):
+            await asyncio.sleep(PAST_AFTER + 0.1)
+            await again(desk, BY_MESSAGE)
+        for _ in range(40):
+            await asyncio.sleep(0.5)
+            desk.acknowledge()
+        told = [json.loads(payload) for topic, payload, *_ in desk.wire.sent if topic.endswith("history")]
+        assert [[each["seq"] for each in array] for array in told] == [[1, 2], [3, 4], [5, 6], [7, 8]]
+        assert desk.outbox.dropped == 0
+
+    in_virtual_time(scenario())
+    assert caplog.text.count("it is sent in smaller parts") == 2
+
+
+def test_a_denied_publication_is_found_though_others_were_under_way(caplog: pytest.LogCaptureFixture) -> None:
+    """The broker disconnects for `info`, with a reason, each time."""
+
+    async def scenario() -> None:
+        desk = Desk()
+        connection: Connection = desk.wire  # type: ignore[assignment]  # as much of one as is used
+        burst = [telemetry.retained(topic, {}) for topic in ("info", "devices", "device/a/state")]
+        for ends in range(2):
+            desk.wire.sent.clear()
+            desk.dispatch.connected(connection, desk.accepted)
+            desk.outbox.burst(burst, ONLINE)
+            await desk.turn()
+            assert len(desk.wire.sent) == (3, 1)[ends], "after the first end each goes alone"
+            desk.dispatch.lost(DENIED)
+        desk.dispatch.connected(connection, desk.accepted)
+        desk.outbox.burst(burst, ONLINE)
+        for _ in range(4):
+            await desk.turn()
+            desk.acknowledge()
+        assert desk.topics[-3:] == ["b/line0/devices", "b/line0/device/a/state", "b/line0/availability"]
+
+    in_virtual_time(scenario())
+    assert "again with a message of 2 bytes to b/line0/info under way" in caplog.text
+
+
+def test_a_message_of_qos_0_that_ends_connections_is_found(caplog: pytest.LogCaptureFixture) -> None:
+    """It is never under way; until something after it is acknowledged it may be the cause. Alone it goes with QoS 1."""
+
+    async def scenario() -> None:
+        desk = Desk()
+        await desk.connect()
+        for explained in (False, True):
+            desk.add(telemetry.retained("device/a/stats", {}, qos=0))
+            await desk.turn()
+            desk.accept("device/a/stats")  # it was written
+            assert desk.dispatch.explains_end is explained
+            await again(desk, BY_MESSAGE)
+        desk.outbox.reload(0.0)
+        desk.outbox.suspects.ended({"device/a/stats": 2}, certain=True)
+        desk.add(telemetry.retained("device/a/stats", {}, qos=0))
+        await desk.turn()
+        assert [each[2] for each in desk.wire.sent if each[0].endswith("stats")] == [1]
+
+    in_virtual_time(scenario())
+    assert "bytes to b/line0/device/a/stats under way: nothing is sent there for an hour" in caplog.text
+
+
+def test_a_message_of_qos_0_is_cleared_by_the_acknowledgement_of_a_later_one() -> None:
+    async def scenario() -> None:
+        desk = Desk()
+        await desk.connect()
+        desk.add(telemetry.retained("device/a/stats", {}, qos=0))
+        await desk.turn()
+        desk.dispatch.acknowledged(2, 0)
+        assert desk.dispatch.under_way == {"device/a/stats": 2}
+        desk.add(sample(1))
+        await desk.turn()
+        desk.dispatch.acknowledged(3, 0)
+        assert desk.dispatch.under_way == {}
+
+    in_virtual_time(scenario())
+
+
+def test_a_message_that_the_broker_never_acknowledges_while_it_does_others_is_found(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async def scenario() -> None:
+        desk = Desk()
+        await desk.connect()
+        desk.add(telemetry.event("swallowed", 0))
+        for ends in (1, 2):
+            await desk.turn()
+            desk.add(telemetry.retained("info", {}))
+            await desk.turn()
+            desk.accept("info")
+            await asyncio.sleep(ACKNOWLEDGED_WITHIN + 1)
+            assert desk.stuck == ends
+            await again(desk, LOST)
+
+    in_virtual_time(scenario())
+    assert "bytes to b/line0/event under way: nothing is sent there for an hour" in caplog.text
+
+
+def test_a_connection_that_the_network_ends_accuses_nobody() -> None:
+    async def scenario() -> None:
+        desk = Desk()
+        await desk.connect()
+        for _ in range(5):
+            desk.add(telemetry.event("scan_progress", 0))
+            await desk.turn()
+            await again(desk, LOST)
+            assert not desk.outbox.passes_over("event")
+
+    in_virtual_time(scenario())
+
+
+def test_a_sample_larger_than_an_array_may_be_goes_alone() -> None:
+    async def scenario() -> None:
+        desk = Desk(limit=2000)
+        long = Sample("a", "k", 1, 0, "synced", None, {}, (), "bad", "x" * 1700, None)
+        desk.add(Publication("device/a/telemetry", {}, Kind.SAMPLE, retain=False, qos=1, sample=long), sample(2))
+        await asyncio.sleep(5.0)
+        await desk.connect()
+        for _ in range(30):
+            await asyncio.sleep(0.5)
+            desk.acknowledge()
+        told = [json.loads(payload) for topic, payload, *_ in desk.wire.sent if topic.endswith("history")]
+        assert [[each["seq"] for each in array] for array in told] == [[1], [2]]
 
     in_virtual_time(scenario())

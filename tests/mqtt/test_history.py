@@ -32,6 +32,33 @@ def test_the_device_with_the_oldest_sample_is_taken_first() -> None:
     assert [seqs(history.take(100)) for _ in range(2)] == [[("b", 1), ("b", 2)], [("a", 1)]]
 
 
+def test_devices_that_are_passed_over_stay() -> None:
+    history = History()
+    history.extend([kept("a", 1), kept("b", 2), kept("b", 3)])
+    assert [history.waits(), history.waits({"a"}), history.waits({"a", "b"})] == [True, True, False]
+    assert seqs(history.take(100, {"a"})) == [("b", 2), ("b", 3)]
+    assert history.take(100, {"a"}) == ()
+    assert len(history) == 1
+
+
+@given(st.integers(1, 8), st.integers(0, 8), st.sets(st.integers(1, 12), max_size=12))
+def test_what_was_taken_is_put_back_in_its_place(most: int, kept_of_it: int, seqs_there: set[int]) -> None:
+    history = History()
+    history.extend(kept("a", seq, repeated=seq % 2 == 0) for seq in seqs_there)
+    taken = history.take(most)
+    history.add(kept("a", 3, repeated=False) if 3 not in seqs_there else kept("a", 13))
+    back = taken[kept_of_it:]
+    if back:
+        history.put_back(back)
+    rest = history.take(100)
+    numbers = [each.sample.seq for each in rest]
+    assert numbers == sorted(numbers)
+    assert sorted([*(each.sample.seq for each in taken[:kept_of_it]), *numbers]) == sorted(
+        {*seqs_there, 3 if 3 not in seqs_there else 13}
+    )
+    assert (len(history), history.evict()) == (0, None)
+
+
 def test_no_more_are_taken_than_asked_for() -> None:
     history = History()
     history.extend(kept("a", seq) for seq in range(1, 6))

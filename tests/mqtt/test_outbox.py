@@ -17,6 +17,7 @@ from lfs10d.mqtt.letters import Array, Declaration, Letter, Live, Message, Retai
 from lfs10d.mqtt.losses import DECLARED_EVERY
 from lfs10d.mqtt.outbox import LIVE_FOR, MESSAGES_MOST, Outbox
 from lfs10d.mqtt.past import ARRAY_EVERY, ARRAY_MOST, PAST_AFTER
+from lfs10d.mqtt.refusals import BANNED_FOR
 from lfs10d.telemetry import Kind, Publication, Sample
 
 if TYPE_CHECKING:
@@ -117,7 +118,7 @@ def test_a_refused_part_of_the_burst_does_not_keep_online_back() -> None:
     outbox = Outbox()
     outbox.connected(0.0)
     outbox.burst([state(1)], ONLINE)
-    assert outbox.refused(take(outbox, 0.0, Retained), NOT_AUTHORIZED)
+    assert outbox.refused(take(outbox, 0.0, Retained), NOT_AUTHORIZED, 0.0)
     assert take(outbox, 0.0, Retained).topic == "availability"
 
 
@@ -311,7 +312,7 @@ def test_an_array_under_way_when_the_connection_is_lost_waits_again() -> None:
     assert seqs(outbox.next(32.0)) == [1]
 
 
-def test_a_refused_array_is_declared_but_for_what_was_acknowledged_before() -> None:
+def test_an_unfit_array_is_declared_but_for_what_was_acknowledged_before() -> None:
     outbox = connected(now=-100.0)
     outbox.add(sample(1), 0.0)
     outbox.settled(take(outbox, 0.0, Live), 0.0)
@@ -320,8 +321,12 @@ def test_a_refused_array_is_declared_but_for_what_was_acknowledged_before() -> N
     connect(outbox, 10.0)
     array = take(outbox, 20.0, Array)
     assert seqs(array) == [1, 2]
-    outbox.refused(array, NOT_AUTHORIZED)
-    assert take(outbox, 20.0, Declaration).loss == Loss("a", "k", 2, 2, 1)
+    assert not outbox.unfit(array)
+    for seq in (1, 2):
+        one = take(outbox, 20.0 + seq, Array)
+        assert seqs(one) == [seq]
+        assert outbox.unfit(one) is (seq == 1)
+    assert take(outbox, 23.0, Declaration).loss == Loss("a", "k", 2, 2, 1)
 
 
 def test_messages_under_way_wait_again_in_order_and_traces_do_not() -> None:
@@ -491,57 +496,61 @@ def test_what_is_under_way_is_never_dropped() -> None:
 # Refused and unfit
 
 
-def test_a_refused_topic_is_reported_once_and_left_alone_until_reload() -> None:
+def test_a_refused_topic_is_reported_once_and_its_samples_wait_for_history_until_reload() -> None:
     outbox = connected(now=-100.0)
     for seq in (1, 2, 3):
         outbox.add(sample(seq), 0.0)
     first, second = take(outbox, 0.0, Live), take(outbox, 0.0, Live)
-    assert outbox.refused(first, NOT_AUTHORIZED)
-    assert not outbox.refused(second, NOT_AUTHORIZED)
-    assert take(outbox, 0.0, Declaration).loss == Loss("a", "k", 1, 3, 3)
-    assert outbox.dropped == 3
-    assert outbox.reload()
-    assert not outbox.reload()
+    assert outbox.refused(first, NOT_AUTHORIZED, 0.0)
+    assert not outbox.refused(second, NOT_AUTHORIZED, 0.0)
+    array = take(outbox, 0.0, Array)
+    assert seqs(array) == [1, 2, 3]
+    assert outbox.dropped == 0
+    assert outbox.refused(array, NOT_AUTHORIZED, 0.0)
+    assert outbox.next(1.0) is None
+    assert outbox.depth == 3
+    assert outbox.reload(1.0)
+    assert not outbox.reload(1.0)
     outbox.add(sample(4), 1.0)
     assert seqs(outbox.next(1.0)) == [4]
+    assert seqs(outbox.next(1.0)) == [1, 2, 3]
 
 
 def test_a_refused_topic_does_not_stop_the_others() -> None:
     outbox = connected()
     outbox.add(state(1, "a"), 0.0)
-    assert outbox.refused(take(outbox, 0.0, Retained), NOT_AUTHORIZED)
+    assert outbox.refused(take(outbox, 0.0, Retained), NOT_AUTHORIZED, 0.0)
     outbox.add(state(2, "a"), 0.0)
     outbox.add(state(1, "b"), 0.0)
     assert take(outbox, 0.0, Retained).topic == "device/b/state"
 
 
-def test_refused_history_is_declared_and_the_other_devices_go_on() -> None:
+def test_refused_history_waits_and_the_other_devices_go_on() -> None:
     outbox = connected(now=-100.0)
     outbox.add(sample(1, "a"), 0.0)
-    assert outbox.refused(take(outbox, 50.0, Array), NOT_AUTHORIZED)
-    outbox.settled(take(outbox, 50.0, Declaration), 50.0)
+    assert outbox.refused(take(outbox, 50.0, Array), NOT_AUTHORIZED, 50.0)
     outbox.add(sample(2, "a"), 50.0)
     outbox.add(sample(1, "b"), 50.1)
-    assert take(outbox, 60.0, Array).topic == "device/b/history"
-    assert outbox.dropped == 2
+    other = take(outbox, 60.0, Array)
+    assert other.topic == "device/b/history"
+    outbox.settled(other, 60.0)
+    assert (outbox.next(61.0), outbox.dropped, outbox.depth) == (None, 0, 2)
 
 
-def test_where_all_history_is_refused_nothing_goes() -> None:
+def test_where_all_history_is_refused_nothing_goes_and_nothing_is_due() -> None:
     outbox = connected(now=-100.0)
     outbox.add(sample(1), 0.0)
-    assert outbox.refused(take(outbox, 50.0, Array), NOT_AUTHORIZED)
-    outbox.settled(take(outbox, 50.0, Declaration), 50.0)
+    assert outbox.refused(take(outbox, 50.0, Array), NOT_AUTHORIZED, 50.0)
     outbox.add(sample(2), 50.0)
     assert outbox.next(60.0) is None
-    assert outbox.depth == 0
-    assert outbox.due() == 50.0 + DECLARED_EVERY
+    assert (outbox.depth, outbox.due()) == (2, None)
 
 
 def test_a_refused_availability_does_not_keep_the_rest_back() -> None:
     outbox = Outbox()
     outbox.connected(0.0)
     outbox.burst([], ONLINE)
-    assert outbox.refused(take(outbox, 0.0, Retained), NOT_AUTHORIZED)
+    assert outbox.refused(take(outbox, 0.0, Retained), NOT_AUTHORIZED, 0.0)
     assert outbox.announced
     outbox.burst([], ONLINE)
     outbox.add(sample(1), 0.0)
@@ -552,7 +561,7 @@ def test_a_refused_availability_does_not_keep_the_rest_back() -> None:
 def test_a_refused_part_of_a_later_burst_is_left_out() -> None:
     outbox = connected()
     outbox.add(state(1), 0.0)
-    assert outbox.refused(take(outbox, 0.0, Retained), NOT_AUTHORIZED)
+    assert outbox.refused(take(outbox, 0.0, Retained), NOT_AUTHORIZED, 0.0)
     outbox.burst([state(2)], ONLINE)
     assert take(outbox, 0.0, Retained).topic == "availability"
 
@@ -562,21 +571,249 @@ def test_a_refused_event_topic_keeps_losses_for_the_reload() -> None:
     for seq in (1, 2):
         outbox.add(sample(seq), 0.0)
     connect(outbox, 10.0)
-    assert outbox.refused(take(outbox, 20.0, Declaration), NOT_AUTHORIZED)
+    assert outbox.refused(take(outbox, 20.0, Declaration), NOT_AUTHORIZED, 20.0)
     assert outbox.due() == 20.0
     outbox.settled(take(outbox, 20.0, Array), 20.0)
     assert outbox.next(200.0) is None
-    assert outbox.reload()
+    assert outbox.reload(200.0)
     assert take(outbox, 200.0, Declaration).loss.count == 1
 
 
-def test_a_quota_says_nothing_about_the_topic() -> None:
+def test_a_quota_is_asked_again_with_back_off_and_loses_nothing() -> None:
+    outbox = connected(now=-100.0)
+    outbox.add(sample(1), -10.0)
+    now, told, tried = 0.0, [], []
+    for _ in range(9):
+        array = take(outbox, now, Array)
+        tried.append(now)
+        told.append(outbox.refused(array, QUOTA_EXCEEDED, now))
+        assert outbox.next(now + 0.9) is None
+        due = outbox.due()
+        assert due is not None
+        now = due
+    assert tried == [0, 1, 3, 7, 15, 31, 63, 123, 183]
+    assert told == [True, *[False] * 8]
+    outbox.settled(take(outbox, now, Array), now)
+    assert (outbox.depth, outbox.dropped) == (0, 0)
+
+
+def test_a_live_sample_that_is_refused_goes_as_history_and_the_next_is_tried_live() -> None:
     outbox = connected(now=-100.0)
     outbox.add(sample(1), 0.0)
-    outbox.add(sample(2), 0.0)
-    assert not outbox.refused(take(outbox, 0.0, Live), QUOTA_EXCEEDED)
-    assert seqs(outbox.next(0.0)) == [2]
-    assert outbox.dropped == 1
+    assert outbox.refused(take(outbox, 0.0, Live), QUOTA_EXCEEDED, 0.0)
+    outbox.add(sample(2), 0.5)
+    array = take(outbox, 0.5, Array)
+    assert seqs(array) == [1, 2]
+    outbox.settled(array, 0.5)
+    outbox.add(sample(3), 1.0)
+    assert take(outbox, 1.0, Live).kept.sample.seq == 3
+
+
+def test_an_event_that_is_refused_waits_and_delays_no_response() -> None:
+    outbox = connected()
+    outbox.add(telemetry.event("first", 0), 0.0)
+    event = take(outbox, 0.0, Message)
+    outbox.add(telemetry.event("second", 0), 0.0)
+    outbox.add(Publication("response/x", {}, Kind.RESPONSE, retain=False, qos=1), 0.0)
+    assert outbox.refused(event, QUOTA_EXCEEDED, 0.0)
+    assert take(outbox, 0.0, Message).topic == "response/x"
+    assert outbox.next(0.9) is None
+    kinds = [take(outbox, 1.0, Message).publication.payload for _ in range(2)]
+    assert [isinstance(each, dict) and each["type"] for each in kinds] == ["first", "second"]
+
+
+def test_a_refused_state_is_tried_again_in_its_newest_version_at_the_next_connect() -> None:
+    outbox = connected()
+    outbox.add(state(1), 0.0)
+    assert outbox.refused(take(outbox, 0.0, Retained), NOT_AUTHORIZED, 0.0)
+    outbox.add(state(2), 1.0)
+    assert outbox.next(100.0) is None
+    assert outbox.retained_out
+    outbox.lost(101.0)
+    connect(outbox, 102.0)
+    outbox.add(state(3), 103.0)
+    assert take(outbox, 103.0, Retained).publication == state(3)
+
+
+def test_a_trace_that_is_refused_is_gone() -> None:
+    outbox = connected()
+    outbox.add(trace(1), 0.0)
+    assert outbox.refused(take(outbox, 0.0, Message), NOT_AUTHORIZED, 0.0)
+    outbox.add(trace(2), 0.0)
+    assert outbox.next(0.0) is None
+    assert outbox.reload(1.0)
+    assert outbox.next(1.0) is None
+
+
+def test_what_clears_topics_goes_when_nothing_else_does() -> None:
+    outbox = connected(now=-100.0)
+    for number in range(3):
+        outbox.add(telemetry.retained(f"device/{number}/state", None), 0.0)
+    outbox.add(sample(1), 0.0)
+    outbox.add(state(1), 0.0)
+    outbox.add(sample(1, "b"), -20.0)
+    assert not outbox.idle
+    kinds = [type(outbox.next(0.0)) for _ in range(6)]
+    assert kinds == [Retained, Live, Array, Retained, Retained, Retained]
+
+
+# What ends the connection
+
+
+def under_way(outbox: Outbox) -> dict[str, int]:
+    return {letter.topic: 100 for letter in outbox.under_way}
+
+
+def end(outbox: Outbox, now: float, sent: dict[str, int], *, denied: bool = False) -> str | None:
+    """End the connection by the broker's will and connect anew; return the topic found guilty."""
+    culprit = outbox.suspects.ended(sent, certain=denied)
+    outbox.lost(now, culprit, denied=denied)
+    return None if culprit is None else culprit.topic
+
+
+def test_an_array_that_ends_two_connections_is_cut_over_connects_until_a_reload() -> None:
+    outbox, found = Outbox(), []
+    for seq in range(1, 5):
+        outbox.add(sample(seq), 0.0)
+    for now in (100.0, 200.0, 300.0):
+        connect(outbox, now)
+        array = take(outbox, now + PAST_AFTER, Array)
+        found.append((len(array.samples), end(outbox, now + 20, under_way(outbox))))
+    assert found == [(4, None), (4, "device/a/history"), (2, "device/a/history")]
+    assert outbox.dropped == 0
+    connect(outbox, 400.0)
+    assert seqs(outbox.next(410.0)) == [1]
+    outbox.reload(411.0)
+    outbox.lost(412.0)
+    connect(outbox, 500.0)
+    assert seqs(outbox.next(510.0)) == [1, 2, 3, 4]
+
+
+def test_a_single_sample_that_ends_connections_is_declared_and_its_topic_rests_for_an_hour() -> None:
+    outbox = Outbox()
+    outbox.add(sample(1), 0.0)
+    for now in (100.0, 200.0):
+        connect(outbox, now)
+        take(outbox, now + PAST_AFTER, Array)
+        end(outbox, now + 20, under_way(outbox))
+    outbox.add(sample(2), 221.0)
+    connect(outbox, 222.0)
+    outbox.settled(take(outbox, 222.0, Live), 222.0)
+    declaration = take(outbox, 240.0, Declaration)
+    assert declaration.loss == Loss("a", "k", 1, 1, 1)
+    outbox.settled(declaration, 240.0)
+    assert outbox.passes_over("device/a/history")
+    assert outbox.due() == 220.0 + BANNED_FOR
+    assert seqs(outbox.next(220.0 + BANNED_FOR)) == [2]
+
+
+def test_a_denied_topic_loses_nothing_whatever_was_under_way_there() -> None:
+    outbox = connected(now=-100.0)
+    for seq in (1, 2):
+        outbox.add(sample(seq), 0.0)
+    take(outbox, 0.0, Live)
+    take(outbox, 10.0, Array)
+    for number, found in enumerate([None, "device/a/history"], 1):
+        assert end(outbox, 10.0 * number, {"device/a/history": 100}, denied=True) == found
+        connect(outbox, 10.0 * number + 1)
+        outbox.next(10.0 * number + 11)
+    assert (outbox.depth, outbox.dropped) == (2, 0)
+    outbox.lost(40.0)
+    outbox.past.losses.restore(Loss("b", "k", 1, 1, 1))
+    connect(outbox, 41.0)
+    take(outbox, 60.0, Declaration)
+    outbox.suspects.ended({"event": 9}, certain=True)
+    assert end(outbox, 61.0, {"event": 9}, denied=True) == "event"
+    assert outbox.past.undeclared() == [Loss("b", "k", 1, 1, 1)]
+
+
+def test_a_live_sample_that_ends_connections_goes_as_history() -> None:
+    outbox = connected(now=-100.0)
+    outbox.add(sample(1), 0.0)
+    take(outbox, 0.0, Live)
+    end(outbox, 0.1, under_way(outbox))
+    connect(outbox, 0.2)
+    take(outbox, 0.3, Live)
+    assert end(outbox, 0.4, under_way(outbox)) == "device/a/telemetry"
+    connect(outbox, 0.5)
+    assert outbox.next(0.5) is None
+    assert seqs(outbox.next(11.0)) == [1]
+
+
+def test_a_message_that_ends_connections_is_dead_and_the_others_go_on() -> None:
+    outbox = connected()
+    outbox.add(telemetry.event("first", 0), 0.0)
+    found = []
+    for _ in range(2):
+        take(outbox, 0.0, Message)
+        found.append(end(outbox, 1.0, {"event": 100}))
+        connect(outbox, 2.0)
+    assert found == [None, "event"]
+    outbox.add(sample(1), 2.0)
+    assert isinstance(outbox.next(2.0), Live)
+    assert outbox.next(2.0) is None
+
+
+def test_where_several_were_under_way_each_goes_alone_and_the_rest_comes_through() -> None:
+    outbox = Outbox()
+    states = [state(1, "a"), state(1, "b"), state(1, "c")]
+    outbox.connected(0.0)
+    outbox.burst(states, ONLINE)
+    for now in (1.0, 2.0):
+        for _ in states:
+            take(outbox, now, Retained)
+        assert end(outbox, now, under_way(outbox)) is None
+        outbox.connected(now)
+        outbox.burst(states, ONLINE)
+    first = take(outbox, 3.0, Retained)
+    assert (outbox.next(3.0), outbox.waits, outbox.due()) == (None, True, None)
+    outbox.settled(first, 3.0)
+    outbox.suspects.acknowledged(first.topic, 100)
+    second = take(outbox, 3.0, Retained)
+    assert second.topic == "device/b/state"
+    assert end(outbox, 3.0, {second.topic: 100}) == second.topic
+    outbox.connected(4.0)
+    outbox.burst(states, ONLINE)
+    told = []
+    while not outbox.announced:
+        letter = outbox.next(4.0)
+        assert letter is not None
+        told.append(letter.topic)
+        outbox.settled(letter, 4.0)
+    assert told == ["device/a/state", "device/c/state", "availability"]
+
+
+def test_what_goes_alone_waits_until_nothing_is_under_way() -> None:
+    outbox = connected(now=-100.0)
+    outbox.suspects.ended({"device/a/history": 100}, certain=True)
+    outbox.add(sample(1), -10.0)
+    outbox.add(sample(2), -10.0)
+    outbox.add(sample(1, "b"), 0.0)
+    live = take(outbox, 0.0, Live)
+    assert outbox.next(0.0) is None
+    outbox.add(sample(2, "b"), 0.0)
+    assert outbox.next(0.0) is None
+    outbox.settled(live, 0.0)
+    array = take(outbox, 0.0, Array)
+    shorter = outbox.shorten(array, 1)
+    assert seqs(shorter) == [1]
+    assert outbox.next(0.0) is None
+    outbox.settled(shorter, 0.0)
+    assert isinstance(outbox.next(0.0), Live)
+
+
+def test_an_array_under_way_is_shortened_and_the_rest_goes_after_it() -> None:
+    outbox = connected(now=-100.0)
+    for seq in range(1, 6):
+        outbox.add(sample(seq), 0.0)
+    array = take(outbox, 50.0, Array)
+    shorter = outbox.shorten(array, 2)
+    assert (seqs(shorter), outbox.under_way, outbox.depth) == ([1, 2], (shorter,), 5)
+    outbox.settled(shorter, 50.0)
+    assert seqs(outbox.next(51.0)) == [3, 4, 5]
+
+
+# What is too large
 
 
 def test_an_array_that_is_too_large_is_cut_until_it_fits() -> None:
@@ -726,6 +963,13 @@ class OutboxLaws(RuleBasedStateMachine):
         self.outbox.lost(self.now)
         self.online = False
 
+    @precondition(lambda self: self.online)
+    @rule(denied=st.booleans())
+    def throw_out(self, denied: bool) -> None:  # noqa: FBT001 - drawn by hypothesis
+        """End the connection for what is under way, as the broker does."""
+        end(self.outbox, self.now, under_way(self.outbox), denied=denied)
+        self.online = False
+
     @rule()
     def take(self) -> None:
         letter = self.outbox.next(self.now)
@@ -741,7 +985,9 @@ class OutboxLaws(RuleBasedStateMachine):
             assert len(kept) <= ARRAY_MOST
 
     @precondition(lambda self: self.outbox.under_way)
-    @rule(which=st.integers(0, 4), fate=st.sampled_from(["settled", "settled", "settled", "refused", "unfit"]))
+    @rule(
+        which=st.integers(0, 4), fate=st.sampled_from(["settled", "settled", "settled", "refused", "denied", "unfit"])
+    )
     def answer(self, which: int, fate: str) -> None:
         letter = self.outbox.under_way[which % len(self.outbox.under_way)]
         if fate == "settled":
@@ -750,7 +996,9 @@ class OutboxLaws(RuleBasedStateMachine):
             if isinstance(letter, Declaration):
                 self.declared.append(letter.loss)
         elif fate == "refused":
-            self.outbox.refused(letter, QUOTA_EXCEEDED)
+            self.outbox.refused(letter, QUOTA_EXCEEDED, self.now)
+        elif fate == "denied":
+            self.outbox.refused(letter, NOT_AUTHORIZED, self.now)
         else:
             self.outbox.unfit(letter)
 
@@ -769,6 +1017,7 @@ class OutboxLaws(RuleBasedStateMachine):
             self.delivered |= {(each.sample.device, each.sample.seq) for each in samples_of(letter)}
             if isinstance(letter, Declaration):
                 self.declared.append(letter.loss)
+        self.outbox.reload(self.now)
         self.now += PAST_AFTER + DECLARED_EVERY
         for _ in range(1000):
             taken = self.outbox.next(self.now)

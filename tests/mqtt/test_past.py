@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from lfs10d.mqtt.letters import Letter
     from lfs10d.telemetry import Clock
 
-QUOTA_EXCEEDED = 0x97
+NOT_AUTHORIZED, QUOTA_EXCEEDED = 0x87, 0x97
 ONLINE = telemetry.retained("availability", "online")
 
 
@@ -63,7 +63,7 @@ class MemoryStore:
         for each in kept:
             self.rows[self.next] = Row(self.next, each.sample, each.shift, each.repeated)
             self.next += 1
-        for number in [number for number in self.rows if number > past.stored.after]:
+        for number in [number for number in self.rows if number > past.beyond]:
             if len(self.rows) <= self.room:
                 break
             row = self.rows.pop(number)
@@ -442,50 +442,98 @@ def test_what_is_still_to_be_repeated_is_kept_at_the_end() -> None:
 # Refused
 
 
-def refused_history() -> tuple[Outbox, MemoryStore]:
-    """Return an outbox whose history the broker has refused once, with three samples in memory."""
-    outbox, store = Outbox(), MemoryStore()
-    for seq in (1, 2, 3):
-        outbox.add(sample(seq), 0.0)
-    connect(outbox, 10.0)
-    array = outbox.next(20.0)
-    assert isinstance(array, Array)
-    assert outbox.refused(array, 0x87)
-    return outbox, store
-
-
-def test_where_history_is_refused_what_the_store_gives_back_is_declared_and_let_go() -> None:
+def test_where_history_is_refused_the_store_keeps_it_and_the_others_go_on() -> None:
     store = MemoryStore()
-    outbox = away(3, store)
+    outbox = Outbox()
+    for seq in range(1, 5):
+        outbox.add(sample(seq), 0.0)
+        outbox.add(sample(seq, "b"), 0.0)
+    assert store.spill(outbox, 4.0)
     connect(outbox, 10.0)
-    store.page(outbox, 20.0)
+    store.page(outbox, 20.0)  # both in one, and one row more after it
     array = outbox.next(20.0)
     assert isinstance(array, Array)
-    assert outbox.refused(array, 0x87)
-    store.release(outbox, 20.0)
-    assert not store.rows
-    assert store.losses == (Loss("a", "k2", 1, 3, 3),)
+    assert outbox.refused(array, 0x87, 20.0)
+    for now in (20.2, 20.4):
+        other = outbox.next(now)
+        assert isinstance(other, Array)
+        assert other.topic == "device/b/history"
+        outbox.settled(other, now)
+        assert outbox.next(now + 0.1) is None
+        store.page(outbox, now + 0.1)
+    assert outbox.due() is None
+    outbox.add(sample(5, "b"), 21.0)
+    outbox.add(sample(5), 21.0)
+    outbox.age(30.0)
+    assert seqs(outbox.next(30.0)) == [5]  # of b: what waits in memory goes too
+    assert outbox.depth == 6
+    assert outbox.reload(31.0)
+    store.release(outbox, 31.0)
+    assert store.page(outbox, 31.0)
+    again = outbox.next(31.0)
+    assert again is None  # the one of b is under way
+    outbox.lost(32.0)
+    connect(outbox, 33.0)
+    store.page(outbox, 43.0, most=20)
+    assert seqs(outbox.next(43.0)) == [1, 2, 3, 4]
+    assert outbox.dropped == 0
 
 
-def test_what_would_be_refused_is_not_sent_and_declared_at_once() -> None:
-    outbox, _ = refused_history()
+def test_a_topic_that_is_tried_again_on_the_same_connection_gets_what_it_missed_once() -> None:
+    store = MemoryStore()
+    outbox = Outbox()
+    for seq in range(1, 5):
+        outbox.add(sample(seq), 0.0)
+        outbox.add(sample(seq, "b"), 0.0)
+    assert store.spill(outbox, 4.0)
+    connect(outbox, 10.0)
+    store.page(outbox, 20.0, most=20)
+    array = outbox.next(20.0)
+    assert isinstance(array, Array)
+    assert outbox.refused(array, QUOTA_EXCEEDED, 20.0)
+    other = outbox.next(20.2)
+    assert isinstance(other, Array)
+    outbox.settled(other, 20.2)
+    assert outbox.next(20.4) is None
+    assert (outbox.due(), outbox.depth) == (21.0, 4)
+    assert outbox.next(21.0) is None
+    assert store.page(outbox, 21.0, most=20)
+    last = outbox.next(21.2)
+    assert isinstance(last, Array)
+    assert (last.topic, seqs(last)) == ("device/a/history", [1, 2, 3, 4])
+    outbox.settled(last, 21.2)
+    assert (outbox.next(22.0), outbox.depth) == (None, 0)
+
+
+def lost_three() -> Outbox:
+    """Return a connected outbox that has lost three samples."""
+    outbox = Outbox()
+    outbox.past.losses.restore(Loss("a", "k2", 1, 3, 3))
+    connect(outbox, 10.0)
+    return outbox
+
+
+def test_what_would_be_refused_is_not_sent_and_waits() -> None:
+    outbox = Outbox()
+    outbox.add(sample(1), 0.0)
+    connect(outbox, 10.0)
+    array = outbox.next(20.0)
+    assert isinstance(array, Array)
+    assert outbox.refused(array, 0x87, 20.0)
     outbox.add(sample(4), 20.0)
     outbox.age(30.0)
-    declaration = outbox.next(30.0)
-    assert isinstance(declaration, Declaration)
-    outbox.settled(declaration, 30.0)
-    assert outbox.next(30.2) is None
-    assert outbox.past.undeclared() == [Loss("a", "k2", 4, 4, 1)]
+    assert outbox.next(30.0) is None
+    assert (outbox.past.undeclared(), outbox.depth) == ([], 2)
 
 
 def test_where_events_are_refused_losses_wait_and_the_past_goes_on() -> None:
-    outbox, _ = refused_history()
-    declaration = outbox.next(30.0)
+    outbox = lost_three()
+    declaration = outbox.next(20.0)
     assert isinstance(declaration, Declaration)
-    assert outbox.refused(declaration, 0x87)
+    assert outbox.refused(declaration, 0x87, 20.0)
     outbox.add(sample(1, "b"), 20.0)
     outbox.age(30.0)
-    assert outbox.due() == 20.0 + 0.1
+    assert outbox.due() == 20.0
     assert seqs(outbox.next(30.0)) == [1]
     assert outbox.due() is None
     assert outbox.past.undeclared() == [Loss("a", "k2", 1, 3, 3)]
@@ -499,7 +547,7 @@ def test_losing_a_connection_that_never_was_is_no_new_absence() -> None:
 
 
 def test_a_declaration_under_way_is_made_again_after_a_loss_and_kept_until_then() -> None:
-    outbox, _ = refused_history()
+    outbox = lost_three()
     assert isinstance(outbox.next(30.0), Declaration)
     assert outbox.past.undeclared() == [Loss("a", "k2", 1, 3, 3)]
     outbox.lost(31.0)
@@ -517,6 +565,39 @@ def test_an_array_of_memory_that_is_too_large_is_cut() -> None:
     assert isinstance(array, Array)
     assert not outbox.unfit(array)
     assert seqs(outbox.next(20.0)) == [1, 2]
+
+
+def test_an_array_that_ended_its_connection_leaves_shorter_ones_after_it_for_a_time_or_until_a_reload() -> None:
+    outbox, lengths = Outbox(), []
+    for seq in (1, 2, 3, 4):
+        outbox.add(sample(seq), 0.0)
+    for now in (10.0, 30.0, 100.0, 130.0, 160.0):
+        connect(outbox, now)
+        array = outbox.next(now + 10.0)
+        assert isinstance(array, Array)
+        lengths.append(len(array.samples))
+        if now == 10.0:
+            outbox.past.cut_for(array, 90.0)
+        if now == 100.0:
+            outbox.past.cut_for(array, 1000.0)
+        if now == 130.0:
+            outbox.past.reload()
+        outbox.lost(now + 11.0)
+    assert lengths == [4, 2, 4, 2, 4]
+
+
+def test_an_array_of_the_store_is_shortened_and_refused_without_a_loss() -> None:
+    store = MemoryStore()
+    outbox = away(5, store)
+    connect(outbox, 10.0)
+    store.page(outbox, 20.0)
+    array = outbox.next(20.0)
+    assert isinstance(array, Array)
+    shorter = outbox.past.shorten(array, 2)
+    assert seqs(shorter) == [1, 2]
+    outbox.past.refused(shorter)
+    outbox.past.over(shorter)
+    assert seqs(outbox.next(20.2)) == [1, 2, 3, 4, 5]
 
 
 def test_the_second_sending_is_due_when_the_past_is_opened() -> None:
@@ -545,7 +626,7 @@ def test_what_is_acknowledged_until_the_past_is_opened_goes_once_more_and_nothin
     assert seqs(outbox.next(80.0)) == [1, 2]
 
 
-def test_what_was_acknowledged_before_is_no_loss_when_its_second_sending_is_refused() -> None:
+def test_what_was_acknowledged_before_is_no_loss_when_its_second_sending_is_unfit() -> None:
     outbox = Outbox()
     connect(outbox, 0.0)
     outbox.add(sample(1), 50.0)
@@ -556,7 +637,7 @@ def test_what_was_acknowledged_before_is_no_loss_when_its_second_sending_is_refu
     connect(outbox, 52.0)
     again = outbox.next(62.0)
     assert isinstance(again, Array)
-    assert outbox.refused(again, QUOTA_EXCEEDED) is False
+    assert outbox.unfit(again)
     assert outbox.past.undeclared() == []
 
 
@@ -636,6 +717,15 @@ class PastLaws(RuleBasedStateMachine):
         self.losses_at.append(self.now)
         self.online = False
 
+    @precondition(lambda self: self.online and self.outbox.under_way)
+    @rule(denied=st.booleans())
+    def throw_out(self, denied: bool) -> None:  # noqa: FBT001 - drawn by hypothesis
+        """End the connection for what is under way, as the broker does."""
+        sent = {letter.topic: 100 for letter in self.outbox.under_way}
+        self.outbox.lost(self.now, self.outbox.suspects.ended(sent, certain=denied), denied=denied)
+        self.losses_at.append(self.now)
+        self.online = False
+
     @precondition(lambda self: not self.online and not self.store.broken)
     @rule()
     def restart(self) -> None:
@@ -650,13 +740,15 @@ class PastLaws(RuleBasedStateMachine):
         self.begin()
 
     @precondition(lambda self: self.online)
-    @rule(fate=st.sampled_from(["settled", "settled", "settled", "settled", "refused", "unfit", "nothing"]))
+    @rule(fate=st.sampled_from(["settled", "settled", "settled", "settled", "refused", "denied", "unfit", "nothing"]))
     def go(self, fate: str) -> None:
         letter = self.outbox.next(self.now)
         if letter is None or fate == "nothing":
             return
         if fate == "refused":
-            self.outbox.refused(letter, QUOTA_EXCEEDED)
+            self.outbox.refused(letter, QUOTA_EXCEEDED, self.now)
+        elif fate == "denied":
+            self.outbox.refused(letter, NOT_AUTHORIZED, self.now)
         elif fate == "unfit":
             self.outbox.unfit(letter)
         else:
@@ -687,6 +779,7 @@ class PastLaws(RuleBasedStateMachine):
             connect(self.outbox, self.now)
         for letter in self.outbox.under_way:
             self.settle(letter)
+        self.outbox.reload(self.now)
         self.now += PAST_AFTER + DECLARED_EVERY
         for _ in range(3000):
             self.keep()

@@ -323,3 +323,21 @@ def test_two_gateways_with_one_id_meet_less_and_less_often() -> None:
         inside = 1 - inside
     assert len(connects) < 40
     assert any(gate.duplicate for gate in gates)
+
+
+@pytest.mark.parametrize(
+    ("ended", "explained"),
+    [(Ended(Ending.LOST, "", 0x87, by_message=True), False), (Ended(Ending.LOST, "", 0x8B), False), (LOST, True)],
+)
+def test_a_broker_that_ends_connections_for_a_reason_or_a_message_is_no_duplicate_client(
+    ended: Ended,
+    explained: bool,  # noqa: FBT001 - a column of the table
+) -> None:
+    policy = fresh()
+    for count in range(3 * SHORT_MOST):
+        start = 1000.0 * count
+        policy.accepted(start)
+        policy.missed()
+        policy.ended(ended, start + 1.0, explained=explained)
+        assert not policy.duplicate
+        assert policy.due - start - 1.0 < TAKEN_OVER_FIRST

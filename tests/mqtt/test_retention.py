@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import time
+from typing import TYPE_CHECKING
+
 from lfs10d import telemetry
 from lfs10d.mqtt.retention import Retention
+
+if TYPE_CHECKING:
+    from lfs10d.mqtt.letters import Retained
 
 NONE: frozenset[str] = frozenset()
 ONLINE = telemetry.retained("availability", "online")
@@ -71,30 +77,87 @@ def test_a_loss_leaves_only_what_clears_a_topic() -> None:
     retention = Retention()
     retention.burst([state(1), telemetry.retained("gone", None)], ONLINE)
     retention.lost()
-    left = retention.next(NONE)
+    left = retention.next_clearing(NONE)
     assert left is not None
     assert left.topic == "gone"
-    assert retention.next(NONE) is None
+    assert (retention.next(NONE), retention.next_clearing(NONE)) == (None, None)
 
 
 def test_a_clearing_is_put_back_unless_a_newer_version_waits() -> None:
     retention = Retention()
-    for topic in ("gone", "back"):
+    for topic in ("gone", "back", "again"):
         retention.add(telemetry.retained(topic, None))
-    gone, back = retention.next(NONE), retention.next(NONE)
+    gone, back, again = (retention.next_clearing(NONE) for _ in range(3))
     assert gone is not None
     assert back is not None
+    assert again is not None
     retention.lost()
     retention.add(state(2, "back"))
-    retention.put_back(gone)
-    retention.put_back(back)
-    retention.add(state(1, "other"))
-    waiting = [letter.publication.payload for _ in range(3) if (letter := retention.next(NONE)) is not None]
-    assert waiting == [{"version": 2}, None, {"version": 1}]
+    retention.add(telemetry.retained("again", None))
+    for letter in (gone, back, again):
+        retention.put_back(letter)
+    waiting = [each and each.publication.payload for each in (retention.next(NONE), retention.next(NONE))]
+    assert waiting == [{"version": 2}, None]
+    assert [letter and letter.topic for letter in (retention.next_clearing(NONE) for _ in range(3))] == [
+        "again",
+        "gone",
+        None,
+    ]
     other = Retention()
     other.add(state(1))
-    letter = other.next(NONE)
-    assert letter is not None
+    version = other.next(NONE)
+    assert version is not None
     other.lost()
-    other.put_back(letter)
+    other.put_back(version)
     assert not other
+
+
+def test_the_newest_of_what_clears_and_what_fills_a_topic_waits() -> None:
+    retention = Retention()
+    retention.add(telemetry.retained("state", None))
+    retention.add(state(1))
+    assert retention.next_clearing(NONE) is None
+    retention.add(telemetry.retained("state", None))
+    assert retention.next(NONE) is None
+    clearing = retention.next_clearing(NONE)
+    assert clearing is not None
+    retention.add(telemetry.retained("state", None))
+    assert retention.next_clearing(NONE) is None, "one is under way"
+    retention.over(clearing)
+    assert retention.next_clearing(NONE) is not None
+    assert not retention
+
+
+def test_what_is_passed_over_waits_in_its_newest_version_until_its_topic_is_tried_again() -> None:
+    retention = Retention()
+    retention.burst([state(1), telemetry.retained("gone", None)], ONLINE)
+    refused = frozenset({"state", "gone", "availability"})
+    assert (retention.next(refused), retention.next_clearing(refused), bool(retention)) == (None, None, False)
+    retention.add(state(2))
+    assert retention.next(refused) is None
+    retention.lifted(frozenset({"state", "other"}))
+    version = retention.next(frozenset({"gone", "availability"}))
+    assert version is not None
+    assert version.publication == state(2)
+    retention.refused(version)
+    retention.over(version)
+    retention.add(state(3))
+    retention.lifted(refused)
+    newest = [letter and letter.publication for letter in (retention.next(NONE) for _ in range(3))]
+    assert newest == [state(3), ONLINE, None]
+    retention.next(frozenset({"gone"}))
+    retention.lost()
+    assert retention.next_clearing(NONE) is not None
+
+
+def test_thousands_of_clearings_are_taken_in_linear_time() -> None:
+    retention = Retention()
+    for number in range(60_000):
+        retention.add(telemetry.retained(f"device/{number}/state", None))
+    under_way: list[Retained] = []
+    begun = time.process_time()
+    while (letter := retention.next_clearing(NONE)) is not None:
+        under_way.append(letter)
+        if len(under_way) == 20:
+            retention.over(under_way.pop(0))
+    assert time.process_time() - begun < 5.0, "a look at all that wait for each would take minutes"

@@ -41,6 +41,24 @@ def test_a_page_goes_in_order_and_a_short_one_is_the_last() -> None:
     assert (stored.more, stored.after) == (False, 5)
 
 
+def test_what_is_passed_over_is_read_again_and_nothing_else() -> None:
+    stored = filled(6)
+    stored.read_again(())
+    assert (stored.after, stored.turn) == (6, 0), "nothing was passed over"
+    acknowledged, under_way = stored.page.take(1), stored.page.take(2)
+    assert (ids(acknowledged), ids(under_way)) == ([1], [2, 3])
+    stored.settled([1], 0.0)
+    stored.leave()
+    assert (stored.left, stored.depth, stored.more) == (True, 5, False)
+    stored.read_again([2, 3])
+    assert (stored.left, stored.after, stored.more, stored.turn) == (False, 0, True, 1)
+    stored.take_page(rows(1, 6), 9)
+    assert ids(stored.page.take(9)) == [4, 5, 6]
+    stored.rewind()
+    stored.take_page(rows(1, 6), 9)
+    assert ids(stored.page.take(9)) == [1, 2, 3, 4, 5, 6]
+
+
 def test_what_was_repeated_before_a_restart_is_known_as_such() -> None:
     stored = Stored(rows=1)
     stored.take_page([row(1, repeated=True)], 9)

@@ -1,0 +1,107 @@
+"""What we add to paho's client: packets of any size and reason codes of any value, and why a connection ended.
+
+paho 2.2 takes a packet into memory whole, however large; it closes the connection at a reason code that is not in its
+table, for it calls that packet malformed; and it says only in its log what went wrong.
+"""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING
+
+from paho.mqtt.client import Client
+from paho.mqtt.enums import MQTTErrorCode
+from paho.mqtt.packettypes import PacketTypes
+from paho.mqtt.reasoncodes import ReasonCode
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+LARGEST_PACKET = 128 * 1024
+"""Bytes of a packet that are taken, the rest is passed over. By MQTT 5 the broker is asked to send none larger."""
+
+PASSED_OVER_AT_ONCE = 64 * 1024
+PASSES = 16
+"""Bytes passed over by one call of the system, and calls in one turn of the loop."""
+
+_ANSWERS = (
+    PacketTypes.CONNACK,
+    PacketTypes.PUBACK,
+    PacketTypes.PUBREC,
+    PacketTypes.SUBACK,
+    PacketTypes.UNSUBACK,
+    PacketTypes.DISCONNECT,
+)
+"""The packets in which a broker refuses something."""
+
+
+def every_reason(known: Mapping[int, Mapping[str, list[int]]]) -> dict[int, dict[str, list[int]]]:
+    """Return a table of reason codes in which each code from 0x80 on has a name in each packet.
+
+    It is a plain dict, which paho copies for every reason code that it makes in half the time of its own.
+    """
+    table = {code: dict(names) for code, names in known.items()}
+    for code in range(0x80, 0x100):
+        named = {packet for packets in table.setdefault(code, {}).values() for packet in packets}
+        unnamed = [packet for packet in _ANSWERS if packet not in named]
+        if unnamed:
+            table[code][f"Reason code 0x{code:02X}"] = unnamed
+    return table
+
+
+ReasonCode.names = every_reason(ReasonCode.names)
+
+
+class _Trouble(logging.Logger):
+    """Takes what paho logs, and keeps the last of it that is an error, or an exception."""
+
+    def __init__(self) -> None:
+        super().__init__("paho")
+        self.last: BaseException | str | None = None
+
+    def log(self, level: int, msg: object, *args: object, **_: object) -> None:
+        """Keep an error; paho tells of a packet it does not understand at level debug."""
+        if level < logging.ERROR and not (level == logging.DEBUG and msg == "Received malformed packet: %s"):
+            return
+        caught = next((each for each in args if isinstance(each, OSError)), None)
+        self.last = caught or (str(msg) % args)
+
+
+class BoundedClient(Client):
+    """A client that holds at most `LARGEST_PACKET` bytes of a packet; a longer message comes cut to that."""
+
+    _passing_over = 0
+    """Bytes of the packet before that are still to come."""
+
+    def __init__(self, *arguments: object, **named: object) -> None:
+        super().__init__(*arguments, **named)  # type: ignore[arg-type]  # passed on as they are
+        self._trouble = _Trouble()
+        self.enable_logger(self._trouble)
+
+    @property
+    def trouble(self) -> BaseException | str | None:
+        """What went wrong last; None: nothing, so that the broker closed the connection."""
+        return self._trouble.last
+
+    def _sock_recv(self, bufsize: int) -> bytes:
+        # paho asks for all that is missing of a packet at once.
+        if bufsize > LARGEST_PACKET:
+            self._passing_over = bufsize - LARGEST_PACKET
+            self._in_packet["to_process"] = bufsize = LARGEST_PACKET
+        return super()._sock_recv(bufsize)
+
+    def _packet_read(self) -> MQTTErrorCode:
+        for _ in range(PASSES):
+            if not self._passing_over or self._in_packet["command"]:
+                return super()._packet_read()
+            try:
+                passed = len(self._sock_recv(min(self._passing_over, PASSED_OVER_AT_ONCE)))
+            except BlockingIOError:
+                return MQTTErrorCode.MQTT_ERR_AGAIN
+            except OSError as error:
+                self._trouble.last = error
+                return MQTTErrorCode.MQTT_ERR_CONN_LOST
+            if not passed:
+                return MQTTErrorCode.MQTT_ERR_CONN_LOST
+            self._passing_over -= passed
+        return MQTTErrorCode.MQTT_ERR_AGAIN

@@ -1,0 +1,66 @@
+"""Which message makes the broker end the connection. Pure.
+
+Brokers end a connection for one message: too large, denied. By MQTT 3.1.1 none says why, by MQTT 5 not all do.
+
+- What was under way when the broker ended a connection, and again when it ended the next, is suspected. Where that is
+  one topic alone it is the culprit.
+- Where it is several, each of them goes alone from then on: the next end has one under way.
+- A reason that speaks of a message (`certain`) makes what was under way go alone after the first end already.
+- The broker's acknowledgement of a message of that topic, about as large, clears it.
+- Ends that no message causes (the network, a broker that shuts down, another client) change nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+ABOUT_AS_LARGE = 0.9
+"""A message of this part of a suspect's size proves that it is not its size."""
+
+
+@dataclass(frozen=True, slots=True)
+class Culprit:
+    """A topic under `B` whose message of `size` bytes ends the connection."""
+
+    topic: str
+    size: int
+
+
+class Suspects:
+    """The rules above; sizes are in bytes."""
+
+    def __init__(self) -> None:
+        self._sizes: dict[str, int] = {}
+        self._alone = False
+
+    def goes_alone(self, topic: str) -> bool:
+        """Tell whether a message of this topic may only be sent while nothing else is under way."""
+        return self._alone and topic in self._sizes
+
+    def explain(self, sent: Mapping[str, int]) -> bool:
+        """Tell whether one of these was under way at the last end too: then a message may be why."""
+        return not self._sizes.keys().isdisjoint(sent)
+
+    def ended(self, sent: Mapping[str, int], *, certain: bool) -> Culprit | None:
+        """Note that the broker ended the connection while these (topic -> size) were under way."""
+        again = {topic: size for topic, size in sent.items() if topic in self._sizes}
+        self._sizes = again or dict(sent)
+        self._alone = bool(again) or certain
+        if len(again) != 1:
+            return None
+        [(topic, size)] = again.items()
+        return Culprit(topic, size)
+
+    def cut(self, culprit: Culprit) -> None:
+        """Note that what is sent on the culprit's topic is half as large from now on."""
+        self._sizes[culprit.topic] = culprit.size // 2
+
+    def acknowledged(self, topic: str, size: int) -> None:
+        """Note that the broker has taken a message of `size` bytes."""
+        if self._sizes and size >= ABOUT_AS_LARGE * self._sizes.get(topic, float("inf")):
+            del self._sizes[topic]
+            self._alone = self._alone and bool(self._sizes)
