@@ -94,15 +94,15 @@ WALK: Final = (
     ),
     Step(
         "device/readdress",
-        "Then in earnest. The answer comes when the sensor has been heard at its new id.",
+        "Then in earnest. The answer comes when the sensor has been heard at its new id: after 10 to 25 s.",
         {"device": "slave-3", "to": 9},
         slow=True,
     ),
     Step("device/readdress", "An id that is taken is refused at once:", {"device": "slave-3", "to": 2}),
     Step(
         "line/adopt",
-        "The factory-new sensor, slave id 1 at 9600 baud, gets the next free id and the line's rate. With `--repeat` "
-        "one after the other: [installation.md](installation.md#mounting-sensors).",
+        "The factory-new sensor, slave id 1 at 9600 baud, gets the next free id and the line's rate, in half a "
+        "minute. With `--repeat` one after the other: [installation.md](installation.md#mounting-sensors).",
         {"name": "north", "label": "North side"},
         slow=True,
     ),

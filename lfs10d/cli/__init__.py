@@ -37,10 +37,10 @@ VERBS = {
 
 EXAMPLES = """\b
 Examples:
-  lfs10d demo                        see it work, without hardware
-  lfs10d scan /dev/ttyUSB0           who is on the line?
-  lfs10d check -c lfs10d.yaml        is the configuration right? does the line carry it?
-  lfs10d run -c lfs10d.yaml          measure and publish
+  lfs10d demo                  see it work, without hardware
+  lfs10d scan /dev/ttyUSB0     who is on the line?
+  lfs10d check -c lfs10d.yaml  is the file right, can the line carry it?
+  lfs10d run -c lfs10d.yaml    measure and publish
 """
 
 

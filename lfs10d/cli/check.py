@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 EXAMPLES = """\b
 Examples:
-  lfs10d check                       the file of the service
-  lfs10d check -c site.yaml          another one
-  lfs10d check -c site.yaml --json   for programs
+  lfs10d check                      the file of the service
+  lfs10d check -c site.yaml         another one
+  lfs10d check -c site.yaml --json  for programs
 """
 
 

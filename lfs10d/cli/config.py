@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from lfs10d.changefile import ChangeFile
-from lfs10d.cli import config_option, json_option
+from lfs10d.changes import Changes
+from lfs10d.cli import EXIT_FAILED, config_option, json_option
 from lfs10d.cli.columns import columns
 from lfs10d.cli.json_text import json_text
 from lfs10d.config import Config, Section
@@ -30,11 +31,14 @@ from lfs10d.statedir import state_directory
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+DENIED = "permission denied"
+"""What the system says of a directory that is not for us, in the words of `lfs10d.credentials.reason`."""
+
 EXAMPLES = """\b
 Examples:
-  lfs10d config                      every value and its origin
-  lfs10d config --merged             YAML to put into the file
-  lfs10d config --json               for programs
+  lfs10d config           every value and its origin
+  lfs10d config --merged  YAML to put into the file
+  lfs10d config --json    for programs
 """
 
 
@@ -51,19 +55,26 @@ Examples:
 def command(config: Path, state_dir: Path | None, *, merged: bool, as_json: bool) -> int:
     """Print the effective configuration, each value with its origin.
 
-    That is the file and what requests changed, which the daemon keeps in its state directory; exit code 1 if that
-    cannot be read. Passwords are never shown: the file names a file that holds one.
+    That is the file and what requests changed, which the daemon keeps in its state directory. Who may not read that is
+    shown the file's part, without --merged, and told what is missing; exit code 1. Passwords are never shown: the file
+    names a file that holds one.
     """
     if merged and as_json:
         raise click.UsageError("--merged prints YAML; leave --json out")
     file = load(config, files=False)
     directory = state_directory(config, file.config.line.name, chosen=state_dir, environment=os.environ)
-    now = _with_changes(file, directory, chosen=state_dir is not None)
+    missing = None
+    try:
+        now = _with_changes(file, directory, chosen=state_dir is not None)
+    except StateError as error:
+        if merged or DENIED not in str(error):
+            raise
+        now, missing = effective(file, Changes()), str(error)
     if merged:
         _refuse_conflicts(now, config)
         click.echo(render(merged_data(now)), nl=False)
     elif as_json:
-        click.echo(json.dumps(_report(now.loaded), indent=2, allow_nan=False))
+        click.echo(json.dumps(_report(now.loaded, missing), indent=2, allow_nan=False))
     else:
         loaded = now.loaded
         rows = [
@@ -74,6 +85,9 @@ def command(config: Path, state_dir: Path | None, *, merged: bool, as_json: bool
             click.echo(text)
     for warning in _warnings(now):
         click.echo(f"lfs10d: {warning}", err=True)
+    if missing is not None:
+        click.echo(f"lfs10d: {missing}; what requests changed is missing here: call it as root", err=True)
+        return EXIT_FAILED
     return 0
 
 
@@ -112,8 +126,11 @@ def _warnings(now: Effective) -> Iterator[str]:
         yield f"{name}: {why}"
 
 
-def _report(loaded: Loaded) -> dict[str, Any]:
+def _report(loaded: Loaded, missing: str | None) -> dict[str, Any]:
+    """Return it as JSON has it; `missing`: why what requests changed is not in it."""
+    report = {} if missing is None else {"missing": missing}
     return {
+        **report,
         "config": loaded.config.model_dump(mode="json"),
         "origins": {path: str(origin) for path, origin in loaded.origins.items()},
     }

@@ -36,6 +36,7 @@ _TROUBLES: Final = {
     "out_of_range": "impossible value",
     "not_finite": "not a number",
     "unavailable": "has no value now",
+    "starting": "not polled yet",
     "late": "answers too late",
     "collision": "line never silent",
     "port_lost": "no port",
@@ -43,9 +44,7 @@ _TROUBLES: Final = {
     "config_conflict": "two devices with one id",
 }
 """What a code says, in a word or two; the code itself stands before it, as in docs/when-it-goes-wrong.md."""
-STARTING: Final = "starting"
-"""The code of a device that was not asked yet."""
-_OF_THE_LINE: Final = frozenset({"port_lost", "port_busy", "config_conflict"})
+_OF_THE_LINE: Final = frozenset({"starting", "port_lost", "port_busy", "config_conflict"})
 """Codes that say nothing of the device itself."""
 _MARKS: Final = {"moved": ">", "came": "+", "went": "-"}
 _MARK_STYLES: Final = {"moved": "bold black on green", "came": "bold green", "went": "bold red"}
@@ -133,7 +132,7 @@ def _state(device: Device, moment: _Moment, *, stale: bool) -> str:
         return "disabled"
     if device.good:
         return "old value" if stale else "good"
-    if device.error is None or device.error == STARTING:
+    if device.error is None:
         return "not heard yet"
     code = escape(device.error)
     trouble = f"{code}, {_TROUBLES[code]}" if code in _TROUBLES else code

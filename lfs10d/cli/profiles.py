@@ -60,7 +60,7 @@ def command(context: click.Context, *, as_json: bool) -> None:
         _draw([_overview(known)])
 
 
-@command.command("show", epilog=EXAMPLES)
+@command.command("show", short_help="Explain a profile: a built-in one, or a YAML file.", epilog=EXAMPLES)
 @click.argument("name", shell_complete=profile_names)
 @json_option
 def show(name: str, *, as_json: bool) -> None:

@@ -42,10 +42,10 @@ BAR_MOST = 40
 
 EXAMPLES = """\b
 Examples:
-  lfs10d read /dev/ttyUSB0 3                        the wind sensor with id 3
-  lfs10d read /dev/ttyUSB0 3 --watch                every second, until Ctrl-C
-  lfs10d read /dev/ttyUSB0 4 --baudrate 19200       another rate
-  lfs10d read /dev/ttyUSB0 7 --profile ld-e --json  another device, for programs
+  lfs10d read /dev/ttyUSB0 3                   the wind sensor with id 3
+  lfs10d read /dev/ttyUSB0 3 --watch           every second, until Ctrl-C
+  lfs10d read /dev/ttyUSB0 4 --baudrate 19200  another rate
+  lfs10d read /dev/ttyUSB0 7 --profile ld-e    another device
 """
 
 

@@ -44,14 +44,14 @@ PATIENT = frozenset({"line/scan", "line/baudrate", "line/adopt", "device/readdre
 
 EXAMPLES = """\b
 Examples:
-  lfs10d request --list                            every request with its parameters
-  lfs10d request device/options --help             what one of them takes
-  lfs10d request health                            how the daemon, the line and every sensor are
-  lfs10d request device/read device=mast-top       poll one sensor now
-  lfs10d request line/trace for=1m                 the frames of a minute, on topic trace
-  lfs10d request line/adopt --repeat               mount sensors: plug one in, then the next
-  lfs10d request config/reload -c site.yaml        the daemon of another file reads it again
-  lfs10d request device/read device=north --json   the response as the broker brought it
+  lfs10d request --list                       all requests and parameters
+  lfs10d request device/options --help        what one of them takes
+  lfs10d request health                       how daemon, line and sensors are
+  lfs10d request device/read device=mast-top  poll one sensor now
+  lfs10d request line/trace for=1m            a minute of frames, on a topic
+  lfs10d request line/adopt --repeat          mount one sensor after the other
+  lfs10d request config/reload -c site.yaml   another daemon reads its file
+  lfs10d request device/read device=2 --json  the response as JSON
 """
 
 

@@ -26,8 +26,8 @@ STANDARD_ERROR = 2
 
 EXAMPLES = """\b
 Examples:
-  lfs10d run                         the service's file, /etc/lfs10d/lfs10d.yaml
-  lfs10d run -c site.yaml            another one
+  lfs10d run               the service's file, /etc/lfs10d/lfs10d.yaml
+  lfs10d run -c site.yaml  another one
 """
 
 

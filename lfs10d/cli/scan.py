@@ -32,9 +32,9 @@ LOOK_EVERY = 0.1
 
 EXAMPLES = """\b
 Examples:
-  lfs10d scan /dev/ttyUSB0                          all ids at 9600 and 19200 baud, about a minute
-  lfs10d scan /dev/ttyUSB0 --ids 1-20               the first twenty ids, a few seconds
-  lfs10d scan /dev/ttyUSB0 --baudrate 9600 --json   one rate, for programs
+  lfs10d scan /dev/ttyUSB0                  all ids at both rates, a minute
+  lfs10d scan /dev/ttyUSB0 --ids 1-20       twenty ids, a few seconds
+  lfs10d scan /dev/ttyUSB0 --baudrate 9600  one rate
 """
 
 

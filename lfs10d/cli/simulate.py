@@ -27,18 +27,18 @@ if TYPE_CHECKING:
 
 EXAMPLES = """\b
 Examples:
-  lfs10d simulate --link /tmp/line0                       eight sensors in moving wind
+  lfs10d simulate --link /tmp/line0                       eight sensors
   lfs10d simulate --link /tmp/line0 --slaves 1-4,255      these ids
   lfs10d simulate --link /tmp/line0 --faults faults.yaml  some of them ill
   lfs10d read /tmp/line0 3                                in another terminal
 
-\b
-A faults file:
+  \b
+  A faults file:
   slaves:
-    3: silent
-    4: [{fault: noisy, rate: 0.1}]
-    5: [{fault: silent, after: 10s, for: 5s}]
-SIGUSR1 takes the power from all sensors for a moment.
+  3: silent
+  4: [{fault: noisy, rate: 0.1}]
+  5: [{fault: silent, after: 10s, for: 5s}]
+  SIGUSR1 takes the power from all sensors for a moment.
 """
 
 

@@ -46,10 +46,10 @@ LARGEST_STATUS: Final = 2**22
 
 EXAMPLES = """\b
 Examples:
-  lfs10d watch                       the service's line
-  lfs10d watch -c site.yaml          the line of another daemon
-  lfs10d watch | grep mast-top       one line for each new value of one sensor
-  lfs10d watch --json                the same for programs
+  lfs10d watch                  the service's line
+  lfs10d watch -c site.yaml     the line of another daemon
+  lfs10d watch | grep mast-top  one line for each new value of one sensor
+  lfs10d watch --json           the same for programs
 """
 
 

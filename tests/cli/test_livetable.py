@@ -118,7 +118,7 @@ def test_one_that_just_came_or_went_is_marked_for_five_seconds(online: bool, mar
         (bad("a", 2, "config_conflict"), "config_conflict, two devices with one id"),
         (bad("a", 2, "something new"), "offline: something new"),
         (bad("a", 2, None), "not heard yet"),
-        (bad("a", 2, "starting"), "not heard yet"),
+        (bad("a", 2, "starting"), "starting, not polled yet"),
         (bad("a", 2, alarm={"active": False, "code": None}), "offline: timeout, no answer"),
         (bad("a", 2, alarm=AN_HOUR_AGO), "offline: timeout, no answer; since 20:53"),
         (bad("a", 2, alarm={**AN_HOUR_AGO, "since": 0}), "offline: timeout, no answer; since 1 Jan 00:00"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -36,16 +37,33 @@ def test_an_unreadable_configuration_is_a_configuration_error(tmp_path: Path, ve
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("arguments", [[], ["--merged"], ["--json"]])
-def test_a_state_directory_that_may_not_be_read_is_told_with_exit_code_1(tmp_path: Path, arguments: list[str]) -> None:
+def config_of_another(tmp_path: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Print the configuration where the state directory, `tmp_path`/state, may not be read."""
     file, state = tmp_path / "lfs10d.yaml", tmp_path / "state"
     file.write_text(TEXT)
     state.mkdir()
     (state / "changes.yaml").write_text("version: 1\n")
     state.chmod(0)
     try:
-        done = unprivileged("config", "-c", str(file), "--state-dir", str(state), *arguments)
+        return unprivileged("config", "-c", str(file), "--state-dir", str(state), *arguments)
     finally:
         state.chmod(0o700)
+
+
+def test_who_may_not_read_the_state_directory_is_shown_the_file_s_part_and_told_what_is_missing(tmp_path: Path) -> None:
+    """The contract's words; before, nothing was shown."""
+    done = config_of_another(tmp_path)
+    assert done.returncode == 1
+    assert "mqtt.host" in done.stdout
+    why = f"{tmp_path}/state/changes.yaml cannot be read: permission denied"
+    assert done.stderr == f"lfs10d: {why}; what requests changed is missing here: call it as root\n"
+    (again := tmp_path / "again").mkdir()
+    done = config_of_another(again, "--json")
+    assert (done.returncode, json.loads(done.stdout)["config"]["mqtt"]["host"]) == (1, "localhost")
+    assert "permission denied" in json.loads(done.stdout)["missing"]
+
+
+def test_yaml_to_put_into_the_file_is_never_half_of_it(tmp_path: Path) -> None:
+    done = config_of_another(tmp_path, "--merged")
     assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr == f"lfs10d: {state}/changes.yaml cannot be read: permission denied\n"
+    assert done.stderr == f"lfs10d: {tmp_path}/state/changes.yaml cannot be read: permission denied\n"
