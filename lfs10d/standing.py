@@ -133,7 +133,7 @@ class Standing:
         """Return the state that waited, if its time has come."""
         if self.state_due is None or self.state_due > now.mono:
             return None
-        return self._state(now)
+        return self._state(now, refresh=True)
 
     def burst(self, now: Instant) -> list[Publication]:
         """Return every retained topic of this device."""
@@ -147,7 +147,7 @@ class Standing:
 
     def stats(self, now: Instant) -> Publication:
         """Return the statistics."""
-        return retained(self._topics[STATS], self.tally.payload(now.ts()), qos=0)
+        return retained(self._topics[STATS], self.tally.payload(now.ts()), qos=0, refresh=True)
 
     def snapshot(self, now: Instant) -> dict[str, object]:
         """Return what a live view shows of this device; `age_s` is the age of the last good reading."""
@@ -199,8 +199,10 @@ class Standing:
         turned, self.online = online is not self.online, online
         if turned and online:
             published.append(self._availability())
-        if sample.error != shown.error or sample.quality != shown.quality or now.mono >= self._state_from - STATE_EARLY:
+        if sample.error != shown.error or sample.quality != shown.quality:
             published.append(self._state(now))
+        elif now.mono >= self._state_from - STATE_EARLY:
+            published.append(self._state(now, refresh=True))
         else:
             self.state_due = self._state_from
         if turned and not online:
@@ -210,12 +212,12 @@ class Standing:
     def _telling(self, sample: Sample, payload: dict[str, object]) -> Publication:
         return Publication(self._telemetry, payload, Kind.SAMPLE, retain=False, qos=1, sample=sample)
 
-    def _state(self, now: Instant) -> Publication:
-        """Return the newest state, which is then shown."""
+    def _state(self, now: Instant, *, refresh: bool = False) -> Publication:
+        """Return the newest state, which is then shown; `refresh`: quality and error are those shown before."""
         on_time = abs(now.mono - self._state_from) <= STATE_EARLY
         self._state_from = (self._state_from if on_time else now.mono) + STATE_EVERY
         self.state_due = None
-        return retained(self._topics[STATE], self._payload)
+        return retained(self._topics[STATE], self._payload, refresh=refresh)
 
     def _availability(self) -> Publication:
         return retained(self._topics[AVAILABILITY], "online" if self.online else "offline")

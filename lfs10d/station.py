@@ -340,4 +340,4 @@ class Station:
             gap_required=self._line.gap_required,
             backlog=self._backlog(),
         )
-        return retained(LINE_STATS, payload, qos=0)
+        return retained(LINE_STATS, payload, qos=0, refresh=True)

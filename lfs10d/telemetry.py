@@ -121,7 +121,8 @@ class Publication:
     """One message for the broker; `topic` is under `B`.
 
     `payload` is an object or an array to be written as JSON, a bare word, or None to clear a retained topic.
-    `sample` is set for kind SAMPLE alone, whose topic is `device/<name>/telemetry`.
+    `sample` is set for kind SAMPLE alone, whose topic is `device/<name>/telemetry`. `refresh`: only newer figures of a
+    retained topic, which may wait where the broker is slow and be replaced by the next.
     """
 
     topic: str
@@ -130,6 +131,7 @@ class Publication:
     retain: bool
     qos: int
     sample: Sample | None = None
+    refresh: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,9 +143,9 @@ class Backlog:
     dropped: int = 0
 
 
-def retained(topic: str, payload: Payload, *, qos: int = 1) -> Publication:
+def retained(topic: str, payload: Payload, *, qos: int = 1, refresh: bool = False) -> Publication:
     """Return a retained publication; payload None clears the topic."""
-    return Publication(topic, payload, Kind.RETAINED, retain=True, qos=qos)
+    return Publication(topic, payload, Kind.RETAINED, retain=True, qos=qos, refresh=refresh)
 
 
 def event(kind: str, ts: int, **facts: object) -> Publication:

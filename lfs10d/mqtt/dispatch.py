@@ -166,6 +166,16 @@ class Dispatch:
             self._outbox.settled(sent.letter, self._now(), heard=reason != NO_MATCHING_SUBSCRIBERS)
         else:
             self._refused(sent, reason)
+        congested = self._outbox.congested(self._now())
+        if congested is not None:
+            log.warning(
+                "the way to the broker carries about %.3g messages a second (round trip %.3g s, %d under way at most), "
+                "less than is published: states come less often, and samples that find no room follow as history; "
+                "see mqtt.telemetry, mqtt.state_every and poll.interval",
+                congested.rate,
+                congested.round_trip,
+                congested.window,
+            )
         if self._outbox.waits:
             self.wake()
 
@@ -210,7 +220,7 @@ class Dispatch:
     def _send_a_few(self) -> bool:
         """Send up to `LETTERS_AT_ONCE`; return whether nothing more may go now."""
         for _ in range(LETTERS_AT_ONCE):
-            letter = self._outbox.next(self._now())
+            letter = self._outbox.next(self._now(), past=self._assembly is None)
             if letter is None:
                 return True
             if isinstance(letter, Array):

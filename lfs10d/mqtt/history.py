@@ -64,6 +64,10 @@ class History:
     def __len__(self) -> int:
         return self._count
 
+    def __contains__(self, key: Key) -> bool:
+        """Tell whether a sample of this device and boot waits."""
+        return key in self._shelves
+
     def add(self, kept: Kept) -> None:
         """Put one sample in its place."""
         shelf = self._shelves.setdefault(kept.key, [])

@@ -2,13 +2,15 @@
 
 The rules (contract, section 3):
 
-1. Classes in order: retained topics; responses and events, and live samples, in turn where both wait, so that a flood
-   of requests delays no sample; traces; the past; what clears a retained topic. Within a class the oldest goes first.
+1. Classes by weight (`turns`): changes of retained topics, responses and events, and live samples 8 each; the past 8,
+   and more while its backlog does not shrink (`drain`); refreshes of retained topics (newer figures, nothing else) 4;
+   traces, and what clears a retained topic, 1. The first three go before the others until the window was full; then
+   all go in turn until nothing waits: each class goes on, and refreshes come less often. Within a class the oldest
+   goes first; live samples device by device.
 2. Of a retained topic only the newest version waits, and no second version goes while the first is under way.
-   After a connect the whole burst goes first; its `last` (availability) only when all of it is settled, and
-   everything else only after that.
-3. A sample that is older than 3 s when its turn comes belongs to the past, whose rules are in `past`; live samples
-   never wait behind more than one array of it.
+   After a connect the whole burst goes first, and everything else only after that, but for no longer than 10 s; its
+   `last` (availability) goes when all of it is settled.
+3. A sample that is older than 3 s when its turn comes belongs to the past, whose rules are in `past`.
 4. A letter leaves for ever when it is settled (PUBACK). A connection lost puts all that was under way back.
 5. At most `capacity` samples wait in memory. Beyond that those go first that are only repeated, then the oldest,
    which are declared.
@@ -34,21 +36,26 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import replace
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from lfs10d import telemetry
+from lfs10d.mqtt.congestion import Congestion
 from lfs10d.mqtt.history import Kept
 from lfs10d.mqtt.letters import Array, Declaration, Letter, Live, Message, Retained, samples_of
+from lfs10d.mqtt.livequeue import LiveQueue
 from lfs10d.mqtt.past import Past
 from lfs10d.mqtt.refusals import BANNED_FOR, Refusals
 from lfs10d.mqtt.retention import Retention
 from lfs10d.mqtt.suspects import Suspects
+from lfs10d.mqtt.turns import Turns
 from lfs10d.telemetry import Kind, Publication
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
     from collections.abc import Set as AbstractSet
 
+    from lfs10d.mqtt.congestion import Congested
     from lfs10d.mqtt.suspects import Culprit
 
 CAPACITY = 10_000
@@ -63,6 +70,20 @@ MESSAGES_MOST = 1000
 IN_FLIGHT_MOST = 20
 """Letters under way; mosquitto's own default for `max_inflight_messages`."""
 
+BURST_FIRST = 10.0
+"""Seconds for which a burst keeps everything else back; what follows in turn then is no smaller for it."""
+
+CHANGES, MESSAGES, LIVE, PAST, REFRESHES, TRACES, CLEARINGS = range(7)
+"""The classes, as `Turns` numbers them."""
+
+FIRST_CLASSES = PAST
+"""Those below go before the others while the window has room for all."""
+
+WEIGHT = 8
+REFRESH_WEIGHT = 4
+LEAST_WEIGHT = 1
+"""Weights of the classes (rule 1)."""
+
 
 class Outbox:
     """The rules above. `detection`: seconds in which a dead connection is noticed at the latest."""
@@ -70,12 +91,13 @@ class Outbox:
     def __init__(self, *, capacity: int = CAPACITY, detection: float = 40.0) -> None:
         self._capacity = capacity
         self._window = 0  # 0: not connected
-        self._under_way: dict[Letter, None] = {}
+        self._under_way: dict[Letter, float] = {}  # since when
         self._retention = Retention()
         self._messages: deque[Message] = deque(maxlen=MESSAGES_MOST)
-        self._live: deque[Live] = deque()
+        self._live = LiveQueue()
         self._traces: deque[Message] = deque(maxlen=MESSAGES_MOST)
-        self._message_went = False
+        self._burst_until: float | None = None
+        self._congestion = Congestion()
         self._refusals = Refusals()
         self._refused = self._refusals.topics
         self._passed_over: deque[Message] = deque(maxlen=MESSAGES_MOST)
@@ -86,6 +108,18 @@ class Outbox:
         """What may have ended the last connection."""
         self.past = Past(capacity=capacity, detection=detection)
         """What is no longer live."""
+        self._classes: dict[int, Callable[[float], Letter | None]] = {
+            CHANGES: lambda _now: self._retention.next_change(self._refused),
+            MESSAGES: lambda _now: self._next_message(self._messages),
+            LIVE: lambda _now: self._next_live(),
+            PAST: self._next_past,
+            REFRESHES: lambda _now: self._retention.next_refresh(self._refused),
+            TRACES: lambda _now: self._next_message(self._traces),
+            CLEARINGS: lambda _now: self._retention.next_clearing(self._refused),
+        }
+        self._turns = Turns(len(self._classes))
+        self._past_may_go = True
+        self._narrow = False  # the window was full, and not everything has gone since
 
     # What comes in
 
@@ -97,17 +131,22 @@ class Outbox:
         `shift` is the wall clock less the monotonic one now, in ms.
         """
         if publication.sample is not None:
-            self._live.append(Live(publication, Kept(publication.sample, now, shift=shift)))
+            self._live.add(Live(publication, Kept(publication.sample, now, shift=shift)))
             self.age(now)
             self._make_room()
         elif publication.kind is Kind.RETAINED:
-            if self._window or publication.payload is None:
-                self._retention.add(publication)
+            if (self._window or publication.payload is None) and self._retention.add(publication):
+                self._displaced(now)
         elif publication.kind is Kind.TRACE:
             if self._window:
                 self._traces.append(Message(publication))
         else:
             self._messages.append(Message(publication, correlation))
+
+    def _displaced(self, now: float) -> None:
+        """Note that a state was replaced or a sample grew old while it waited."""
+        if self.announced and len(self._under_way) >= self._window:
+            self._congestion.displaced(now)
 
     def burst(self, publications: Iterable[Publication], last: Publication) -> None:
         """Send all retained topics, then `last`, then everything else."""
@@ -118,7 +157,9 @@ class Outbox:
     def connected(self, now: float, *, window: int = IN_FLIGHT_MOST) -> None:
         """Begin to send: at most `window` letters under way at once. `burst` is to follow."""
         self._window = window
-        self.past.connected(now)
+        self._burst_until = None
+        self._congestion.connected()
+        self.past.connected(now, window)
         self._lift(self._refusals.connected(now))
 
     def lost(self, now: float, culprit: Culprit | None = None, *, denied: bool = False) -> None:
@@ -164,22 +205,27 @@ class Outbox:
                 if publication.qos and len(self._messages) < MESSAGES_MOST:
                     self._messages.appendleft(letter)
             case Live():
-                self._live.appendleft(letter)
+                self._live.put_back(letter)
             case _:
                 self.past.put_back(letter)
 
     # What goes out
 
-    def next(self, now: float) -> Letter | None:
-        """Take what goes next; it is under way until settled, refused, unfit or lost. None: nothing goes now."""
+    def next(self, now: float, *, past: bool = True) -> Letter | None:
+        """Take what goes next; it is under way until settled, refused, unfit or lost. None: nothing goes now.
+
+        `past`: the array before is on its way, so that another may follow.
+        """
         if self._alone is not None:
             return self._next_alone()
         if len(self._under_way) >= self._window:
+            self._narrow = True
             return None
+        self._past_may_go = past
         letter = self._next(now)
         if letter is None:
             return None
-        self._under_way[letter] = None
+        self._under_way[letter] = now
         if not self.suspects.goes_alone(letter.topic):
             return letter
         self._alone, self._alone_went = letter, False
@@ -194,21 +240,59 @@ class Outbox:
 
     def _next(self, now: float) -> Letter | None:
         self._lift_due(now)
-        retained = self._retention.next(self._refused)
-        if retained is not None or self._retention.first:
-            return retained
+        if self._keeps_back(now):
+            retained = self._retention.next_change(self._refused)
+            if retained is not None or self._retention.first:
+                return retained
         self.age(now)
-        in_turn = (self._live, self._messages) if self._message_went else (self._messages, self._live)
-        queues: tuple[deque[Message] | deque[Live], ...] = (*in_turn, self._traces)
-        for queue in queues:
-            while queue:
-                letter = queue.popleft()
-                if letter.topic not in self._refused:
-                    self._message_went = queue is self._messages
-                    return letter
-                self._wait_for_topic(letter)
+        for number in self._turns.order(first=None if self._narrow else FIRST_CLASSES):
+            letter = self._classes[number](now)
+            if letter is None:
+                self._turns.passed(number)
+            else:
+                self._turns.went(number, self._weight(number))
+                return letter
+        self._narrow = False
+        return None
+
+    def _keeps_back(self, now: float) -> bool:
+        """Tell whether nothing but the burst may go now."""
+        if not self._retention.first:
+            self._burst_until = None
+            return False
+        if self._burst_until is None:
+            self._burst_until = now + BURST_FIRST
+        return now < self._burst_until
+
+    def _weight(self, number: int) -> int:
+        """Return the weight of a class; what is left of a burst has as much as samples and past together."""
+        bursting = self._retention.first
+        if number == CHANGES:
+            return 2 * WEIGHT if bursting else WEIGHT
+        if number == PAST:
+            return WEIGHT if bursting else WEIGHT * self.past.drain.level
+        if number in (MESSAGES, LIVE):
+            return WEIGHT
+        return REFRESH_WEIGHT if number == REFRESHES else LEAST_WEIGHT
+
+    def _next_message(self, queue: deque[Message]) -> Letter | None:
+        while queue:
+            letter = queue.popleft()
+            if letter.topic not in self._refused:
+                return letter
+            self._wait_for_topic(letter)
+        return None
+
+    def _next_live(self) -> Letter | None:
+        while (letter := self._live.take()) is not None:
+            if letter.topic not in self._refused:
+                return letter
+            self._wait_for_topic(letter)
+        return None
+
+    def _next_past(self, now: float) -> Letter | None:
         self._repeat(now)
-        return self.past.next(now, self._refused) or self._retention.next_clearing(self._refused)
+        return self.past.next(now, self._refused) if self._past_may_go else None
 
     def _wait_for_topic(self, letter: Message | Live) -> None:
         """Let a letter wait until its topic is passed over no longer; a sample may go with the past."""
@@ -250,10 +334,16 @@ class Outbox:
 
     def settled(self, letter: Letter, now: float, *, heard: bool = True) -> None:
         """Note that the broker has it; `heard`: it did not say that nobody listens."""
+        if isinstance(letter, Live | Array):
+            self._congestion.answered(now - self._under_way[letter])
         self._over(letter)
         self._refusals.accepted(letter.topic)
         self._repeat(now)
         self.past.settled(letter, now, heard=heard)
+
+    def congested(self, now: float) -> Congested | None:
+        """Return once what the window carries, where that is less than what is published."""
+        return self._congestion.report(now, self._window)
 
     def refused(self, letter: Letter, reason: int, now: float) -> bool:
         """Note that the broker refused it, not as `UNFIT` (`refusals`); return True if its topic is to be reported."""
@@ -293,7 +383,7 @@ class Outbox:
     def shorten(self, array: Array, count: int) -> Array:
         """Return an array of its first `count` samples, under way in its place; the others wait again."""
         shorter = self.past.shorten(array, count)
-        self._under_way = {shorter if letter is array else letter: None for letter in self._under_way}
+        self._under_way = {shorter if letter is array else letter: at for letter, at in self._under_way.items()}
         if self._alone is array:
             self._alone = shorter
         return shorter
@@ -356,33 +446,44 @@ class Outbox:
         """What `line/stats` says of it."""
         oldest_ts = self.past.stored.oldest()
         if oldest_ts is None:
-            waiting = [*self._under_way_alone(), *self.past.waiting(), *(live.kept for live in list(self._live)[:1])]
+            under_way = chain.from_iterable(self._under_way_alone())
+            waiting = [*under_way, *self.past.waiting(), *self._oldest_live()]
             first = min(waiting, key=lambda kept: kept.since, default=None)
             oldest_ts = first.sample.ts if first else None
         return telemetry.Backlog(self.depth, oldest_ts, self.dropped)
 
     def _in_memory(self) -> int:
         """Return how many samples are in memory alone."""
-        return len(self._live) + len(self.past) + sum(1 for _ in self._under_way_alone())
+        return len(self._live) + len(self.past) + sum(len(samples) for samples in self._under_way_alone())
 
-    def _under_way_alone(self) -> Iterator[Kept]:
-        """Return the samples under way that are not in the store."""
+    def _under_way_alone(self) -> Iterator[tuple[Kept, ...]]:
+        """Return the samples under way that are not in the store, letter by letter: all of one are, or none is."""
         for letter in self._under_way:
-            yield from (kept for kept in samples_of(letter) if kept.row is None)
+            samples = samples_of(letter)
+            if samples and samples[0].row is None:
+                yield samples
+
+    def _oldest_live(self) -> list[Kept]:
+        first = self._live.oldest()
+        return [] if first is None else [first.kept]
 
     def next_old(self) -> float | None:
         """Return when the oldest live sample becomes history; None: there is none."""
-        return self._live[0].kept.since + LIVE_FOR if self._live else None
+        first = self._live.oldest()
+        return None if first is None else first.kept.since + LIVE_FOR
 
     def age(self, now: float) -> None:
         """Let live samples that are too old for it wait with the past."""
-        while self._live and now - self._live[0].kept.since > LIVE_FOR:
-            self.past.history.add(self._live.popleft().kept)
+        while (live := self._live.oldest()) is not None and now - live.kept.since > LIVE_FOR:
+            self._live.take_oldest()
+            self.past.history.add(live.kept)
+            self._displaced(now)
 
     def _make_room(self) -> None:
         history = self.past.history
         while self._in_memory() > self._capacity and (history or self._live):
-            kept = history.evict() if history else self._live.popleft().kept
+            live = None if history else self._live.take_oldest()
+            kept = history.evict() if live is None else live.kept
             if kept is not None:
                 self.past.losses.add(kept.sample)
 
@@ -395,7 +496,7 @@ class Outbox:
 
     def correct(self, shift: int) -> None:
         """Give what waits the time that the clock tells now that it is synchronised; `shift` as in `add`."""
-        self._live = deque(_corrected(live, shift) for live in self._live)
+        self._live.change(lambda live: _corrected(live, shift))
         self.past.correct(shift)
 
 

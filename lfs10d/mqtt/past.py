@@ -4,7 +4,8 @@ The rules (contract, section 3):
 
 1. The past is opened 10 s after a connect: subscribers come back later than we do. First what was lost is declared;
    then it goes oldest first, by boot and seq: what lies in the store, then what waits in memory. One device and one
-   boot per array, one array under way at a time and at most ten a second.
+   boot per array, at most 1000 samples a second, and as many arrays under way at a time as `drain` says: one, as long
+   as the backlog shrinks. One more goes whenever none has gone for 2 s.
 2. What was acknowledged from 10 s before a loss until the past is opened goes once more, in its place by seq, because
    an acknowledgement of a broker that dies is not durable. After the first connect of a life so does what
    was acknowledged until then with the word that nobody listens: after a power cut subscribers are late there too.
@@ -23,6 +24,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from lfs10d import telemetry
+from lfs10d.mqtt.drain import Drain
 from lfs10d.mqtt.history import History, Kept
 from lfs10d.mqtt.letters import Array, Declaration, samples_of
 from lfs10d.mqtt.losses import Losses
@@ -41,8 +43,14 @@ ARRAY_MOST = 100
 ARRAY_BYTES = 8000
 """Bytes of one history array at most (contract, section 3)."""
 
-ARRAY_EVERY = 0.1
-"""Seconds from one history array to the next: the bounded rate of the contract, 1000 samples a second."""
+SAMPLE_EVERY = 0.001
+"""Seconds from one history array to the next, per sample of the first: the bounded rate, 1000 samples a second."""
+
+AT_ONCE = 1.0
+"""Seconds of that rate which may go at once where several arrays may be under way: there is room for them at once."""
+
+TURN_EVERY = 2.0
+"""Seconds after which one more array goes though others are under way (contract, section 3)."""
 
 PAST_AFTER = 10.0
 """Seconds after a connect at which the past is opened (contract, section 3)."""
@@ -69,7 +77,9 @@ class Past:
         self._array_at = 0.0
         self._array_most = ARRAY_MOST
         self._limit, self._limit_until = ARRAY_MOST, float("-inf")
-        self._under_way: Array | Declaration | None = None
+        self._window = 1
+        self._turn_at = 0.0
+        self._under_way: dict[Array | Declaration, None] = {}
         self._acknowledged: deque[tuple[float, Kept]] = deque(maxlen=capacity)
         self._unheard: deque[tuple[float, Kept]] = deque(maxlen=capacity)
         self._repeat = False
@@ -81,13 +91,18 @@ class Past:
         """What waits in the store."""
         self.losses = Losses()
         """What will never come."""
+        self.drain = Drain()
+        """How much of the window the past takes."""
 
     # The connection
 
-    def connected(self, now: float) -> None:
-        """Note that the broker is there."""
+    def connected(self, now: float, window: int) -> None:
+        """Note that the broker is there, and takes `window` messages at once."""
         self._connected = True
         self._open_from = self._array_at = now + PAST_AFTER
+        self._turn_at = self._open_from + TURN_EVERY
+        self._window = window
+        self.drain.begin(self._open_from)
         self._array_most = self._limit if now < self._limit_until else ARRAY_MOST
         self.losses.connected()
 
@@ -101,7 +116,7 @@ class Past:
         self._acknowledged.extend(self._unheard)
         self._unheard.clear()
         self._repeat = True
-        self._under_way = None
+        self._under_way.clear()
         self.stored.rewind()
 
     def part(self) -> None:
@@ -115,21 +130,36 @@ class Past:
 
     def next(self, now: float, refused: AbstractSet[str]) -> Array | Declaration | None:
         """Take what goes next, after `repeat`; None: nothing. Topics that are `refused` are passed over."""
-        if now < self._open_from or self._under_way is not None:
+        if now < self._open_from:
             return None
-        if telemetry.EVENT not in refused:
+        if telemetry.EVENT not in refused and not self._declaring:
             loss = self.losses.take(now)
             if loss is not None:
-                self._under_way = Declaration(loss)
-                return self._under_way
-        if now < self._array_at:
+                declaration = Declaration(loss)
+                self._under_way[declaration] = None
+                return declaration
+        if now < max(self._array_at, self._free_at):
             return None
         samples = self._take(_devices(refused))
         if not samples:
             return None
-        self._array_at = now + ARRAY_EVERY
-        self._under_way = Array(samples)
-        return self._under_way
+        at_once = AT_ONCE if self.drain.level > 1 else 0.0
+        self._array_at = max(self._array_at, now - at_once) + SAMPLE_EVERY * len(samples)
+        self._turn_at = now + TURN_EVERY
+        array = Array(samples)
+        self._under_way[array] = None
+        waiting = self.history if samples[0].row is None else self.stored.page
+        self.drain.taken(full=self.stored.more or array.samples[0].key in waiting)
+        return array
+
+    @property
+    def _declaring(self) -> bool:
+        return any(isinstance(each, Declaration) for each in self._under_way)
+
+    @property
+    def _free_at(self) -> float:
+        """When the next array may go for what is under way."""
+        return float("-inf") if len(self._under_way) < self.drain.arrays(self._window) else self._turn_at
 
     def _take(self, passed_over: AbstractSet[str]) -> tuple[Kept, ...]:
         if self.stored.page:
@@ -141,9 +171,8 @@ class Past:
 
     def lifted(self) -> None:
         """Try again what was passed over: topics are refused no longer."""
-        array = self._under_way
-        rows = samples_of(array) if isinstance(array, Array) else ()
-        self.stored.read_again(kept.row for kept in rows if kept.row is not None)
+        under_way = (kept.row for each in self._under_way for kept in samples_of(each))
+        self.stored.read_again(row for row in under_way if row is not None)
 
     def repeat(self, now: float) -> bool:
         """Once the past is open, let what rule 2 says wait once more; return True if it does."""
@@ -160,27 +189,27 @@ class Past:
 
     def due(self, refused: AbstractSet[str]) -> float | None:
         """Return when `next` may have something though nothing happens before; None: not by time alone."""
-        if self._under_way is not None:
-            return None
-        declared = self.losses.due() if telemetry.EVENT not in refused else None
+        declared = self.losses.due() if telemetry.EVENT not in refused and not self._declaring else None
         times = [] if declared is None else [declared]
         again = self._acknowledged if self._repeat else self._unheard
         in_memory = not self.stored.more and (again or self.history.waits(_devices(refused)))
         if self.stored.page or in_memory:
-            times.append(self._array_at)
+            times.append(max(self._array_at, self._free_at))
         return max(self._open_from, min(times)) if times else None
 
     # What became of it
 
     def over(self, letter: Letter) -> None:
         """Note that a letter is no longer under way."""
-        if letter is self._under_way:
-            self._under_way = None
+        if isinstance(letter, Array | Declaration):
+            self._under_way.pop(letter, None)
 
     def settled(self, letter: Letter, now: float, *, heard: bool = True) -> None:
         """Note that the broker has it; `heard`: it did not say that nobody listens."""
         if not self._repeat:
             self._forget(now - AGAIN_WITHIN)
+        if isinstance(letter, Array) and self.drain.settled(now):
+            self.drain.look(now, len(self) + self.stored.depth)
         rows = [kept.row for kept in samples_of(letter) if kept.row is not None]
         if rows:
             self.stored.settled(rows, now)
@@ -215,7 +244,10 @@ class Past:
     def shorten(self, array: Array, count: int) -> Array:
         """Return an array of its first samples to be under way in its place; the others wait again."""
         self._wait(array.samples[count:])
-        self._under_way = shorter = Array(array.samples[:count])
+        shorter = Array(array.samples[:count])
+        self._under_way = {shorter if each is array else each: None for each in self._under_way}
+        self._array_at -= SAMPLE_EVERY * (len(array.samples) - count)
+        self.drain.taken(full=True)
         return shorter
 
     def refused(self, array: Array) -> None:
@@ -281,7 +313,7 @@ class Past:
     @property
     def beyond(self) -> int:
         """The id of the last row that the store may not evict: it is in the page or under way, or one before it is."""
-        under_way = isinstance(self._under_way, Array) and self._under_way.samples[0].row is not None
+        under_way = any(isinstance(each, Array) and each.samples[0].row is not None for each in self._under_way)
         return 0 if self.stored.left and not (self.stored.page or under_way) else self.stored.after
 
     def page_due(self) -> float | None:
@@ -291,7 +323,7 @@ class Past:
 
     def undeclared(self) -> list[Loss]:
         """Return the losses that are not declared, one under way included."""
-        under_way = [self._under_way.loss] if isinstance(self._under_way, Declaration) else []
+        under_way = [each.loss for each in self._under_way if isinstance(each, Declaration)]
         return under_way + self.losses.waiting()
 
     def correct(self, shift: int) -> None:

@@ -1,6 +1,8 @@
 """The retained topics that wait: the newest version of each, a burst of all of them, and what goes last in it. Pure.
 
-What clears a topic waits apart and goes when nothing else does: there may be thousands. What the broker refuses is
+Changes and refreshes (`Publication.refresh`: only newer figures) wait apart, each in the order in which they came. A
+refresh of a topic whose change waits replaces that version in its place; a change takes the place of a refresh. What
+clears a topic waits apart too: there may be thousands. What the broker refuses is
 kept apart until its topic is tried again.
 """
 
@@ -21,7 +23,8 @@ class Retention:
     """Of each topic one version waits and one is under way at most."""
 
     def __init__(self) -> None:
-        self._waiting: dict[str, Retained] = {}
+        self._changes: dict[str, Retained] = {}
+        self._refreshes: dict[str, Retained] = {}
         self._clearings: dict[str, Retained] = {}
         self._passed_over: dict[str, Retained] = {}
         self._under_way: set[str] = set()
@@ -31,7 +34,7 @@ class Retention:
 
     def __bool__(self) -> bool:
         """Tell whether anything waits."""
-        return bool(self._waiting or self._clearings) or self._last is not None
+        return bool(self._changes or self._refreshes or self._clearings) or self._last is not None
 
     @property
     def announced(self) -> bool:
@@ -43,14 +46,22 @@ class Retention:
         """Nothing else may go now: the `last` of a burst waits for its turn."""
         return self._last is not None
 
-    def add(self, publication: Publication) -> None:
-        """Take the newest version of a topic."""
+    def add(self, publication: Publication) -> bool:
+        """Take the newest version of a topic; return True if it replaces a refresh that still waited."""
+        replaced = publication.topic in self._refreshes
         self._wait(Retained(publication))
+        return replaced
 
     def _wait(self, letter: Retained) -> None:
-        clearing = letter.publication.payload is None
-        (self._waiting if clearing else self._clearings).pop(letter.topic, None)
-        (self._clearings if clearing else self._waiting)[letter.topic] = letter
+        topic, queue = letter.topic, self._changes
+        if letter.publication.payload is None:
+            queue = self._clearings
+        elif letter.publication.refresh and topic not in self._changes:
+            queue = self._refreshes
+        for other in (self._changes, self._refreshes, self._clearings):
+            if other is not queue:
+                other.pop(topic, None)
+        queue[topic] = letter
 
     def burst(self, publications: Iterable[Publication], last: Publication) -> None:
         """Take all topics, then `last`."""
@@ -60,9 +71,9 @@ class Retention:
                 self._burst.add(publication.topic)
         self._last = self._closing = Retained(last)
 
-    def next(self, refused: AbstractSet[str]) -> Retained | None:
-        """Take what goes next, nothing that clears a topic; topics the broker refuses are passed over."""
-        letter = self._take(self._waiting, refused)
+    def next_change(self, refused: AbstractSet[str]) -> Retained | None:
+        """Take the change, or the `last` of the burst, that goes next; topics the broker refuses are passed over."""
+        letter = self._take(self._changes, refused)
         if letter is not None:
             return letter
         if self._burst or self._last is None or self._last.topic in self._under_way:
@@ -74,6 +85,10 @@ class Retention:
             return None
         self._under_way.add(last.topic)
         return last
+
+    def next_refresh(self, refused: AbstractSet[str]) -> Retained | None:
+        """Take the refresh that goes next."""
+        return self._take(self._refreshes, refused)
 
     def next_clearing(self, refused: AbstractSet[str]) -> Retained | None:
         """Take what clears a topic."""
@@ -101,7 +116,7 @@ class Retention:
         self._wait_unless_newer(letter)
 
     def _wait_unless_newer(self, letter: Retained) -> None:
-        if letter.topic not in self._waiting and letter.topic not in self._clearings:
+        if not any(letter.topic in queue for queue in (self._changes, self._refreshes, self._clearings)):
             self._wait(letter)
 
     def over(self, letter: Retained) -> None:
@@ -116,7 +131,8 @@ class Retention:
         self._under_way.clear()
         self._burst.clear()
         self._last = self._closing = None
-        self._waiting.clear()
+        self._changes.clear()
+        self._refreshes.clear()
         self._passed_over = {
             topic: each for topic, each in self._passed_over.items() if each.publication.payload is None
         }

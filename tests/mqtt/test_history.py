@@ -119,3 +119,13 @@ def test_what_is_cleared_is_gone() -> None:
     history.extend([kept("a", 1), kept("b", 1, repeated=True)])
     history.clear()
     assert (len(history), history.take(9), history.evict()) == (0, (), None)
+
+
+def test_it_tells_whether_a_sample_of_a_key_waits() -> None:
+    history = History()
+    one = kept("a", 1)
+    assert one.key not in history
+    history.add(one)
+    assert one.key in history
+    history.take(1)
+    assert one.key not in history

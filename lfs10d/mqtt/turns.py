@@ -1,0 +1,37 @@
+"""Weighted turns of the classes of messages that wait for room in the window. Pure.
+
+Stride scheduling: with each message a class advances by 1 / weight, and the least advanced class goes next; of equals
+the first. A class that had nothing to send begins level with the class that went last: it has saved up no turns and
+owes none. So a class of weight w that waits gets at least every n-th message, where n is the sum of all weights
+divided by w, rounded up, plus one for each other class.
+"""
+
+from __future__ import annotations
+
+
+class Turns:
+    """The turns of `classes` classes, numbered from 0."""
+
+    def __init__(self, classes: int) -> None:
+        self._advanced = [0.0] * classes
+        self._level = 0.0  # where the class stood that went last
+
+    def order(self, *, first: int | None = None) -> list[int]:
+        """Return the classes in the order in which they may send: the first that has a message goes.
+
+        `first`: the classes below this number go before the others now.
+        """
+        numbers = range(len(self._advanced))
+        advanced = self._advanced
+        if first is None:
+            return sorted(numbers, key=advanced.__getitem__)
+        return sorted(numbers, key=lambda each: (each >= first, advanced[each]))
+
+    def passed(self, number: int) -> None:
+        """Note that this class had its turn and nothing to send."""
+        self._advanced[number] = max(self._advanced[number], self._level)
+
+    def went(self, number: int, weight: float) -> None:
+        """Note that a message of this class goes, at this weight."""
+        self._level = max(self._level, self._advanced[number])
+        self._advanced[number] = self._level + 1.0 / weight
