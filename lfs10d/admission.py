@@ -4,6 +4,7 @@ Rules
 -----
 1. Checked in this order: empty (ignored), retained, too_large, rate_limited, invalid_json, unknown_request,
    not_allowed, repeated id, parameters. Whoever performs the request checks the rest, `busy` among it.
+   All but empty ones count towards the rate.
 2. The id of a request that passed `not_allowed` is remembered with its answer, whatever the answer is. Repeated
    with the same parameters it gets that answer again and is not executed twice; while the first still runs the
    repeat waits for its end. With other parameters it is a `duplicate_conflict`.
@@ -50,12 +51,16 @@ class Ignored:
 
 @dataclass(frozen=True, slots=True)
 class Answered:
-    """The answer is known already, after `took` s; `clear`: the request was retained and must be cleared."""
+    """The answer is known already, after `took` s; `clear`: the request was retained and must be cleared.
+
+    `flood`: it came beyond the rate.
+    """
 
     call: Call
     answer: Answer
     took: float = 0.0
     clear: bool = False
+    flood: bool = False
 
 
 @dataclass(slots=True)
@@ -101,23 +106,25 @@ class Admission(Generic[W]):
         """Judge a request; `whence` is kept for `done` if it repeats one that still runs."""
         if not payload:
             return Ignored()
+        flood = not self._within_rate(now)
         if retained:
             call = commands.read(payload)[0] if len(payload) <= LARGEST else Call()
             message = "a retained request is never executed; publish it without the retain flag"
-            return Answered(call, rejected("retained", message), clear=True)
+            return Answered(call, rejected("retained", message), clear=True, flood=flood)
         if len(payload) > LARGEST:
-            message = f"the payload has {len(payload)} bytes; {LARGEST} are allowed"
-            return Answered(Call(), rejected("too_large", message))
+            message = f"the payload has more than the {LARGEST} bytes that are allowed"
+            return Answered(Call(), rejected("too_large", message), flood=flood)
         call, problem = commands.read(payload)
-        refusal = self._refusal(name, problem, now)
+        if flood:
+            message = f"more than {RATE:g} requests a second; send it again later"
+            return Answered(call, rejected("rate_limited", message), flood=True)
+        refusal = self._refusal(name, problem)
         if refusal is not None:
             return Answered(call, refusal)
         return self._repeated(name, call, whence, now) or self._new(name, call, problem, now)
 
-    def _refusal(self, name: str, problem: Answer | None, now: float) -> Answer | None:
+    def _refusal(self, name: str, problem: Answer | None) -> Answer | None:
         """Return why the request is not obeyed, whoever asks it with whatever parameters."""
-        if not self._within_rate(now):
-            return rejected("rate_limited", f"more than {RATE:g} requests a second; send it again later")
         if problem is not None and problem.code == "invalid_json":
             return problem
         form = self._forms.get(name)

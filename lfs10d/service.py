@@ -78,7 +78,7 @@ class Service:
             case Answered(call=call, answer=answer, took=took):
                 if verdict.clear:
                     self._clear(request.topic)
-                self._log_answered(whence.name, answer, now)
+                self._log_answered(whence.name, verdict, now)
                 self._tell(whence, call, answer, took)
             case Waiting():
                 log.debug("request %s repeats one that still runs", escape(whence.name))
@@ -130,10 +130,10 @@ class Service:
         for again, where in repeats:
             self._tell(where, again, answer, 0.0)
 
-    def _log_answered(self, name: str, answer: Answer, now: float) -> None:
+    def _log_answered(self, name: str, verdict: Answered, now: float) -> None:
         """Log a request that was answered at once; of a flood only that there is one."""
-        if answer.code != "rate_limited":
-            log.info("request %s: %s", escape(name), _in_short(answer))
+        if not verdict.flood:
+            log.info("request %s: %s", escape(name), _in_short(verdict.answer))
         elif now >= self._flood_told_until:
             self._flood_told_until = now + FLOOD_TOLD_EVERY
             log.warning("more requests come in than are obeyed; those beyond are rejected")

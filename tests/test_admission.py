@@ -129,12 +129,15 @@ def test_a_retained_request_is_told_by_its_id_if_it_can_be_read() -> None:
     assert door.answered("health", b'{"id":"a",' + b" " * LARGEST + b"}", retained=True).call.id is None
 
 
-def test_retained_and_oversize_requests_use_up_nothing_of_the_rate() -> None:
+@pytest.mark.parametrize(("content", "retained"), [({}, True), (b" " * (LARGEST + 1), False)])
+def test_retained_and_oversize_requests_count_towards_the_rate_and_keep_their_code(
+    content: object, retained: bool  # noqa: FBT001 - a column of the table
+) -> None:  # fmt: skip
     door = Door()
-    for _ in range(2 * BURST):
-        door.answered("health", {}, retained=True)
-        door.answered("health", b" " * (LARGEST + 1))
-    assert isinstance(door.tell("health", {}), Ticket)
+    told = [door.answered("health", content, retained=retained) for _ in range(BURST + 2)]
+    assert {each.answer.code for each in told} == {"retained" if retained else "too_large"}
+    assert [each.flood for each in told] == [*[False] * BURST, True, True]
+    assert door.code("health", {}) == "rate_limited"
 
 
 def test_a_payload_may_have_4096_bytes_and_no_more() -> None:

@@ -278,6 +278,23 @@ def test_every_request_of_a_flood_is_answered_and_the_log_has_one_line_of_it(
     assert [record.levelname for record in caplog.records] == ["WARNING"]
 
 
+@pytest.mark.parametrize(("content", "retained"), [({}, True), (b" " * (LARGEST + 1), False)])
+def test_of_a_flood_that_is_retained_or_too_large_the_log_has_the_burst_and_one_line(
+    content: object, retained: bool, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch  # noqa: FBT001 - a column of the table
+) -> None:  # fmt: skip
+    async def scene() -> None:
+        bench = Bench()
+        monkeypatch.setattr(asyncio.get_running_loop(), "time", lambda: 0.0)  # all of it at one moment
+        for _ in range(5 * BURST):
+            bench.ask("echo", content, retained=retained)
+        assert len(bench.answered) == 5 * BURST
+
+    with caplog.at_level(logging.INFO, "lfs10d"):
+        run(scene())
+    assert len(caplog.records) == BURST + 1
+    assert caplog.records[-1].levelname == "WARNING"
+
+
 HOSTILE = "\x1b[31m\r\n\u2028\u202e"
 
 

@@ -263,7 +263,7 @@ class Connection:
         self, _c: Client, _u: object, flags: DisconnectFlags, reason: ReasonCode, _p: Properties | None
     ) -> None:
         if flags.is_disconnect_packet_from_server:
-            self._note(self._gone, reason.value, None)
+            self._note(self._gone, reason.value or None, None)  # 0: a DISCONNECT that says nothing
         else:
             unanswered = reason.value == KEEP_ALIVE_TIMEOUT
             self._note(self._gone, None, "no answer to a ping" if unanswered else self._client.trouble)

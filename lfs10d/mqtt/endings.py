@@ -23,7 +23,7 @@ REFUSED_FROM = 0x80
 """Reason codes from here on are refusals (MQTT 5.0, section 2.4)."""
 
 NOT_FOR_A_MESSAGE = frozenset(
-    {0x00, 0x04, *range(0x88, 0x8C), KEEP_ALIVE_TIMEOUT, SESSION_TAKEN_OVER}
+    {0x04, *range(0x88, 0x8C), KEEP_ALIVE_TIMEOUT, SESSION_TAKEN_OVER}
     | {0x93, 0x96, 0x97, 0x98, 0x9A, 0x9B, 0x9C, 0x9D, 0x9F, 0xA0}
 )
 """Reasons of a DISCONNECT that speak of the broker or of the connection, never of one message (section 3.14.2.1)."""
