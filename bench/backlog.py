@@ -43,7 +43,7 @@ def _made(count: int) -> Path:
             for device in range(1, DEVICES + 1)
             for seq in range(part + 1, min(part + TOGETHER, each) + 1)
         ]
-        file.append(entries, losses=(), now=now)
+        file.append(entries, losses=(), now=now, mono=0)
     file.close()
     return folder / "backlog.db"
 

@@ -56,7 +56,7 @@ def fill(folder: Path, count: int) -> None:
             for device in range(1, DEVICES + 1)
             for seq in range(part + 1, part + 21)
         ]
-        file.append(entries, losses=(), now=0)
+        file.append(entries, losses=(), now=0, mono=0)
     rows = file.rows
     file.close()
     size = (folder / "backlog.db").stat().st_size

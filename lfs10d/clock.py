@@ -28,6 +28,15 @@ PATIENCE = 2.0
 LOOK_AGAIN: dict[ClockState, float] = {"synced": 600.0, "unsynced": 15.0, "unknown": 600.0}
 """How long an answer is good for, s. A clock is usually synchronised within a minute of the network."""
 
+SOON_AFTER_START = 600.0
+"""For so long, s, nobody knowing is no answer yet: timedate1 and what it asks may still be starting."""
+
+
+def look_again(state: ClockState, age: float) -> float:
+    """Return in how many seconds to look again, `age` seconds after the start."""
+    soon = state == "unknown" and age < SOON_AFTER_START
+    return LOOK_AGAIN["unsynced" if soon else state]
+
 
 def look(*, mark: Path = MARK, question: Sequence[str] = QUESTION, patience: float = PATIENCE) -> ClockState:
     """Tell the state of the wall clock. Blocks up to `patience` seconds, so never call it on loop or line thread."""

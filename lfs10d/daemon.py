@@ -82,7 +82,10 @@ class Daemon:
         self._over = asyncio.Event()
         self._failed = False
         self._tasks = BackgroundTasks(on_failure=self._failed_inside)
-        self._moments = Moments(lambda: self._uplink.synchronised())  # noqa: PLW0108 - built below
+        self._moments = Moments(
+            synchronised=lambda: self._uplink.synchronised(),  # noqa: PLW0108 - built below
+            stepped=lambda: self._uplink.stepped(),  # noqa: PLW0108 - built below
+        )
         self._now = self._moments.now
         self._boot = boot
         self._state_directory = state_directory

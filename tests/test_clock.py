@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from lfs10d.clock import LOOK_AGAIN, judge, look
+from lfs10d.clock import LOOK_AGAIN, SOON_AFTER_START, judge, look, look_again
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -55,3 +55,9 @@ def test_on_this_machine_there_is_an_answer() -> None:
 def test_an_unsynchronised_clock_is_looked_at_most_often() -> None:
     assert LOOK_AGAIN["unsynced"] < LOOK_AGAIN["synced"]
     assert LOOK_AGAIN["unsynced"] < LOOK_AGAIN["unknown"]
+
+
+def test_soon_after_the_start_what_nobody_knows_is_looked_at_as_often() -> None:
+    assert look_again("unknown", 0.0) == look_again("unknown", SOON_AFTER_START - 1) == LOOK_AGAIN["unsynced"]
+    assert look_again("unknown", SOON_AFTER_START) == LOOK_AGAIN["unknown"]
+    assert look_again("synced", 0.0) == LOOK_AGAIN["synced"]

@@ -11,12 +11,14 @@ from bisect import insort
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
+from lfs10d.clockstep import corrects
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
     from collections.abc import Set as AbstractSet
 
     from lfs10d.loss import Key
-    from lfs10d.telemetry import Sample
+    from lfs10d.telemetry import Clock, Sample
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,11 +40,14 @@ class Kept:
         """Device and boot: one history array holds samples of one key."""
         return self.sample.device, self.sample.boot
 
-    def at(self, shift: int) -> Kept:
-        """Return it with the time that a clock tells that is synchronised now; unchanged if its own was."""
-        if self.shift is None or self.sample.clock == "synced":
+    def at(self, shift: int, clock: Clock = "synced") -> Kept:
+        """Return it with the time that the clock tells now, whose word is `clock`.
+
+        Unchanged if its own was synchronised; and where nobody vouches for the clock now, unless it was stepped since.
+        """
+        if self.shift is None or not corrects(self.sample.clock, self.shift, shift, clock):
             return self
-        right = replace(self.sample, ts=self.sample.ts + shift - self.shift, clock="synced")
+        right = replace(self.sample, ts=self.sample.ts + shift - self.shift, clock=clock)
         return replace(self, sample=right, shift=shift)
 
 
@@ -125,10 +130,10 @@ class History:
         self._repeated = 0
         return None
 
-    def correct(self, shift: int) -> None:
-        """Give all the time that the clock tells now that it is synchronised."""
+    def correct(self, shift: int, clock: Clock = "synced") -> None:
+        """Give all the time that the clock tells now, as `Kept.at` does."""
         for shelf in self._shelves.values():
-            shelf[:] = [kept.at(shift) for kept in shelf]
+            shelf[:] = [kept.at(shift, clock) for kept in shelf]
 
     def clear(self) -> None:
         """Forget all."""

@@ -494,14 +494,14 @@ class Outbox:
 
     # The clock
 
-    def correct(self, shift: int) -> None:
-        """Give what waits the time that the clock tells now that it is synchronised; `shift` as in `add`."""
-        self._live.change(lambda live: _corrected(live, shift))
-        self.past.correct(shift)
+    def correct(self, shift: int, clock: telemetry.Clock = "synced") -> None:
+        """Give what waits the time that the clock tells now, as `Kept.at` does; `shift` as in `add`."""
+        self._live.change(lambda live: _corrected(live, shift, clock))
+        self.past.correct(shift, clock)
 
 
-def _corrected(live: Live, shift: int) -> Live:
-    kept = live.kept.at(shift)
+def _corrected(live: Live, shift: int, clock: telemetry.Clock) -> Live:
+    kept = live.kept.at(shift, clock)
     payload = live.publication.payload
     if kept is live.kept or not isinstance(payload, dict):
         return live

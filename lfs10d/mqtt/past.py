@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
     from lfs10d.loss import Loss
     from lfs10d.mqtt.letters import Letter
+    from lfs10d.telemetry import Clock
 
 ARRAY_MOST = 100
 """Samples in one history array (contract, section 3)."""
@@ -326,11 +327,11 @@ class Past:
         under_way = [each.loss for each in self._under_way if isinstance(each, Declaration)]
         return under_way + self.losses.waiting()
 
-    def correct(self, shift: int) -> None:
-        """Give what waits the time that the clock tells now that it is synchronised."""
-        self.history.correct(shift)
-        self.stored.page.correct(shift)
-        self._spilling = [kept.at(shift) for kept in self._spilling]
+    def correct(self, shift: int, clock: Clock = "synced") -> None:
+        """Give what waits the time that the clock tells now, as `Kept.at` does."""
+        self.history.correct(shift, clock)
+        self.stored.page.correct(shift, clock)
+        self._spilling = [kept.at(shift, clock) for kept in self._spilling]
 
     # How much
 

@@ -62,7 +62,7 @@ class Stowage:
         self._opened = False
         self._open_at = float("-inf")
         self._trouble: str | None = None
-        self._shift: int | None = None
+        self._right: tuple[int, telemetry.Clock] | None = None
         self._limits: Limits | None = None
         self._changed_at: float | None = None
         self._first_opening = True
@@ -101,9 +101,9 @@ class Stowage:
         """Look again what is to be done: something has happened."""
         self._poked.set()
 
-    def correct(self, shift: int) -> None:
-        """Give the samples of this boot the time that the clock tells now that it is synchronised."""
-        self._shift = shift
+    def correct(self, shift: int, clock: telemetry.Clock = "synced") -> None:
+        """Give the samples of this boot the time that the clock tells now, as `Kept.at` does."""
+        self._right = (shift, clock)
         self.poke()
 
     def limit(self, limits: Limits) -> None:
@@ -144,7 +144,7 @@ class Stowage:
             return self._open_at, self._open
         if self._limits is not None:
             return float("-inf"), self._take_limits
-        if self._shift is not None:
+        if self._right is not None:
             return float("-inf"), self._correct
         spill, page, release = self._past.spill_due(), self._past.page_due(), self._past.stored.release_due()
         choices: list[tuple[float, Callable[[], Awaitable[None]]]] = [
@@ -225,11 +225,11 @@ class Stowage:
         await self._thread.call(self._store.limit, limits)
 
     async def _correct(self) -> None:
-        shift = self._shift
-        assert shift is not None  # noqa: S101 - or it would not be due
-        await self._thread.call(self._store.correct, shift)
-        if shift == self._shift:
-            self._shift = None
+        right = self._right
+        assert right is not None  # noqa: S101 - or it would not be due
+        await self._thread.call(self._store.correct, *right)
+        if right == self._right:
+            self._right = None
 
     async def _spill(self) -> None:
         stored = self._past.stored
@@ -240,6 +240,7 @@ class Stowage:
                 entries,
                 losses=self._past.undeclared(),
                 now=self._epoch_ms(),
+                mono=round(self._now() * 1000),
                 beyond=self._past.beyond,
                 delivered=stored.delivered,
             )
@@ -259,8 +260,8 @@ class Stowage:
         rows = await self._thread.call(self._store.read, stored.after, PAGE_ROWS)
         if turn == stored.turn:
             stored.take_page(rows, PAGE_ROWS)
-            if self._shift is not None:
-                stored.page.correct(self._shift)
+            if self._right is not None:
+                stored.page.correct(*self._right)
             self._wake()
 
     async def _release(self) -> None:

@@ -158,10 +158,20 @@ class Uplink:
 
     def synchronised(self) -> None:
         """Note that the wall clock is right now: what waits is given the time it should have had."""
+        self._correct("synced")
+
+    def stepped(self) -> None:
+        """Note that somebody has set the wall clock, which is not known to be synchronised.
+
+        What waits from before the step is given the time of after it, and marked as `unsynced`.
+        """
+        self._correct("unsynced")
+
+    def _correct(self, clock: telemetry.Clock) -> None:
         shift = self._shift(asyncio.get_running_loop().time())
-        self._outbox.correct(shift)
+        self._outbox.correct(shift, clock)
         if self._stowage is not None:
-            self._stowage.correct(shift)
+            self._stowage.correct(shift, clock)
 
     def _shift(self, now: float) -> int:
         """Return the wall clock less the monotonic one, in ms."""

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from lfs10d.loss import Loss
     from lfs10d.store.opening import Limits
     from lfs10d.store.samplefile import Entry, Row
+    from lfs10d.telemetry import Clock
 
 T = TypeVar("T")
 
@@ -130,6 +131,7 @@ class Store:
         *,
         losses: Sequence[Loss],
         now: int,
+        mono: int,
         beyond: int = 0,
         delivered: AbstractSet[int] = frozenset(),
     ) -> tuple[Loss, ...]:
@@ -139,7 +141,13 @@ class Store:
             before = self._settle_doubt(file)
             self._doubtful = (file.next, ())
             evicted = file.append(
-                entries, losses=(*losses, *before), now=now, beyond=beyond, delivered=delivered, about=self._doubt
+                entries,
+                losses=(*losses, *before),
+                now=now,
+                mono=mono,
+                beyond=beyond,
+                delivered=delivered,
+                about=self._doubt,
             )
             self._doubtful = None
             return (*before, *evicted)
@@ -168,10 +176,10 @@ class Store:
         if not self._unused:
             self._use(lambda file: file.delete(ids, losses=losses))
 
-    def correct(self, shift: int) -> None:
+    def correct(self, shift: int, clock: Clock = "synced") -> None:
         """Set the time of this boot's samples right, as `SampleFile.correct` does. Raises StoreError."""
         if not self._unused:
-            self._use(lambda file: file.correct(shift))
+            self._use(lambda file: file.correct(shift, clock))
 
     # The file
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from lfs10d.clockstep import corrects
 from lfs10d.store.row import DamagedError, Series, check
 
 if TYPE_CHECKING:
@@ -81,11 +82,15 @@ class Catalogue:
         era_id, series = self._series[key]
         return self._eras[era_id], series
 
-    def correct(self, shift: int) -> None:
-        """Give the samples of this boot, measured while the clock was not synchronised, the time it tells now."""
+    def correct(self, shift: int, clock: Clock = "synced") -> None:
+        """Give the samples of this boot the time that the clock tells now, whose word is `clock`.
+
+        Those that were measured while it was synchronised stay; and where nobody vouches for the clock now, all but
+        those from before a step.
+        """
         for key, era in self._eras.items():
-            if era.boot == self._boot and era.clock != "synced":
-                right = replace(era, base=era.base + shift - era.shift, clock="synced", shift=shift)
+            if era.boot == self._boot and corrects(era.clock, era.shift, shift, clock):
+                right = replace(era, base=era.base + shift - era.shift, clock=clock, shift=shift)
                 self._eras[key] = right
                 self._db.execute(
                     "UPDATE era SET base = ?, clock = ?, shift = ?, checked = ? WHERE id = ?",

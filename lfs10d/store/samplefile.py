@@ -14,7 +14,7 @@ from lfs10d.store import opening
 from lfs10d.store.catalogue import Catalogue
 from lfs10d.store.opening import PAGE, Limits, number, transaction
 from lfs10d.store.row import Cell, DamagedError, check, pack_rtt, unpack_rtt, values_from, values_of
-from lfs10d.telemetry import Sample
+from lfs10d.telemetry import Clock, Sample
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Sequence
@@ -99,6 +99,7 @@ class SampleFile:
         *,
         losses: Sequence[Loss],
         now: int,
+        mono: int,
         beyond: int = 0,
         delivered: AbstractSet[int] = frozenset(),
         about: Callable[[tuple[Loss, ...]], None] = unheard,
@@ -106,12 +107,12 @@ class SampleFile:
         """Keep samples, evict the oldest where there is no room or they are too old; return what is lost by that.
 
         There is at least one entry. `losses` are those to be declared so far; with the new ones they are kept.
-        `now` is epoch ms. Rows up to id `beyond` are under way to the broker and stay; the going of rows
-        `delivered` is no loss. `about` is told what is lost before that is so.
+        `now` is epoch ms, `mono` the monotonic clock in ms. Rows up to id `beyond` are under way to the broker and
+        stay; the going of rows `delivered` is no loss. `about` is told what is lost before that is so.
         """
-        certain = entries[-1].sample.clock != "unsynced"
+        certain = entries[-1].sample.clock == "synced"
         with transaction(self._db):
-            evicted = self._evict(len(entries), beyond, delivered, now if certain else None)
+            evicted = self._evict(len(entries), beyond, delivered, (now if certain else None, mono))
             for entry in entries:
                 self._insert(entry)
             self._keep_losses((*losses, *evicted))
@@ -204,7 +205,9 @@ class SampleFile:
 
     # Evicting
 
-    def _evict(self, coming: int, beyond: int, delivered: AbstractSet[int], now: int | None) -> tuple[Loss, ...]:
+    def _evict(
+        self, coming: int, beyond: int, delivered: AbstractSet[int], now: tuple[int | None, int]
+    ) -> tuple[Loss, ...]:
         lost: dict[tuple[str, str], list[Loss]] = {}
         room = self._limits.pages - coming * BYTES_PER_SAMPLE // PAGE
         while self.rows:
@@ -212,7 +215,7 @@ class SampleFile:
                 "SELECT id, series, seq, at FROM sample WHERE id > ? ORDER BY id LIMIT ?", (beyond, EVICTED_AT_ONCE)
             ).fetchall()
             if number(self._db, "PRAGMA page_count") - number(self._db, "PRAGMA freelist_count") <= room:
-                found = found[: self._too_old(found, now)]
+                found = found[: self._too_old(found, *now)]
             if not found:
                 break
             for key, series_id, seq, _ in found:
@@ -223,24 +226,29 @@ class SampleFile:
             self._delete(found[0][0], found[-1][0])
         return tuple(loss for losses in lost.values() for loss in losses)
 
-    def _too_old(self, found: Sequence[tuple[int, int, int, int]], now: int | None) -> int:
+    def _too_old(self, found: Sequence[tuple[int, int, int, int]], now: int | None, mono: int) -> int:
         """Return how many of the rows are too old: all up to the last one of which it is certain.
 
-        Where the clock was not synchronised nobody knows how old a sample is.
+        Within this boot the monotonic clock knows, whatever becomes of the wall clock. Of an earlier boot the wall
+        clock does, if it was synchronised then and is now (`now`, else None): where it was not, nobody knows.
         """
         count = 0
         for place, (_, series_id, _, at) in enumerate(found, 1):
             era, _ = self._catalogue.find(series_id)
-            if now is not None and era.clock != "unsynced" and now - (era.base + at) > self._limits.age:
+            if era.boot == self._boot:
+                age: int | None = mono - (era.base + at - era.shift)
+            else:
+                age = None if now is None or era.clock != "synced" else now - (era.base + at)
+            if age is not None and age > self._limits.age:
                 count = place
         return count
 
     # What else is kept
 
-    def correct(self, shift: int) -> None:
-        """Give the samples of this boot, measured while the clock was not synchronised, the time it tells now."""
+    def correct(self, shift: int, clock: Clock = "synced") -> None:
+        """Give this boot's samples the time that the clock tells now, as `Catalogue.correct` does."""
         with transaction(self._db):
-            self._catalogue.correct(shift)
+            self._catalogue.correct(shift, clock)
 
     def _keep_losses(self, losses: Sequence[Loss]) -> None:
         if tuple(losses) != self.losses:

@@ -114,6 +114,15 @@ def test_a_clock_set_right_corrects_what_had_none_and_knows_its_shift() -> None:
     assert told == [(13_000, "synced", 9000), (5000, "unsynced", None), (0, "synced", None)]
 
 
+def test_a_clock_that_was_set_corrects_what_waited_before_and_marks_it() -> None:
+    unknown = replace(kept("a", 1).sample, clock="unknown", ts=5000)
+    history = History()
+    history.extend([Kept(unknown, 1.0, shift=1000), Kept(replace(unknown, seq=2), 2.0, shift=8900), kept("a", 3)])
+    history.correct(9000, "unsynced")
+    told = [(each.sample.ts, each.sample.clock, each.shift) for each in history.take(9)]
+    assert told == [(13_000, "unsynced", 9000), (5000, "unknown", 8900), (0, "synced", None)]
+
+
 def test_what_is_cleared_is_gone() -> None:
     history = History()
     history.extend([kept("a", 1), kept("b", 1, repeated=True)])

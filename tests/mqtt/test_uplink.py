@@ -551,7 +551,7 @@ def test_while_a_backlog_on_disk_leaves_in_order_live_samples_stay_live(mosquitt
     limits = Limits(size=10**9, age=10**12)
     store = Store(tmp_path, boot="k0000000", limits=limits)
     kept = [sample(seq, "b").sample for seq in range(1, stored + 1)]
-    store.append([Entry(each, 0) for each in kept if each is not None], losses=(), now=0)
+    store.append([Entry(each, 0) for each in kept if each is not None], losses=(), now=0, mono=0)
     store.close()
 
     async def scenario() -> None:

@@ -37,7 +37,7 @@ def store(tmp_path: Path) -> Iterator[Store]:
 
 
 def keep(store: Store, *samples: Sample) -> tuple[Loss, ...]:
-    return store.append(entries(*samples), losses=(), now=NOW)
+    return store.append(entries(*samples), losses=(), now=NOW, mono=NOW - START)
 
 
 def kept(store: Store) -> list[int]:
@@ -59,7 +59,7 @@ def test_the_folder_and_the_file_are_made(store: Store) -> None:
 
 def test_what_is_kept_is_there_after_a_restart_and_told(store: Store) -> None:
     loss = Loss("a", BOOT, 1, 1, 1)
-    store.append(entries(sample(2), sample(3)), losses=(loss,), now=NOW)
+    store.append(entries(sample(2), sample(3)), losses=(loss,), now=NOW, mono=NOW - START)
     store.close()
     assert store.open() == (loss,)
     assert (store.rows, store.oldest_ts) == (2, START + 2000)
@@ -76,7 +76,7 @@ def test_an_empty_file_is_used(store: Store) -> None:
 
 
 def test_the_clock_and_the_limits_reach_the_file(store: Store) -> None:
-    store.append(entries(sample(1, clock="unsynced", ts=5), shift=0), losses=(), now=NOW)
+    store.append(entries(sample(1, clock="unsynced", ts=5), shift=0), losses=(), now=NOW, mono=NOW - START)
     store.correct(START)
     assert store.read(0, 1)[0].sample.ts == START + 5
     store.limit(replace(ROOMY, age=1))
@@ -298,8 +298,10 @@ def test_a_commit_that_happened_though_it_failed_is_not_kept_twice(store: Store)
     Failing(store._file, "COMMIT", sqlite3.SQLITE_IOERR, after=True)
     late = START + 10**7
     with pytest.raises(StoreError):
-        store.append(entries(sample(2), sample(3)), losses=(), now=late)
-    assert store.append(entries(sample(2), sample(3), sample(4)), losses=(), now=START) == (Loss("a", BOOT, 1, 1, 1),)
+        store.append(entries(sample(2), sample(3)), losses=(), now=late, mono=late - START)
+    assert store.append(entries(sample(2), sample(3), sample(4)), losses=(), now=START, mono=START - START) == (
+        Loss("a", BOOT, 1, 1, 1),
+    )
     assert store.losses == (Loss("a", BOOT, 1, 1, 1),)
     assert kept(store) == [2, 3, 4]
 

@@ -50,6 +50,23 @@ def test_only_eras_of_this_boot_are_corrected_and_only_once(tmp_path: Path) -> N
             assert (each.find(ours)[0].base, each.find(ours)[0].clock) == (START + 7, "synced")
 
 
+def test_a_clock_that_was_set_corrects_what_was_measured_before_and_marks_it(tmp_path: Path) -> None:
+    with closing(connect(tmp_path / "f.db", boot=BOOT, limits=ROOMY)) as db:
+        catalogue = Catalogue(db, boot=BOOT)
+        with transaction(db):
+            before, _, _ = catalogue.place(sample(1, clock="unknown", ts=7), 0, repeated=False)
+            synced, _, _ = catalogue.place(sample(2, clock="synced", ts=8), 1, repeated=False)
+            after, _, _ = catalogue.place(sample(3, clock="unknown", ts=START + 9), START, repeated=False)
+            catalogue.correct(START + 1, "unsynced")
+        for each in (catalogue, Catalogue(db, boot=BOOT)):
+            eras = [each.find(key)[0] for key in (before, synced, after)]
+            assert [(era.base, era.clock) for era in eras] == [
+                (START + 8, "unsynced"),
+                (8, "synced"),
+                (START + 9, "unknown"),
+            ]
+
+
 def test_what_is_cleared_is_made_anew(tmp_path: Path) -> None:
     with closing(connect(tmp_path / "f.db", boot=BOOT, limits=ROOMY)) as db:
         catalogue = Catalogue(db, boot=BOOT)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from lfs10d.store.opening import Limits
-    from lfs10d.telemetry import Sample
+    from lfs10d.telemetry import Clock, Sample
 
 NOW = START + 60_000
 
@@ -39,7 +39,7 @@ def file(path: Path) -> Iterator[SampleFile]:
 
 
 def keep(file: SampleFile, *samples: Sample, shift: int = START) -> tuple[Loss, ...]:
-    return file.append(entries(*samples, shift=shift), losses=file.losses, now=NOW)
+    return file.append(entries(*samples, shift=shift), losses=file.losses, now=NOW, mono=NOW - START)
 
 
 def kept(file: SampleFile) -> list[Sample]:
@@ -157,20 +157,65 @@ def test_file_and_log_never_take_more_than_the_limit_and_the_oldest_goes_exactly
 def test_what_is_too_old_is_evicted_and_declared(path: Path) -> None:
     file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, age=10_000))
     keep(file, *(sample(seq) for seq in range(1, 1001)))
-    lost = file.append(entries(sample(1001)), losses=(), now=START + 910_500)
+    lost = file.append(entries(sample(1001)), losses=(), now=START + 910_500, mono=START + 910_500 - START)
     assert lost == (Loss("a", BOOT, 1, 900, 900),)
     assert file.losses == lost
     assert [each.seq for each in kept(file)] == list(range(901, 1002))
     file.close()
 
 
-def test_of_samples_without_a_clock_nobody_knows_the_age(path: Path) -> None:
+DAY = 86_400_000
+WEEK = 7 * DAY
+
+
+@pytest.mark.parametrize("clock", ["unsynced", "unknown"])
+@pytest.mark.parametrize("after", ["unsynced", "unknown", "synced"])
+def test_a_gateway_that_began_400_days_back_loses_nothing_when_its_clock_is_set(
+    path: Path, clock: Clock, after: Clock
+) -> None:
+    file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, age=WEEK))
+    back = START - 400 * DAY
+    keep(file, *(sample(seq, clock=clock, ts=back + 1000 * seq) for seq in range(1, 101)), shift=back)
+    assert file.append(entries(sample(101, clock=after)), losses=(), now=START + 101_000, mono=101_000) == ()
+    assert file.rows == 101
+    file.close()
+
+
+@pytest.mark.parametrize("clock", ["unsynced", "unknown", "synced"])
+def test_within_a_boot_age_is_monotonic_whatever_the_wall_clock_says(path: Path, clock: Clock) -> None:
     file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, age=10_000))
-    keep(file, sample(1, clock="unsynced", ts=0))
-    assert file.append(entries(sample(2)), losses=(), now=START + 3000) == ()
-    keep(file, sample(3, clock="unsynced"))
-    assert file.append(entries(sample(4, clock="unsynced")), losses=(), now=START + 10**9) == ()
-    assert file.rows == 4
+    keep(file, *(sample(seq, clock=clock) for seq in range(1, 1001)))
+    lost = file.append(entries(sample(1001, clock=clock)), losses=(), now=START - 400 * DAY, mono=910_500)
+    assert lost == (Loss("a", BOOT, 1, 900, 900),)
+    file.close()
+
+
+@pytest.mark.parametrize(
+    ("clock", "now", "lost"),
+    [
+        ("synced", "synced", 1),
+        ("synced", "unknown", 0),
+        ("synced", "unsynced", 0),
+        ("unknown", "synced", 0),
+        ("unsynced", "synced", 0),
+    ],
+)
+def test_of_an_earlier_boot_the_age_is_known_where_the_clock_was_synchronised_then_and_is_now(
+    path: Path, clock: Clock, now: Clock, lost: int
+) -> None:
+    file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, age=10_000))
+    keep(file, sample(1, boot="k0000001", clock=clock))
+    evicted = file.append(entries(sample(1, clock=now)), losses=(), now=START + 10**9, mono=1000)
+    assert sum(loss.count for loss in evicted) == lost
+    file.close()
+
+
+def test_what_is_older_than_a_sample_that_is_too_old_is_too_old_itself(path: Path) -> None:
+    """Where the clock is never synchronised, what earlier boots left goes with this boot's own."""
+    file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, age=10_000))
+    keep(file, sample(1, boot="k0000001", clock="unknown"), sample(1, clock="unknown"))
+    lost = file.append(entries(sample(2, clock="unknown")), losses=(), now=START, mono=50_000)
+    assert lost == (Loss("a", "k0000001", 1, 1, 1), Loss("a", BOOT, 1, 1, 1))
     file.close()
 
 
@@ -178,7 +223,14 @@ def test_what_is_under_way_stays_and_what_was_delivered_is_no_loss(path: Path) -
     file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, age=1000))
     keep(file, *(sample(seq) for seq in range(1, 7)))
     ids = [row.id for row in file.read(0, 6)]
-    lost = file.append(entries(sample(7)), losses=(), now=START + 10**6, beyond=ids[1], delivered=frozenset({ids[3]}))
+    lost = file.append(
+        entries(sample(7)),
+        losses=(),
+        now=START + 10**6,
+        mono=START + 10**6 - START,
+        beyond=ids[1],
+        delivered=frozenset({ids[3]}),
+    )
     assert lost == (Loss("a", BOOT, 3, 3, 1), Loss("a", BOOT, 5, 6, 2))
     assert [each.seq for each in kept(file)] == [1, 2, 7]
     file.close()
@@ -186,8 +238,8 @@ def test_what_is_under_way_stays_and_what_was_delivered_is_no_loss(path: Path) -
 
 def test_what_is_only_repeated_is_no_loss(path: Path) -> None:
     file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, age=1000))
-    file.append(entries(sample(1), repeated=True), losses=(), now=NOW)
-    assert file.append(entries(sample(2)), losses=(), now=START + 10**6) == ()
+    file.append(entries(sample(1), repeated=True), losses=(), now=NOW, mono=NOW - START)
+    assert file.append(entries(sample(2)), losses=(), now=START + 10**6, mono=START + 10**6 - START) == ()
     assert [each.seq for each in kept(file)] == [2]
     file.close()
 
@@ -195,7 +247,9 @@ def test_what_is_only_repeated_is_no_loss(path: Path) -> None:
 def test_other_limits_hold_from_the_next_sample_on(file: SampleFile) -> None:
     keep(file, *(sample(seq) for seq in range(1, 4)))
     file.limit(replace(ROOMY, age=1000))
-    assert file.append(entries(sample(4)), losses=(), now=START + 10**6) == (Loss("a", BOOT, 1, 3, 3),)
+    assert file.append(entries(sample(4)), losses=(), now=START + 10**6, mono=START + 10**6 - START) == (
+        Loss("a", BOOT, 1, 3, 3),
+    )
 
 
 # Losses
@@ -203,7 +257,7 @@ def test_other_limits_hold_from_the_next_sample_on(file: SampleFile) -> None:
 
 def test_losses_are_kept_across_a_restart_until_they_are_declared(file: SampleFile, path: Path) -> None:
     losses = (Loss("a", "k0000001", 1, 5, 5), Loss("b", BOOT, 2, 9, 3))
-    file.append(entries(sample(1)), losses=losses, now=NOW)
+    file.append(entries(sample(1)), losses=losses, now=NOW, mono=NOW - START)
     other = reopened(file, path)
     assert other.losses == losses
     other.delete([], losses=losses[1:])
@@ -251,7 +305,7 @@ def test_a_transaction_that_fails_leaves_no_trace(file: SampleFile, path: Path) 
         raise sqlite3.OperationalError("for the test")
 
     with pytest.raises(sqlite3.OperationalError, match="for the test"):
-        file.append(entries(sample(2)), losses=(), now=NOW, about=fail)
+        file.append(entries(sample(2)), losses=(), now=NOW, mono=NOW - START, about=fail)
     other = reopened(file, path)
     assert [each.seq for each in kept(other)] == [1]
     other.close()
