@@ -51,7 +51,7 @@ class Style(StrEnum):
     JOURNAL = "journal"
     """`<4>message`: the journal takes the priority off and adds the time (sd-daemon(3))."""
     COLOUR = "colour"
-    """`21:53:42 warning message` with colour, local time: for a person at a terminal."""
+    """`21:53:42 CET warning message` with colour, local time: for a person at a terminal."""
     PLAIN = "plain"
     """`2026-11-21T21:53:42.003Z warning message`: for a file or another program."""
     BARE = "bare"
@@ -125,7 +125,7 @@ class LineFormatter(logging.Formatter):
         if self._look is Style.JOURNAL:
             return f"<{_at_level(_PRIORITIES, record.levelno, _DEBUG_PRIORITY)}>{words}"
         if self._look is Style.COLOUR:
-            stamp = time.strftime("%H:%M:%S", time.localtime(record.created))
+            stamp = time.strftime("%H:%M:%S %Z", time.localtime(record.created))
             colour = _at_level(_COLOURS, record.levelno, _DIM)
             return f"{_DIM}{stamp}{_RESET} {colour}{level:<7} {words}{_RESET}"
         if self._look is Style.BARE:

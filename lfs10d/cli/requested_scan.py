@@ -101,7 +101,7 @@ def row(entry: Mapping[str, Any]) -> tuple[str, ...]:
 def _what(entry: Mapping[str, Any]) -> str:
     profile = entry.get("profile")
     if not isinstance(profile, str):
-        return "no profile fits"
+        return "unknown device"
     return load_profile(profile, relative_to=Path()).title if profile in builtin_names() else profile
 
 
