@@ -22,6 +22,7 @@ from lfs10d.mqtt.inbound import inbound
 from lfs10d.mqtt.link import Link
 from lfs10d.mqtt.messages import Filter, Will
 from lfs10d.mqtt.outbox import Outbox
+from lfs10d.mqtt.retained_requests import RetainedRequests
 from lfs10d.mqtt.stowage import Stowage
 from lfs10d.mqtt.topics import OFFLINE, ONLINE, Topics
 from lfs10d.telemetry import Kind, Publication
@@ -75,6 +76,7 @@ class Uplink:
         self._burst = burst
         self._clearing = Clearing(self._topics, stands_behind=stands_behind, clear=self._clear_orphans)
         self._requested = requested
+        self._retained_requests = RetainedRequests(self._ask_for_retained_requests)
         self._changed = changed
         self._announced = announced
         self._announcing = False
@@ -284,6 +286,7 @@ class Uplink:
         if self._earlier is not None:
             self._earlier.lost()
         self._clearing.lost()
+        self._retained_requests.lost()
         self._farewell = None
         self._drop_told = False
         self._progress.set()
@@ -327,7 +330,12 @@ class Uplink:
             return
         request = inbound(message, self._topics)
         if request is not None:
+            self._retained_requests.received(request, self.version)
             self._requested(request)
+
+    def _ask_for_retained_requests(self) -> None:
+        if (standing := self._link.standing) is not None:
+            standing.subscribe([Filter(self._topics.requests)])
 
     def _heard_offline(self) -> None:
         """Contradict the will of our connection before, or somebody's mistake; the burst will do so by itself."""

@@ -11,6 +11,7 @@ import time
 from typing import TYPE_CHECKING
 
 from lfs10d import telemetry
+from lfs10d.mqtt.retained_requests import ASK_AFTER
 from lfs10d.mqtt.settings import BrokerSettings, Version
 from lfs10d.mqtt.uplink import Uplink
 from lfs10d.store.backlog import Store
@@ -540,6 +541,51 @@ def test_other_settings_are_taken_at_a_reload(mosquitto: Mosquitto) -> None:
 
     asyncio.run(scenario())
     assert "as another" in mosquitto.log
+
+
+# Retained requests by 3.1.1
+
+
+def test_a_retained_request_by_3_1_1_comes_once_as_a_request_and_at_once_again_as_retained(
+    mosquitto: Mosquitto,
+) -> None:
+    """The second is rejected and cleared, as at the next connect; one that is not retained comes once."""
+
+    async def scenario() -> None:
+        listener = mosquitto.subscribe(f"{B}/#")
+        site = Site(mosquitto.port, version=Version.V311)
+        async with running(site) as uplink:
+            await online(listener)
+            mosquitto.publish(f"{B}/request/health", '{"id":1}')
+            mosquitto.publish(f"{B}/request/device/read", '{"id":2}', retain=True)
+            await until(lambda: len(site.requests) == 3, "both, and the copy")
+            told = [(each.topic, each.retained) for each in site.requests]
+            copy = ("request/device/read", True)
+            assert told == [("request/health", False), ("request/device/read", False), copy]
+            uplink.clear_retained("request/device/read")
+            await until(lambda: len(site.requests) == 4, "the clearing, of which we hear too")
+            mosquitto.publish(f"{B}/request/health", '{"id":3}')
+            await until(lambda: len(site.requests) >= 5, "the next")
+            await asyncio.sleep(2 * ASK_AFTER)
+            assert [each.payload for each in site.requests[3:]] == [b"", b'{"id":3}']
+            assert uplink.connected
+
+    asyncio.run(scenario())
+    assert not mosquitto.retained(f"{B}/request/#")
+
+
+def test_a_connection_that_is_lost_before_the_question_asks_nothing(mosquitto: Mosquitto) -> None:
+    async def scenario() -> None:
+        listener = mosquitto.subscribe(f"{B}/#")
+        site = Site(mosquitto.port, version=Version.V311)
+        async with running(site):
+            await online(listener)
+            mosquitto.publish(f"{B}/request/health", '{"id":1}')
+            await until(lambda: len(site.requests) == 1, "the request")
+        await asyncio.sleep(2 * ASK_AFTER)
+        assert len(site.requests) == 1
+
+    asyncio.run(scenario())
 
 
 # The store
