@@ -7,7 +7,8 @@ Rules
    All but empty ones count towards the rate.
 2. The id of a request that passed `not_allowed` is remembered with its answer, whatever the answer is. Repeated
    with the same parameters it gets that answer again and is not executed twice; while the first still runs the
-   repeat waits for its end. With other parameters it is a `duplicate_conflict`.
+   repeat waits for its end, up to `WAITING` of them; more are `busy`. With other parameters it is a
+   `duplicate_conflict`.
 3. What was rejected before that is not remembered: sent again later, it is judged again.
 """
 
@@ -18,7 +19,17 @@ from math import inf
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from lfs10d import commands
-from lfs10d.commands import LARGEST, Answer, Call, Identifier, NoParameters, Parameters, RequestClass, rejected
+from lfs10d.commands import (
+    LARGEST,
+    LARGEST_CORRELATION,
+    Answer,
+    Call,
+    Identifier,
+    NoParameters,
+    Parameters,
+    RequestClass,
+    rejected,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -31,6 +42,9 @@ REMEMBERED = 256
 """Ids that are remembered, those of requests that still run besides."""
 REMEMBERED_FOR = 60.0
 """How long an answer is kept for its repeats, in s."""
+
+WAITING = 16
+"""Repeats that wait for the end of one request."""
 
 W = TypeVar("W")
 
@@ -101,9 +115,12 @@ class Admission(Generic[W]):
         self._seen: dict[tuple[str, Identifier], _Memory[W]] = {}
 
     def admit(
-        self, name: str, payload: bytes, *, retained: bool, whence: W, now: float
+        self, name: str, payload: bytes, *, retained: bool, whence: W, now: float, correlation: int = 0
     ) -> Ignored | Answered | Ticket[W] | Waiting:
-        """Judge a request; `whence` is kept for `done` if it repeats one that still runs."""
+        """Judge a request; `whence` is kept for `done` if it repeats one that still runs.
+
+        `correlation` is how many bytes its Correlation Data has.
+        """
         if not payload:
             return Ignored()
         flood = not self._within_rate(now)
@@ -115,6 +132,9 @@ class Admission(Generic[W]):
             message = f"the payload has more than the {LARGEST} bytes that are allowed"
             return Answered(Call(), rejected("too_large", message), flood=flood)
         call, problem = commands.read(payload)
+        if correlation > LARGEST_CORRELATION:
+            message = f"the Correlation Data has more than the {LARGEST_CORRELATION} bytes that are allowed"
+            return Answered(call, rejected("too_large", message), flood=flood)
         if flood:
             message = f"more than {RATE:g} requests a second; send it again later"
             return Answered(call, rejected("rate_limited", message), flood=True)
@@ -152,6 +172,9 @@ class Admission(Generic[W]):
         if first.fingerprint != call.fingerprint:
             message = "this id was used for another request; give every request an id of its own"
             return Answered(call, rejected("duplicate_conflict", message))
+        if first.answer is None and len(first.repeats) >= WAITING:
+            message = f"{WAITING} repeats of this request wait for its end already; its response comes once it is over"
+            return Answered(call, rejected("busy", message))
         if first.answer is None:
             first.repeats.append((call, whence))
             return Waiting()

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 LARGEST = 4096
 """Bytes of a request's payload."""
+LARGEST_CORRELATION = 1024
+"""Bytes of a request's Correlation Data."""
 LONGEST_ID = 64
 """Characters of a request's `id`."""
 

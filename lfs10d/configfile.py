@@ -17,6 +17,7 @@ from lfs10d.document import Document, decode, parse, path_text
 from lfs10d.errors import ConfigError, Problem
 from lfs10d.kinds import quoted, shown
 from lfs10d.profiles.library import builtin_names, load_profile
+from lfs10d.regularfile import read_regular
 from lfs10d.resolution import resolved, unfit
 
 if TYPE_CHECKING:
@@ -124,8 +125,7 @@ def load(
 
 def _content(path: Path) -> bytes:
     try:
-        with path.open("rb") as file:
-            return file.read(LARGEST_READ)
+        return read_regular(path, LARGEST_READ)
     except FileNotFoundError:
         message = "there is no such file; name another with -c FILE or $LFS10D_CONFIG"
     except (OSError, ValueError) as error:
@@ -134,7 +134,7 @@ def _content(path: Path) -> bytes:
 
 
 LARGEST_READ = 2**20
-"""Bytes: enough for `decode` to see that a file is too large, and no more of /dev/zero."""
+"""Bytes: enough for `decode` to see that a file is too large."""
 
 
 def _validated(document: Document) -> tuple[Config, list[Problem], frozenset[KeyPath]]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from lfs10d.kinds import quoted
+from lfs10d.regularfile import read_regular
 from lfs10d.secret import Secret
 
 if TYPE_CHECKING:
@@ -41,8 +42,7 @@ def reason(error: OSError | ValueError) -> str:
 def readable(path: Path) -> None:
     """Raise UnreadableError if a file cannot be read."""
     try:
-        with path.open("rb") as file:
-            file.read(1)
+        read_regular(path, 1)
     except (OSError, ValueError) as error:
         raise UnreadableError(f"{_named(path)} cannot be read: {reason(error)}") from None
 
@@ -50,8 +50,7 @@ def readable(path: Path) -> None:
 def password_in(path: Path) -> Secret:
     """Return the first line of a file, without a byte order mark; raises UnreadableError if there is none."""
     try:
-        with path.open("rb") as file:
-            content = file.read(len(BOM_UTF8) + LARGEST_PASSWORD + 2)
+        content = read_regular(path, len(BOM_UTF8) + LARGEST_PASSWORD + 2)
         first = content.decode("utf-8-sig").partition("\n")[0].removesuffix("\r")
     except UnicodeDecodeError:
         raise UnreadableError(f"{_named(path)} is no UTF-8 text") from None

@@ -10,6 +10,8 @@ import contextlib
 import os
 from typing import TYPE_CHECKING, Protocol
 
+from lfs10d.regularfile import read_regular, write_new
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -21,7 +23,7 @@ class Files(Protocol):
         """Return the content."""
 
     def write(self, path: Path, data: bytes, *, mode: int) -> None:
-        """Create or empty the file and write; nothing is safe yet."""
+        """Write a new file, in the place of one that is there; nothing is safe yet."""
 
     def append(self, path: Path, data: bytes, *, mode: int) -> None:
         """Write at the end, creating the file if need be; nothing is safe yet."""
@@ -49,19 +51,16 @@ class SystemFiles:
     """The steps as system calls."""
 
     def read(self, path: Path) -> bytes:
-        """Return the content."""
-        return path.read_bytes()
+        """Return the content; raises OSError where it is no regular file, and never waits."""
+        return read_regular(path)
 
     def write(self, path: Path, data: bytes, *, mode: int) -> None:
-        """Create or empty the file and write."""
-        self._put(path, data, os.O_TRUNC, mode)
+        """Write a new file, in the place of one that is there."""
+        write_new(path, data, mode=mode)
 
     def append(self, path: Path, data: bytes, *, mode: int) -> None:
         """Write at the end, creating the file if need be."""
-        self._put(path, data, os.O_APPEND, mode)
-
-    def _put(self, path: Path, data: bytes, flags: int, mode: int) -> None:
-        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC | flags, mode)
+        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW | os.O_CLOEXEC, mode)
         try:
             rest = memoryview(data)
             while rest:

@@ -69,6 +69,11 @@ class Asked(_Record):
         """What tells a repeat."""
         return self.transaction if self.id is None else self.id
 
+    @property
+    def finished(self) -> Asked:
+        """The same once it has its answer: a repeat says itself where the answer goes."""
+        return self.model_copy(update={"topic": None, "correlation": None})
+
 
 class OpenChange(_Record):
     """A change that may have been written. `begun` is in epoch milliseconds.
@@ -117,13 +122,14 @@ class _Content(_Record):
 class Journal:
     """The journal in one state directory. Used by one caller at a time; every step is on the disk when it returns.
 
-    A step that cannot be put on the disk raises StateError, and nothing has happened then.
+    Only `note` is not. A step that cannot be put on the disk raises StateError, and nothing has happened then.
     """
 
     def __init__(self, directory: Path, disk: Disk) -> None:
         self.path = directory / FILE_NAME
         self._disk = disk
         self._content = _Content()
+        self._unsaved = False
         self._unread: str | None = None
 
     def take(self) -> str | None:
@@ -136,7 +142,7 @@ class Journal:
             self._unread = f"{self.path} cannot be read: {error.strerror}"
             return f"{self._unread}; whether a sensor was being moved is not known"
         try:
-            self._content = _Content.model_validate_json(content)
+            kept = _Content.model_validate_json(content)
         except ValidationError:
             aside = self.path.with_name(ASIDE)
             trouble = f"{self.path} is damaged, or a newer lfs10d wrote it"
@@ -145,6 +151,8 @@ class Journal:
                 return f"{trouble}; it is now {aside}. If a sensor is missing, look for it: lfs10d scan PORT"
             self._unread = trouble
             return trouble
+        answers = tuple(each.model_copy(update={"asked": each.asked.finished}) for each in kept.answers)
+        self._content = kept.model_copy(update={"answers": answers})
         return None
 
     @property
@@ -180,8 +188,12 @@ class Journal:
 
     def keep(self, number: int, told: Told | None) -> None:
         """Note that a change stays open, and the answer its request was given."""
-        changes = self._with(number, lambda change: change.model_copy(update={"answered": True}))
-        self._save(changes=changes, answers=self._answers(told))
+
+        def answered(change: OpenChange) -> OpenChange:
+            asked = None if change.asked is None else change.asked.finished
+            return change.model_copy(update={"answered": True, "asked": asked})
+
+        self._save(changes=self._with(number, answered), answers=self._answers(told))
 
     def close(self, numbers: frozenset[int], *told: Told | None) -> None:
         """Note that these changes are finished or undone, and the answers that are given with that."""
@@ -189,6 +201,21 @@ class Journal:
         answers = self._answers(*told)
         if (changes, answers) != (self.open, self.answers):
             self._save(changes=changes, answers=answers)
+
+    def note(self, told: Told | None) -> None:
+        """Remember an answer to a request of which nothing was written; it comes on the disk with the next `save`.
+
+        Lost before that, a repeat of the request is judged anew.
+        """
+        answers = self._answers(told)
+        if answers != self.answers:
+            self._content = self._content.model_copy(update={"answers": answers})
+            self._unsaved = True
+
+    def save(self) -> None:
+        """Put on the disk what was noted since the last step."""
+        if self._unsaved:
+            self._save()
 
     def _with(self, number: int, amended: Callable[[OpenChange], OpenChange]) -> tuple[OpenChange, ...]:
         return tuple(amended(change) if change.number == number else change for change in self.open)
@@ -198,7 +225,7 @@ class Journal:
         for each in told:
             if each is not None and each.asked.key is not None:
                 kept = [older for older in answers if older.at > each.at - REMEMBERED_FOR_MS]
-                answers = (*kept[-REMEMBERED + 1 :], each)
+                answers = (*kept[-REMEMBERED + 1 :], each.model_copy(update={"asked": each.asked.finished}))
         return answers
 
     def _save(self, **changed: object) -> None:
@@ -210,7 +237,7 @@ class Journal:
         except OSError as error:
             self._restore(content)
             raise StateError(f"{self.path} cannot be written: {error.strerror}") from None
-        self._content = content
+        self._content, self._unsaved = content, False
 
     def _restore(self, refused: _Content) -> None:
         """Take back what was written but, for all we know, not synced: an intent must not outlive its refusal."""

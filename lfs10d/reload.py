@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from lfs10d.configfile import load
 from lfs10d.difference import difference
+from lfs10d.regularfile import read_regular
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -62,7 +63,7 @@ def imprint(loaded: Loaded) -> dict[str, bytes]:
 
 def _digest(file: Path) -> bytes:
     try:
-        return hashlib.sha256(file.read_bytes()).digest()
+        return hashlib.sha256(read_regular(file)).digest()
     except OSError:
         return b""
 

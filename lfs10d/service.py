@@ -9,7 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from lfs10d.admission import Admission, Answered, Ignored, Ticket, Waiting
-from lfs10d.commands import Answer, Call, failed, rejected
+from lfs10d.commands import LARGEST_CORRELATION, Answer, Call, failed, rejected
 from lfs10d.logs import escape
 from lfs10d.requests import audit
 
@@ -70,8 +70,13 @@ class Service:
         now = asyncio.get_running_loop().time()
         name = "/".join(request.levels)
         own = f"response/{name}" if name in self._requests else "response/unknown"
-        whence = _Whence(request.response_topic or own, request.correlation, name[:LONGEST_NAME])
-        verdict = self._admission.admit(name, request.payload, retained=request.retained, whence=whence, now=now)
+        size = len(request.correlation or b"")
+        # What is too large is not returned either: a slow broker would have us keep it.
+        correlation = request.correlation if size <= LARGEST_CORRELATION else None
+        whence = _Whence(request.response_topic or own, correlation, name[:LONGEST_NAME])
+        verdict = self._admission.admit(
+            name, request.payload, retained=request.retained, whence=whence, now=now, correlation=size
+        )
         match verdict:
             case Ignored():
                 return

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from lfs10d.config import DEFAULT_STEM
 from lfs10d.errors import StateError
+from lfs10d.regularfile import write_new
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -72,7 +73,7 @@ def prepare(directory: Path) -> None:
     try:
         directory.mkdir(mode=0o750, parents=True, exist_ok=True)
         probe = directory / ".writable"
-        probe.write_bytes(b"")
+        write_new(probe, b"", mode=0o600)
         probe.unlink()
     except OSError as error:
         reason = (error.strerror or str(error)).lower()

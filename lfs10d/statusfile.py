@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import json
-import os
 from typing import TYPE_CHECKING
+
+from lfs10d.regularfile import write_new
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -26,8 +27,7 @@ class StatusFile:
         text = _json(status)
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._draft.write_text(text, encoding="utf-8")
-            os.chmod(self._draft, WORLD_READABLE)  # noqa: PTH101 - whatever the umask says
+            write_new(self._draft, text.encode(), mode=WORLD_READABLE)
             self._draft.replace(self.path)
         except OSError:
             return False

@@ -14,6 +14,7 @@ from lfs10d.admission import (
     RATE,
     REMEMBERED,
     REMEMBERED_FOR,
+    WAITING,
     Admission,
     Answered,
     Form,
@@ -21,7 +22,7 @@ from lfs10d.admission import (
     Ticket,
     Waiting,
 )
-from lfs10d.commands import LARGEST, Call, Parameters, failed, ok
+from lfs10d.commands import LARGEST, LARGEST_CORRELATION, Call, Parameters, failed, ok
 from lfs10d.kinds import Whole
 
 if TYPE_CHECKING:
@@ -232,6 +233,38 @@ def test_repeats_wait_while_the_first_runs_and_are_all_given_back_once() -> None
     assert door.tell("device/read", {"transaction": "a", "to": 1}, whence="two") == Waiting()
     assert door.done(ticket) == [("a", "one"), (None, "two")]
     assert isinstance(door.tell("device/read", {"id": "a", "to": 1}), Answered)
+
+
+def test_of_the_repeats_of_one_request_16_wait_and_more_are_busy() -> None:
+    door = Door()
+    ticket = door.ticket("device/read", {"id": "a", "to": 1})
+    for number in range(WAITING):
+        assert door.tell("device/read", {"id": "a", "to": 1}, whence=str(number)) == Waiting()
+    assert door.code("device/read", {"id": "a", "to": 1}) == "busy"
+    other = door.ticket("device/read", {"id": "b", "to": 1})
+    assert door.tell("device/read", {"id": "b", "to": 1}) == Waiting(), "those of another request are its own"
+    assert [whence for _, whence in door.done(ticket)] == [str(number) for number in range(WAITING)]
+    assert len(door.done(other)) == 1
+    assert door.answered("device/read", {"id": "a", "to": 1}).answer == ok()
+
+
+def test_correlation_data_may_have_1024_bytes_and_no_more_whatever_the_payload() -> None:
+    door = Door()
+    for name in ("device/read", "no/request"):
+        verdict = door.admission.admit(
+            name,
+            b'{"id": "a", "to": 1}',
+            retained=False,
+            whence="here",
+            now=NOW,
+            correlation=LARGEST_CORRELATION + 1,
+        )
+        assert isinstance(verdict, Answered)
+        assert (verdict.call.id, verdict.answer.status, verdict.answer.code) == ("a", "rejected", "too_large")
+    allowed = door.admission.admit(
+        "device/read", b'{"id": "a", "to": 1}', retained=False, whence="here", now=NOW, correlation=LARGEST_CORRELATION
+    )
+    assert isinstance(allowed, Ticket), "and what was too large was not remembered"
 
 
 def test_a_repeat_with_other_parameters_is_a_conflict_while_the_first_runs_and_afterwards() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 from pathlib import Path
 
 import pytest
@@ -168,3 +169,64 @@ def test_a_request_is_told_from_its_repeat_by_its_id_or_else_its_transaction(
     id_: str | None, transaction: int | None, key: str | int | None
 ) -> None:
     assert Asked(name="r", id=id_, transaction=transaction).key == key
+
+
+ASKED = Asked(name="device/readdress", id="a", topic="response/mine", correlation="00" * 1024)
+
+
+def test_an_answer_that_was_given_keeps_neither_topic_nor_correlation_a_repeat_brings_its_own() -> None:
+    files = ForgetfulFiles()
+    journal = read(files)
+    kept = journal.intend("readdress", (move(),), 5, ASKED)
+    journal.keep(kept.number, Told(asked=ASKED, status="failed", at=1))
+    closed = journal.intend("readdress", (move("b"),), 5, ASKED)
+    assert read(files).open[1].asked == ASKED, "an answer that is still owed goes where it was asked for"
+    journal.close(frozenset({closed.number}), Told(asked=ASKED, status="ok", at=2))
+    for each in (journal, read(files)):
+        assert {(one.asked.topic, one.asked.correlation) for one in each.answers} == {(None, None)}
+        assert [one.asked.key for one in each.answers] == ["a", "a"]
+        assert each.open[0].asked == ASKED.finished
+    assert len(files.read(FILE)) < 2000
+
+
+def test_a_journal_of_before_that_kept_them_is_read_without_them() -> None:
+    files = ForgetfulFiles()
+    entry = {"asked": ASKED.model_dump(), "status": "rejected", "data": None, "error": None, "at": 5, "took_ms": 0.0}
+    Disk(files).replace(FILE, json.dumps({"version": 1, "last_number": 3, "changes": [], "answers": [entry]}).encode())
+    (answer,) = read(files).answers
+    assert answer.asked == ASKED.finished
+
+
+def test_what_is_noted_is_remembered_at_once_and_on_the_disk_with_the_next_step_or_save() -> None:
+    files = ForgetfulFiles()
+    journal = read(files)
+    before = files.steps
+    for number in range(300):
+        journal.note(told(f"id-{number}", at=number))
+    journal.note(None)
+    journal.note(told(None))
+    assert files.steps == before
+    assert len(journal.answers) == REMEMBERED
+    assert read(files).answers == ()
+    journal.save()
+    steps = files.steps
+    files.power_cut()
+    assert read(files).answers == journal.answers
+    journal.save()
+    assert files.steps == steps, "there is nothing new"
+    journal.note(told("late", at=400))
+    journal.intend("readdress", (move(),), 5, None)
+    assert read(files).answers[-1].asked.key == "late"
+
+
+def test_what_is_noted_stays_noted_where_the_disk_refuses_it() -> None:
+    files = ForgetfulFiles()
+    journal = read(files)
+    journal.note(told("a"))
+    files.full = 10
+    with pytest.raises(StateError):
+        journal.save()
+    assert [each.asked.key for each in journal.answers] == ["a"]
+    files.full = None
+    journal.save()
+    assert [each.asked.key for each in read(files).answers] == ["a"]

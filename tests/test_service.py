@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 import pytest
 
 from lfs10d.admission import BURST, Form
-from lfs10d.commands import LARGEST, Answer, NoParameters, Parameters, ok
+from lfs10d.commands import LARGEST, LARGEST_CORRELATION, Answer, NoParameters, Parameters, ok
 from lfs10d.mqtt.inbound import InboundRequest
 from lfs10d.requests.request import Powers, Request
 from lfs10d.service import Service
@@ -118,6 +118,21 @@ def test_a_request_is_answered_on_the_topic_of_its_name_with_its_id() -> None:
             "error": None,
         }
         assert 0 <= took < 1000
+
+    run(scene())
+
+
+def test_correlation_data_that_is_too_large_is_refused_and_neither_kept_nor_returned() -> None:
+    async def scene() -> None:
+        bench = Bench()
+        large = bytes(LARGEST_CORRELATION + 1)
+        for content, retained in (({"id": "a"}, False), ({"id": "b"}, True), (b"[", False), (b"x" * 5000, False)):
+            bench.ask("echo", content, retained=retained, correlation=large)
+        bench.ask("echo", {"id": "c"}, correlation=large[:-1])
+        await bench.settle()
+        assert bench.codes == ["too_large", "retained", "too_large", "too_large", None]
+        assert [correlation for _, _, correlation in bench.answered] == [None] * 4 + [large[:-1]]
+        assert bench.performed == ["echo"]
 
     run(scene())
 

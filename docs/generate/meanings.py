@@ -35,7 +35,8 @@ ERROR_CODES: Final = {
     "not_allowed": "`commands` in the configuration leaves this class out, or it is never permitted here.",
     "retained": "It was published with the retain flag. It is not executed, and it is cleared.",
     "duplicate_conflict": "The `id` was used for another request.",
-    "busy": "Another scan or physical change is under way, or the device says itself that it is busy.",
+    "busy": "Another scan or physical change is under way, the device says that it is busy, or 16 repeats of the "
+    "request wait for its end already.",
     "address_in_use": "The slave id is configured, reserved, or somebody answers there.",
     "duplicate_id": "Two sensors answer under one id now, or did before anything was written.",
     "not_recognised": "What answers is no sensor of that profile; nothing was written.",
@@ -48,7 +49,7 @@ ERROR_CODES: Final = {
     "line_error": "The line failed: bytes came, but no right answer.",
     "storage_full": "The change could not be written to the disk, so it was not made.",
     "timeout": "The device did not answer.",
-    "too_large": "The payload has more than 4096 bytes.",
+    "too_large": "The payload has more than 4096 bytes, or the Correlation Data more than 1024 (then not returned).",
     "rate_limited": "More than 20 requests a second.",
     "cancelled": "It was ended before its end.",
     "internal": "A fault of lfs10d itself; its log says more. Please report it.",

@@ -23,6 +23,7 @@ from lfs10d.cli.spinner import spinning
 from lfs10d.cli.visitor import RETAINED_WITHIN, Visitor, parsed
 from lfs10d.errors import BrokerError, FailedError
 from lfs10d.mqtt.messages import Filter
+from lfs10d.regularfile import read_regular
 from lfs10d.statedir import status_places
 
 if TYPE_CHECKING:
@@ -170,8 +171,7 @@ class _Watch:
         """Read the status file of our line, if there is one; what was read before stays and grows old."""
         for path in self._files:
             try:
-                with path.open("rb") as file:
-                    status = parsed(file.read(LARGEST_STATUS))
+                status = parsed(read_regular(path, LARGEST_STATUS))
             except OSError:
                 continue
             line = status.get("line") if isinstance(status, dict) else None

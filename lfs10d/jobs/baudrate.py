@@ -215,11 +215,13 @@ def shifted(sensor: Sensor, old: int, to: int) -> Generator[Step, Any, tuple[int
     return exception, old if found.old.answers else None, False
 
 
-def found_at(sensor: Sensor, rates: Sequence[int]) -> Generator[Step, Any, tuple[int | None, int | None]]:
+def found_at(
+    sensor: Sensor, rates: Sequence[int], *, tries: int = TRIES, timeout: float | None = None
+) -> Generator[Step, Any, tuple[int | None, int | None]]:
     """Look for a sensor at these rates; return what its register of the rate says, and the rate it answers at."""
-    for _ in range(TRIES):
+    for _ in range(tries):
         for rate in rates:
-            reply = yield from sensor.asking.who(sensor.at(rate), register=sensor.register)
+            reply = yield from sensor.asking.who(sensor.at(rate), timeout, register=sensor.register)
             if reply.answers:
                 return reply.register, rate
     return None, None
@@ -238,20 +240,25 @@ def restored(sensor: Sensor, rate: int, other: int) -> Generator[Step, Any, int 
         reply = yield from sensor.asking.who(sensor.at(rate), PATIENT, register=sensor.register)
         if reply.register == sensor.code(rate):
             return rate
+    return rate if (yield from written_back(sensor, rate)) else None
+
+
+def written_back(sensor: Sensor, rate: int) -> Generator[Step, Any, bool]:
+    """Have a sensor that answers at `rate` store it too; whether its register says so then."""
     yield from written(sensor.at(rate), sensor.register, sensor.code(rate), sensor.asking)
     for _ in range(TRIES):
         reply = yield from sensor.asking.who(sensor.at(rate), PATIENT, register=sensor.register)
         if reply.register == sensor.code(rate):
-            return rate
-    return None
+            return True
+    return False
 
 
 def rolled_back(
-    sensors: Sequence[Sensor], rate: int, other: int, where: dict[str, int | None], *, once_more: bool = True
+    sensors: Sequence[Sensor], rate: int, other: int, where: dict[str, int | None]
 ) -> Generator[Step, Any, RateVerdict]:
     """Bring these sensors to `rate`, for up to `ROLL_BACK`; `where` learns where they are.
 
-    `once_more`: all are looked for at the other rate in the end, after `VERIFY`, in which nobody is polled.
+    All are looked for at the other rate in the end, after `VERIFY`, in which nobody is polled.
     """
     until: float | None = None
     missing = list(sensors)
@@ -266,7 +273,7 @@ def rolled_back(
                 return RateVerdict(Ended.UNVERIFIED, where, tuple(each.name for each in missing))
         if missing:
             yield Hold(missing[0].asking.clock.now + FIRST_PAUSE)
-        elif once_more:
+        else:
             missing = yield from _left_behind(sensors, other)
     return RateVerdict(Ended.ROLLED_BACK, where)
 

@@ -1,6 +1,7 @@
-"""Sensors of a change of rate that is still open: undone, or awaited, however long it takes. Pure.
+"""Sensors of a change of rate that is still open: put back, or awaited, however long it takes. Pure.
 
-What the daemon did not live to finish is undone, unless every sensor is at the new rate already. Sensors that have
+What the daemon did not live to finish is undone, unless every sensor is at the new rate already: what answers is put
+back at once, what is lost is looked for until it is found and then put back too. Sensors that have
 stored the new rate and want their power switched are asked there until they come up; nothing is written to them. Where
 somebody answers at the old rate too there are two of that slave id, and one of them has still to come.
 """
@@ -8,17 +9,22 @@ somebody answers at the old rate too there are two of that slave id, and one of 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import TYPE_CHECKING, Any
 
-from lfs10d.jobs.baudrate import FIRST_PAUSE, Ended, RateVerdict, found_at, restored, rolled_back
+from lfs10d.jobs.asking import PATIENT
+from lfs10d.jobs.baudrate import FIRST_PAUSE, Ended, RateVerdict, found_at, restored, written_back
 from lfs10d.jobs.course import Aside
 from lfs10d.jobs.job import Hold
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Sequence
+    from collections.abc import Generator, Mapping, Sequence
 
     from lfs10d.jobs.baudrate import Sensor
     from lfs10d.jobs.course import Step
+
+PATIENT_EVERY = 4
+"""Every so many rounds a lost sensor is waited for long, at each rate in turn: it may be slow."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,40 +35,93 @@ class CameUp:
 
 
 @dataclass(frozen=True, slots=True)
+class StillLost:
+    """Some are not found again, and have not been for long."""
+
+
+@dataclass(frozen=True, slots=True)
 class Twins:
     """A sensor answers at both rates: it is two."""
 
     name: str
 
 
-def undo(
-    sensors: Sequence[Sensor], rate: int, other: int, *, longest_pause: float, finish: bool
-) -> Generator[Step, Any, RateVerdict]:
-    """Find every sensor after a change of rate that was cut short, and bring it to `rate`, however long it takes.
+def look_back(
+    sensors: Sequence[Sensor], rate: int, other: int, where: dict[str, int | None], *, own: int
+) -> Generator[Step, Any, dict[str, int | None]]:
+    """Look once for each sensor after a change of rate that was cut short, at the line's `own` rate first.
 
-    With `finish` they are left where they are if all of them answer at the `other` rate. What was not found in the
-    first look goes aside.
+    One that answers at `rate` and has stored another is written back at once, before it comes up there: none waits
+    for one that is lost. `where` learns where each is, and is returned.
     """
-    where: dict[str, int | None] = {}
-    if finish:
-        for sensor in sensors:
-            _, where[sensor.name] = yield from found_at(sensor, (rate, other))
-            if where[sensor.name] == rate:
-                break
-        if len(where) == len(sensors) and all(at == other for at in where.values()):
-            return RateVerdict(Ended.MOVED, where)
-    verdict = yield from rolled_back(sensors, rate, other, where, once_more=False)
-    pause = min(FIRST_PAUSE, longest_pause)
-    while verdict.ended is not Ended.ROLLED_BACK:
-        yield Aside(verdict)
-        missing = [sensor for sensor in sensors if where[sensor.name] != rate]
-        yield Hold(missing[0].asking.clock.now + pause)
+    for sensor in sensors:
+        says, at = yield from found_at(sensor, _first(own, rate, other), tries=1)
+        where[sensor.name] = at
+        if at == rate and says != sensor.code(rate):
+            yield from written_back(sensor, rate)
+    return where
+
+
+def put_back(
+    sensors: Sequence[Sensor], rate: int, other: int, where: dict[str, int | None]
+) -> Generator[Step, Any, RateVerdict]:
+    """Bring those of these sensors that were found to `rate`; the verdict speaks of all in `where`.
+
+    One that answers at the `other` rate too is two sensors: that goes aside, and it counts as being there.
+    """
+    for sensor in sensors:
+        if where[sensor.name] is None:
+            continue
+        where[sensor.name] = yield from restored(sensor, rate, other)
+        if where[sensor.name] == rate and (yield from sensor.asking.who(sensor.at(other))).answers:
+            where[sensor.name] = other
+            yield Aside(Twins(sensor.name))
+    names = tuple(name for name, at in where.items() if at != rate)
+    return RateVerdict(Ended.UNVERIFIED if names else Ended.ROLLED_BACK, dict(where), names)
+
+
+def await_lost(
+    sensors: Sequence[Sensor],
+    rate: int,
+    other: int,
+    where: Mapping[str, int | None],
+    *,
+    own: int,
+    pause: float,
+    longest_pause: float,
+    tell_at: float,
+) -> Generator[Step, Any, tuple[Sensor, ...]]:
+    """Return the first of these sensors that can be put back, however long it takes; nothing is written.
+
+    They are asked after `pause` s, twice that ... up to `longest_pause`, at the line's `own` rate first, but where each
+    was found if it was. One that answers at the `other` rate and has stored `rate` waits for its power cycle, and is
+    waited for. From the time `tell_at` on, once, `StillLost` goes aside.
+    """
+    rounds = 0
+    while True:
+        now = sensors[0].asking.clock.now
+        if now >= tell_at:
+            yield Aside(StillLost())
+            tell_at = inf
+        yield Hold(now + pause)
         pause = min(2 * pause, longest_pause)
-        for sensor in missing:
-            where[sensor.name] = yield from restored(sensor, rate, other)
-        names = tuple(sensor.name for sensor in missing if where[sensor.name] != rate)
-        verdict = RateVerdict(Ended.UNVERIFIED if names else Ended.ROLLED_BACK, where, names)
-    return verdict
+        found: list[Sensor] = []
+        turn, rest = divmod(rounds, PATIENT_EVERY)
+        for sensor in sensors:
+            for n, asked in enumerate(_first(where[sensor.name] or own, rate, other)):
+                timeout = PATIENT if rest == PATIENT_EVERY - 1 and turn % 2 == n else None
+                reply = yield from sensor.asking.who(sensor.at(asked), timeout, register=sensor.register)
+                if reply.answers and not (asked == other and reply.register == sensor.code(rate)):
+                    found.append(sensor)
+                if reply.answers:
+                    break
+        if found:
+            return tuple(found)
+        rounds += 1
+
+
+def _first(own: int, *rates: int) -> tuple[int, ...]:
+    return tuple(sorted(rates, key=lambda each: each != own))
 
 
 def await_power(

@@ -26,6 +26,7 @@ from lfs10d.physical.readdressing import Readdressing
 from lfs10d.physical.reserving import Reserving
 from lfs10d.physical.talk import Talk
 from lfs10d.profiles.library import load_profile
+from lfs10d.tasks import BackgroundTasks
 
 if TYPE_CHECKING:
     from collections.abc import Awaitable, Callable, Coroutine, Iterator, Mapping
@@ -44,6 +45,9 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 T = TypeVar("T")
+
+REFUSALS_SAVED_AFTER = 10.0
+"""Seconds after which the answers to requests that wrote nothing are on the disk, all in one step."""
 
 
 class Recall(Protocol):
@@ -88,6 +92,8 @@ class Physical:
         self._reserving = Reserving(lambda: journal.open)
         self._writing: asyncio.Future[Any] | None = None
         self._underway: Asked | None = None
+        self._tasks = BackgroundTasks()
+        self._saving: asyncio.Task[None] | None = None
         self._act = act
         self._moves = Readdressing(self)
         self._rates = RateChange(self)
@@ -185,10 +191,22 @@ class Physical:
             return await self._moves.perform(slave, to, who, dry_run=dry_run)
 
     async def refused(self, who: Asked, answer: Answer) -> Answer:
-        """Return the answer to a request of which nothing was written, kept for its repeats."""
-        with contextlib.suppress(StateError):  # a repeat may be judged anew
-            await self.put(partial(self.journal.close, frozenset(), self.told(who, answer)))
+        """Return the answer to a request of which nothing was written, kept for its repeats.
+
+        It is not waited for that the disk has it: a flood of such requests must not wear the disk out.
+        """
+        await self.put(partial(self.journal.note, self.told(who, answer)))
+        if self.ending:
+            await self._save_noted()
+        elif self._saving is None or self._saving.done():
+            self._saving = self._tasks.start("journal", self._save_noted(REFUSALS_SAVED_AFTER))
         return answer
+
+    async def _save_noted(self, after: float = 0.0) -> None:
+        if after:
+            await asyncio.sleep(after)
+        with contextlib.suppress(StateError):  # a repeat may be judged anew
+            await self.put(self.journal.save)
 
     # -- what the kinds of change have in common
 
@@ -324,5 +342,5 @@ class Physical:
         self.ending = True
         self._locating.stop()
         self._following.stop()
-        if self._writing is not None:
-            await asyncio.wait([self._writing])
+        self._tasks.cancel_all()
+        await self._save_noted()

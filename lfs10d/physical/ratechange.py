@@ -5,12 +5,15 @@ from __future__ import annotations
 import logging
 from dataclasses import replace
 from functools import partial
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 from lfs10d.changes import Changes, Rate
 from lfs10d.commands import Answer, failed, ok, rejected
 from lfs10d.errors import StateError
 from lfs10d.jobs.baudrate import (
+    FIRST_PAUSE,
+    ROLL_BACK,
     UNTOUCHED,
     Ended,
     RateVerdict,
@@ -20,7 +23,7 @@ from lfs10d.jobs.baudrate import (
     change_rate,
 )
 from lfs10d.jobs.course import Now, Over
-from lfs10d.jobs.rejoin import CameUp, Twins, await_power, undo
+from lfs10d.jobs.rejoin import CameUp, Twins, await_lost, await_power, look_back, put_back
 from lfs10d.journal import Move
 from lfs10d.reading import Errand
 
@@ -211,22 +214,20 @@ class RateChange:
 
     async def follow(self, change: OpenChange, talk: Talk) -> None:
         """Look for the sensors of an open change; finish it, or undo what the daemon did not live to finish."""
-        physical = self._physical
         old, to = int(change.facts["from"]), int(change.facts["to"])
+        if change.answered and "pending" in change.facts:
+            await self._await_power(change, talk, old, to)
+        else:
+            await self._undo(change, talk, old, to)
+
+    async def _await_power(self, change: OpenChange, talk: Talk, old: int, to: int) -> None:
+        """Follow sensors that have stored the new rate until each comes up there."""
+        physical = self._physical
         clock = Now()
-        longest = physical.running().config.poll.probe_interval_max
-        waiting = change.answered and "pending" in change.facts
-        names = change.facts["pending"] if waiting else [move.device for move in change.moves]
-        sensors = self._sensors(names, clock)
-        if waiting:
-            steps = await_power(sensors, old, to, longest_pause=longest)
-        else:
-            steps = undo(sensors, old, to, longest_pause=longest, finish=not change.answered)
-        if change.answered:
-            talk.begin(steps, clock, line_rate=0, share=1.0, errand=Errand.PROBE)
-        else:
-            talk.begin(steps, clock, line_rate=0, excludes=frozenset(sensor.slave for sensor in sensors))
-        pending = list(names)
+        pending = list(change.facts["pending"])
+        sensors = self._sensors(pending, clock)
+        steps = await_power(sensors, old, to, longest_pause=physical.running().config.poll.probe_interval_max)
+        talk.begin(steps, clock, line_rate=0, share=1.0, errand=Errand.PROBE)
         while not isinstance(what := await talk.wanted(), Over):
             if isinstance(what, CameUp):
                 if physical.running().config.line.baudrate != to:
@@ -235,11 +236,74 @@ class RateChange:
                 await physical.put(partial(physical.journal.amend, change.number, change.moves, pending=pending))
             elif isinstance(what, Twins):
                 self._tell_twins(what.name, sensors)
-            elif isinstance(what, RateVerdict) and not change.answered:
-                change = await physical.answered(change, _answer(old, to, what))
             talk.go_on()
         if what.result is not None:
             await self._settle(change, old, to, what.result)
+
+    async def _undo(self, change: OpenChange, talk: Talk, old: int, to: int) -> None:
+        """Put back at once what answers, and what is lost when it is found, within the share of probes."""
+        physical = self._physical
+        longest = physical.running().config.poll.probe_interval_max
+        clock = Now()
+        everybody = found = self._sensors([move.device for move in change.moves], clock)
+        where: dict[str, int | None] = {}
+        twins: set[str] = set()
+        finish, tell_at, pause = not change.answered, inf, min(FIRST_PAUSE, longest)
+        while True:
+            own = physical.running().config.line.baudrate
+            steps = look_back(found, old, to, where, own=own)
+            talk.begin(steps, clock, line_rate=0, share=1.0, excludes=frozenset(each.slave for each in found))
+            if await self._over(talk, found, twins) is None:
+                return
+            if finish and all(at == to for at in where.values()):
+                await self._settle(change, old, to, RateVerdict(Ended.MOVED, where))
+                return
+            tell_at = clock.now + ROLL_BACK if finish else tell_at
+            away = tuple(sensor for sensor in found if where[sensor.name] != old)
+            here = tuple(sensor for sensor in found if where[sensor.name] == old)
+            talk.go_on()
+            talk.begin(
+                put_back(away, old, to, where),
+                clock, line_rate=0, share=1.0, excludes=frozenset(sensor.slave for sensor in away),
+            )  # fmt: skip
+            if await self._over(talk, found, twins) is None:
+                return
+            talk.go_on()
+            talk.begin(put_back(here, old, to, where), clock, line_rate=0)  # of two of one id one may have moved
+            verdict = await self._over(talk, found, twins)
+            if verdict is None:
+                return
+            if verdict.ended is not Ended.UNVERIFIED:
+                await self._settle(change, old, to, verdict)
+                return
+            if old in where.values() and own != old:
+                await self._record(to, old)  # those that are back are polled, whoever is still lost
+            talk.go_on()
+            finish = False
+            lost = tuple(sensor for sensor in everybody if where[sensor.name] != old)
+            talk.begin(
+                await_lost(
+                    lost, old, to, where, own=physical.running().config.line.baudrate,
+                    pause=pause, longest_pause=longest, tell_at=inf if change.answered else tell_at,
+                ),
+                clock, line_rate=0, share=1.0, errand=Errand.PROBE,
+            )  # fmt: skip
+            while not isinstance(what := await talk.wanted(), Over):
+                change = await physical.answered(change, _answer(old, to, verdict))
+                talk.go_on()
+            if what.result is None:
+                return
+            talk.go_on()
+            found, pause = what.result, min(2 * pause, longest)
+
+    async def _over(self, talk: Talk, sensors: Iterable[Sensor], twins: set[str]) -> Any:  # noqa: ANN401 - a course's
+        """Return the result of a course, None where the port was lost; tell of `twins` that were not told of yet."""
+        while not isinstance(what := await talk.wanted(), Over):
+            if isinstance(what, Twins) and what.name not in twins:
+                twins.add(what.name)
+                self._tell_twins(what.name, sensors)
+            talk.go_on()
+        return what.result
 
     async def _settle(self, change: OpenChange, old: int, to: int, verdict: RateVerdict) -> None:
         physical = self._physical

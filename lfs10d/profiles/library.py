@@ -11,6 +11,7 @@ from lfs10d import document
 from lfs10d.errors import ConfigError, Problem
 from lfs10d.kinds import quoted
 from lfs10d.profiles.schema import Profile
+from lfs10d.regularfile import read_regular
 
 BUILTIN_NAMES = ("lfs10", "ld-e", "fuling-dzb", "eh600")
 """The profiles that come with lfs10d, the first being a slave's default."""
@@ -42,8 +43,7 @@ def _load_builtin(name: str) -> Profile:
 
 def _read(path: Path, wanted: str) -> str:
     try:
-        with path.open("rb") as file:
-            content = file.read(document.LARGEST_FILE + 1)
+        content = read_regular(path, document.LARGEST_FILE + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "is no path"
         known = ", ".join(BUILTIN_NAMES)

@@ -17,6 +17,7 @@ import sqlite3
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from lfs10d.regularfile import create_private, make_private
 from lfs10d.store.row import DamagedError
 
 if TYPE_CHECKING:
@@ -89,8 +90,12 @@ class Limits:
 def connect(path: Path, *, boot: str, limits: Limits) -> sqlite3.Connection:
     """Open the file, bring its log into it, and write `boot`. A file shorter than it says SQLite refuses itself.
 
-    Raises sqlite3.Error, ForeignError, or DamagedError where the file is cut.
+    Only the owner may read it, whatever the umask is. Raises OSError, sqlite3.Error, ForeignError, or DamagedError
+    where the file is cut.
     """
+    create_private(path)  # SQLite gives what it keeps beside the file the rights of the file
+    for beside in ("-wal", "-shm", "-journal"):
+        make_private(path.with_name(f"{path.name}{beside}"))
     torn = _ends_within_a_page(path)
     db = sqlite3.connect(path, timeout=PATIENCE, isolation_level=None)
     try:

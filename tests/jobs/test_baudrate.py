@@ -17,9 +17,8 @@ from lfs10d.jobs.baudrate import (
     WriteRates,
     change_rate,
     restored,
-    rolled_back,
 )
-from lfs10d.jobs.readdress import ECHO_READS, VERIFY
+from lfs10d.jobs.readdress import ECHO_READS
 from lfs10d.modbus.frames import WriteRegister
 from lfs10d.profiles.library import load_profile
 
@@ -246,20 +245,6 @@ def test_one_that_was_deaf_while_its_twin_was_brought_back_is_looked_for_once_mo
     verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True))
     assert verdict == RateVerdict(Ended.ROLLED_BACK, {"s1": 9600, "s2": 9600})
     assert [sensor.baudrate for sensor in pretence.sensors] == [9600] * 3
-
-
-def test_where_somebody_else_looks_on_nobody_is_waited_for_in_the_end(pretence: Pretence) -> None:
-    sensors = line(pretence, "obeys")
-    pretence.sensors[0].baudrate = 19200
-    where: dict[str, int | None] = {}
-    begun = pretence.clock.now
-    verdict = pretence.carry_out(rolled_back(sensors, *UP, where, once_more=False))
-    assert verdict == RateVerdict(Ended.ROLLED_BACK, {"s1": 9600})
-    assert where == {"s1": 9600}
-    assert pretence.clock.now - begun < VERIFY
-
-
-# -- after an earlier change that waits for the power
 
 
 def test_a_first_sensor_that_stays_has_the_others_forget_what_they_stored_before(pretence: Pretence) -> None:

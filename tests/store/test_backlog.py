@@ -188,7 +188,7 @@ def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
 
 def test_a_place_that_is_a_folder_is_told_and_left_alone(store: Store) -> None:
     store.path.mkdir(parents=True)
-    with pytest.raises(StoreError, match="cannot be opened"):
+    with pytest.raises(StoreError, match="is a directory"):
         store.open()
     assert store.path.is_dir()
 

@@ -122,3 +122,18 @@ def test_a_transaction_happens_as_one_or_not_at_all(path: Path, last: str) -> No
         with transaction(db):
             db.execute("INSERT INTO further VALUES (1, 1, 1)")
         assert number(db, "SELECT count(*) FROM further") == 1
+
+
+def test_nobody_but_the_owner_may_read_the_file_and_what_is_beside_it_whatever_was_before(tmp_path: Path) -> None:
+    path = tmp_path / "backlog.db"
+    for _ in range(2):
+        db = connect(path, boot="k3f9a2c7", limits=ROOMY)
+        with transaction(db):
+            db.execute("UPDATE life SET boot = 'k3f9a2c8'")
+        modes = {each.name: each.stat().st_mode & 0o777 for each in tmp_path.iterdir()}
+        assert set(modes) >= {"backlog.db", "backlog.db-wal"}
+        assert set(modes.values()) == {0o600}
+        db.close()
+        path.chmod(0o644)
+        path.with_name("backlog.db-wal").touch()
+        path.with_name("backlog.db-wal").chmod(0o644)
