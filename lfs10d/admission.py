@@ -128,13 +128,9 @@ class Admission(Generic[W]):
             call = commands.read(payload)[0] if len(payload) <= LARGEST else Call()
             message = "a retained request is never executed; publish it without the retain flag"
             return Answered(call, rejected("retained", message), clear=True, flood=flood)
-        if len(payload) > LARGEST:
-            message = f"the payload has more than the {LARGEST} bytes that are allowed"
-            return Answered(Call(), rejected("too_large", message), flood=flood)
-        call, problem = commands.read(payload)
-        if correlation > LARGEST_CORRELATION:
-            message = f"the Correlation Data has more than the {LARGEST_CORRELATION} bytes that are allowed"
-            return Answered(call, rejected("too_large", message), flood=flood)
+        call, problem = commands.read(payload) if len(payload) <= LARGEST else (Call(), None)
+        if (excess := _too_large(len(payload), correlation)) is not None:
+            return Answered(call, rejected("too_large", excess), flood=flood)
         if flood:
             message = f"more than {RATE:g} requests a second; send it again later"
             return Answered(call, rejected("rate_limited", message), flood=True)
@@ -223,3 +219,12 @@ class Admission(Generic[W]):
         memory.forget_at = now + self._forms[ticket.name].remembered_for
         repeats, memory.repeats = memory.repeats, []
         return repeats
+
+
+def _too_large(payload: int, correlation: int) -> str | None:
+    """Return what of a request has more bytes than are allowed, in words; None if nothing has."""
+    if payload > LARGEST:
+        return f"the payload has more than the {LARGEST} bytes that are allowed"
+    if correlation > LARGEST_CORRELATION:
+        return f"the Correlation Data has more than the {LARGEST_CORRELATION} bytes that are allowed"
+    return None
