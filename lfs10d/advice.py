@@ -38,20 +38,31 @@ def advice(loaded: Loaded, budget: Budget, host: str) -> tuple[Problem, ...]:
 
 def _load(loaded: Loaded, budget: Budget) -> Iterator[tuple[KeyPath, str]]:
     path: KeyPath = ("poll", "interval") if loaded.document.holds(("poll", "interval")) else ("slaves",)
-    if budget.load > 1:
+    for share in budget.shares:
+        if share.rest and share.load_with_turnaround is not None and share.load_with_turnaround > 1:
+            index = [slave.name for slave in loaded.config.slaves].index(share.device)
+            needed = duration_text(round(share.load_with_turnaround * share.interval, 3))
+            yield (
+                ("slaves", index),
+                (
+                    f"one poll takes {needed} with the rest before each request (request_gap): it will be polled less "
+                    f"often than every {duration_text(share.interval)}"
+                ),
+            )
+    if budget.wire_load > 1:
         yield (
             path,
             (
-                f"the intervals ask for {budget.load:.1%} of what the line carries: every device will be polled less "
-                "often; use longer intervals, a higher baud rate or a second line"
+                f"the intervals ask for {budget.wire_load:.1%} of what the line carries: every device will be polled "
+                "less often; use longer intervals, a higher baud rate or a second line"
             ),
         )
-    elif budget.load_with_turnaround > 1:
+    elif budget.wire_load_with_turnaround > 1:
         yield (
             path,
             (
-                f"the intervals ask for {budget.load_with_turnaround:.1%} of what the line carries if the devices take "
-                f"{duration_text(ASSUMED_TURNAROUND)} to answer (and {budget.load:.1%} if they took none)"
+                f"the intervals ask for {budget.wire_load_with_turnaround:.1%} of what the line carries if the devices "
+                f"take {duration_text(ASSUMED_TURNAROUND)} to answer (and {budget.wire_load:.1%} if they took none)"
             ),
         )
     if not loaded.config.slaves:

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from lfs10d.budget import timing_of
+from lfs10d.budget import request_gap, timing_of
 from lfs10d.facts import DeviceFacts, LineFacts
 from lfs10d.jobs.register import Target
 from lfs10d.jobs.search import Search
@@ -79,6 +79,7 @@ def _device_spec(slave: SlaveConfig, line: LineConfig, profile: Profile) -> Devi
         interval=max(slave.interval, profile.min_interval),  # 0 is as fast as the line allows, and the device
         enabled=slave.enabled,
         response_timeout=slave.response_timeout,
+        request_gap=request_gap(slave, profile),
     )
 
 
@@ -145,6 +146,7 @@ def device_facts(config: Config, profiles: Mapping[str, Profile]) -> tuple[Devic
             interval=slave.interval,
             enabled=slave.enabled,
             response_timeout=slave.response_timeout,
+            request_gap=request_gap(slave, profiles[slave.profile]),
             value_names=profiles[slave.profile].value_names,
             units=profiles[slave.profile].units,
             offline_after=config.poll.offline_after,

@@ -163,6 +163,11 @@ class SlaveConfig(Section):
     checksum: Annotated[Literal["crc", "sum"] | None, Choice(("crc", "sum"), null=True)] = Field(
         None, description="Check of its rtu frames; null is the profile's."
     )
+    request_gap: Annotated[float, Duration(0, 60)] = Field(
+        0.0,
+        description="Rest before each request to it, counted from the end of the exchange with it before; "
+        "the greater of this and the profile's.",
+    )
 
 
 def _slave(value: object) -> object:

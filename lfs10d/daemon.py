@@ -12,6 +12,7 @@ import os
 import socket
 import sys
 from dataclasses import replace
+from math import inf
 from typing import TYPE_CHECKING
 
 from lfs10d import __version__, assembly, logs, signals
@@ -30,12 +31,13 @@ from lfs10d.mqtt.uplink import Uplink
 from lfs10d.physical.losing import Losing
 from lfs10d.physical.place import Physical
 from lfs10d.powers import DaemonPowers
-from lfs10d.reading import Exchanged, FaultCode, PortChanged
+from lfs10d.reading import Exchanged, FaultCode, PortChanged, Reading
 from lfs10d.recalling import Recalling
 from lfs10d.requests.table import REQUESTS
 from lfs10d.running import Running
 from lfs10d.service import Service
 from lfs10d.signals import Signals
+from lfs10d.startreport import WITHIN, StartReport
 from lfs10d.statedir import status_file
 from lfs10d.station import Station
 from lfs10d.statusfile import StatusFile
@@ -93,6 +95,7 @@ class Daemon:
         self._signals = Signals(notifier, end=self._over.set, reload=self._reload, summary=self._summary)
         self._ticking: asyncio.TimerHandle | None = None
         self._logbook = Logbook()
+        self._start_report = StartReport()
         self._facts = DaemonFacts(
             version=__version__,
             host=socket.gethostname(),
@@ -225,6 +228,7 @@ class Daemon:
         published: list[Publication] = []
         for event in events:
             self._enter(self._logbook.happened(event, port=port.settings.path, notices=port.notices, frames=frames))
+            self._watch_start(event)
             known = self._station.heard(event, now)
             self._enter(self._logbook.published(known))
             published += [*known, *self._powers.heard(event, known, now)]
@@ -237,6 +241,24 @@ class Daemon:
             self._yield(self._running.now.conflicts)
             self._physical.follow()
             self._losing.begin()
+
+    def _watch_start(self, event: Event) -> None:
+        """Report who answers after the port was opened."""
+        report = self._start_report
+        if isinstance(event, Reading):
+            report.heard(event)
+            if report.due < inf:
+                self._report_start()
+        elif isinstance(event, PortChanged):
+            if event.fault is not None:
+                report.lost()
+                return
+            report.opened((slave.name for slave in self._running.now.polled.slaves if slave.enabled), event.at)
+            self._loop.call_at(event.at + WITHIN + TICK_SLACK, self._report_start)
+
+    def _report_start(self) -> None:
+        entry = self._start_report.entry(self._now().mono)
+        self._enter([] if entry is None else [entry])
 
     def _publish(self, publications: Iterable[Publication]) -> None:
         self._uplink.publish(self._first_burst.passing(publications))

@@ -87,7 +87,10 @@ class LineFacts:
 
 @dataclass(frozen=True, slots=True)
 class DeviceFacts:
-    """A device as configured; `interval` and `response_timeout` in s, the latter None where it is learned."""
+    """A device as configured; durations in s; `response_timeout` is None where it is learned.
+
+    `request_gap` is the rest that it is given between two exchanges, where no longer one was learned.
+    """
 
     name: str
     slave: int
@@ -99,6 +102,7 @@ class DeviceFacts:
     value_names: tuple[str, ...]
     units: Mapping[str, str]
     offline_after: int
+    request_gap: float = 0.0
 
     def entry(self) -> dict[str, object]:
         """Return the device's place in the array `devices`."""
@@ -111,7 +115,7 @@ class DeviceFacts:
             "interval": self.interval,
         }
 
-    def payload(self) -> dict[str, object]:
+    def payload(self, learned_gap: float = 0.0) -> dict[str, object]:
         """Return the object for `device/<name>/config`; a learned time-out is `auto`, as in the YAML."""
         return {
             "v": VERSION,
@@ -121,4 +125,5 @@ class DeviceFacts:
             "interval": self.interval,
             "enabled": self.enabled,
             "response_timeout": "auto" if self.response_timeout is None else self.response_timeout,
+            "request_gap": max(self.request_gap, learned_gap),
         }

@@ -10,7 +10,8 @@ import logging
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
-from lfs10d.reading import Exchanged, PortChanged
+from lfs10d.quantities import duration_text
+from lfs10d.reading import Exchanged, PortChanged, Reading
 from lfs10d.telemetry import ERROR, device_of
 
 if TYPE_CHECKING:
@@ -33,6 +34,8 @@ class Logbook:
     def __init__(self) -> None:
         self._failing: dict[str, str] = {}
         """The code last told, by device."""
+        self._rested: set[str] = set()
+        """Devices whose learned rest was reported."""
 
     def happened(self, event: Event, *, port: str, notices: Sequence[str], frames: bool) -> list[Entry]:
         """Return what an event of the line thread says by itself; exchanges only where `frames` are wanted.
@@ -48,6 +51,12 @@ class Logbook:
                 Entry(logging.INFO, f"{port}: the port is open"),
                 *(Entry(logging.WARNING, notice) for notice in notices),
             ]
+        if isinstance(event, Reading) and event.gap_learned and event.device not in self._rested:
+            self._rested.add(event.device)
+            gap = duration_text(event.request_gap)
+            text = f"{event.device}: ignores a request right behind another, and is now given {gap} of rest before each"
+            why = f"more if that is too short, see device/{event.device}/config"
+            return [Entry(logging.WARNING, f"{text} ({why}): set request_gap for it in the configuration")]
         if frames and isinstance(event, Exchanged):
             heard = event.heard.hex(" ") or "nothing"
             fault = f": {event.fault}" if event.fault else ""

@@ -186,6 +186,7 @@ class DeviceConfig(Payload):
     interval: float = Field(ge=0, description="s")
     enabled: bool
     response_timeout: float | Literal["auto"] = Field(description="s; auto: learned")
+    request_gap: float = Field(ge=0, description="rest before each request to it in s, as set or learned")
 
 
 class RoundTrip(Payload):
@@ -205,6 +206,7 @@ class DeviceStats(Payload):
     errors: Errors
     rtt_ms: RoundTrip = Field(description="times of its last 100 answers")
     response_timeout_ms: float | None = Field(description="as set or learned")
+    request_gap_ms: float = Field(ge=0, description="rest before each request to it, as set or learned")
     last_good_ts: Milliseconds | None
 
 

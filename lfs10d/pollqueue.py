@@ -2,7 +2,8 @@
 
 Polls lie on a fixed grid per device: no drift. A point of the grid that is missed is skipped and counted. A retry
 goes behind what was due before the attempt failed. So overload degrades evenly, and no device is asked twice before
-one that was due. A device with interval 0 that waited 5 s goes as one that was due then.
+one that was due. A device with interval 0 that waited 5 s goes as one that was due then. One that is silent at the
+start is polled again at once, but not before the first poll of each other device.
 """
 
 from __future__ import annotations
@@ -68,7 +69,10 @@ class PollQueue:
         if device.queued or not device.spec.enabled or device.doubtful:
             return
         device.queued = True
-        if device.spec.interval == 0:
+        if device.starting:
+            first = (each.due for _, _, each in self._due if isinstance(each, Device) and each.last_asked == -inf)
+            self._push(max(device.again_at, *first, -inf), device)
+        elif device.spec.interval == 0:
             self._flat.append(device)
         else:
             self._push(device.due, device)
@@ -114,7 +118,9 @@ class PollQueue:
     def _begin(self, device: Device, now: float) -> Poll:
         interval = device.spec.interval
         due = now
-        if interval > 0:
+        if device.starting:
+            back_on_grid(device, now)
+        elif interval > 0:
             due = device.due
             missed = floor((now - due) / interval)
             device.overruns += missed

@@ -77,7 +77,8 @@ class Reading:
     was given up. `rtt` runs from the request's first bit to the answer's last byte; None for a failed poll.
     `online` and `response_timeout` are the device's state after this poll. `failed_attempts` are the codes of
     the attempts before the last. `overruns` counts the points of the grid missed since the reading before.
-    `requests` are the numbers of the requests that asked for it.
+    `requests` are the numbers of the requests that asked for it. `request_gap` is the rest in s that the device is
+    given between two exchanges; `gap_learned`: more than configured, because it ignored requests.
     """
 
     device: str
@@ -91,6 +92,8 @@ class Reading:
     failed_attempts: tuple[FaultCode, ...] = ()
     overruns: int = 0
     requests: tuple[int, ...] = ()
+    request_gap: float = 0.0
+    gap_learned: bool = False
 
 
 class Errand(StrEnum):

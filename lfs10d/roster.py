@@ -9,9 +9,11 @@ Rules
 4. The time-out is fixed, or learned: 2 x p99 of the last 100 answers + 20 ms within 50 ms..1 s. A slave never
    heard is given 200, 400, 1000 ms on its first polls. A late answer counts with the time it took.
 5. A probe of an OFFLINE device waits 200 ms or what was learned, every fourth one 1 s.
-6. An UNHEARD device that did not answer its first poll is doubtful: asked on as an OFFLINE one is, within the share
-   of probes, so that the absent cost the present little from the start; when the first other one answers, at once
-   but for 200 ms only.
+6. A device that is silent at the start, or when the port is back, is polled `START_POLLS` times at once. Then it is
+   doubtful, as an OFFLINE one is: asked within the share of probes, so that the absent cost the present little; when
+   the first other one answers, at once but for 200 ms only.
+7. A device that answers badly (bytes came, but no right frame) is polled as one that answers well, however it is: bad
+   answers are cheap. Of one that was never heard it is not known how long it takes: it is given 200 ms.
 
 ======== =================== =============================================== =========
 from     answer or alive     failed poll                                     port lost
@@ -32,12 +34,19 @@ from enum import StrEnum
 from math import ceil
 from typing import TYPE_CHECKING
 
-from lfs10d.reading import ALIVE_CODES, Fault
+from lfs10d.reading import ALIVE_CODES, Fault, FaultCode
+from lfs10d.requestgap import RequestGap
 
 if TYPE_CHECKING:
     from lfs10d.modbus.frames import Codec
     from lfs10d.profiles.schema import Profile
 
+START_POLLS = 3
+"""So many polls at once decide at the start whether a device answers."""
+SILENT_CODES = frozenset({FaultCode.TIMEOUT, FaultCode.LATE, FaultCode.COLLISION, FaultCode.WRONG_SLAVE})
+"""With these faults the device itself said nothing that came in time, and its time-out was waited for."""
+BAD_ANSWER_PATIENCE = 0.1
+"""How long one that was never heard and answers badly is waited for once bytes came that begin no answer, in s."""
 FIRST_TIMEOUTS = (0.2, 0.4, 1.0)
 """Time-outs in s of the first polls of a slave never heard; the last one holds on."""
 LEARNED_LEAST = 0.05
@@ -68,7 +77,10 @@ class Health(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class DeviceSpec:
-    """A configured slave: what the configuration says of it. Durations in s; `response_timeout` None: learned."""
+    """A configured slave: what the configuration says of it. Durations in s; `response_timeout` None: learned.
+
+    `request_gap` is the rest it needs between two exchanges.
+    """
 
     name: str
     slave: int
@@ -77,6 +89,7 @@ class DeviceSpec:
     interval: float
     enabled: bool = True
     response_timeout: float | None = None
+    request_gap: float = 0.0
 
     def begins_anew(self, before: DeviceSpec) -> bool:
         """Whether nothing that was learned of the device as it was `before` holds for it now."""
@@ -120,7 +133,9 @@ class Device:
     """One configured slave at run time.
 
     `due` is its next point of the grid, `overruns` counts the points missed since its last reading. `queued`: it
-    waits in the schedule's queue; `polling`: a poll or probe of it is under way.
+    waits in the schedule's queue; `polling`: a poll or probe of it is under way. `polled_at` is when its last poll
+    was begun, whoever wanted it. `silent`: its last poll failed without an answer, good or bad. `start_polls` are left
+    of those that are made at once, the next one at `again_at`; `hurried`: many are silent, none is waited for long.
     """
 
     spec: DeviceSpec
@@ -138,6 +153,12 @@ class Device:
     queued: bool = False
     polling: bool = False
     turnarounds: Turnarounds = field(default_factory=Turnarounds)
+    gap: RequestGap = field(default_factory=RequestGap)
+    polled_at: float = float("-inf")
+    silent: bool = False
+    start_polls: int = START_POLLS
+    again_at: float = 0.0
+    hurried: bool = False
 
     @property
     def name(self) -> str:
@@ -151,8 +172,13 @@ class Device:
 
     @property
     def doubtful(self) -> bool:
-        """It is probed, not polled (rule 6)."""
-        return self.health is Health.OFFLINE or (self.health is Health.UNHEARD and self.failures > 0)
+        """It is probed, not polled (rules 6 and 7)."""
+        return self.silent and not self.online and self.start_polls == 0
+
+    @property
+    def starting(self) -> bool:
+        """It was silent since the start, and is polled again at once (rule 6)."""
+        return self.silent and self.start_polls > 0
 
     @property
     def timeout(self) -> float:
@@ -161,9 +187,19 @@ class Device:
             return self.spec.response_timeout
         p99 = self.turnarounds.p99
         if p99 is None:
+            if self.hurried or (self.failures and not self.silent):
+                return FIRST_TIMEOUTS[0]
             return FIRST_TIMEOUTS[min(self.failures, len(FIRST_TIMEOUTS) - 1)]
         least = LEARNED_LEAST if len(self.turnarounds) >= CONFIDENT_FROM else FIRST_TIMEOUTS[0]
         return min(max(2 * p99 + LEARNED_MARGIN, least), LEARNED_MOST)
+
+    @property
+    def patience(self) -> float | None:
+        """How long after a request bytes may come that begin its answer, in s, where that is known."""
+        p99 = self.turnarounds.p99
+        if p99 is None and self.failures and not self.silent:
+            return BAD_ANSWER_PATIENCE
+        return p99
 
     @property
     def probe_timeout(self) -> float:
@@ -184,6 +220,9 @@ class Device:
     def answered(self) -> None:
         """Note a poll that gave a value, or a fault that proves the device alive."""
         self.failures = 0
+        self.silent = False
+        self.start_polls = 0
+        self.hurried = False
         self.health = Health.ONLINE
         self.probes = 0
         self.probe_interval = PROBE_INTERVAL_LEAST
@@ -196,24 +235,33 @@ class Device:
             return
         self.failures += 1
         self.probe_exempt = False
-        if self.health is Health.OFFLINE:
+        self.silent = fault.code in SILENT_CODES
+        self.again_at = now
+        if self.start_polls > 0:
+            self.start_polls -= 1
+        elif self.health is Health.OFFLINE:
             self.probes += 1
             self.probe_interval = min(2 * self.probe_interval, self.rules.probe_interval_max)
             self.next_probe = now + self.probe_interval
             return
         if self.failures >= self.rules.offline_after:
             self.health = Health.OFFLINE
+            self.gap.offline()
             self.probe_interval = min(PROBE_INTERVAL_LEAST, self.rules.probe_interval_max)
         self.next_probe = now + self.probe_interval
 
     def cut_off(self) -> None:
         """Note that the port is lost, and with it any poll under way."""
         self.health = Health.OFFLINE
+        self.silent = True
+        self.start_polls = 0
         self.polling = False
 
     def reconnected(self) -> None:
         """Note that the port is open again: nothing is known of the device yet."""
         self.health = Health.UNHEARD
         self.failures = 0
+        self.silent = False
+        self.start_polls = START_POLLS
         self.probes = 0
         self.probe_exempt = False

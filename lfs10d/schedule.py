@@ -9,7 +9,9 @@ Rules
    device is due at once.
 4. A device that is never heard, or probed in turn with others, and is silent right after another was silent, is asked
    once more at once: some sensors ignore the request after one to a dead neighbour.
-5. One poll, one reading; none if its device is no longer configured, or no longer enabled and nobody requested it.
+5. A slave is given its rest before each request, whatever it is for (`lfs10d.slaverests`): a job that wants to ask
+   it sooner is held, while others have the line.
+6. One poll, one reading; none if its device is no longer configured, or no longer enabled and nobody requested it.
 """
 
 from __future__ import annotations
@@ -28,6 +30,7 @@ from lfs10d.pollqueue import PollQueue, back_on_grid, spread
 from lfs10d.probing import Probing
 from lfs10d.reading import Errand, Fault, FaultCode
 from lfs10d.roster import LEARNED_MOST, Device, DeviceSpec, Health, PollRules
+from lfs10d.slaverests import SlaveRests
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -43,6 +46,9 @@ class Rest:
 
     until: float
 
+
+START_PATIENT = 8
+"""With more silent devices than this at the start none of them is waited for longer than 200 ms."""
 
 Decision: TypeAlias = Ask | Rest
 
@@ -65,6 +71,7 @@ class Schedule:
         self._current: tuple[Job, Ask] | None = None
         self._silent: int | None = None
         self._lost: Fault | None = None
+        self._rests = SlaveRests()
 
     # -- what is to be polled
 
@@ -82,9 +89,12 @@ class Schedule:
                 if self._lost:
                     device.cut_off()
                 fresh.append(device)
+                if (known := before.get(spec.name)) is not None and known.spec.profile == spec.profile:
+                    device.gap = known.gap
             elif device.spec.interval != spec.interval:
                 fresh.append(device)
             device.spec, device.rules = spec, rules
+            device.gap.configured = spec.request_gap
             self.devices[spec.name] = device
         self._by_slave = {device.slave: device for device in self.devices.values()}
         for job in self._jobs.drop(lambda job: isinstance(job, Poll) and not self._wanted(job)):
@@ -149,6 +159,7 @@ class Schedule:
             self._jobs.over(job)
             jobs.append(job)
             self.unanswered.abandoned(ask.request, ask.codec, ask.timeout, now)
+            self._rests.abandoned(ask.request.slave, now)
         for job in jobs:
             job.cut_off(now)
         self._current = None
@@ -185,13 +196,22 @@ class Schedule:
         while (chosen := self._choose(now)) is not None:
             decision = chosen.ask(now)
             if isinstance(decision, Ask):
-                self._current = chosen, decision
-                return decision
+                until = self._rests.until(chosen, decision, self._by_slave)
+                if until <= now:
+                    self._begin(chosen, decision, now)
+                    return decision
+                self._toll.released()
+                decision = Hold(until)
             if isinstance(decision, Hold):
                 self._jobs.hold(chosen, decision)
             else:
                 self._jobs.over(chosen)
         return Rest(min(self._probing.next_at, self._polls.next_due(), self._jobs.next_at(now)))
+
+    def _begin(self, job: Job, ask: Ask, now: float) -> None:
+        self._current = job, ask
+        if isinstance(job, Poll) and not job.begun:
+            job.device.polled_at = now
 
     def _choose(self, now: float) -> Job | None:
         job = self._jobs.choose(now)
@@ -229,9 +249,10 @@ class Schedule:
         (job, ask), self._current = self._current, None
         self.unanswered.settled(outcome, ask.codec, ask.timeout, now)
         self._learn(outcome)
+        widened = self._rests.learn(outcome, ask, self._by_slave, line_rate=self.timing.baudrate)
         self._spend(job, outcome, now)
         ignored = self._ignored(outcome)
-        if ignored and isinstance(job, Poll) and self._benefits(job.device) and self._wanted(job):
+        if isinstance(job, Poll) and self._wanted(job) and (widened or (ignored and self._benefits(job.device))):
             self._jobs.resume(job)
             return []
         following = job.heard(outcome, now)
@@ -259,6 +280,8 @@ class Schedule:
 
     def _benefits(self, device: Device) -> bool:
         """Whether a doubt about silence is worth another exchange at once (rule 4)."""
+        if device.starting:
+            return False
         return device.health is Health.UNHEARD or device.probe_exempt or not self._probing.anyone_online
 
     def _learn(self, outcome: Outcome) -> None:
@@ -292,22 +315,30 @@ class Schedule:
 
     def _finish(self, poll: Poll, now: float) -> Reading:
         device = poll.device
-        before = device.health
+        before, doubtful = device.health, device.doubtful
         if poll.fault is None:
             device.answered()
         else:
             device.failed(poll.fault, now)
         if poll.errand is not Errand.REQUEST:
             device.polling = False
-        if before is not Health.ONLINE and device.online:
+        if (before is not Health.ONLINE and device.online) or (doubtful and not device.doubtful):
             back_on_grid(device, now)
+        if device.starting:
+            self._hurry()
         if not device.polling:
             self._polls.enqueue(device)
-        if device.health is not before or device.health is Health.UNHEARD:
+        if (device.health, device.doubtful) != (before, doubtful):
             self._probing.review(self.devices.values(), now)
-        elif device.health is Health.OFFLINE:
+        elif device.doubtful:
             self._probing.plan(now)
         return tell(poll)
+
+    def _hurry(self) -> None:
+        """Wait for none of the devices long that are silent at the start, where they are many."""
+        starting = [device for device in self.devices.values() if device.starting]
+        for device in starting if len(starting) > START_PATIENT else ():
+            device.hurried = True
 
 
 def _wire_time(device: Device, timing: LineTiming) -> float:

@@ -53,6 +53,7 @@ class Standing:
     __slots__ = (
         "_alarm",
         "_boot",
+        "_gap",
         "_last_good",
         "_line",
         "_payload",
@@ -78,7 +79,8 @@ class Standing:
         self._topics = {leaf: device_topic(facts.name, leaf) for leaf in (STATE, AVAILABILITY, ERROR, STATS)}
         self._telemetry = device_topic(facts.name, TELEMETRY)
         self._alarm = DeviceAlarm(facts.offline_after)
-        self.tally = DeviceTally(facts.response_timeout)
+        self._gap = facts.request_gap
+        self.tally = DeviceTally(facts.response_timeout, facts.request_gap)
         self._last_good: float | None = None
         self._state_from = now.mono
         code = FaultCode.STARTING if facts.enabled else FaultCode.DISABLED
@@ -92,10 +94,11 @@ class Standing:
         """
         fault = reading.fault
         ts = now.ts(reading.at)
+        rested = self._rest(reading.request_gap)
         if not self.facts.enabled:
             self.seq += 1
             sample = self._form(self.seq, ts, now, reading)
-            return [self._telling(sample, sample.payload(self._line))]
+            return [self._telling(sample, sample.payload(self._line)), *rested]
         if fault is None:
             self._last_good = reading.at
             changed = self._alarm.ended(ts)
@@ -108,7 +111,14 @@ class Standing:
         published = self._show(sample, now, online=reading.online or fault is None)
         if changed:
             published.append(self._error())
-        return published
+        return published + rested
+
+    def _rest(self, gap: float) -> list[Publication]:
+        """Take the rest in s that the device is given; return its configuration where that changes it."""
+        if gap == self._gap:
+            return []
+        self._gap = gap
+        return [self._config()]
 
     def disable(self, now: Instant) -> list[Publication]:
         """Publish the one sample of a device that is no longer polled; its error becomes inactive."""
@@ -124,6 +134,8 @@ class Standing:
         """Take new facts about the same device on the same profile; return what changed."""
         before, self.facts = self.facts, facts
         self._alarm.rise_after = facts.offline_after
+        if facts.request_gap != before.request_gap:
+            self._gap = facts.request_gap
         published = [self._config()] if facts.payload() != before.payload() else []
         if before.enabled and not facts.enabled:
             published += self.disable(now)
@@ -226,7 +238,7 @@ class Standing:
         return retained(self._topics[ERROR], self._alarm.payload())
 
     def _config(self) -> Publication:
-        return retained(device_topic(self.facts.name, CONFIG), self.facts.payload())
+        return retained(device_topic(self.facts.name, CONFIG), self.facts.payload(self._gap))
 
 
 RETAINED_LEAVES: Final = (STATE, CONFIG, AVAILABILITY, ERROR, STATS)

@@ -179,12 +179,13 @@ class LineTally:
 
 
 class DeviceTally:
-    """The figures of one device; `response_timeout` in s, None until it is known."""
+    """The figures of one device; `response_timeout` in s, None until it is known, `request_gap` in s."""
 
-    __slots__ = ("_last_poll", "_rtts", "errors", "good", "last_good_ts", "polls", "response_timeout")
+    __slots__ = ("_last_poll", "_rtts", "errors", "good", "last_good_ts", "polls", "request_gap", "response_timeout")
 
-    def __init__(self, response_timeout: float | None) -> None:
+    def __init__(self, response_timeout: float | None, request_gap: float = 0.0) -> None:
         self.response_timeout = response_timeout
+        self.request_gap = request_gap
         self.polls = 0
         self.good = 0
         self.errors: Counter[str] = Counter()
@@ -198,6 +199,7 @@ class DeviceTally:
         Probes stand apart: their distance is the device's illness, not the line's pace.
         """
         self.response_timeout = reading.response_timeout
+        self.request_gap = reading.request_gap
         if reading.overruns:
             self.errors[FaultCode.OVERRUN.value] += reading.overruns
         fault = reading.fault
@@ -229,5 +231,6 @@ class DeviceTally:
                 "p95": scaled(percentile(self._rtts, 95), 1e3, 1),
             },
             "response_timeout_ms": scaled(self.response_timeout, 1e3, 1),
+            "request_gap_ms": scaled(self.request_gap, 1e3, 1),
             "last_good_ts": self.last_good_ts,
         }

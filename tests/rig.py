@@ -60,7 +60,7 @@ def asking(slave: int) -> Ask:
 
 
 class Rig:
-    """A schedule and a line whose `dead` slaves are silent."""
+    """A schedule and a line whose `dead` slaves are silent; `times` are slave, begin and end of each exchange."""
 
     def __init__(self, *specs: DeviceSpec, rules: PollRules | None = None) -> None:
         self.now = 0.0
@@ -68,6 +68,8 @@ class Rig:
         self.rules = rules or PollRules()
         self.schedule.replace(specs, self.rules, 0.0)
         self.dead: set[int] = set()
+        self.garbage: set[int] = set()
+        self.times: list[tuple[int, float, float]] = []
         self.asked: list[int] = []
 
     def replace(self, *specs: DeviceSpec) -> None:
@@ -77,18 +79,20 @@ class Rig:
         request = ask.request
         assert isinstance(request, ReadRegisters)
         silent = request.slave in self.dead
+        bad = request.slave in self.garbage
+        fault = Fault(FaultCode.TIMEOUT, "no answer") if silent else Fault(FaultCode.CRC, "crc") if bad else None
         ended = self.now + (ask.timeout if silent else TAKES)
         return Outcome(
             request=request,
-            answer=None if silent else VALUES.get(request.address, (0,)),
-            fault=Fault(FaultCode.TIMEOUT, "no answer") if silent else None,
+            answer=None if fault else VALUES.get(request.address, (0,)),
+            fault=fault,
             asked=self.now,
             began=self.now,
             sent_end=self.now,
             gap=0.004,
             ended=ended,
-            turnaround=None if silent else 0.005,
-            rtt=None if silent else TAKES,
+            turnaround=None if fault else 0.005,
+            rtt=None if fault else TAKES,
             answered=not silent,
             late=tuple(late),
             echoed=None,
@@ -110,6 +114,7 @@ class Rig:
     def settle(self, ask: Ask, late: Iterable[LateAnswer] = ()) -> list[Reading]:
         outcome = self.outcome(ask, late)
         self.now = outcome.ended
+        self.times.append((outcome.request.slave, outcome.asked, outcome.ended))
         return self.schedule.settled(outcome, self.now)
 
     def run(self, until: float) -> list[Reading]:

@@ -41,6 +41,11 @@ REMOTE = "mqtt: {host: broker, base_topic: site, username: me, tls: {}}\n"
             LINE + f"poll: {{interval: 100ms}}\nslaves: {list(range(1, 5))}",
             ["2:18: poll.interval: the intervals ask for 120.0% of what the line carries if the devices take 5ms to"],
         ),
+        (
+            LINE + "slaves: [2, {id: 3, interval: 250ms, request_gap: 500ms}]",
+            ["2:13: slaves[1]: one poll takes 526ms with the rest before each request (request_gap): it will be"],
+        ),
+        (LINE + "slaves: [{id: 3, request_gap: 500ms}]", []),
         (LINE, ["1:1: slaves: there are no slaves"]),
         (LINE + "slaves: [{id: 2, enabled: false}]", ["2:9: slaves: no slave is enabled"]),
         (

@@ -89,7 +89,8 @@ def test_as_fast_as_the_line_allows_is_no_faster_than_the_device_does(
     tmp_path: Path, asked: float, polled: float
 ) -> None:
     (tmp_path / "slow.yaml").write_text(
-        "{name: slow, title: Slow, min_interval: 2s, values: [{name: a, register: 1, type: uint16, unit: m}]}"
+        "{name: slow, title: Slow, min_interval: 2s, request_gap: 300ms, "
+        "values: [{name: a, register: 1, type: uint16, unit: m}]}"
     )
     file = tmp_path / "lfs10d.yaml"
     slave = f"{{id: 3, profile: slow.yaml, interval: {asked}}}"
@@ -97,6 +98,7 @@ def test_as_fast_as_the_line_allows_is_no_faster_than_the_device_does(
     config = load(file)
     (spec,) = assembly.device_specs(config.config, config.profiles)
     assert spec.interval == polled
+    assert spec.request_gap == assembly.device_facts(config.config, config.profiles)[0].request_gap == 0.3
 
 
 def test_registers_are_accessed_as_the_device_is_polled_or_as_the_line_usually_speaks(loaded: Loaded) -> None:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from lfs10d.budget import Budget, budget
-from lfs10d.config import Config
+from lfs10d.budget import Budget, budget, request_gap
+from lfs10d.config import Config, SlaveConfig
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.schema import Profile
 from lfs10d.resolution import resolved
@@ -67,6 +67,34 @@ def test_the_load_is_what_intervals_ask_for_and_interval_0_takes_the_rest() -> N
     assert found.shortest_cycle == pytest.approx(0.075)
     assert found.slowest_cycle == pytest.approx(3.075)
     assert found.gap == pytest.approx(3645.8e-6, rel=1e-4)
+
+
+def test_the_rest_of_a_device_counts_in_its_own_load_and_others_are_polled_meanwhile() -> None:
+    tired = {"id": 3, "interval": "500ms", "request_gap": "100ms"}
+    found = of([2, tired])
+    rest = 0.1 - found.gap
+    assert found.shares[1].rest == pytest.approx(rest)
+    assert found.shares[1].load == pytest.approx((0.025 + rest) / 0.5)
+    assert found.load == pytest.approx((0.025 + rest) / 0.5)
+    assert found.load_with_turnaround == pytest.approx((0.030 + rest) / 0.5)
+    assert [found.wire_load, found.wire_load_with_turnaround] == pytest.approx([0.075, 0.09])
+    assert found.shortest_cycle == pytest.approx(0.025 + rest)
+    assert found.slowest_cycle == pytest.approx(2.05)
+    many = of([{"id": slave, "interval": "500ms", "request_gap": "100ms"} for slave in range(1, 11)])
+    assert many.load == pytest.approx(0.5)
+
+
+def test_a_rest_is_taken_before_each_read_of_a_poll() -> None:
+    (share,) = of([{"id": 3, "profile": "two", "request_gap": "100ms"}]).shares
+    assert share.rest == pytest.approx(2 * (0.1 - 3645.8e-6))
+    (share,) = of([{"id": 3, "request_gap": "1ms"}]).shares  # less than the line's own silence
+    assert share.rest == 0
+
+
+@pytest.mark.parametrize(("of_slave", "of_profile", "kept"), [(0, 0.3, 0.3), (0.2, 0.3, 0.3), (0.4, 0.3, 0.4)])
+def test_the_longer_rest_of_slave_and_profile_is_kept(of_slave: float, of_profile: float, kept: float) -> None:
+    profile = TWO_READS.model_copy(update={"request_gap": of_profile})
+    assert request_gap(SlaveConfig(id=3, request_gap=of_slave), profile) == kept
 
 
 def test_a_disabled_device_takes_nothing() -> None:

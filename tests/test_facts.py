@@ -28,6 +28,7 @@ def test_a_learned_time_out_is_published_as_the_yaml_spells_it(fixed: float | No
         "interval": 0.25,
         "enabled": True,
         "response_timeout": published,
+        "request_gap": 0.0,
     }
 
 
@@ -73,3 +74,8 @@ def test_the_line_state_is_configuration_and_what_goes_on() -> None:
         "activity": "polling",
         "requests": "ok",
     }
+
+
+def test_the_rest_of_a_device_is_the_longer_of_the_configured_and_the_learned() -> None:
+    device = replace(DEVICE, request_gap=0.2)
+    assert [device.payload(learned)["request_gap"] for learned in (0.0, 0.1, 0.4)] == [0.2, 0.2, 0.4]

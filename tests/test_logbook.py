@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 
 import pytest
 
 from lfs10d.logbook import Logbook
-from lfs10d.reading import Errand, Exchanged, Fault, FaultCode, PortChanged
+from lfs10d.reading import Errand, Exchanged, Fault, FaultCode, PortChanged, Reading
 from lfs10d.telemetry import Kind, Publication, Sample, device_topic, retained
 
 PORT = "/dev/ttyUSB0"
@@ -98,3 +99,22 @@ def test_frames_are_told_at_debug_where_they_are_wanted(heard: bytes, fault: Fau
 
     assert book.happened(happened, port=PORT, notices=(), frames=True) == [(logging.DEBUG, words)]
     assert not book.happened(happened, port=PORT, notices=(), frames=False)
+
+
+def test_a_learned_rest_is_told_once_with_what_to_set() -> None:
+    book = Logbook()
+    plain = Reading("mast", 1.0, {"a": 1.0}, None, 0.02, online=True, response_timeout=0.2, request_gap=0.2)
+    rested = replace(plain, request_gap=0.4, gap_learned=True)
+
+    def told(reading: Reading) -> list[tuple[int, str]]:
+        return [*book.happened(reading, port=PORT, notices=(), frames=False)]
+
+    assert not told(plain)
+    ((level, text),) = told(rested)
+    assert level == logging.WARNING
+    assert text == (
+        "mast: ignores a request right behind another, and is now given 400ms of rest before each (more if that is too "
+        "short, see device/mast/config): set request_gap for it in the configuration"
+    )
+    assert not told(replace(rested, request_gap=0.8))
+    assert told(replace(rested, device="other"))

@@ -138,10 +138,28 @@ def test_an_excluded_slave_id_is_passed_over_for_a_while() -> None:
 def test_one_that_went_offline_leaves_the_grid() -> None:
     device = a_device(1, 1.0)
     queue = a_queue(device)
+    device.answered()
     device.failed(Fault(FaultCode.TIMEOUT, "silent"), 0.0)
     assert queue.choose(0.0, NOBODY) is None
     queue.enqueue(device)
     assert queue.next_due() == inf
+
+
+def test_one_that_is_silent_at_the_start_is_polled_again_at_once_but_after_each_first_poll() -> None:
+    silent, other, flat = a_device(1, 100.0), a_device(2, 100.0, due=0.3), a_device(3, 0.0)
+    queue = a_queue(silent, other)
+    assert (first := queue.choose(0.0, NOBODY)) is not None
+    silent.polling = False
+    silent.failed(Fault(FaultCode.TIMEOUT, "silent"), 0.2)
+    queue.enqueue(silent)
+    queue.enqueue(flat)
+    polled = [queue.choose(0.4, NOBODY) for _ in range(3)]
+    assert first.device is silent
+    assert [poll and poll.device.slave for poll in polled] == [2, 1, 3]
+    assert (silent.overruns, silent.due) == (0, 100.0)
+    silent.failed(Fault(FaultCode.TIMEOUT, "silent"), 0.8)
+    queue.enqueue(silent)
+    assert queue.next_due() == 0.8
 
 
 def test_nobody_waits_twice() -> None:

@@ -34,6 +34,7 @@ def a_device(slave: int, *, enabled: bool = True, dead_since: float | None = Non
     if dead_since is None:
         device.answered()
     else:
+        device.start_polls = 1  # the last of those that are made at once
         device.failed(SILENCE, dead_since)
     return device
 

@@ -10,7 +10,7 @@ import pytest
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.profiles.library import load_profile
 from lfs10d.reading import Fault, FaultCode
-from lfs10d.roster import Device, DeviceSpec, Health, PollRules, Turnarounds
+from lfs10d.roster import BAD_ANSWER_PATIENCE, START_POLLS, Device, DeviceSpec, Health, PollRules, Turnarounds
 
 SILENCE = Fault(FaultCode.TIMEOUT, "no answer in 200 ms")
 REFUSAL = Fault(FaultCode.EXCEPTION, "exception 02", exception_code=2)
@@ -90,6 +90,7 @@ def test_every_fourth_probe_waits_a_second() -> None:
 
 def test_probes_come_after_1_2_4_s_up_to_the_longest_interval() -> None:
     device = a_device(rules=PollRules(offline_after=1, probe_interval_max=5.0))
+    device.answered()
     now = 100.0
     waits = []
     for _ in range(5):
@@ -141,17 +142,72 @@ def test_when_the_port_comes_back_nothing_is_known_of_it() -> None:
     assert device.name == "mast"
 
 
-def test_one_that_did_not_answer_its_first_poll_is_in_doubt_until_it_is_heard() -> None:
-    device = a_device()
-    doubts = [device.doubtful]
-    device.failed(SILENCE, 0.0)
-    doubts.append(device.doubtful)
-    assert device.probe_timeout == 0.4
+def test_one_that_is_silent_is_in_doubt_after_three_polls_at_once_until_it_is_heard() -> None:
+    device = a_device(rules=PollRules(offline_after=9))
+    stages = []
+    for now in (1.0, 2.0, 3.0):
+        stages.append((device.starting, device.doubtful))
+        device.failed(SILENCE, now)
+        assert device.again_at == now
+    assert stages == [(False, False), (True, False), (True, False)]
+    assert (device.starting, device.doubtful, device.probe_timeout) == (False, True, 1.0)
     device.answered()
-    for _ in range(3):
-        doubts.append(device.doubtful)
-        device.failed(SILENCE, 0.0)
-    assert [*doubts, device.doubtful] == [False, True, False, False, False, True]
+    for _ in range(9):
+        assert (device.doubtful, device.starting) == (False, False)
+        device.failed(SILENCE, 4.0)
+    assert (device.starting, device.doubtful) == (False, True)
+
+
+@pytest.mark.parametrize("offline_after", [1, 3])
+def test_the_polls_of_the_start_are_three_whenever_it_counts_as_offline(offline_after: int) -> None:
+    device = a_device(rules=PollRules(offline_after=offline_after))
+    for _ in range(2):
+        device.failed(SILENCE, 5.0)
+        assert (device.starting, device.doubtful) == (True, False)
+    device.failed(SILENCE, 5.0)
+    assert (device.starting, device.doubtful, device.health) == (False, True, Health.OFFLINE)
+    assert device.next_probe == 6.0
+    device.reconnected()
+    assert (device.starting, device.doubtful, device.start_polls) == (False, False, START_POLLS)
+
+
+def test_one_that_answers_badly_is_never_in_doubt_and_not_waited_for_long() -> None:
+    device = a_device()
+    garbage = Fault(FaultCode.CRC, "the check is wrong")
+    patiences = [device.patience]
+    for _ in range(4):
+        device.failed(garbage, 0.0)
+        assert (device.doubtful, device.starting) == (False, False)
+        assert device.timeout == 0.2
+        patiences.append(device.patience)
+    assert patiences == [None, *[BAD_ANSWER_PATIENCE] * 4]
+    assert device.health is Health.OFFLINE
+    device.failed(SILENCE, 0.0)
+    assert device.doubtful
+    device.turnarounds.learn(0.03)
+    assert device.patience == 0.03
+
+
+def test_where_many_are_silent_at_the_start_none_is_waited_for_long() -> None:
+    device = a_device()
+    device.failed(SILENCE, 0.0)
+    assert device.timeout == 0.4
+    device.hurried = True
+    assert device.timeout == 0.2
+    device.answered()
+    assert not device.hurried
+
+
+def test_one_that_goes_offline_may_come_back_as_another_sensor() -> None:
+    device = a_device(rules=PollRules(offline_after=1))
+    device.answered()
+    device.gap.exchanged(0.0, 0.1, spoke=True, silent=False)
+    device.gap.exchanged(0.11, 0.2, spoke=True, silent=False)  # needs no rest
+    device.failed(SILENCE, 1.0)
+    for now in (2.0, 3.0):
+        device.gap.exchanged(now, now + 0.1, spoke=True, silent=False)
+        device.gap.exchanged(now + 0.11, now + 0.2, spoke=False, silent=True)
+    assert device.gap.learned == 0.1
 
 
 def test_a_probe_of_one_that_answers_slowly_waits_as_long_as_was_learned() -> None:

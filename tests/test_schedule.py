@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from math import inf
 
 import pytest
@@ -12,8 +13,8 @@ from lfs10d.modbus.exchange import LateAnswer
 from lfs10d.modbus.frames import ReadRegisters
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.reading import Errand, Fault, FaultCode
-from lfs10d.roster import LEARNED_MOST, PollRules
-from lfs10d.schedule import Rest, Schedule
+from lfs10d.roster import LEARNED_MOST, Health, PollRules
+from lfs10d.schedule import START_PATIENT, Rest, Schedule
 from tests.rig import GONE, RTU, T9600, TAKES, Rig, Task, asking, spec
 
 
@@ -135,11 +136,43 @@ def test_one_that_is_offline_is_probed_and_back_on_its_grid() -> None:
     assert sum(reading.overruns for reading in back) <= 1
 
 
-def test_with_nobody_answering_one_that_is_silent_after_another_is_asked_twice() -> None:
+def test_one_that_is_silent_after_another_is_asked_twice_at_its_first_poll_and_three_polls_are_made_at_once() -> None:
     rig = Rig(spec(1, 10.0), spec(2, 10.0))
     rig.dead = {1, 2}
-    rig.run(0.7)
-    assert rig.asked == [1, 2, 2]
+    readings = rig.run(3.3)
+    assert rig.asked == [1, 2, 2, 1, 2, 1, 2]
+    assert [(reading.device, reading.online, reading.probe) for reading in readings] == [
+        ("slave-1", False, False), ("slave-2", False, False)
+    ] * 3  # fmt: skip
+    assert [readings[-2].at, readings[-1].at] == pytest.approx([2.4, 3.4])
+
+
+def test_with_many_silent_at_the_start_none_is_waited_for_long() -> None:
+    dead = range(1, START_PATIENT + 2)
+    rig = Rig(*(spec(slave, 100.0) for slave in dead))
+    rig.dead = set(dead)
+    readings = rig.run(0.4 * len(dead) + 1.0)
+    at = [reading.at for reading in readings if reading.at > 0.4 * len(dead)]
+    assert [later - earlier for earlier, later in pairwise(at)] == pytest.approx([0.2] * (len(at) - 1))
+
+
+def test_one_that_answers_badly_is_polled_on_its_grid_though_it_is_offline() -> None:
+    rig = Rig(spec(1, 1.0), spec(2, 1.0), rules=PollRules(retries=0))
+    rig.run(0.5)
+    rig.dead = {2}
+    rig.run(8.5)
+    device = rig.schedule.devices["slave-2"]
+    assert (device.health, device.doubtful) == (Health.OFFLINE, True)
+    rig.dead, rig.garbage = set(), {2}
+    while device.doubtful:
+        rig.run(rig.now + 0.1)
+    found = rig.now
+    readings = [reading for reading in rig.run(found + 20.0) if reading.device == "slave-2"]
+    assert len(readings) == pytest.approx(20, abs=1)
+    assert not any(reading.online or reading.probe or reading.overruns for reading in readings[1:])
+    rig.dead, rig.garbage = {2}, set()
+    rig.run(rig.now + 1.5)
+    assert device.doubtful
 
 
 def test_late_answers_are_learned_whoever_asked_but_not_what_is_later_than_any_time_out() -> None:
@@ -318,11 +351,11 @@ def test_when_the_port_is_back_what_a_lost_job_excluded_is_free_and_jobs_are_car
 def test_a_single_dead_device_is_probed_and_the_line_rests_until_then() -> None:
     rig = Rig(spec(1, 0.5), rules=PollRules(offline_after=1))
     rig.dead = {1}
-    (first,) = rig.run(0.3)
+    *_, first = rig.run(1.7)  # three polls at once
     decision = rig.schedule.next(rig.now)
     assert not first.online
     assert isinstance(decision, Rest)
-    assert decision.until == pytest.approx(1.0, abs=0.3)
+    assert decision.until == pytest.approx(2.6, abs=0.1)
     rig.now = decision.until
     ask = rig.ask()
     assert ask is not None
@@ -372,8 +405,8 @@ def test_a_requested_poll_whose_device_goes_while_it_is_on_the_line_is_over_then
 def test_one_never_heard_that_is_silent_after_another_is_asked_twice_though_somebody_answers() -> None:
     rig = Rig(spec(1, 100.0), spec(2, 100.0), spec(3, 100.0))
     rig.dead = {2, 3}
-    rig.run(1.0)
-    assert rig.asked == [1, 2, 3, 3]
+    rig.run(0.7)
+    assert rig.asked == [1, 2, 3, 3, 2]
 
 
 def test_one_that_answered_before_is_not_asked_again_at_once_for_the_silence_of_another() -> None:

@@ -377,6 +377,19 @@ def test_the_configuration_is_that_of_the_facts() -> None:
     assert Watched().shown["config"] == FACTS.payload()
 
 
+def test_a_rest_that_was_learned_is_published_with_the_configuration_once() -> None:
+    standing = Standing(replace(FACTS, request_gap=0.1), line="line0", boot="b", seq=0, now=instant(0))
+    rested = Reading("a", 1.0, {"wind_speed": 1.0}, None, 0.02, online=True, response_timeout=0.2, request_gap=0.4)
+    told = [leaves(standing.read(replace(rested, at=at), instant(at), masked=False)) for at in (1.0, 2.0)]
+    assert [("config" in each) for each in told] == [True, False]
+    shown = {each.topic: each.payload for each in standing.burst(instant(3.0))}
+    assert fields(shown["device/a/config"], "request_gap") == (0.4,)
+    changed = standing.reconfigure(replace(FACTS, request_gap=0.5), instant(4.0))
+    assert [fields(each.payload, "request_gap") for each in changed] == [(0.5,)]
+    kept = standing.reconfigure(replace(FACTS, request_gap=0.5, interval=9.0), instant(5.0))
+    assert [fields(each.payload, "request_gap", "interval") for each in kept] == [(0.5, 9.0)]
+
+
 def test_a_state_just_at_its_early_time_is_shown() -> None:
     watched = Watched()
     watched.poll(0.0, 1.0)

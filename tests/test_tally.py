@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
 import pytest
@@ -240,12 +241,20 @@ def test_a_device_never_polled_has_nulls() -> None:
         "errors": {},
         "rtt_ms": {"p50": None, "p95": None},
         "response_timeout_ms": None,
+        "request_gap_ms": 0.0,
         "last_good_ts": None,
     }
 
 
 def test_a_fixed_time_out_is_known_before_the_first_poll() -> None:
     assert DeviceTally(0.25).payload(7)["response_timeout_ms"] == 250.0
+
+
+def test_a_configured_rest_is_known_before_the_first_poll_and_a_learned_one_after_it() -> None:
+    tally = DeviceTally(None, 0.1)
+    assert tally.payload(7)["request_gap_ms"] == 100.0
+    tally.polled(replace(reading(1.0), request_gap=0.4), 7)
+    assert tally.payload(7)["request_gap_ms"] == 400.0
 
 
 def test_a_device_s_polls_values_errors_and_times_are_told() -> None:
@@ -262,6 +271,7 @@ def test_a_device_s_polls_values_errors_and_times_are_told() -> None:
         "errors": {"overrun": 2, "timeout": 1},
         "rtt_ms": {"p50": 59.1, "p95": 104.1},
         "response_timeout_ms": 200.0,
+        "request_gap_ms": 0.0,
         "last_good_ts": 5099,
     }
 

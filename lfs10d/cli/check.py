@@ -85,6 +85,7 @@ def _report(loaded: Loaded, found: Budget, warnings: tuple[Problem, ...]) -> dic
                     "interval": share.interval,
                     "exchanges": share.exchanges,
                     "wire_ms": round(share.wire * 1e3, 3),
+                    "rest_ms": round(share.rest * 1e3, 3),
                     "load_pct": None if share.load is None else round(share.load * 100, 3),
                 }
                 for share in found.shares
@@ -105,8 +106,9 @@ def _lines(loaded: Loaded, found: Budget) -> Iterator[str]:
     yield ""
     if not found.shares:
         return
+    rests = any(share.rest for share in found.shares)
     yield from columns(
-        ("device", "id", "profile", "interval", "wire time", "load"),
+        ("device", "id", "profile", "interval", "wire time", *(["rest"] if rests else []), "load"),
         [
             (
                 share.device,
@@ -114,11 +116,12 @@ def _lines(loaded: Loaded, found: Budget) -> Iterator[str]:
                 share.profile,
                 duration_text(share.interval) if share.interval else "0",
                 f"{share.wire * 1e3:.1f} ms",
+                *([f"{share.rest * 1e3:.1f} ms"] if rests else []),
                 "the rest" if share.load is None else f"{share.load:.1%}",
             )
             for share in found.shares
         ],
-        right=(1, 3, 4, 5),
+        right=(1, 3, 4, 5, 6),
     )
     yield ""
     yield (

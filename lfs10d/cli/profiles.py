@@ -142,6 +142,8 @@ def _device(profile: Profile) -> Iterator[Row]:
         yield "never written", f"{', '.join(map(_register, profile.run_commands))}: run commands"
     if profile.min_interval:
         yield "interval", f"at least {profile.min_interval:g} s"
+    if profile.request_gap:
+        yield "rest", f"{profile.request_gap:g} s between two exchanges"
 
 
 def _unless(lock: str | None) -> str:

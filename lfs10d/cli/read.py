@@ -134,6 +134,7 @@ class _Wanted:
             codec=self.codec,
             interval=max(interval, self.profile.min_interval),
             response_timeout=self.line.timeout,
+            request_gap=self.profile.request_gap,
         )
 
 

@@ -148,7 +148,7 @@ class Asking:
         waits = self.timeout if timeout is None else timeout
         if self._unanswered.tardy(spot.slave):
             waits = max(waits, PATIENT)
-        return Ask(request, self.codec, waits, None, baudrate)
+        return Ask(request, self.codec, waits, None, baudrate, request_gap=self.profile.request_gap)
 
     def _allowed(
         self, request: ReadRegisters, spot: Spot, timeout: float | None

@@ -21,7 +21,8 @@ class Ask:
 
     `timeout` (s) runs from the request's last bit to the answer's first byte; `patience` is the slave's learned
     p99 of it, None where it is not known. `baudrate` None means the line's own rate. `at_once`: nobody else is asked
-    between the job's exchange before and this one, so that what comes late is received here.
+    between the job's exchange before and this one, so that what comes late is received here. `request_gap` (s) is the
+    rest that the slave needs by what the job knows of it; the schedule keeps what it knows itself in any case.
     """
 
     request: Request
@@ -30,6 +31,7 @@ class Ask:
     patience: float | None = None
     baudrate: int | None = None
     at_once: bool = False
+    request_gap: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +103,10 @@ class Job(Protocol):
         ...
 
     def ask(self, now: float) -> Ask | Hold | Done:
-        """Decide what to put on the line now."""
+        """Decide what to put on the line now.
+
+        What was decided is not sent yet where the slave must rest first: then the job is asked again after that.
+        """
         ...
 
     def heard(self, outcome: Outcome, now: float) -> Next:

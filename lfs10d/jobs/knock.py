@@ -35,13 +35,14 @@ class Knock:
         self.fault: Fault | None = None
         self._request = first_read(profile, slave)
         self._codec = codec
+        self._gap = profile.request_gap
         self._over = over
         self._asked = 0
 
     def ask(self, now: float) -> Ask:
         """Ask once more, longer than before."""
         del now
-        return Ask(self._request, self._codec, FIRST_TIMEOUTS[self._asked])
+        return Ask(self._request, self._codec, FIRST_TIMEOUTS[self._asked], request_gap=self._gap)
 
     def heard(self, outcome: Outcome, now: float) -> Next:
         """Take an outcome; silence and noise are asked again."""

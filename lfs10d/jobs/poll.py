@@ -8,6 +8,9 @@ Rules
 2. A fault of the line is tried again, `retries` times, as a later exchange. A right frame is not: an exception or
    a value out of range would only be said twice.
 3. One poll, one outcome, whatever it took.
+4. A device that sleeps (`lfs10d.requestgap`) may lose the first request after a pause: it is asked again at once,
+   and where that has helped before the silence is no failed attempt. It is woken by its barrier, where it has one,
+   so that the value can be asked right after it.
 """
 
 from __future__ import annotations
@@ -29,6 +32,8 @@ if TYPE_CHECKING:
     from lfs10d.profiles.blocks import Block
     from lfs10d.roster import Device
 
+WAKES = 3
+"""So often within one poll a silence after a pause is taken for sleep."""
 _NOTHING: frozenset[int] = frozenset()
 
 
@@ -70,6 +75,14 @@ class Poll:
         self._retries = device.retries if errand is not Errand.PROBE else 0
         self._barrier_due = errand is Errand.PROBE
         self._barrier_asked = False
+        self._begun = False
+        self._waking = False
+        self._wakes = 0
+
+    @property
+    def begun(self) -> bool:
+        """Something was put on the line for it."""
+        return self._begun
 
     @property
     def good(self) -> Mapping[str, Number] | None:
@@ -80,6 +93,7 @@ class Poll:
         """Decide what to put on the line now."""
         device = self.device
         spec = device.spec
+        self._waking = self._wakes < WAKES and device.gap.may_sleep(now)
         block = self._blocks[self._block]
         request = _read(device.slave, block.address, block.count, block.function)
         barrier = spec.profile.barrier
@@ -89,19 +103,28 @@ class Poll:
         if until is not None:
             return Hold(until)
         self._barrier_asked = False
-        if barrier is not None and (self._barrier_due or self._unanswered.confusable(request, spec.codec)):
+        first = self._barrier_due or (self._waking and device.gap.sleeps)
+        if barrier is not None and (first or self._unanswered.confusable(request, spec.codec)):
             request = _read(device.slave, barrier.register, barrier.count, barrier.function)
             self._barrier_asked = True
         elif (until := self._unanswered.lingering_until(request, spec.codec, now)) is not None:
             return Hold(until)
         timeout = device.probe_timeout if self.errand is Errand.PROBE else device.timeout
-        return Ask(request, spec.codec, timeout, device.turnarounds.p99)
+        return Ask(request, spec.codec, timeout, device.patience)
 
     def heard(self, outcome: Outcome, now: float) -> Next:
         """Take the outcome of what was asked."""
         device = self.device
         self.at = outcome.ended
+        self._begun = True
         fault = outcome.fault
+        waking, self._waking = self._waking, False
+        if waking and fault is not None and fault.code is FaultCode.TIMEOUT:
+            self._wakes += 1
+            if not device.gap.sleeps:
+                self.failed_attempts.append(fault.code)
+            self._barrier_due = False
+            return Later(self.due)
         if fault is None or fault.code is not FaultCode.LATE:  # else the attempt itself is counted as late
             self.failed_attempts += [FaultCode.LATE for late in outcome.late if late.request.slave == device.slave]
         if self._barrier_asked:

@@ -37,4 +37,6 @@ def _reading(device: Device, at: float, fault: Fault | None, poll: Poll | None, 
         failed_attempts=tuple(poll.failed_attempts) if poll else (),
         overruns=overruns,
         requests=tuple(each.request for each in polls if each.request is not None),
+        request_gap=device.gap.seconds,
+        gap_learned=device.gap.learned > device.gap.configured,
     )

@@ -122,7 +122,8 @@ class Profile(Facts):
     """A kind of device. The first of `values` is the primary one; the first of `checksums` is the usual one.
 
     `ids` are the first and the last slave id it can have, both included. `ascii_max_data` bounds the data
-    bytes of an ASCII answer. `min_interval` is the shortest time between two polls in seconds.
+    bytes of an ASCII answer. `min_interval` is the shortest time between two polls in seconds, `request_gap` the
+    silence before each request to it, counted from the end of the exchange with it before.
     `busy_exceptions` are asked again later. `provenance` tells where a plain key's fact comes from.
     """
 
@@ -146,6 +147,9 @@ class Profile(Facts):
         None, description="Data bytes that one ascii answer may have."
     )
     min_interval: Annotated[float, Duration(0, 86400)] = Field(0.0, description="Shortest time between two polls.")
+    request_gap: Annotated[float, Duration(0, 60)] = Field(
+        0.0, description="Rest that it needs between the end of one exchange and its next request, whatever it is for."
+    )
     busy_exceptions: Annotated[tuple[Annotated[int, Whole(1, 255)], ...], Field(strict=False)] = Field(
         BUSY_EXCEPTIONS, description="Exception codes that mean: ask again later."
     )

@@ -24,6 +24,10 @@ class Kind(StrEnum):
     """Hears nothing, answers nothing."""
     SHY = "shy"
     """Ignores the request after one to a neighbour that did not answer."""
+    NEEDS_REST = "needs_rest"
+    """Ignores a request that ends sooner than `delay` (250 ms) after the end of its last answer."""
+    SLEEPS = "sleeps"
+    """Is woken by a request, and loses it, where nothing was asked of it for `delay` (500 ms)."""
     LATE = "late"
     """Answers `delay` later than it would, also into the next requests."""
     SLOW_BYTES = "slow_bytes"
@@ -138,7 +142,7 @@ class Ailment:
         return self.window.covers(now) and (self.rate >= 1.0 or random.random() < self.rate)
 
 
-DEFAULT_DELAYS = {Kind.LATE: 0.6, Kind.SLOW_BYTES: 0.001, Kind.SLOW_FLASH: 5.0}
+DEFAULT_DELAYS = {Kind.LATE: 0.6, Kind.SLOW_BYTES: 0.001, Kind.SLOW_FLASH: 5.0, Kind.NEEDS_REST: 0.25, Kind.SLEEPS: 0.5}
 """Seconds, where none is given."""
 
 

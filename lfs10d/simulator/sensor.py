@@ -55,6 +55,8 @@ _BROKEN_FLOATS: Final[Mapping[Kind, int]] = {
     Kind.SUBNORMAL: 0x0000_0001,
 }
 _SPOILS: Final = (STRIKES_ANSWERS | STRIKES_FRAMES) - {Kind.LEADING_NOISE, Kind.TRAILING_NOISE}
+DAYS: Final = nanoseconds(1e6)
+"""Before anything happened on the line, in ns."""
 _NOTHING: Final[Mapping[Kind, Ailment]] = {}
 
 
@@ -108,6 +110,8 @@ class Sensor:
         self.powered = True
         self.hung = False
         self.deaf_until = 0
+        self._last_answer = -DAYS
+        self._last_request = -DAYS
         self._last: float | None = None
         self._cuts = 0
         self.random = Random(f"{seed}/{slave}")  # noqa: S311  # repeatable faults, no secret
@@ -174,7 +178,8 @@ class Sensor:
         if not self.powered or self.hung or ended < self.deaf_until or len(body) != REQUEST_BODY:
             return None
         struck = self._struck(ended) if self.ailments else _NOTHING
-        if Kind.SILENT in struck or Kind.POWER_CUT in struck or (after_dead and Kind.SHY in struck):
+        gone = Kind.SILENT in struck or Kind.POWER_CUT in struck
+        if gone or (after_dead and Kind.SHY in struck) or self._unfit(struck, ended):
             return None
         format_before = self.format
         answer, values = self._obey(body, ended, struck)
@@ -188,20 +193,23 @@ class Sensor:
             delay += nanoseconds(self.jitter * self.random.random())
         if not struck:
             frame = seal(answer, self.framing, self.blueprint.check)
-            return Reply(self, ended + delay, frame, shape, 0, values, whole=True)
+            return self._reply(Reply(self, ended + delay, frame, shape, 0, values, whole=True))
         if Kind.LATE in struck:
             delay += struck[Kind.LATE].delay
         frame = seal(self._distort(answer, struck), self.framing, self.blueprint.check)
         pause = struck[Kind.SLOW_BYTES].delay if Kind.SLOW_BYTES in struck else 0
-        return Reply(
-            self,
-            ended + delay,
-            self._spoil(frame, struck),
-            shape,
-            pause,
-            values,
-            whole=_SPOILS.isdisjoint(struck),
-        )
+        spoilt, whole = self._spoil(frame, struck), _SPOILS.isdisjoint(struck)
+        return self._reply(Reply(self, ended + delay, spoilt, shape, pause, values, whole=whole))
+
+    def _reply(self, reply: Reply) -> Reply:
+        self._last_answer = reply.format.ends(reply.start, len(reply.data), reply.pause)[-1]
+        return reply
+
+    def _unfit(self, struck: Mapping[Kind, Ailment], ended: int) -> bool:
+        """Whether it loses this request: it came too soon after an answer, or after too long a pause."""
+        before, self._last_request = self._last_request, ended
+        slept = Kind.SLEEPS in struck and ended - max(before, self._last_answer) > struck[Kind.SLEEPS].delay
+        return slept or (Kind.NEEDS_REST in struck and ended - self._last_answer < struck[Kind.NEEDS_REST].delay)
 
     def _wild(self, slave: int, now: int) -> bool:
         return slave == WILDCARD_ID and any(
