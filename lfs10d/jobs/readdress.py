@@ -229,7 +229,9 @@ def written(spot: Spot, register: int, value: int, asking: Asking) -> Generator[
     """Write once; return the code of an exception, if one came."""
     request = WriteRegister(spot.slave, register, value)
     baudrate = None if spot.baudrate == asking.line_rate else spot.baudrate
-    outcome: Outcome = yield Ask(request, asking.codec, WRITE_TIMEOUT, None, baudrate, request_gap=asking.profile.request_gap)
+    outcome: Outcome = yield Ask(
+        request, asking.codec, WRITE_TIMEOUT, None, baudrate, request_gap=asking.profile.request_gap
+    )
     fault = outcome.fault
     if fault is not None and fault.code is FaultCode.EXCEPTION:
         return fault.exception_code
