@@ -14,6 +14,7 @@ from lfs10d.cli import EXIT_CONFIG, config_option, json_option
 from lfs10d.cli.columns import columns
 from lfs10d.configfile import Loaded, load
 from lfs10d.errors import ConfigError, Problem
+from lfs10d.logs import escape
 from lfs10d.quantities import duration_text
 
 if TYPE_CHECKING:
@@ -51,9 +52,9 @@ def command(config: Path, *, as_json: bool) -> int:
         click.echo(json.dumps(_report(loaded, found, warnings), indent=2, allow_nan=False))
     else:
         for text in _lines(loaded, found):
-            click.echo(text)
+            click.echo(escape(text))
     for warning in warnings:
-        click.echo(str(warning), err=True)
+        click.echo(escape(str(warning)), err=True)
     return 0
 
 

@@ -107,3 +107,14 @@ def test_the_environment_names_the_file_and_the_option_comes_before_it(lfs10d: L
     assert lfs10d("check", LFS10D_CONFIG=small.name).returncode == 0
     assert lfs10d("check", "-c", small.name, LFS10D_CONFIG="none.yaml").returncode == 0
     assert lfs10d("check", LFS10D_CONFIG="").stderr.startswith("/etc/lfs10d/lfs10d.yaml:1:1: ")
+
+
+def test_what_would_turn_or_hide_text_is_escaped(lfs10d: Lfs10d, tmp_path: Path) -> None:
+    (tmp_path / "lfs10d.yaml").write_text(
+        'line: {port: "/dev/\\u202ex"}\nslaves: [{id: 2, label: "a\\u2066b"}]\nmqtt: {host: localhost}\n'
+    )
+    for verb in (["check"], ["config"], ["config", "--merged"], ["config", "--json"], ["check", "--json"]):
+        done = lfs10d(*verb, "-c", "lfs10d.yaml")
+        shown = done.stdout + done.stderr
+        assert done.returncode == 0
+        assert all(sign.isprintable() or sign == "\n" for sign in shown), verb
