@@ -5,7 +5,7 @@ Rules
 1. *Recognised*: the register of the slave id has answered with the id it was asked by, the register of the rate (where
    the profile has one) holds one of its codes, and every value has answered in range each time it was read.
 2. *One alone*: the value is read three times, and behind each read a silent slave id is asked, so that the line is
-   listened to for 0.2, 0.2 and 1 s. Two sensors share the id where any of these answers collides, is followed by
+   listened to for 0.2, 0.2 and 0.6 s. Two sensors share the id where any of these answers collides, is followed by
    another or by bytes that no longer come when the silent id alone is asked, or is impossible (not in range, no finite
    number), and where the values are those of two sensors (rule 3).
 3. Wind varies: two reads of one sensor may differ by any amount. So values are those of two only if they jump there
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 READS = 3
 """How often a value is read."""
-LISTENING = (QUICK, QUICK, PATIENT)
+LISTENING = (QUICK, QUICK, 0.6)
 """How long the line is listened to behind each read, in s."""
 MORE_READS = 6
 """How often it is read besides where the first reads jump there and back."""

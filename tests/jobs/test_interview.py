@@ -112,7 +112,7 @@ def test_what_is_known_already_is_not_asked_again() -> None:
     "content",
     [
         {1: NOT_A_NUMBER[0], 2: NOT_A_NUMBER[1], 4: 1, 5: 3},
-        {1: 12, 2: 0, 4: 1, 5: 3},
+        {1: 225, 2: 0, 4: 1, 5: 3},
         {1: WIND[0], 2: WIND[1], 4: 9, 5: 3},
         {1: WIND[0], 2: WIND[1], 5: 3},
         {4: 1, 5: 3},

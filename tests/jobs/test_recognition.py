@@ -186,7 +186,7 @@ def test_one_sensor_is_read_three_times_and_the_line_is_listened_to_behind_each_
     pretence.sensor(3)
     assert look(pretence) == Look()
     assert [(ask.request.slave, ask.at_once) for ask in pretence.asked] == READS * [(3, False), (9, True)]
-    assert [ask.timeout for ask in pretence.asked[1::2]] == [0.2, 0.2, 1.0]
+    assert [ask.timeout for ask in pretence.asked[1::2]] == [0.2, 0.2, 0.6]
 
 
 def test_answers_that_collide_are_of_two(pretence: Pretence) -> None:

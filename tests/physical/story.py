@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from lfs10d.forgetful import PowerCutError
+from lfs10d.simulator.registers import Blueprint
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 
@@ -18,6 +19,31 @@ IDS = (3, 4, 5)
 RATES = 9600 + 19200
 LONGEST = 4000
 """Turns of 50 ms after which a request counts as never answered."""
+
+
+FOREIGN: list[dict[int, int]] = [
+    {0: 3, 1: 225, 2: 0, 3: 7, 4: 9, 5: 700},
+    {1: 225, 2: 0, 4: 1, 5: 1},
+    {1: 0x414F, 2: 0xD70A, 4: 9, 5: 1},
+    {1: 0x414F, 2: 0xD70A, 4: 1, 5: 9},
+    {0: 87, 2000: 1, 2001: 2},
+]
+"""The registers of devices that are no LFS10, as they come at the factory's id."""
+
+
+class Foreigner(Sensor):
+    """A device of another kind that takes any write; `written` is how many came."""
+
+    written = 0
+
+    def __init__(self, words: dict[int, int], baudrate: int) -> None:
+        anything = range(1 << 16)
+        kind = Blueprint("foreign", (), words, dict.fromkeys(words, anything))
+        super().__init__(1, blueprint=kind, format=Format(baudrate))
+
+    def _write(self, *args: Any) -> bytes:  # noqa: ANN401 - passed on
+        self.written += 1
+        return super()._write(*args)
 
 
 @dataclass
@@ -48,6 +74,7 @@ class Story:
         self.by_name = {f"s{sensor.slave}": sensor for sensor in bench.line.sensors}
         self.others: list[Sensor] = []
         self.newcomers: list[Sensor] = []
+        self.foreigners: list[Foreigner] = []
         self.asked: list[Asked] = []
         self.told: list[tuple[str, Any]] = []
         """Events of the lives that are over."""
@@ -89,6 +116,9 @@ class Story:
                 self.newcomers.append(bench.line.add(Sensor(1, format=Format(one))))
                 _ail(self.newcomers[-1], more)
                 self.before = self._ids()
+            case "foreign":
+                self.foreigners.append(Foreigner(more, one))
+                bench.line.add(self.foreigners[-1])
             case "power":
                 self._powered()
                 self.sensors[one % len(self.sensors)].power_cycle()
@@ -109,6 +139,8 @@ class Story:
         asked = Asked(name, {"id": len(self.asked), **parameters})
         self.asked.append(asked)
         self.hushed |= self.by_name["s3"].deaf_until > bench.clock.now * 1e9  # its flash is not done yet
+        pair = self._pair() if (name, parameters.get("device")) == ("device/readdress", "s3") else ()
+        together = [each.slave for each in pair]
         how, after = end
         if how == "crash":
             bench.files.steps_left = bench.files.steps + after
@@ -124,12 +156,22 @@ class Story:
         if how == "sigterm":
             self.life.end()
             assert self.answers_of(asked), "SIGTERM answers what is under way"
+        assert [each.slave for each in pair] == together, "of two sensors of one id none is moved"
         dead, bench.files.steps_left = self._dead, None
         if how in ("leave", "sigterm") or dead:
             self.restart()
         else:
             assert self.answers_of(asked), "a request is answered"
         return asked
+
+    def _pair(self) -> tuple[Sensor, ...]:
+        """Return s3 and its twin where both can be heard at one id and rate, else nothing."""
+        one, now = self.by_name["s3"], self.bench.clock.now * 1e9
+        if self.twin is None or (one.slave, one.format) != (self.twin.slave, self.twin.format):
+            return ()
+        pair = (one, self.twin)
+        mute = any(each.deaf_until > now or any(ail.kind == "silent" for ail in each.ailments) for each in pair)
+        return () if mute else pair
 
     @property
     def _dead(self) -> bool:
@@ -153,7 +195,7 @@ class Story:
         for sensor in self.sensors:
             sensor.heal()
             sensor.power_cycle()
-        for other in self.others:
+        for other in (*self.others, *self.foreigners):
             self.bench.line.sensors.remove(other)
         self.restart()
         begun = self.bench.clock.now
@@ -189,6 +231,7 @@ class Story:
         self._apart()
         for name, sensor in self.by_name.items():
             self._known(name, sensor)
+        assert not any(each.written for each in self.foreigners), "nothing is written to another kind of device"
         for asked in self.asked:
             assert len(self.answers_of(asked)) <= 1, "no request is answered twice"
 

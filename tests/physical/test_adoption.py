@@ -184,7 +184,7 @@ def test_the_first_sensor_of_a_line_is_adopted_as_any_other(bench: Bench, slaves
 
 FOREIGN: list[tuple[dict[int, int], str]] = [
     ({0: 3, 1: 225, 2: 0, 3: 7, 4: 9, 5: 700}, "says 700, not 1"),
-    ({1: 12, 2: 0, 4: 1, 5: 1}, "wind_speed"),
+    ({1: 225, 2: 0, 4: 1, 5: 1}, "wind_speed"),
     ({1: 0x414F, 2: 0xD70A, 4: 9, 5: 1}, "its register 0x0004 says 9"),
     ({1: 0x414F, 2: 0xD70A, 5: 1}, "its register 0x0004 does not answer"),
     ({4: 1, 5: 1}, "it refuses (exception 02) its values"),
