@@ -101,10 +101,9 @@ def _looked_before(wish: Newcomer, asking: Asking, echo_known: Callable[[], bool
     old = newcomer.old
     if newcomer.verdict.ending is not Ending.FREE or old is None:
         return newcomer
-    to = yield from _free_id(wish, asking)
+    to, refusal = yield from _free_id(wish, old, asking)
     if to is None:
         return Adopted(Verdict(Ending.TAKEN, at=old.baudrate), old, next(iter(wish.candidates), None))
-    refusal = yield from alone(old, to, asking)
     if refusal is not None:
         return Adopted(refusal, old, to)
     for _ in range(ECHO_READS):
@@ -142,15 +141,20 @@ def _newcomer(wish: Newcomer, asking: Asking) -> Generator[Step, Any, Adopted]:
     return found[0]
 
 
-def _free_id(wish: Newcomer, asking: Asking) -> Generator[Step, Any, int | None]:
-    """Return the first candidate at which nothing is heard, None if there is none."""
+def _free_id(wish: Newcomer, old: Spot, asking: Asking) -> Generator[Step, Any, tuple[int | None, Verdict | None]]:
+    """Return the first candidate at which nothing is heard, None if there is none, and why it must not be written.
+
+    At the newcomer's own rate the candidate is listened to while it is found out whether the newcomer is alone.
+    """
     for candidate in wish.candidates:
         clear = True
         for rate in wish.rates:
-            clear = clear and (yield from free(Spot(slave=candidate, baudrate=rate), asking))
-        if clear:
-            return candidate
-    return None
+            if rate != old.baudrate:
+                clear = clear and (yield from free(Spot(slave=candidate, baudrate=rate), asking))
+        refusal = (yield from alone(old, candidate, asking)) if clear else Verdict(Ending.TAKEN)
+        if refusal is None or refusal.ending is not Ending.TAKEN:
+            return candidate, refusal
+    return None, None
 
 
 def _at_line_rate(old: Spot, rate: int, asking: Asking) -> Generator[Step, Any, Verdict | None]:
