@@ -170,7 +170,7 @@ class Daemon:
                 tell=self._powers.tell,
             )
             self._uplink.read_back(recalling.wanted, recalling.take)
-        file = status_file(config.line.name, os.environ)
+        file = status_file(loaded.path, config.line.name, os.environ, root=os.geteuid() == 0)
         self._supervision = Supervision(
             notifier,
             None if file is None else StatusFile(file),

@@ -52,19 +52,22 @@ def _home(environment: Mapping[str, str]) -> Path:
     return Path(environment.get("HOME") or "/")
 
 
-def status_file(line: str, environment: Mapping[str, str]) -> Path | None:
-    """Return where the daemon writes its status; None where there is no place for it."""
+def status_file(file: Path, line: str, environment: Mapping[str, str], *, root: bool = False) -> Path | None:
+    """Return where the daemon of a configuration file writes its status; None where there is no place for it.
+
+    `root`: the user is root, who may write where the verbs look first; run by hand (by sudo) there is no session.
+    """
     if given := environment.get("RUNTIME_DIRECTORY", "").partition(":")[0]:
         return Path(given, STATUS_FILE)
     if session := environment.get("XDG_RUNTIME_DIR"):
         return Path(session, f"lfs10d-{line}", STATUS_FILE)
-    return None
+    return Path("/run", _service(file), STATUS_FILE) if root else None
 
 
 def status_places(file: Path, line: str, environment: Mapping[str, str]) -> tuple[Path, ...]:
     """Return where a verb looks for the daemon's status, the likeliest first."""
     places = [Path("/run", _service(file), STATUS_FILE)]
-    own = status_file(line, environment)
+    own = status_file(file, line, environment)
     return (*places, own) if own is not None and own not in places else tuple(places)
 
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import socket
 import subprocess
+import sys
 import time
+import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -202,6 +204,38 @@ def test_a_unit_is_understood_without_a_complaint(unit: str, tmp_path: Path, pro
     assert not [line for line in told.splitlines() if "lfs10d" in line]
 
 
+@pytest.mark.parametrize(
+    ("text", "code"), [("line: {port: /dev/null}\nslaves: [2]\nmqtt: {host: localhost}\n", 0), ("line: 7\n", 78)]
+)
+def test_a_reload_is_begun_only_where_the_file_is_right_and_says_on_one_line_what_is_wrong(
+    text: str, code: int, tmp_path: Path
+) -> None:
+    """The unit's own command, with this program and this file."""
+    file = tmp_path / "lfs10d.yaml"
+    file.write_text(text)
+    reloads = [line for line in (UNITS / "lfs10d.service").read_text().splitlines() if line.startswith("ExecReload=")]
+    assert reloads[1:] == ["ExecReload=/bin/kill -HUP $MAINPID"], "the daemon is told after the file was found right"
+    command = reloads[0].removeprefix("ExecReload=/bin/sh -c '").removesuffix("'")
+    command = command.replace("/opt/lfs10d/bin/lfs10d", f"{sys.executable} -m lfs10d")
+    command = command.replace("/etc/lfs10d/lfs10d.yaml", str(file))
+    done = subprocess.run(["/bin/sh", "-c", command], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (code, "")
+    assert bool(done.stderr) is bool(code)
+    if code:
+        assert done.stderr.startswith(f"{file}:1:7: line: ")
+
+
+def test_the_documentation_that_a_unit_names_comes_with_the_wheel() -> None:
+    wheel = tomllib.loads((UNITS.parent / "pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"]["wheel"]
+    named = {
+        line for unit in UNITS.glob("*.service") for line in unit.read_text().splitlines() if "Documentation" in line
+    }
+    (url,) = named
+    place = url.removeprefix("Documentation=file:///opt/lfs10d/")
+    sources = {target: source for source, target in wheel["shared-data"].items()}
+    assert (UNITS.parent / sources[place]).is_file()
+
+
 def test_the_units_differ_in_nothing_but_their_instance() -> None:
     plain, instance = ((UNITS / name).read_text().splitlines() for name in ("lfs10d.service", "lfs10d@.service"))
 
@@ -214,6 +248,10 @@ def test_the_units_differ_in_nothing_but_their_instance() -> None:
         (
             "ExecStart=/opt/lfs10d/bin/lfs10d run -c /etc/lfs10d/lfs10d.yaml",
             "ExecStart=/opt/lfs10d/bin/lfs10d run -c /etc/lfs10d/%i.yaml",
+        ),
+        (
+            "ExecReload=/bin/sh -c 'exec /opt/lfs10d/bin/lfs10d check -c /etc/lfs10d/lfs10d.yaml >/dev/null'",
+            "ExecReload=/bin/sh -c 'exec /opt/lfs10d/bin/lfs10d check -c /etc/lfs10d/%i.yaml >/dev/null'",
         ),
         ("StateDirectory=lfs10d", "StateDirectory=lfs10d-%i"),
         ("RuntimeDirectory=lfs10d", "RuntimeDirectory=lfs10d-%i"),
