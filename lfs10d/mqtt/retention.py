@@ -64,10 +64,15 @@ class Retention:
         queue[topic] = letter
 
     def burst(self, publications: Iterable[Publication], last: Publication) -> None:
-        """Take all topics, then `last`."""
+        """Take all topics, then `last`: within a burst a refresh is a change, for `last` waits for it."""
         for publication in publications:
-            self.add(publication)
-            if publication.payload is not None:
+            letter = Retained(publication)
+            if publication.payload is None:
+                self._wait(letter)
+            else:
+                self._refreshes.pop(publication.topic, None)
+                self._clearings.pop(publication.topic, None)
+                self._changes[publication.topic] = letter
                 self._burst.add(publication.topic)
         self._last = self._closing = Retained(last)
 

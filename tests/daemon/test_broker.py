@@ -36,6 +36,21 @@ def whole(view: View, device: str) -> bool:
     return numbers == list(range(1, len(numbers) + 1))
 
 
+def test_online_and_samples_follow_a_connect_within_3_s_whatever_the_burst_holds(
+    site: Site, mosquitto: Mosquitto
+) -> None:
+    site.line()
+    site.write()
+    run = site.run()
+    view = View(mosquitto.subscribe())
+    run.says("connected by MQTT 5")
+    connected = time.monotonic()
+    view.wait("availability", "online".__eq__)
+    view.wait("line/stats")
+    view.wait_samples("slave-1", 1)
+    assert time.monotonic() - connected < 3.0
+
+
 def test_what_was_measured_before_the_broker_came_is_history(site: Site, mosquitto: Mosquitto) -> None:
     mosquitto.stop()
     site.line()

@@ -205,6 +205,23 @@ def test_a_refresh_of_a_topic_whose_change_waits_goes_as_the_change() -> None:
     assert not retention
 
 
+def test_the_last_of_a_burst_follows_the_refreshes_in_it_and_waits_for_no_other() -> None:
+    """With the figures apart, `online` and every sample waited 10 s after each connect."""
+    retention = Retention()
+    retention.add(refresh(1))
+    retention.add(telemetry.retained("state", None))
+    retention.burst([refresh(2), refresh(1, "stats"), telemetry.retained("gone", None)], ONLINE)
+    went = [retention.next_change(NONE), retention.next_change(NONE)]
+    assert [each and each.topic for each in went] == ["state", "stats"]
+    for each in went:
+        assert each is not None
+        retention.over(each)
+    last = retention.next_change(NONE)
+    assert last is not None
+    assert last.publication == ONLINE
+    assert retention.next_refresh(NONE) is None
+
+
 def test_a_loss_forgets_refreshes() -> None:
     retention = Retention()
     retention.add(refresh(1))
