@@ -42,11 +42,14 @@ class Task:
         self.over_at: float | None = None
 
     def ask(self, now: float) -> Ask | Hold | Done:  # noqa: ARG002 - a job
-        word = self.words.pop(0) if self.words else Done()
+        word = self.words[0] if self.words else Done()
         assert isinstance(word, Ask | Hold | Done)
+        if not isinstance(word, Ask):  # which is asked again where its slave must rest first
+            self.words = self.words[1:]
         return word
 
     def heard(self, outcome: Outcome, now: float) -> Next:  # noqa: ARG002 - a job
+        self.words = self.words[1:]
         word = self.words.pop(0) if self.words else Done()
         assert isinstance(word, Later | Again | Done)
         return word

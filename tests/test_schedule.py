@@ -476,3 +476,39 @@ def test_those_probed_in_turn_after_the_first_answer_are_asked_twice_where_they_
     rig.asked.clear()
     rig.run(rig.now + 0.65)
     assert rig.asked in ([2, 3, 3], [3, 2, 2])
+
+
+def test_a_slave_is_asked_no_sooner_than_its_rest_allows_and_others_have_the_line_meanwhile() -> None:
+    rig = Rig(replace(spec(1, 100.0), request_gap=0.5), spec(2, 0.0))
+    rig.run(0.2)
+    rig.schedule.submit(Task(asking(1), Later(0.0), asking(1)), rig.now)
+    rig.schedule.submit(rig.poll_of("slave-1", 5), rig.now)
+    readings = rig.run(3.0)
+    of_1 = [(began, ended) for slave, began, ended in rig.times if slave == 1]
+    assert len(of_1) == 4
+    assert all(later[0] - before[1] >= 0.5 for before, later in pairwise(of_1))
+    assert [reading.requests for reading in readings if reading.device == "slave-1"] == [(5,)]
+    assert len(rig.times) - 4 > 0.9 * 3.0 / TAKES - 4
+
+
+def test_a_poll_goes_on_when_its_silence_has_widened_the_gap_and_the_gap_outlasts_another_id() -> None:
+    rig = Rig(spec(1, 100.0), rules=PollRules(retries=0))
+    device = rig.schedule.devices["slave-1"]
+    for began in (-20.0, -10.0):
+        device.gap.exchanged(began, began + 0.02, spoke=True, silent=False)
+        if began < -15.0:
+            device.gap.exchanged(began + 0.03, began + 0.2, spoke=False, silent=True)
+    device.gap.exchanged(-0.03, -0.01, spoke=True, silent=False)
+    rig.dead = {1}
+    ask = rig.ask()
+    assert ask is not None
+    assert rig.settle(ask) == []
+    assert device.gap.learned == 0.1
+    rig.dead = set()
+    (reading,) = rig.run(4.0)
+    assert (reading.fault, reading.gap_learned) == (None, True)
+    rig.replace(replace(spec(7, 100.0), name="slave-1"))
+    assert rig.schedule.devices["slave-1"].gap is device.gap
+    other = spec(7).profile.model_copy(update={"title": "Another"})
+    rig.replace(replace(spec(7, 100.0), name="slave-1", profile=other))
+    assert rig.schedule.devices["slave-1"].gap.learned == 0

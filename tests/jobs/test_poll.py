@@ -227,3 +227,40 @@ def test_one_that_is_cut_off_says_when() -> None:
     rig = Rig()
     rig.poll.cut_off(5.0)
     assert rig.poll.at == 5.0
+
+
+def sleeper(rig: Rig, helped: int) -> None:
+    """Let asking again at once after a pause have helped so many times, the last time at 0."""
+    for ended_at in range(-10 * helped, 0, 10):
+        rig.device.gap.exchanged(ended_at + 9.0, ended_at + 9.2, spoke=False, silent=True)
+        rig.device.gap.exchanged(ended_at + 9.21, ended_at + 10.0, spoke=True, silent=False)
+    rig.begin()
+
+
+def test_one_that_sleeps_is_woken_by_its_barrier_and_that_is_no_failed_attempt() -> None:
+    rig = Rig(retries=0)
+    sleeper(rig, 2)
+    assert rig.asks(5.0) == WHO
+    assert rig.hears(5.0, code=FaultCode.TIMEOUT) == Later(0.0)
+    rig.device.gap.exchanged(5.0, 5.2, spoke=False, silent=True)
+    assert rig.asks(5.21) == WIND
+    assert isinstance(rig.hears(5.21, VALUE), Done)
+    assert (rig.poll.fault, rig.poll.failed_attempts, rig.poll.begun) == (None, [], True)
+
+
+def test_where_asking_again_has_helped_once_it_is_tried_and_counts_as_a_failed_attempt() -> None:
+    rig = Rig(retries=0)
+    sleeper(rig, 1)
+    assert rig.asks(5.0) == WIND
+    assert rig.hears(5.0, code=FaultCode.TIMEOUT) == Later(0.0)
+    assert rig.poll.failed_attempts == [FaultCode.TIMEOUT]
+    rig.device.gap.exchanged(5.0, 5.2, spoke=False, silent=True)
+    assert rig.hears(5.21, code=FaultCode.TIMEOUT) == Done()
+    assert rig.poll.fault is not None
+
+
+def test_a_poll_wakes_its_device_three_times_at_most() -> None:
+    rig = Rig(retries=0)
+    sleeper(rig, 2)
+    outcomes = [rig.hears(now, code=FaultCode.TIMEOUT) for now in (5.0, 10.0, 15.0, 20.0)]
+    assert outcomes == [Later(0.0)] * 3 + [Done()]

@@ -238,6 +238,27 @@ def test_a_shy_sensor_ignores_the_request_after_one_to_the_dead(bench: Maker) ->
     assert line.id_of(1) == 1
 
 
+def test_a_sensor_that_needs_rest_ignores_what_comes_too_soon_after_its_answer(bench: Maker) -> None:
+    line = bench(Sensor(1), Sensor(2))
+    line.line.sensor(1).ail("needs_rest", delay=0.2)
+    assert line.id_of(1) == 1
+    assert line.id_of(1) is None
+    for _ in range(20):
+        line.id_of(2)
+    assert line.id_of(1) == 1
+
+
+def test_a_sensor_that_sleeps_loses_the_request_that_wakes_it(bench: Maker) -> None:
+    line = bench(Sensor(1), Sensor(2))
+    line.line.sensor(1).ail("sleeps", delay=0.2)
+    assert line.id_of(1) is None
+    assert line.id_of(1) == 1
+    for _ in range(20):
+        line.id_of(2)
+    assert line.id_of(1) is None
+    assert line.id_of(1) == 1
+
+
 def test_a_broadcast_is_obeyed_by_all_and_answered_by_nobody(bench: Maker) -> None:
     line = bench(Sensor(1), Sensor(2))
     assert line.write(0, RATE, 2) is None
