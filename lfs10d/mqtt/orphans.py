@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 QUIET = 0.5
 """Seconds without a retained message after which the broker has sent them all."""
 
-LONGEST = 5.0
-"""Seconds after which a sweep ends in any case."""
+LONGEST = 120.0
+"""Seconds after which a sweep ends in any case; a slow gateway takes 30 s for 60 000 messages, which come anyway."""
 
 
 @dataclass(slots=True)

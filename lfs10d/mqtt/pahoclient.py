@@ -9,8 +9,8 @@ from __future__ import annotations
 import logging
 from typing import TYPE_CHECKING
 
-from paho.mqtt.client import Client
-from paho.mqtt.enums import MQTTErrorCode
+from paho.mqtt.client import Client, MQTTMessage
+from paho.mqtt.enums import MQTTErrorCode, MQTTProtocolVersion
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.reasoncodes import ReasonCode
 
@@ -23,6 +23,9 @@ LARGEST_PACKET = 128 * 1024
 PASSED_OVER_AT_ONCE = 64 * 1024
 PASSES = 16
 """Bytes passed over by one call of the system, and calls in one turn of the loop."""
+
+RETAINED_QOS_0 = 0x31
+"""First byte of a PUBLISH of QoS 0 that is retained and no repetition (MQTT 5.0, section 3.3.1)."""
 
 _ANSWERS = (
     PacketTypes.CONNACK,
@@ -89,6 +92,19 @@ class BoundedClient(Client):
             self._passing_over = bufsize - LARGEST_PACKET
             self._in_packet["to_process"] = bufsize = LARGEST_PACKET
         return super()._sock_recv(bufsize)
+
+    def _handle_publish(self) -> MQTTErrorCode:
+        # What is retained comes by thousands at once where somebody left it: without properties that is half the work.
+        packet = self._in_packet["packet"]
+        end = 2 + int.from_bytes(packet[:2], "big")
+        begin = end + (self._protocol == MQTTProtocolVersion.MQTTv5)
+        if self._in_packet["command"] != RETAINED_QOS_0 or begin > len(packet) or any(packet[end:begin]):
+            return super()._handle_publish()
+        message = MQTTMessage(0, bytes(packet[2:end]))
+        message.payload, message.retain = bytes(packet[begin:]), True
+        if self.on_message is not None:
+            self.on_message(self, self._userdata, message)
+        return MQTTErrorCode.MQTT_ERR_SUCCESS
 
     def _packet_read(self) -> MQTTErrorCode:
         for _ in range(PASSES):

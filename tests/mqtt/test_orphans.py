@@ -36,7 +36,7 @@ def test_it_is_over_when_the_broker_has_fallen_silent() -> None:
     assert sweep.due == 10.3 + QUIET
 
 
-def test_it_is_over_after_five_seconds_in_any_case() -> None:
+def test_it_is_over_after_two_minutes_in_any_case() -> None:
     sweep = Sweep(B, 10.0)
-    sweep.heard("b/line0/device/gone/state", b"{}", 14.9)
+    sweep.heard("b/line0/device/gone/state", b"{}", 129.9)
     assert sweep.due == 10.0 + LONGEST

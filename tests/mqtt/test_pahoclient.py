@@ -173,6 +173,37 @@ def test_why_a_connection_ended_is_told(serving: Serving, bytes_said: bytes, wor
     asyncio.run(scenario())
 
 
+@pytest.mark.parametrize("version", list(Version))
+def test_a_retained_message_of_qos_0_comes_whole_with_properties_or_without(serving: Serving, version: Version) -> None:
+    five = version is Version.V5
+    plain = b"\x31" + (b"\x06\x00\x01t\x00hi" if five else b"\x05\x00\x01thi")
+    correlated = b"\x31\x0a\x00\x01t\x04\x09\x00\x01chi" if five else plain
+    empty = b"\x31" + (b"\x04\x00\x01t\x00" if five else b"\x03\x00\x01t")
+
+    async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await reader.read(1000)
+        writer.write(b"\x20\x03\x00\x00\x00" if five else b"\x20\x02\x00\x00")
+        await reader.read(1000)
+        writer.write(plain + correlated + empty + b"\x31\x02\x00\x09")
+        await reader.read(1000)
+
+    async def scenario() -> None:
+        async with serving(answer) as port:
+            taker = Taker()
+            taker.link = Link(BrokerSettings("127.0.0.1", port, "me", version), taker)
+            taker.link.start()
+            await taker.until(lambda: bool(taker.endings))
+            assert taker.messages == [
+                Incoming("t", b"hi", retained=True),
+                Incoming("t", b"hi", retained=True, correlation=b"c" if five else None),
+                Incoming("t", b"", retained=True),
+            ]
+            assert "malformed" in taker.endings[0].message
+            await taker.link.leave(0.1)
+
+    asyncio.run(scenario())
+
+
 class Torn(BoundedClient):
     """A client in the middle of a packet that it passes over, whose socket says this."""
 

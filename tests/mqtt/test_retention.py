@@ -228,3 +228,15 @@ def test_a_loss_forgets_refreshes() -> None:
     assert retention
     retention.lost()
     assert not retention
+
+
+def test_refreshes_of_a_burst_go_with_its_changes_and_before_its_last() -> None:
+    retention = Retention()
+    retention.burst([telemetry.retained("stats", {}, qos=0, refresh=True), state(1)], ONLINE)
+    told = []
+    while not retention.announced:
+        letter = retention.next_change(NONE)
+        assert letter is not None
+        told.append(letter.topic)
+        retention.over(letter)
+    assert told == ["stats", "state", "availability"]
