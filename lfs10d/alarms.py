@@ -8,7 +8,9 @@ Rules
    are listed in `also`.
 3. One good poll ends the run and clears the error. So does what masks it: a lost port, or disabling.
    Afterwards it rises by rule 1 again.
-4. An error of the line rises at once. Of several the one that explains the others is shown.
+4. `duplicate_id` is of no poll: it rises and clears by what is heard besides the answers (`stands`), whatever the
+   polls say. While polls fail it is listed in `also`.
+5. An error of the line rises at once. Of several the one that explains the others is shown.
 
 Each change says whether the error object must be published. Times are epoch milliseconds.
 """
@@ -77,12 +79,14 @@ def _inactive(last_code: FaultCode | None, cleared: int | None) -> dict[str, obj
 class DeviceAlarm:
     """The error of one device; `rise_after` may be changed at any time and holds from the next failure on."""
 
-    __slots__ = ("_cleared", "_last_code", "_run", "active", "rise_after")
+    __slots__ = ("_cleared", "_last_code", "_run", "_standing", "active", "rise_after")
 
     def __init__(self, rise_after: int) -> None:
         self.rise_after = rise_after
         self.active = False
+        """An error of the polls is active."""
         self._run: _Run | None = None
+        self._standing: _Run | None = None
         self._last_code: FaultCode | None = None
         self._cleared: int | None = None
 
@@ -110,12 +114,27 @@ class DeviceAlarm:
         self._cleared = ts
         return True
 
+    def stands(self, fault: Fault | None, ts: int) -> bool:
+        """Take an error that no poll raises or clears, None where it is over; return whether that is a change."""
+        before = self._standing
+        if fault is None:
+            self._standing = None
+            if before is not None and not self.active:
+                self._last_code = before.fault.code
+                self._cleared = ts
+        elif before is None:
+            self._standing = _Run(fault, ts, ts)
+        return (before is None) is not (self._standing is None)
+
     def payload(self) -> dict[str, object]:
         """Return the error object."""
-        run = self._run
-        if run is None or not self.active:
-            return _inactive(self._last_code, self._cleared)
-        return run.payload([code.value for code in run.codes if code != run.fault.code])
+        run, standing = self._run if self.active else None, self._standing
+        if run is not None:
+            codes = [code.value for code in run.codes if code != run.fault.code]
+            return run.payload(codes if standing is None else [*codes, standing.fault.code.value])
+        if standing is not None:
+            return standing.payload([])
+        return _inactive(self._last_code, self._cleared)
 
 
 class LineAlarm:

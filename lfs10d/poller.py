@@ -137,6 +137,9 @@ class Poller:
             else:
                 self._ask(decision)
         step = self.bus.step(now, readable=readable)
+        if self.bus.strays:
+            strays, self.bus.strays = self.bus.strays, []
+            self._events += self.schedule.overheard(strays)
         if isinstance(step, PortChanged):
             self._port_changed(step)
             return None
@@ -184,10 +187,13 @@ class Poller:
                 sent=outcome.sent,
                 heard=outcome.heard,
                 unsolicited=outcome.unsolicited + stray,
-                late=len(outcome.late),
+                late=sum(late.ours for late in outcome.late),
             )
         )
         self._events += readings
+        self._events += self.schedule.answered(outcome)
+        if outcome.strays:
+            self._events += self.schedule.overheard(outcome.strays, outcome)
 
     def _port_changed(self, changed: PortChanged) -> None:
         self._events.append(changed)

@@ -34,6 +34,7 @@ class FaultCode(StrEnum):
     PORT_LOST = "port_lost"
     PORT_BUSY = "port_busy"
     WRONG_RATE = "wrong_rate"
+    DUPLICATE_ID = "duplicate_id"
     CONFIG_CONFLICT = "config_conflict"
     STORAGE_FULL = "storage_full"
     DUPLICATE_CLIENT = "duplicate_client"
@@ -158,4 +159,17 @@ class UartCounted:
     counters: UartCounters
 
 
-Event: TypeAlias = Reading | Exchanged | PortChanged | UartCounted
+@dataclass(frozen=True, slots=True)
+class AnsweredTwice:
+    """Two answers come to one request of a device (`fault` says what was heard), or no longer do (None).
+
+    Its readings go on: the first answer is believed.
+    """
+
+    at: float
+    device: str
+    slave: int
+    fault: Fault | None
+
+
+Event: TypeAlias = Reading | Exchanged | PortChanged | UartCounted | AnsweredTwice

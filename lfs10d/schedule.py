@@ -24,11 +24,13 @@ from lfs10d.jobs.poll import Poll
 from lfs10d.jobs.queue import JobQueue
 from lfs10d.jobs.telling import tell, tell_lost
 from lfs10d.jobs.toll import Toll
-from lfs10d.modbus.frames import ReadRegisters
+from lfs10d.modbus import verdict
+from lfs10d.modbus.frames import EXCEPTION_FLAG, ReadRegisters
+from lfs10d.modbus.overhearing import Overhearing
 from lfs10d.modbus.unanswered import Unanswered
 from lfs10d.pollqueue import PollQueue, back_on_grid, spread
 from lfs10d.probing import Probing
-from lfs10d.reading import Errand, Fault, FaultCode
+from lfs10d.reading import AnsweredTwice, Errand, Fault, FaultCode
 from lfs10d.roster import LEARNED_MOST, Device, DeviceSpec, Health, PollRules
 from lfs10d.slaverests import SlaveRests
 
@@ -64,6 +66,7 @@ class Schedule:
         self.unanswered = Unanswered()
         self.devices: dict[str, Device] = {}
         self._by_slave: dict[int, Device] = {}
+        self._overhearing = Overhearing()
         self._polls = PollQueue(self.unanswered)
         self._probing = Probing(now)
         self._jobs = JobQueue()
@@ -97,6 +100,9 @@ class Schedule:
             device.gap.configured = spec.request_gap
             self.devices[spec.name] = device
         self._by_slave = {device.slave: device for device in self.devices.values()}
+        self._overhearing.codecs = {device.slave: device.spec.codec for device in self.devices.values()}
+        for device in fresh:
+            self.unanswered.duplicates.forget(device.slave)
         for job in self._jobs.drop(lambda job: isinstance(job, Poll) and not self._wanted(job)):
             job.cut_off(now)
         self._requeue(fresh, now)
@@ -183,6 +189,7 @@ class Schedule:
     def port_opened(self, now: float) -> None:
         """Note that the port is open: every device is due at once."""
         self._lost = None
+        self.unanswered.duplicates.forget()
         for device in self.devices.values():
             device.reconnected()
         self._requeue(list(self.devices.values()), now)
@@ -270,6 +277,40 @@ class Schedule:
         self._jobs.over(job)
         return [self._finish(job, now)] if isinstance(job, Poll) else []
 
+    def answered(self, outcome: Outcome) -> list[AnsweredTwice]:
+        """Take an outcome that is settled: a second answer may follow it, or none does any more."""
+        device = self._by_slave.get(outcome.request.slave)
+        if device is None or outcome.answer is None:
+            return []
+        barrier, request = device.spec.profile.barrier, outcome.request
+        asked = (
+            None if barrier is None else ReadRegisters(device.slave, barrier.register, barrier.count, barrier.function)
+        )
+        ended = self.unanswered.duplicates.answered(device.slave, outcome.ended, barrier=request == asked)
+        return [AnsweredTwice(outcome.ended, device.name, device.slave, None)] if ended else []
+
+    def overheard(self, strays: Iterable[tuple[bytes, float]], outcome: Outcome | None = None) -> list[AnsweredTwice]:
+        """Take what was heard and belongs to no exchange, or is left over by `outcome`, with the times of its pieces.
+
+        A right frame of a slave that owes nothing is one answer too many.
+        """
+        events: list[AnsweredTwice] = []
+        owing = outcome.request.slave if outcome is not None and outcome.answer is None else None
+        for frame in self._overhearing.hear(strays):
+            codec = self._overhearing.codecs[frame.slave]
+            if frame.request is not None:
+                self.unanswered.asked_by_another(frame.request, codec, frame.at)
+                continue
+            size, exception = codec.size(len(frame.body)), bool(frame.body[1] & EXCEPTION_FLAG)
+            owed = self.unanswered.overheard(frame.slave, size, exception=exception, now=frame.at)
+            if owed or frame.slave == owing:
+                continue
+            twice = self.unanswered.duplicates.second(frame.slave, frame.at)
+            if twice is not None:
+                fault = Fault(FaultCode.DUPLICATE_ID, verdict.twice(twice), heard=codec.wrap(frame.body))
+                events.append(AnsweredTwice(frame.at, self._by_slave[frame.slave].name, frame.slave, fault))
+        return events
+
     def _ignored(self, outcome: Outcome) -> bool:
         """Whether the request may have been ignored only for the one before it (rule 4)."""
         before, self._silent = self._silent, None
@@ -289,7 +330,7 @@ class Schedule:
         for late in outcome.late:
             device = self._by_slave.get(late.request.slave)
             # What is later than any time-out says nothing of the usual time, and may be an older answer's.
-            if device is not None and late.latency <= LEARNED_MOST:
+            if device is not None and late.ours and late.latency <= LEARNED_MOST:
                 device.turnarounds.learn(late.latency)
         if outcome.turnaround is not None and outcome.answer is not None:
             device = self._by_slave.get(outcome.request.slave)

@@ -33,11 +33,13 @@ from lfs10d.telemetry import (
     Publication,
     Sample,
     device_topic,
+    event,
     retained,
 )
 
 if TYPE_CHECKING:
     from lfs10d.facts import DeviceFacts, Instant
+    from lfs10d.reading import AnsweredTwice
 
 STATE_EVERY: Final = 1.0
 """s between two states of the same quality and error."""
@@ -128,7 +130,19 @@ class Standing:
 
     def mask(self, now: Instant) -> list[Publication]:
         """Take the device's own error back: what ails it is not the device."""
-        return [self._error()] if self._alarm.ended(now.ts()) else []
+        ended = self._alarm.ended(now.ts())
+        return [self._error()] if self._alarm.stands(None, now.ts()) or ended else []
+
+    def answered_twice(self, heard: AnsweredTwice, now: Instant) -> list[Publication]:
+        """Take that a second answer comes to each request, or no longer does."""
+        ts = now.ts(heard.at)
+        published = []
+        if self._alarm.stands(heard.fault, ts):
+            published.append(self._error())
+            if heard.fault is not None:
+                facts = {"device": self.facts.name, "slave": heard.slave, "message": heard.fault.message}
+                published.append(event("duplicate_id", ts, **facts))
+        return published
 
     def reconfigure(self, facts: DeviceFacts, now: Instant) -> list[Publication]:
         """Take new facts about the same device on the same profile; return what changed."""

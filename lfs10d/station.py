@@ -16,6 +16,7 @@ from lfs10d.alarms import LineAlarm
 from lfs10d.facts import DaemonFacts, DeviceFacts, Instant, LineFacts
 from lfs10d.reading import (
     PORT_CODES,
+    AnsweredTwice,
     Event,
     Exchanged,
     Fault,
@@ -108,6 +109,10 @@ class Station:
                 published += self._port_changed(happened, now)
             case UartCounted():
                 self._tally.uart = happened.counters
+            case AnsweredTwice():
+                standing = self._standings.get(happened.device)
+                if standing is not None and standing.facts.enabled and not self._masked:
+                    published += standing.answered_twice(happened, now)
             case _:
                 assert_never(happened)
         return published

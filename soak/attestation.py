@@ -175,6 +175,8 @@ class Oracle:
                 wrong = "a number nobody sent so"
         elif answer.sensor.slave != slave:
             wrong = f"the number of slave {answer.sensor.slave}"
+        elif answer.second and any(first.believable for first in request.answers if not first.second):
+            wrong = "a second answer to a request"
         elif request is not last and self._displaced(request, last):
             found.by_construction += 1
         elif request is not last:

@@ -86,6 +86,11 @@ def _late(delay: float, also: str = "", **ailments: Particulars) -> Fault:
     )  # fmt: skip
 
 
+def _second(kind: str, delay: int) -> Fault:
+    """Return one to whose requests a second answer comes after so many ms: it may run into what neighbours are sent."""
+    return Fault(_codes(STRUCK), _codes(STRUCK), ailments={kind: {"delay": delay / 1000}}, neighbours=_codes(STRUCK))
+
+
 FAMILY: Mapping[str, Fault] = {
     "silent": _ill("timeout", silent={}),
     "late, in the same shape": _late(1.3),
@@ -107,6 +112,12 @@ FAMILY: Mapping[str, Fault] = {
     "out of range": _ill("out_of_range", out_of_range={}),
     "subnormal": _ill("out_of_range", subnormal={}),
     **{f"exception {code:02}": _ill("exception", exception={"code": code}) for code in (1, 2, 3, 4, 6, 11)},
+    **{f"a twin after {delay} ms": _second("twin", delay) for delay in (5, 37, 100)},
+    **{f"a repeater after {delay} ms": _second("repeated", delay) for delay in (5, 37, 100)},
+    "a gateway whose target answers late": Fault(
+        _codes("exception"), _codes("exception " + LATE), _codes("exception"), {"gateway": {"delay": 0.1}},
+        neighbours=_codes(LATE),
+    ),
     "stray bytes": Fault(begin=_stray),
     "babble": Fault(_codes("collision"), _codes(LATE), _codes("collision"), begin=_babble, neighbours=_codes(LATE),
                     in_pieces=_codes(STRUCK)),
@@ -135,6 +146,9 @@ KINDS: Mapping[str, Particulars] = {
     "out_of_range": {},
     "subnormal": {},
     "hangs": {},
+    "twin": {"delay": 0.037},
+    "repeated": {"delay": 0.02},
+    "gateway": {"delay": 0.1},
 }
 """What is mixed. The id of a sensor that is polled is never borrowed: such a frame is right by construction."""
 

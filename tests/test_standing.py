@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast
 import pytest
 
 from lfs10d.facts import Instant
-from lfs10d.reading import Fault, FaultCode, Reading
+from lfs10d.reading import AnsweredTwice, Fault, FaultCode, Reading
 from lfs10d.standing import STATE_EARLY, Standing
 from lfs10d.telemetry import Kind
 from tests.stations import ONE_VALUE
@@ -417,3 +417,23 @@ def test_a_snapshot_tells_everything_a_live_view_shows() -> None:
         "age_s": 0.6,
         "alarm": {"v": 1, "active": False, "code": None, "last_code": None, "cleared": None},
     }
+
+
+def test_an_id_answered_twice_is_an_event_and_an_error_beside_good_samples() -> None:
+    watched = Watched()
+    watched.poll(1.0, 12.3)
+    twice = AnsweredTwice(1.5, "a", 3, Fault(FaultCode.DUPLICATE_ID, "slave 3 is answered for twice"))
+    error, told = watched.standing.answered_twice(twice, instant(1.5))
+    assert error.topic == "device/a/error"
+    assert fields(error.payload, "active", "code") == (True, "duplicate_id")
+    assert fields(told.payload, "type", "device", "slave") == ("duplicate_id", "a", 3)
+    assert watched.standing.answered_twice(twice, instant(1.6)) == []
+    watched.poll(3.0, 12.4)
+    assert fields(watched.shown["state"], "quality", "error") == ("good", None)
+    assert fields(watched.shown["error"], "code") == ("duplicate_id",)
+    over = AnsweredTwice(9.0, "a", 3, None)
+    (cleared,) = watched.standing.answered_twice(over, instant(9.0))
+    assert fields(cleared.payload, "active", "last_code") == (False, "duplicate_id")
+    watched.standing.answered_twice(twice, instant(10.0))
+    assert leaves(watched.standing.mask(instant(11.0))) == ["error"]
+    assert fields(watched.shown["error"], "active") == (False,)

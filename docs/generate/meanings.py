@@ -14,13 +14,16 @@ FAULT_CODES: Final = {
     "out_of_range": "The value is beyond what the profile believes, or a float32 below 1e-6. The device is alive.",
     "not_finite": "The value is NaN or infinite. The device is alive.",
     "late": "Only the answer to an earlier request came.",
-    "collision": "The line never fell silent for us, or our own bytes came back changed.",
+    "collision": "The line never fell silent for us, our own bytes came back changed, or another master asked the same "
+    "slave between our request and its answer.",
     "starting": "The daemon has just started and has not polled the device yet. No error: it is in no error topic.",
     "disabled": "The device is switched off in the configuration. Not an error: said once, in one sample.",
     "overrun": "A poll was not made in time: the line is full. Counted only, in the statistics.",
     "port_lost": "The serial port is absent, denied or hung up.",
     "port_busy": "Another program has locked the serial port.",
     "wrong_rate": "No sensor answers at the line's rate, but some do at another: the message says at which.",
+    "duplicate_id": "Two answers come to each request: a second sensor with this id, or a repeater. In "
+    "`device/<name>/error` only; the samples go on, with the answer that comes first.",
     "config_conflict": "Two devices would have one id: this one waits, and no value is published under its name.",
     "storage_full": "The state directory cannot be written. Measuring goes on.",
     "duplicate_client": "Another client at the broker uses our client id.",

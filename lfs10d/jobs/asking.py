@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from lfs10d.jobs.interview import shortest_answer, strangers
 from lfs10d.jobs.job import Ask, Hold
-from lfs10d.modbus.frames import ReadRegisters
+from lfs10d.modbus.frames import NOT_FINAL, ReadRegisters
 from lfs10d.reading import FaultCode
 
 if TYPE_CHECKING:
@@ -166,7 +166,7 @@ class Asking:
                     unanswered.leave_alone(spot.slave, self.timeout)
                     continue
                 reply = self._reply((yield self._ask(other, spot, timeout)), values=True)
-                if not reply.answers:
+                if not reply.answers or reply.exception in NOT_FINAL:
                     return reply
             elif (until := unanswered.lingering_until(request, self.codec, now)) is not None:
                 yield Hold(until)

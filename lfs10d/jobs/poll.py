@@ -126,9 +126,13 @@ class Poll:
             self._barrier_due = False
             return Later(self.due)
         if fault is None or fault.code is not FaultCode.LATE:  # else the attempt itself is counted as late
-            self.failed_attempts += [FaultCode.LATE for late in outcome.late if late.request.slave == device.slave]
+            self.failed_attempts += [
+                FaultCode.LATE for late in outcome.late if late.ours and late.request.slave == device.slave
+            ]
         if self._barrier_asked:
-            alive = fault is None or (fault.code is FaultCode.EXCEPTION and not outcome.ambiguous)
+            alive = fault is None or (
+                fault.code is FaultCode.EXCEPTION and not outcome.ambiguous and not outcome.may_follow
+            )
             if alive:
                 self._barrier_due = False
                 return Later(self.due)

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
+from lfs10d.modbus.request import NOT_FINAL
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -24,11 +26,15 @@ class Echo(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Pending:
-    """An unanswered earlier request, whose answer may still come; `sent_end` is its last bit."""
+    """An unanswered earlier request, whose answer may still come; `sent_end` is its last bit.
+
+    `ours`: we asked it, no other master did.
+    """
 
     request: Request
     codec: Codec
     sent_end: float
+    ours: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +46,8 @@ class Attempt:
     into one answer. `earlier` are the requests to this slave whose answers may still come, the oldest first,
     `elsewhere` those to any slave, by slave id. `turn` is how long to wait for
     silence before giving up; `turnaround_delay` the silence after a broadcast. `gap` is the required silence
-    where it is longer than the timing's (a change of rate). `paced`: the port is a real wire, on which nothing
+    where it is longer than the timing's (a change of rate). `echo_proved`: that the adapter has no echo was observed,
+    not only configured. `paced`: the port is a real wire, on which nothing
     arrives sooner than the rate allows (not so on a pseudo terminal or behind a network bridge).
     """
 
@@ -56,6 +63,7 @@ class Attempt:
     turnaround_delay: float = 0.1
     gap: float | None = None
     paced: bool = False
+    echo_proved: bool = False
     elsewhere: Mapping[int, tuple[Pending, ...]] = field(default_factory=dict)
 
 
@@ -65,6 +73,7 @@ class LateAnswer:
 
     request: Request
     latency: float
+    ours: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +87,8 @@ class Outcome:
     `echoed`: whether our own bytes came back, None without evidence. `heard` is what came after the request (the
     last of it where there was much), before it where nothing was sent. `unsolicited` counts the bytes that belong
     to no answer, earlier ones included. `quiet_since` is the last byte sent or heard. `ambiguous`: the answer or
-    exception may be that of another request in `earlier`: the slave is not proved to be synchronised.
+    exception may be that of another request in `earlier`: the slave is not proved to be synchronised. `strays` is what
+    belongs to no echo and to no answer, in order, each piece with the time at which it was read.
     """
 
     request: Request
@@ -99,6 +109,12 @@ class Outcome:
     unsolicited: int
     quiet_since: float
     ambiguous: bool = False
+    strays: tuple[tuple[bytes, float], ...] = ()
+
+    @property
+    def may_follow(self) -> bool:
+        """Whether the answer may still come though an exception did (05, 0A, 0B)."""
+        return self.fault is not None and self.fault.exception_code in NOT_FINAL
 
 
 class Quiet(NamedTuple):

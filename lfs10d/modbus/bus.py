@@ -83,6 +83,8 @@ class Bus:
         self.open = False
         self.timing = self._timing(port.settings)
         self.unsolicited = 0
+        self.strays: list[tuple[bytes, float]] = []
+        """What was heard between two exchanges, with the times at which it was read; whoever looks at it clears it."""
         self._settings = port.settings
         self._clock = clock
         self._echo = EchoLearner(rules.echo)
@@ -209,6 +211,7 @@ class Bus:
         if self._exchange is None:
             if heard:  # nobody asked for it: it restarts the silence
                 self.unsolicited += len(heard)
+                self.strays.append((heard, now))
                 self._quiet_since = max(self._quiet_since, now)
             if self._order is None:
                 return Wait(inf, listen=True)
@@ -245,6 +248,7 @@ class Bus:
             timeout=order.timeout,
             patience=order.patience,
             echo=self._echo.state,
+            echo_proved=self._echo.proved,
             adapter_latency=self.port.adapter_latency,
             paced=self.port.paced,
             earlier=order.earlier,

@@ -23,6 +23,11 @@ class EchoLearner:
         self._seen: bool | None = None
         self._agreeing = 0
 
+    @property
+    def proved(self) -> bool:
+        """Whether what is known was observed, not only configured."""
+        return self._fixed is None and self.state is not Echo.UNKNOWN
+
     def reopened(self) -> None:
         """Forget what was learned: the adapter may be another one."""
         if self._fixed is None:

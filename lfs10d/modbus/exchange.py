@@ -9,6 +9,7 @@
     READY      HEARD: a byte came before the request was written   SILENCE
     READY      SENT: the request was written                       LISTENING
     LISTENING  ANSWERED: a right frame is whole                    SETTLED
+    LISTENING  DISPLACED: one is, another master asked for it      SETTLED
     LISTENING  EXPIRED: nothing more is to be expected             SETTLED
 
 Rules
@@ -31,7 +32,9 @@ Rules
 7. It always ends: a line that never falls silent is given up after the time-out and the longest answer.
 8. The fault names the nearest thing to an answer that came, in this order: a frame with a right check (of the wrong
    count, function, slave), only a late answer, too few bytes, a wrong check; nothing but echo is `timeout`.
-9. A broadcast is answered by nobody and is over after `turnaround_delay`.
+9. A right frame is no answer to us if another master was heard asking the same slave after our request, or right
+   before it and not answered yet: `collision`; our request counts as not answered. No frame says whom it answers.
+10. A broadcast is answered by nobody and is over after `turnaround_delay`.
 """
 
 from __future__ import annotations
@@ -105,6 +108,7 @@ class Happening(StrEnum):
     HEARD = "heard"
     SENT = "sent"
     ANSWERED = "answered"
+    DISPLACED = "displaced"
     EXPIRED = "expired"
 
 
@@ -114,6 +118,7 @@ TRANSITIONS: Mapping[tuple[State, Happening], State] = {
     (State.READY, Happening.HEARD): State.SILENCE,
     (State.READY, Happening.SENT): State.LISTENING,
     (State.LISTENING, Happening.ANSWERED): State.SETTLED,
+    (State.LISTENING, Happening.DISPLACED): State.SETTLED,
     (State.LISTENING, Happening.EXPIRED): State.SETTLED,
 }
 """The whole machine; the picture in `docs/` is drawn from it."""
@@ -214,6 +219,10 @@ class Exchange:
             self._pass(Happening.ANSWERED)
             reception.look_elsewhere()
             return self._settle(reception.answer.last_at, reception.answer, None)
+        if reception.displaced is not None:
+            self._pass(Happening.DISPLACED)
+            reception.look_elsewhere()
+            return self._settle(reception.displaced.last_at, None, verdict.displaced(self._attempt.request.slave))
         first, bound = self._limits()
         until = min(self._until(first), bound)
         if until <= now < first and verdict.stranger_spoke(self._attempt, reception):
@@ -256,7 +265,7 @@ class Exchange:
 
     def _settle(self, ended: float, catch: Catch | None, found: Verdict | None) -> Settled:
         attempt, reception = self._attempt, self._reception
-        sent = reception.sent_yet
+        sent, unsolicited = reception.sent_yet, reception.unsolicited
         answer: tuple[int, ...] | None = ()
         exception: int | None = None
         if catch is not None:
@@ -279,12 +288,13 @@ class Exchange:
             ended=ended,
             turnaround=max(0.0, catch.first_at - self._sent_end) if catch else None,
             rtt=max(0.0, catch.last_at - self._began) if catch else None,
-            answered=sent and reception.begun,
+            answered=sent and reception.begun and reception.displaced is None,
             late=tuple(reception.late),
             echoed=reception.echoed if sent else None,
             sent=self._frame if sent else b"",
             heard=bytes(reception.heard[-HEARD_KEPT:]),
-            unsolicited=reception.unsolicited,
+            unsolicited=unsolicited,
+            strays=reception.strays if unsolicited else (),
             quiet_since=self._quiet_since,
             ambiguous=reception.ambiguous,
         )

@@ -30,6 +30,7 @@ from pymodbus.pdu.register_message import (
 
 from lfs10d.modbus.request import (
     BROADCAST,
+    NOT_FINAL,
     READ_COUNT_MAX,
     READ_HOLDING_REGISTERS,
     READ_INPUT_REGISTERS,
@@ -47,6 +48,7 @@ __all__ = [
     "BROADCAST",
     "EXCEPTION_FLAG",
     "EXCEPTION_NAMES",
+    "NOT_FINAL",
     "READ_COUNT_MAX",
     "READ_HOLDING_REGISTERS",
     "READ_INPUT_REGISTERS",

@@ -119,6 +119,28 @@ class Hunt:
             at = max(at, end)
         return bytes(rest + self._stream[at - self._base :])
 
+    def pieces(self, start: int) -> list[tuple[bytes, float]]:
+        """Return what `unclaimed` returns, in pieces, each with the time at which it was read."""
+        found: list[tuple[bytes, float]] = []
+        at = max(start, self._base, self.end - KEPT)
+        for begin, end in [*sorted(self._claims), (self.end, self.end)]:
+            while at < begin:
+                mark = bisect_right(self._mark_ends, at)
+                until = min(begin, self._mark_ends[mark])
+                found.append((bytes(self._stream[at - self._base : until - self._base]), self._mark_times[mark]))
+                at = until
+            at = max(at, end)
+        return found
+
+    def unclaimed_between(self, start: int, end: int) -> bytes:
+        """Return what was heard from `start` to before `end` and belongs to no claimed frame (of the last `KEPT`)."""
+        rest = bytearray()
+        at = max(start, self._base)
+        for begin, behind in [*sorted(self._claims), (end, end)]:
+            rest += self._stream[at - self._base : max(0, min(begin, end) - self._base)]
+            at = max(at, behind)
+        return bytes(rest)
+
     def unclaimed_count(self, start: int) -> int:
         """Return how many characters from `start` on belong to no claimed frame."""
         claimed = sum(max(0, end - max(begin, start)) for begin, end in self._claims)

@@ -6,7 +6,7 @@ from math import inf
 from typing import TYPE_CHECKING
 
 from lfs10d.modbus.attempt import Attempt, Echo, LateAnswer, Pending
-from lfs10d.modbus.frames import BROADCAST, EXCEPTION_FLAG, WriteRegister
+from lfs10d.modbus.frames import BROADCAST, EXCEPTION_FLAG, ReadRegisters, Shape, WriteRegister
 from lfs10d.modbus.hunt import Catch, Hunt, Quarry
 
 if TYPE_CHECKING:
@@ -18,6 +18,9 @@ HEARD_KEPT = 1024
 EARLY_TOLERANCE = 1
 """Characters by which an answer may seem to come before our request has left: clocks and rates differ a little."""
 
+REQUEST_BODY = 6
+"""Slave id, function and two words: what a master sends that reads registers or writes one."""
+
 RATE_TOLERANCE = 0.9
 """A character takes at least this share of its time: rates differ by a few percent, and stop bits are cut."""
 
@@ -26,7 +29,8 @@ class Reception:
     """The ear of one exchange, which sent `frame`.
 
     `answer` is the right frame, once it is whole; `spare` a right frame that came too early to be believed at
-    once, on a port without pace. `late_at` is when the asked slave's last late answer was whole, `whole_at` when
+    once, on a port without pace; `displaced` a right frame that may answer another master's request to the asked
+    slave, which was heard. `late_at` is when the asked slave's last late answer was whole, `whole_at` when
     the frame in progress can be whole.
     """
 
@@ -42,7 +46,7 @@ class Reception:
         self._held: list[tuple[bytes, float]] = []
         self._matched = self._missing = self._from = self._sent_at = self._early_end = 0
         self._earliest = -inf
-        self._undecided = self._echo_whole = False
+        self._undecided = self._echo_whole = self._owes_another = False
         # Echo and answer of a write look the same.
         self._expects_echo = attempt.echo is Echo.ON or (
             attempt.echo is Echo.UNKNOWN and isinstance(attempt.request, WriteRegister)
@@ -51,6 +55,7 @@ class Reception:
         self.heard = bytearray()
         self.answer: Catch | None = None
         self.spare: Catch | None = None
+        self.displaced: Catch | None = None
         self.late: list[LateAnswer] = []
         self.late_at = self.whole_at = -inf
 
@@ -66,6 +71,7 @@ class Reception:
         timing = self._attempt.timing
         self._earliest = begun + timing.transmission(len(self._frame) - EARLY_TOLERANCE)
         self._undecided = self._attempt.echo is not Echo.OFF
+        self._owes_another = self._foreign(0, self._hunt.end, unanswered=True)
         self._sent_at = self._early_end = self._hunt.end
         self._begin_at(self._sent_at)
         self.heard.clear()
@@ -139,7 +145,8 @@ class Reception:
                 other.skip(catch.end)
             del self._pending[: self._pending.index(pending) + 1]
             self._older = [older for older in self._older if older[0] in self._pending]
-            self.late.append(LateAnswer(pending.request, max(0.0, catch.first_at - pending.sent_end)))
+            latency = max(0.0, catch.first_at - pending.sent_end)
+            self.late.append(LateAnswer(pending.request, latency, pending.ours))
             self.late_at = now
 
     def look_elsewhere(self) -> None:
@@ -157,7 +164,8 @@ class Reception:
                 catch = min((catch for catch in catches if catch), key=lambda catch: catch.begin, default=None)
                 if catch is not None and not self._hunt.claimed(catch):
                     self._hunt.claim(catch)
-                    self.late.append(LateAnswer(each.request, max(0.0, catch.first_at - each.sent_end)))
+                    latency = max(0.0, catch.first_at - each.sent_end)
+                    self.late.append(LateAnswer(each.request, latency, each.ours))
                     start = catch.end
 
     def _seek_ours(self) -> None:
@@ -166,11 +174,34 @@ class Reception:
             del quarries[0]
         for quarry in quarries:
             while self.answer is None and (catch := self._hunt.seek(quarry)) is not None:
+                foreign = self._owes_another or self._foreign(self._sent_at, catch.begin)
                 self._hunt.claim(catch)
+                if foreign:
+                    self.displaced = catch
+                    return
                 if catch.begin < self._early_end:
                     self.spare = self.spare or catch
                 else:
                     self.answer = catch
+
+    def _foreign(self, start: int, end: int, *, unanswered: bool = False) -> bool:
+        """Whether another master was heard asking the asked slave between two positions; for a read only.
+
+        `unanswered`: and the slave was not heard to answer it. What equals our own request counts as its echo, once,
+        unless it is known that the adapter has none.
+        """
+        attempt = self._attempt
+        if end - start < attempt.codec.size(REQUEST_BODY) or not isinstance(attempt.request, ReadRegisters):
+            return False
+        heard = self._hunt.unclaimed_between(start, end)
+        if self.sent_yet and self._echo_possible:
+            heard = heard.replace(self._frame, b"", 1)
+        found = False
+        for _, _, body in attempt.codec.frames(heard, attempt.request.slave, 0):
+            if body[0] == attempt.request.slave:
+                asks = len(body) == REQUEST_BODY and not body[1] & EXCEPTION_FLAG
+                found = asks or (found and not unanswered)
+        return found
 
     def _foresee(self, now: float) -> None:
         """Reckon when the frame in progress can be whole: the soonest that any of its pieces lets expect."""
@@ -193,6 +224,22 @@ class Reception:
     def leftover(self) -> bytes:
         """Return these characters (the last of them where there were very many)."""
         return self._hunt.unclaimed(self._from) + b"".join(held for held, _ in self._held)
+
+    @property
+    def strays(self) -> tuple[tuple[bytes, float], ...]:
+        """What belongs to no echo and to no answer, in pieces, with the times at which they were read."""
+        if self._echo_possible:
+            own = Shape(self._frame, len(self._frame), len(self._frame))
+            echo = self._hunt.seek(Quarry(self._attempt.codec, own, self._sent_at))
+            if echo is not None:
+                self._hunt.claim(echo)
+        return tuple(self._hunt.pieces(0))
+
+    @property
+    def _echo_possible(self) -> bool:
+        """Whether our own request among what was heard may be its echo: none was found, and there may be one."""
+        proved = self._attempt.echo is Echo.OFF and self._attempt.echo_proved
+        return not (self._echo_whole or proved)
 
     @property
     def begun(self) -> bool:
@@ -255,6 +302,6 @@ class Reception:
     def unsolicited(self) -> int:
         """How many bytes are no echo and belong to no answer, of this or of an earlier request."""
         count = self._hunt.unclaimed_count(0) + sum(len(held) for held, _ in self._held)
-        if self.answer is None and self.spare is None and self.begun:
+        if self.answer is None and self.spare is None and self.displaced is None and self.begun:
             count -= min(self.rest, self.expected)
         return count

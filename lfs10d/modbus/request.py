@@ -13,6 +13,10 @@ READ_INPUT_REGISTERS = 0x04
 WRITE_SINGLE_REGISTER = 0x06
 """Function codes (Modbus Application Protocol V1.1b3, section 6)."""
 
+NOT_FINAL = frozenset({5, 10, 11})
+"""Exceptions after which the answer may still come: acknowledged, and what a gateway says while its target is silent
+(Modbus Application Protocol V1.1b3, section 7)."""
+
 READ_COUNT_MAX = 125
 """Registers in one read (Modbus Application Protocol V1.1b3, section 6.3)."""
 

@@ -17,19 +17,24 @@ Rules
    whose profile has no second shape.
 5. A request met by silence *lingers* for as long, though what was asked later is answered: a bridge or a buffer on
    the way may bring answers out of turn. Until then its shape is not asked for a value.
+6. After an exception that does not end it (05, 0A, 0B: a gateway's target may answer later) a request stays pending as
+   after silence, and what is older too.
+7. Another master's request that was heard is pending too, until its answer is heard: the slave owes it.
+8. A slave that is answered for twice is left alone until the second answer has come (`lfs10d.modbus.duplicates`).
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from lfs10d.modbus.duplicates import Duplicates
 from lfs10d.modbus.exchange import Pending
 from lfs10d.reading import FaultCode
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-    from lfs10d.modbus.exchange import Outcome
+    from lfs10d.modbus.exchange import LateAnswer, Outcome
     from lfs10d.modbus.frames import Codec, Request
 
 QUIET_LEAST = 1.0
@@ -50,6 +55,7 @@ class Unanswered:
         self._over: set[Pending] = set()
         self._quiet_until: dict[int, float] = {}
         self._tardy: set[int] = set()
+        self.duplicates = Duplicates()
 
     @property
     def everybodys(self) -> Mapping[int, tuple[Pending, ...]]:
@@ -90,8 +96,25 @@ class Unanswered:
             for each in self._pending.pop(slave, ()):
                 self._forget(each)
             del self._quiet_until[slave]
-            return None
-        return until
+            until = None
+        rests = self.duplicates.rests_until(slave, now)
+        return rests if until is None else max(until, rests or until)
+
+    def asked_by_another(self, request: Request, codec: Codec, now: float) -> None:
+        """Note that another master's request was heard, whole at `now`."""
+        self._remember(Pending(request, codec, now, ours=False), lingers=None)
+
+    def overheard(self, slave: int, frame: int, *, exception: bool, now: float) -> bool:
+        """Note a right answer of `slave`, of `frame` characters, which is none to us; whether it owed one.
+
+        What another master asked is answered by it.
+        """
+        pending = self._pending.get(slave, ())
+        for each in pending:
+            if not each.ours and each.codec.shapes(each.request)[exception].size == frame:
+                self._drop(slave, [each], now)
+                return True
+        return bool(pending)
 
     def abandoned(self, request: Request, codec: Codec, timeout: float, now: float) -> None:
         """Note that the exchange of `request` was cut off at `now`: it may have been sent."""
@@ -102,12 +125,14 @@ class Unanswered:
         """Learn from an exchange that is over at `now`; `timeout` in s is the one it had."""
         slave = outcome.request.slave
         for late in outcome.late:
-            self._came_late(late.request, now)
+            self._came_late(late, now)
         if outcome.sent_end is None or slave == 0:
             return
         asked = Pending(outcome.request, codec, outcome.sent_end)
         pending = self._pending.get(slave, ())
-        if outcome.answer is None and not outcome.answered:
+        if outcome.may_follow:
+            self._remember(asked, lingers=asked.sent_end + max(2 * timeout, QUIET_LEAST))
+        elif outcome.answer is None and not outcome.answered:
             silent = outcome.fault is not None and outcome.fault.code in _SILENT
             self._remember(asked, lingers=asked.sent_end + max(2 * timeout, QUIET_LEAST) if silent else None)
         elif outcome.ambiguous and outcome.answer is None:
@@ -119,14 +144,16 @@ class Unanswered:
             if over < len(pending) or _alike(asked.request, codec, pending[over - 1]):
                 self._remember(asked, lingers=None)
 
-    def _came_late(self, request: Request, now: float) -> None:
-        """Drop `request` and, since a slave answers in order, what its slave was asked before."""
-        self._tardy.add(request.slave)
-        pending = self._pending.get(request.slave, ())
+    def _came_late(self, late: LateAnswer, now: float) -> None:
+        """Drop the request and, since a slave answers in order, what its slave was asked before."""
+        slave = late.request.slave
+        if late.ours:
+            self._tardy.add(slave)
+        pending = self._pending.get(slave, ())
         for place, each in enumerate(pending):
-            if each.request == request:
+            if each.request == late.request:
                 self._lingers.pop(each, None)
-                self._drop(request.slave, pending[: place + 1], now)
+                self._drop(slave, pending[: place + 1], now)
                 return
 
     def _remember(self, asked: Pending, lingers: float | None) -> None:

@@ -17,6 +17,7 @@ from lfs10d.reading import FaultCode
 
 if TYPE_CHECKING:
     from lfs10d.modbus.attempt import Attempt
+    from lfs10d.modbus.duplicates import Twice
     from lfs10d.modbus.reception import Reception
 
 _REQUEST_BODY = 6
@@ -88,6 +89,20 @@ def changed_echo() -> Verdict:
     return Verdict(FaultCode.COLLISION, message)
 
 
+def displaced(slave: int) -> Verdict:
+    """Judge that an answer came which may be another master's."""
+    message = f"another master asked slave {slave} at the same time: no answer tells which of the two it is for"
+    return Verdict(FaultCode.COLLISION, message)
+
+
+def twice(found: Twice) -> str:
+    """Return in words that a second answer comes to each request."""
+    return (
+        f"slave {found.slave} is answered for twice, {milliseconds(found.delay)} apart: a second sensor with this id, "
+        "or a repeater; the first answer is published"
+    )
+
+
 def refusal(code: int, request: Request) -> Verdict:
     """Judge an exception answer; the message names the registers that were asked."""
     name = EXCEPTION_NAMES.get(code, "of the device's own")
@@ -125,7 +140,7 @@ def broken(heard: bytes, size: int, *, begun: bool) -> Verdict:
     return Verdict(FaultCode.MALFORMED, f"{count} byte{plural} in place of an answer of {size}: noise")
 
 
-_CLOSENESS = {FaultCode.MALFORMED: 3, FaultCode.WRONG_FUNCTION: 2, FaultCode.WRONG_SLAVE: 1}
+_CLOSENESS = {FaultCode.COLLISION: 4, FaultCode.MALFORMED: 3, FaultCode.WRONG_FUNCTION: 2, FaultCode.WRONG_SLAVE: 1}
 """Which of several frames tells most: the asked slave's own, nearest to what was asked."""
 
 
@@ -148,6 +163,7 @@ def _judge(request: Request, body: bytes) -> Verdict:
         told = f"slave {slave} confirmed another write: {data.hex(' ').upper()}"
     elif asked:
         told = f"a request to slave {slave} was heard in place of its answer: an echo, or a second master"
+        return Verdict(FaultCode.COLLISION, told)
     else:
         came, announced = max(0, len(data) - 1), sum(data[:1])
         told = f"slave {slave} sent {came} data bytes, announced as {announced}, in place of {2 * request.count}"

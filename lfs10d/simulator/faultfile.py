@@ -70,8 +70,10 @@ class FaultEntry(WindowEntry):
 
     fault: Annotated[str, Choice(tuple(kind.value for kind in Kind))] = Field(description="What ails it.")
     rate: Share = Field(1.0, description="In what share of its answers it shows.")
-    delay: Time | None = Field(None, description="Of late, slow_bytes, slow_flash, needs_rest and sleeps.")
-    code: Annotated[int, Whole(1, 255)] = Field(2, description="Of exception, and of dip_locked.")
+    delay: Time | None = Field(
+        None, description="Of late, slow_bytes, slow_flash, needs_rest, sleeps, twin, repeated and gateway."
+    )
+    code: Annotated[int, Whole(1, 255)] | None = Field(None, description="Of exception, dip_locked and gateway.")
     id: Annotated[int, Whole(0, 255)] | None = Field(None, description="Of wrong_id.")
     bytes: Length | None = Field(None, description="Of garbage, truncated, leading_noise and trailing_noise.")
     answer: Literal["echo", "exception"] = Field("echo", description="How one that is dip_locked answers a write.")

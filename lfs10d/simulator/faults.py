@@ -58,6 +58,12 @@ class Kind(StrEnum):
     SUBNORMAL = "subnormal"
     STUCK = "stuck"
     """The same value for ever."""
+    TWIN = "twin"
+    """A second sensor with this id answers reads too, `delay` (37 ms) after the end of the answer."""
+    REPEATED = "repeated"
+    """The answer comes once more, bit by bit, `delay` (37 ms) after its end."""
+    GATEWAY = "gateway"
+    """Refuses with exception `code` (11) at once, as a gateway does, and answers `delay` (100 ms) after that."""
     HANGS = "hangs"
     """After a frame it could not read, or an exception it sent, silent until the next power cycle."""
     WILDCARD = "wildcard"
@@ -129,7 +135,7 @@ class Ailment:
     window: Window = ALWAYS
     delay: int = 0
     """Nanoseconds; see the kind."""
-    code: int = 2
+    code: int | None = None
     value: int | None = None
     length: int | None = None
     answer: Literal["echo", "exception"] = "echo"
@@ -142,7 +148,16 @@ class Ailment:
         return self.window.covers(now) and (self.rate >= 1.0 or random.random() < self.rate)
 
 
-DEFAULT_DELAYS = {Kind.LATE: 0.6, Kind.SLOW_BYTES: 0.001, Kind.SLOW_FLASH: 5.0, Kind.NEEDS_REST: 0.25, Kind.SLEEPS: 0.5}
+DEFAULT_DELAYS = {
+    Kind.LATE: 0.6,
+    Kind.SLOW_BYTES: 0.001,
+    Kind.SLOW_FLASH: 5.0,
+    Kind.NEEDS_REST: 0.25,
+    Kind.SLEEPS: 0.5,
+    Kind.TWIN: 0.037,
+    Kind.REPEATED: 0.037,
+    Kind.GATEWAY: 0.1,
+}
 """Seconds, where none is given."""
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from lfs10d.simulator.sensor import Sensor
@@ -21,6 +20,7 @@ class InTurn(Sensor):
         reply = super().hear(body, ended, after_dead=after_dead)
         if reply is None:
             return None
-        reply = replace(reply, start=max(reply.start, self._free))
-        self._free = reply.format.ends(reply.start, len(reply.data), reply.pause)[-1] + reply.format.t35
+        reply = reply.postponed(self._free)
+        own = [each for each in (reply, *reply.following) if not each.second]
+        self._free = own[-1].ends + reply.format.t35
         return reply

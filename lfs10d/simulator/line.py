@@ -33,6 +33,8 @@ class Answer:
     """The measured values in it."""
     burst: Burst
     whole: bool
+    second: bool = False
+    """Another answer of the sensor to the same request came before it."""
 
     @property
     def believable(self) -> bool:
@@ -260,10 +262,10 @@ class SimulatedLine:
                 request.body = body
                 reply = sensor.hear(body, now, after_dead=self._dead not in (None, body[0]))
                 if reply is not None:
-                    replies.append(reply)
+                    replies += (reply, *reply.following)
         return replies
 
     def _answer(self, request: Request, reply: Reply) -> None:
         self.answered += 1
         answer = self.speak(reply.sensor, reply.data, reply.start, reply.format, reply.pause)
-        request.answers.append(Answer(reply.sensor, reply.values, answer, reply.whole))
+        request.answers.append(Answer(reply.sensor, reply.values, answer, reply.whole, reply.second))

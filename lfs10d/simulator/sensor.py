@@ -44,6 +44,7 @@ EXCEPTION_BIT: Final = 0x80
 ILLEGAL_FUNCTION: Final = 1
 ILLEGAL_ADDRESS: Final = 2
 ILLEGAL_VALUE: Final = 3
+SILENT_TARGET: Final = 11
 REQUEST_BODY: Final = 6
 """Bytes of the requests 03, 04 and 06 without their check: id, function, two words."""
 _COUNT_AT: Final = 2
@@ -57,6 +58,7 @@ _BROKEN_FLOATS: Final[Mapping[Kind, int]] = {
 _SPOILS: Final = (STRIKES_ANSWERS | STRIKES_FRAMES) - {Kind.LEADING_NOISE, Kind.TRAILING_NOISE}
 DAYS: Final = nanoseconds(1e6)
 """Before anything happened on the line, in ns."""
+_FOLLOWED: Final = frozenset({Kind.TWIN, Kind.REPEATED, Kind.GATEWAY})
 _NOTHING: Final[Mapping[Kind, Ailment]] = {}
 
 
@@ -73,6 +75,21 @@ class Reply:
     """The measured values in it; empty if none, or if they were broken."""
     whole: bool
     """A master that hears every byte may believe it."""
+    second: bool = False
+    """Another answer of this sensor to the same request came before it."""
+    following: tuple[Reply, ...] = ()
+    """What comes after it, to the same request."""
+
+    @property
+    def ends(self) -> int:
+        """When its last bit is over."""
+        return self.format.ends(self.start, len(self.data), self.pause)[-1]
+
+    def postponed(self, start: int) -> Reply:
+        """Return the same, what follows too, beginning no earlier than `start`."""
+        delay = max(0, start - self.start)
+        following = tuple(replace(each, start=each.start + delay) for each in self.following)
+        return replace(self, start=self.start + delay, following=following)
 
 
 class Sensor:
@@ -199,7 +216,27 @@ class Sensor:
         frame = seal(self._distort(answer, struck), self.framing, self.blueprint.check)
         pause = struck[Kind.SLOW_BYTES].delay if Kind.SLOW_BYTES in struck else 0
         spoilt, whole = self._spoil(frame, struck), _SPOILS.isdisjoint(struck)
-        return self._reply(Reply(self, ended + delay, spoilt, shape, pause, values, whole=whole))
+        reply = self._reply(Reply(self, ended + delay, spoilt, shape, pause, values, whole=whole))
+        return self._followed(reply, body, ended, struck) if _FOLLOWED.intersection(struck) else reply
+
+    def _followed(self, reply: Reply, body: bytes, ended: int, struck: Mapping[Kind, Ailment]) -> Reply:
+        """Return a reply with what else comes to the same request."""
+        following: list[Reply] = []
+        if Kind.GATEWAY in struck:
+            gateway = struck[Kind.GATEWAY]
+            code = SILENT_TARGET if gateway.code is None else gateway.code
+            refusal = seal(self._refuse(body, code)[0], self.framing, self.blueprint.check)
+            late, reply = reply, replace(reply, data=refusal, pause=0, values=())
+            following.append(replace(late, start=reply.ends + gateway.delay))
+        if Kind.REPEATED in struck:
+            start = reply.ends + struck[Kind.REPEATED].delay
+            following.append(replace(reply, start=start, values=(), second=True))
+        if Kind.TWIN in struck and body[1] in (READ_HOLDING, READ_INPUT):
+            answer, values = self._obey(body, ended, _NOTHING)
+            frame = seal(answer, self.framing, self.blueprint.check)
+            start = reply.ends + struck[Kind.TWIN].delay
+            following.append(Reply(self, start, frame, reply.format, 0, values, whole=True, second=True))
+        return replace(reply, following=tuple(following))
 
     def _reply(self, reply: Reply) -> Reply:
         self._last_answer = reply.format.ends(reply.start, len(reply.data), reply.pause)[-1]
@@ -222,7 +259,7 @@ class Sensor:
     def _obey(self, body: bytes, now: int, struck: Mapping[Kind, Ailment]) -> tuple[bytes, tuple[float, ...]]:
         function = body[1]
         if Kind.EXCEPTION in struck:
-            return self._refuse(body, struck[Kind.EXCEPTION].code)
+            return self._refuse(body, struck[Kind.EXCEPTION].code or ILLEGAL_ADDRESS)
         if function not in self.blueprint.functions:
             return self._refuse(body, ILLEGAL_FUNCTION)
         address, word = int.from_bytes(body[2:4], "big"), int.from_bytes(body[4:6], "big")
@@ -271,7 +308,7 @@ class Sensor:
             switch = struck[Kind.DIP_LOCKED]
             if switch.reads == "new":
                 self.words[address] = value
-            return body if switch.answer == "echo" else self._refuse(body, switch.code)[0]
+            return body if switch.answer == "echo" else self._refuse(body, switch.code or ILLEGAL_ADDRESS)[0]
         if self.words[address] != value and Kind.SLOW_FLASH in struck:
             self.deaf_until = now + struck[Kind.SLOW_FLASH].delay
         self.words[address] = value

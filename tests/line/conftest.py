@@ -131,7 +131,7 @@ def _nearest(requests: dict[int, Request], when: float) -> Request:
 
 
 def _is_ours(answer: Answer, request: Request) -> bool:
-    return bool(answer.values) and answer.sensor.slave == request.body[0]
+    return bool(answer.values) and answer.sensor.slave == request.body[0] and not answer.second
 
 
 class Rigs:

@@ -268,3 +268,56 @@ def test_a_slave_whose_answer_came_while_another_was_asked_is_tardy() -> None:
     line.answered(OTHER, 0.3, WIND)
     assert line.unanswered.tardy(1)
     assert not line.unanswered.tardy(2)
+
+
+@pytest.mark.parametrize("exception", [5, 10, 11])
+@pytest.mark.parametrize("ambiguous", [True, False])
+def test_after_an_exception_that_does_not_end_it_a_request_stays_pending(exception: int, *, ambiguous: bool) -> None:
+    line = Line()
+    line.silent(WHO, 0.0)
+    outcome = ended(WIND, fault=Fault(FaultCode.EXCEPTION, "", exception), answered=True, ambiguous=ambiguous)
+    line.unanswered.settled(replace(outcome, sent_end=1.0), RTU, 0.2, 1.1)
+    assert [each.request for each in line.unanswered.earlier(1)] == [WHO, WIND]
+    assert line.unanswered.confusable(WIND, RTU)
+    assert line.unanswered.left_alone_until(1, 1.1) is None
+
+
+def test_another_masters_request_is_pending_until_its_answer_is_heard() -> None:
+    line = Line()
+    unanswered = line.unanswered
+    assert not unanswered.overheard(1, 9, exception=False, now=0.0)
+    unanswered.asked_by_another(WIND, RTU, 1.0)
+    assert unanswered.confusable(WIND, RTU)
+    assert unanswered.overheard(1, 7, exception=False, now=1.1)  # of another shape: something is owed, but not this
+    assert unanswered.overheard(1, 9, exception=False, now=1.2)
+    assert unanswered.earlier(1) == ()
+    unanswered.asked_by_another(WIND, RTU, 2.0)
+    assert unanswered.overheard(1, 5, exception=True, now=2.1)
+    assert unanswered.earlier(1) == ()
+
+
+def test_a_request_of_ours_is_not_answered_by_what_is_overheard() -> None:
+    line = Line()
+    line.silent(WIND, 0.0)
+    assert line.unanswered.overheard(1, 9, exception=False, now=0.1)
+    assert [each.request for each in line.unanswered.earlier(1)] == [WIND]
+
+
+def test_the_answer_to_another_master_that_comes_in_our_exchange_makes_nobody_tardy() -> None:
+    line = Line()
+    line.unanswered.asked_by_another(WIND, RTU, 0.0)
+    outcome = ended(WHO, answer=(7,), fault=None, answered=True, late=(LateAnswer(WIND, 0.1, ours=False),))
+    line.unanswered.settled(replace(outcome, sent_end=0.1), RTU, 0.2, 0.2)
+    assert line.unanswered.earlier(1) == ()
+    assert not line.unanswered.tardy(1)
+
+
+def test_a_slave_that_is_answered_for_twice_is_left_alone() -> None:
+    line = Line()
+    line.unanswered.duplicates.answered(1, 1.0)
+    until = line.unanswered.left_alone_until(1, 1.0)
+    assert until is not None
+    assert line.unanswered.left_alone_until(1, until) is None
+    line.silent(WIND, 1.0)
+    line.unanswered.leave_alone(1, 0.2)
+    assert line.unanswered.left_alone_until(1, 1.1) == 2.0

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from lfs10d.modbus import verdict
 from lfs10d.modbus.attempt import Attempt, Echo, Pending
+from lfs10d.modbus.duplicates import Twice
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters, Request, WriteRegister
 from lfs10d.modbus.reception import Reception
 from lfs10d.modbus.timing import LineTiming
@@ -37,7 +38,7 @@ def framed(*bodies: str) -> bytes:
         (
             WIND,
             "030300010002",
-            FaultCode.MALFORMED,
+            FaultCode.COLLISION,  # the contract's new word for a second master
             "a request to slave 3 was heard in place of its answer: an echo, or a second master",
         ),
         (MOVE, "030600050008", FaultCode.MALFORMED, "slave 3 confirmed another write: 00 05 00 08"),
@@ -214,3 +215,13 @@ def test_whatever_was_heard_there_is_one_verdict_in_words_that_can_be_printed(
     found = verdict.judge(reception._attempt, reception)
     assert (found is None) is (request_.slave == 0 and not reception.echo_changed)
     assert found is None or found.message.isprintable()
+
+
+def test_what_another_master_may_have_asked_for_is_a_collision() -> None:
+    found = verdict.displaced(3)
+    assert found.code is FaultCode.COLLISION
+    assert "another master asked slave 3" in found.message
+
+
+def test_a_second_answer_is_told_with_its_delay() -> None:
+    assert verdict.twice(Twice(3, 0.0371)).startswith("slave 3 is answered for twice, 37.1 ms apart: a second sensor")

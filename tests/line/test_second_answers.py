@@ -1,0 +1,122 @@
+"""A second answer to one request is never taken for the next one's; nor is what a gateway's target says late."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+import pytest
+
+from lfs10d.reading import AnsweredTwice, FaultCode
+from lfs10d.simulator.troubles import second_master
+
+if TYPE_CHECKING:
+    from tests.line.conftest import Rig, Rigs
+
+WIND_OF_2 = bytes((2, 3, 0, 1, 0, 2))
+
+
+def told(rig: Rig) -> list[AnsweredTwice]:
+    return [event for event in rig.events if isinstance(event, AnsweredTwice)]
+
+
+@pytest.mark.parametrize("kind", ["twin", "repeated"])
+@pytest.mark.parametrize("delay", [0.005, 0.012, 0.037, 0.06, 0.1])
+@pytest.mark.parametrize(("slaves", "interval"), [(1, 0.0), (4, 0.5)])
+@pytest.mark.parametrize("turnaround", [0.005, 0.04])
+def test_a_late_twin_or_a_repeater_is_told_and_yields_no_value(
+    rigs: Rigs, kind: str, delay: float, slaves: int, interval: float, turnaround: float
+) -> None:
+    rig = rigs(slaves, turnaround=turnaround, interval=interval)
+    rig.line.sensor(1).ail(kind, delay=delay)
+    rig.run(15.0).prove()
+    twice = told(rig)[0]
+    assert (twice.device, twice.slave) == ("slave-1", 1)
+    assert twice.fault is not None
+    assert twice.fault.code is FaultCode.DUPLICATE_ID
+    assert twice.at < 1.5
+    assert len(rig.good(1)) > 25
+    asked = [each for each in rig.exchanges if each.slave == 1 and each.at > twice.at and each.began is not None]
+    for earlier, later in itertools.pairwise(asked):
+        assert later.began is not None
+        assert later.began - earlier.at > delay
+
+
+@pytest.mark.parametrize("kind", ["twin", "repeated"])
+def test_it_is_over_when_no_second_answer_comes_any_more(rigs: Rigs, kind: str) -> None:
+    rig = rigs(1, interval=0.25)
+    rig.line.sensor(1).ail(kind)
+    rig.run(5.0)
+    rig.line.sensor(1).heal()
+    rig.run(20.0).prove()
+    begun, over = told(rig)
+    assert begun.fault is not None
+    assert over.fault is None
+    assert 12.0 < over.at < 14.0
+
+
+def test_a_well_line_is_asked_as_often_as_before_but_once_after_the_first_answer(rigs: Rigs) -> None:
+    rig = rigs(1).run(10.0).prove()
+    assert told(rig) == []
+    pauses = [
+        later.began - earlier.at
+        for earlier, later in zip(rig.exchanges, rig.exchanges[1:], strict=False)
+        if later.began
+    ]
+    assert sum(pause > 0.01 for pause in pauses) == 1
+
+
+def test_a_sensor_that_is_late_is_no_second_one(rigs: Rigs) -> None:
+    rig = rigs(2, interval=0.25, in_turn=True)
+    rig.line.sensor(1).ail("late", 0.2, delay=0.4)
+    rig.run(60.0).prove()
+    assert told(rig) == []
+
+
+@pytest.mark.parametrize("code", [5, 10, 11])
+@pytest.mark.parametrize("interval", [0.0, 0.25, 1.0])
+@pytest.mark.parametrize("delay", [0.05, 0.1, 0.6])
+def test_what_a_gateways_target_says_after_an_exception_is_never_the_next_answer(
+    rigs: Rigs, code: int, interval: float, delay: float
+) -> None:
+    rig = rigs(2, interval=interval, in_turn=True)
+    rig.line.sensor(1).ail("gateway", 0.1, code=code, delay=delay)
+    rig.run(40.0).prove()
+    assert rig.codes(1)[FaultCode.EXCEPTION] > 0
+    assert rig.codes(1).keys() <= {
+        FaultCode.EXCEPTION,
+        FaultCode.LATE,
+        FaultCode.CRC,
+        FaultCode.MALFORMED,
+        FaultCode.TIMEOUT,
+        FaultCode.COLLISION,
+    }
+    assert len(rig.good(1)) > 20
+    assert told(rig) == []
+
+
+def test_a_gateway_that_always_refuses_is_asked_once_per_poll(rigs: Rigs) -> None:
+    rig = rigs(1, interval=0.25)
+    rig.line.sensor(1).ail("exception", code=11)
+    rig.run(10.0).prove()
+    assert rig.codes(1) == {FaultCode.EXCEPTION: len(rig.of(1))}
+    assert len(rig.exchanges) == len(rig.of(1)) >= 35
+    rig.line.sensor(1).heal()
+    rig.run(15.0).prove()
+    assert len(rig.good(1, since=11.5)) > 12
+
+
+@pytest.mark.parametrize("interval", [0.0, 0.25])
+@pytest.mark.parametrize(("turnaround", "every"), [(0.005, 0.37), (0.03, 0.37), (0.03, 0.137)])
+def test_what_a_second_master_is_answered_is_never_ours(
+    rigs: Rigs, interval: float, turnaround: float, every: float
+) -> None:
+    rig = rigs(3, interval=interval, turnaround=turnaround, in_turn=True)
+    second_master(rig.line, WIND_OF_2, 1.0, every)
+    rig.run(30.0).prove()
+    assert told(rig) == []
+    if every < 0.2:  # hardly a moment is free for both
+        assert rig.codes(2)[FaultCode.COLLISION] > 0
+        assert rig.good(2, since=5.0)
+    else:
+        assert len(rig.good(2)) > 90

@@ -1,0 +1,84 @@
+"""Slaves for which two answers come to one request."""
+
+from __future__ import annotations
+
+from lfs10d.modbus.duplicates import CLEAN, LATEST, MARGIN, WATCHED, Duplicates, Twice
+
+
+def test_after_its_first_answer_a_slave_is_watched_once() -> None:
+    duplicates = Duplicates()
+    assert duplicates.rests_until(1, 0.0) is None
+    assert duplicates.answered(1, 1.0) is False
+    assert duplicates.rests_until(1, 1.1) == 1.0 + WATCHED
+    assert duplicates.rests_until(1, 1.0 + WATCHED) is None
+    assert duplicates.rests_until(2, 1.0) is None
+    duplicates.answered(1, 2.0)
+    assert duplicates.rests_until(1, 2.0) is None
+
+
+def test_the_second_one_too_many_tells_once_and_the_slave_rests_until_it_has_come() -> None:
+    duplicates = Duplicates()
+    duplicates.answered(1, 1.0)
+    assert duplicates.second(1, 1.04) is None
+    assert duplicates.rests_until(1, 1.05) == 1.04 + WATCHED
+    assert not duplicates.known(1)
+    duplicates.answered(1, 2.0)
+    assert duplicates.rests_until(1, 2.0) == 2.0 + WATCHED
+    assert duplicates.second(1, 2.25) == Twice(1, 0.25)
+    assert duplicates.known(1)
+    duplicates.answered(1, 3.0)
+    assert duplicates.rests_until(1, 3.0) == 3.0 + 1.25 * 0.25 + MARGIN
+    assert duplicates.second(1, 3.2) is None
+
+
+def test_what_is_long_after_or_before_an_answer_is_no_second_one() -> None:
+    duplicates = Duplicates()
+    assert duplicates.second(1, 0.5) is None
+    for at in (1.0, 10.0, 20.0):
+        duplicates.answered(1, at)
+        assert duplicates.second(1, at + LATEST + 0.1) is None
+        assert duplicates.second(1, at) is None
+    assert not duplicates.known(1)
+    assert duplicates.rests_until(1, 20.0) is None
+
+
+def test_a_second_answer_to_a_barrier_counts_but_a_barrier_needs_no_rest() -> None:
+    duplicates = Duplicates()
+    duplicates.answered(1, 1.0, barrier=True)
+    assert duplicates.rests_until(1, 1.0) is None
+    duplicates.second(1, 1.04)
+    duplicates.answered(1, 2.0, barrier=True)
+    assert duplicates.rests_until(1, 2.0) is None
+    assert duplicates.second(1, 2.04) is not None
+
+
+def test_it_is_forgotten_after_enough_answers_with_none_behind_them() -> None:
+    duplicates = Duplicates()
+    for at in (1.0, 2.0):
+        duplicates.answered(1, at)
+        duplicates.second(1, at + 0.04)
+    over = [duplicates.answered(1, 3.0 + n) for n in range(CLEAN + 3)]
+    assert over == [False] * (CLEAN + 1) + [True, False]
+    assert not duplicates.known(1)
+    assert duplicates.rests_until(1, 100.0) is None
+
+
+def test_a_single_one_is_forgotten_silently() -> None:
+    duplicates = Duplicates()
+    duplicates.answered(1, 1.0)
+    duplicates.second(1, 1.04)
+    assert not any(duplicates.answered(1, 2.0 + n) for n in range(CLEAN + 3))
+    duplicates.answered(1, 90.0)
+    assert duplicates.second(1, 90.04) is None
+
+
+def test_another_device_or_an_opened_port_begins_anew() -> None:
+    duplicates = Duplicates()
+    for slave in (1, 2, 3):
+        for at in (1.0, 2.0):
+            duplicates.answered(slave, at)
+            duplicates.second(slave, at + 0.04)
+    duplicates.forget(1)
+    assert [duplicates.known(slave) for slave in (1, 2, 3)] == [False, True, True]
+    duplicates.forget()
+    assert not any(duplicates.known(slave) for slave in (1, 2, 3))

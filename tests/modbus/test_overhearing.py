@@ -1,0 +1,76 @@
+"""What others say on the line."""
+
+from __future__ import annotations
+
+import itertools
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lfs10d.modbus.frames import ReadRegisters
+from lfs10d.modbus.overhearing import PAUSE, Overheard, Overhearing
+from tests.modbus.exchanging import ANSWER, ASCII, REFUSED, RTU, SUM, WIND, framed
+
+REQUEST = RTU.encode(WIND)
+
+
+def hear(*pieces: tuple[bytes, float], codec: object = RTU) -> list[Overheard]:
+    overhearing = Overhearing()
+    overhearing.codecs = {1: codec, 2: RTU}  # type: ignore[dict-item]  # a codec in each test
+    return list(overhearing.hear(pieces))
+
+
+def test_requests_answers_and_exceptions_are_told_in_order() -> None:
+    noise = bytes.fromhex("FF 01 07 03")
+    assert hear((noise + REQUEST, 1.0), (ANSWER + noise, 1.1), (REFUSED, 1.15)) == [
+        Overheard(1, 1.0, REQUEST[:-2], WIND),
+        Overheard(1, 1.1, ANSWER[:-2]),
+        Overheard(1, 1.15, REFUSED[:-2]),
+    ]
+
+
+@given(st.lists(st.integers(1, len(ANSWER) - 1), max_size=4))
+def test_a_frame_in_pieces_is_whole_by_its_last(cuts: list[int]) -> None:
+    places = [0, *sorted(set(cuts)), len(ANSWER)]
+    pieces = [(ANSWER[a:b], 1.0 + 0.01 * n) for n, (a, b) in enumerate(itertools.pairwise(places))]
+    assert hear(*pieces) == [Overheard(1, pieces[-1][1], ANSWER[:-2])]
+
+
+def test_what_a_pause_cuts_is_no_frame() -> None:
+    assert hear((ANSWER[:4], 1.0), (ANSWER[4:], 1.0 + 2 * PAUSE)) == []
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        RTU.encode(ReadRegisters(9, 1, 2)),  # nobody polls it
+        framed("01 06 00 05 00 07"),
+        framed("01 03 03 00 05 00"),  # an odd count
+        framed("01 03 00 01 00 00"),  # no register at all
+        framed("01 03 FF FF 00 02"),
+        framed("01 83"),
+        framed("01 83 02 00"),
+        ANSWER[:-1] + b"X",
+    ],
+)
+def test_anything_else_is_passed_over(frame: bytes) -> None:
+    assert hear((frame, 1.0)) == []
+
+
+def test_each_slave_has_its_own_check() -> None:
+    answer = SUM.wrap(ANSWER[:-2])
+    assert hear((answer, 1.0), codec=SUM) == [Overheard(1, 1.0, ANSWER[:-2])]
+    assert hear((answer, 1.0)) == []
+    assert hear((ANSWER, 1.0), codec=SUM) == []
+
+
+def test_ascii_frames_are_heard_too() -> None:
+    assert hear((ASCII.encode(WIND).lower(), 1.0), codec=ASCII) == [Overheard(1, 1.0, REQUEST[:-2], WIND)]
+
+
+def test_endless_bytes_are_not_kept() -> None:
+    overhearing = Overhearing()
+    overhearing.codecs = {1: RTU}
+    assert list(overhearing.hear((bytes(100), 1.0 + 0.01 * n) for n in range(200))) == []
+    assert list(overhearing.hear([(ANSWER, 3.01)])) == [Overheard(1, 3.01, ANSWER[:-2])]
