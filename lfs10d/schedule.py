@@ -100,7 +100,7 @@ class Schedule:
             device.gap.configured = spec.request_gap
             self.devices[spec.name] = device
         self._by_slave = {device.slave: device for device in self.devices.values()}
-        self._overhearing.codecs = {device.slave: device.spec.codec for device in self.devices.values()}
+        self._overhearing.listen_to({device.slave: device.spec.codec for device in self.devices.values()})
         for device in fresh:
             self.unanswered.duplicates.forget(device.slave)
         for job in self._jobs.drop(lambda job: isinstance(job, Poll) and not self._wanted(job)):
@@ -297,7 +297,7 @@ class Schedule:
         events: list[AnsweredTwice] = []
         owing = outcome.request.slave if outcome is not None and outcome.answer is None else None
         for frame in self._overhearing.hear(strays):
-            codec = self._overhearing.codecs[frame.slave]
+            codec = self._by_slave[frame.slave].spec.codec
             if frame.request is not None:
                 self.unanswered.asked_by_another(frame.request, codec, frame.at)
                 continue

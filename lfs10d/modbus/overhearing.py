@@ -6,6 +6,7 @@ words), answers (a byte count that is even) and exceptions. Whatever else is on 
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -29,7 +30,9 @@ PAUSE = 0.1
 _READS = frozenset({READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS})
 _REQUEST_BODY = 6
 _LEAST_BODY = 3
-_NO_SLAVE = 0
+_REQUEST = 8
+_EXCEPTION = 5
+"""Characters of a request and of an exception in RTU; an answer has so many more as its third byte says."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +46,21 @@ class Overheard:
 
 
 class Overhearing:
-    """Collects what is heard; `codecs` are those of the slaves that are polled, by slave id."""
+    """Collects what is heard, of the slaves that are polled."""
 
     def __init__(self) -> None:
-        self.codecs: Mapping[int, Codec] = {}
+        self._codecs: Mapping[int, Codec] = {}
+        self._heads = re.compile(rb"(?!)")
+        self._ascii = False
         self._stream = b""
         self._last = float("-inf")
+
+    def listen_to(self, codecs: Mapping[int, Codec]) -> None:
+        """Look for frames of these slaves, by slave id; all have one framing."""
+        self._codecs = codecs
+        slaves = b"".join(re.escape(bytes((slave,))) for slave in codecs)
+        self._heads = re.compile(rb"(?=[" + slaves + rb"][\x03\x04\x83\x84])" if slaves else rb"(?!)", re.DOTALL)
+        self._ascii = any(codec.framing is Framing.ASCII for codec in codecs.values())
 
     def hear(self, pieces: Iterable[tuple[bytes, float]]) -> Iterator[Overheard]:
         """Take what was read, in order, each piece with its time; yield the frames that are whole by it."""
@@ -56,30 +68,45 @@ class Overhearing:
             if at > self._last + PAUSE:
                 self._stream = b""
             self._last = at
-            self._stream += data
-            for codec in dict.fromkeys(self.codecs.values()):
-                yield from self._found(codec, at)
-            self._stream = self._stream[-KEPT:]
+            self._stream = (self._stream + data)[-KEPT:]
+            yield from self._in_ascii(at) if self._ascii else self._in_rtu(at)
 
-    def _found(self, codec: Codec, at: float) -> Iterator[Overheard]:
-        over = 0
-        if codec.framing is Framing.RTU and not self._worth_it():
-            return
-        for begin, end, body in codec.frames(codec.fold(self._stream), _NO_SLAVE, 0):
-            if begin < over or self.codecs.get(body[0]) != codec:
+    def _in_rtu(self, at: float) -> Iterator[Overheard]:
+        stream, over, open_from = self._stream, 0, len(self._stream) - 1
+        for match in self._heads.finditer(stream):
+            begin = match.start()
+            if begin < over:
                 continue
-            frame = _overheard(body, at)
-            if frame is not None:
-                over = end
-                yield frame
-        self._stream = self._stream[over:]
+            sizes, codec = _sizes(stream, begin), self._codecs[stream[begin]]
+            for size in sizes:
+                body = codec.unwrap(stream[begin : begin + size]) if begin + size <= len(stream) else None
+                frame = None if body is None else _overheard(body, at)
+                if frame is not None:
+                    over = begin + size
+                    yield frame
+                    break
+            else:
+                if begin + max(sizes) > len(stream):
+                    open_from = min(open_from, begin)
+        self._stream = stream[max(over, open_from, 0) :]
 
-    def _worth_it(self) -> bool:
-        """Whether any place in the stream begins as a frame of a slave that is polled does."""
-        stream = self._stream
-        return any(
-            stream[n + 1] & ~EXCEPTION_FLAG in _READS and stream[n] in self.codecs for n in range(len(stream) - 1)
-        )
+    def _in_ascii(self, at: float) -> Iterator[Overheard]:
+        *whole, self._stream = self._stream.split(b"\n")
+        for line in whole:
+            for slave, codec in self._codecs.items():
+                frame = line[max(0, line.rfind(b":")) :] + b"\n"
+                body = codec.unwrap(codec.fold(frame))
+                found = None if body is None or body[0] != slave else _overheard(body, at)
+                if found is not None:
+                    yield found
+
+
+def _sizes(stream: bytes, begin: int) -> tuple[int, ...]:
+    """Return the lengths that a frame of the function at `begin` can have: a request's, and an answer's if known."""
+    if stream[begin + 1] & EXCEPTION_FLAG:
+        return (_EXCEPTION,)
+    count = stream[begin + 2] if begin + 2 < len(stream) else 0
+    return (_REQUEST, _EXCEPTION + count)
 
 
 def _overheard(body: bytes, at: float) -> Overheard | None:

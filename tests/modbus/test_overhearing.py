@@ -8,16 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.modbus.frames import ReadRegisters
+from lfs10d.modbus.frames import Codec, ReadRegisters
 from lfs10d.modbus.overhearing import PAUSE, Overheard, Overhearing
 from tests.modbus.exchanging import ANSWER, ASCII, REFUSED, RTU, SUM, WIND, framed
 
 REQUEST = RTU.encode(WIND)
 
 
-def hear(*pieces: tuple[bytes, float], codec: object = RTU) -> list[Overheard]:
+def hear(*pieces: tuple[bytes, float], codec: Codec = RTU) -> list[Overheard]:
     overhearing = Overhearing()
-    overhearing.codecs = {1: codec, 2: RTU}  # type: ignore[dict-item]  # a codec in each test
+    overhearing.listen_to({1: codec, 2: codec if codec is ASCII else RTU})
     return list(overhearing.hear(pieces))
 
 
@@ -71,6 +71,27 @@ def test_ascii_frames_are_heard_too() -> None:
 
 def test_endless_bytes_are_not_kept() -> None:
     overhearing = Overhearing()
-    overhearing.codecs = {1: RTU}
+    assert list(overhearing.hear([(ANSWER, 0.5)])) == []  # nobody is listened to yet
+    overhearing.listen_to({})
+    assert list(overhearing.hear([(ANSWER, 0.6)])) == []
+    overhearing.listen_to({1: RTU})
     assert list(overhearing.hear((bytes(100), 1.0 + 0.01 * n) for n in range(200))) == []
     assert list(overhearing.hear([(ANSWER, 3.01)])) == [Overheard(1, 3.01, ANSWER[:-2])]
+
+
+def test_frames_right_behind_each_other_and_behind_half_a_one_are_all_heard() -> None:
+    assert [each.body for each in hear((ANSWER[:7] + REQUEST + ANSWER + REFUSED + ANSWER[:2], 1.0))] == [
+        REQUEST[:-2],
+        ANSWER[:-2],
+        REFUSED[:-2],
+    ]
+
+
+def test_noise_in_ascii_is_passed_over() -> None:
+    noise = b"\n:01\r\nxx" + ASCII.encode(ReadRegisters(9, 1, 2)) + framed("010600050007", ASCII) + b":0103:"
+    assert hear((noise + ASCII.encode(WIND)[1:], 1.0), codec=ASCII) == [Overheard(1, 1.0, REQUEST[:-2], WIND)]
+
+
+def test_what_looks_like_a_head_inside_a_frame_is_data() -> None:
+    frame = framed("0103040103040A")
+    assert [each.body for each in hear((frame + ANSWER, 1.0))] == [frame[:-2], ANSWER[:-2]]
