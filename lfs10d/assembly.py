@@ -150,6 +150,7 @@ def device_facts(config: Config, profiles: Mapping[str, Profile]) -> tuple[Devic
             value_names=profiles[slave.profile].value_names,
             units=profiles[slave.profile].units,
             offline_after=config.poll.offline_after,
+            state_every=config.mqtt.state_every,
         )
         for slave in config.slaves
     )

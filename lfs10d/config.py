@@ -215,6 +215,15 @@ class MqttConfig(Section):
     client_id: Annotated[str | None, Text(LONGEST_CLIENT_ID, null=True)] = Field(
         None, description="Must differ between clients; %H is the host name. Default: lfs10d-<host name>-<line name>."
     )
+    telemetry: Annotated[bool, Flag()] = Field(
+        default=True,
+        description="false: no `telemetry` and no `history`, only states, errors, statistics, events and responses; "
+        "for a slow or dear uplink.",
+    )
+    state_every: Annotated[float, Duration(1, HOUR)] = Field(
+        1.0,
+        description="`state` of a device at most so often; a change of quality or error at once.",
+    )
     username: Annotated[str | None, Text(200, null=True)] = Field(None, description="Login name; null for none.")
     password_file: Annotated[str | None, FilePath(null=True)] = Field(
         None,

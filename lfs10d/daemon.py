@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from lfs10d.boot import Boot
+    from lfs10d.config import Config
     from lfs10d.configfile import Loaded
     from lfs10d.effective import Effective
     from lfs10d.logbook import Entry
@@ -70,7 +71,10 @@ TICK_SLACK = 0.03
 
 LINE_STOPS_WITHIN = 0.4
 """How long the line thread is waited for at the end, in s; with the uplink's 1.3 s it is over within 2 s."""
-FEATURES = ("history",)
+
+
+def _features(config: Config) -> tuple[str, ...]:
+    return ("history",) if config.mqtt.telemetry else ()
 
 
 class Daemon:
@@ -104,7 +108,7 @@ class Daemon:
             config_hash=assembly.config_hash(config),
             changes=self._running.now.changes.count,
             mqtt={"version": config.mqtt.version},
-            features=FEATURES,
+            features=_features(config),
         )
         self._station = Station(
             self._facts,
@@ -125,6 +129,7 @@ class Daemon:
         )
         store = Store(state_directory, boot=boot.id, limits=assembly.store_limits(config.store))
         self._uplink.keep_in(store, self._storage.backlog_failed)
+        self._uplink.send_samples(telemetry=config.mqtt.telemetry)
         self._first_burst = FirstBurst(self._station.burst(self._now()))
         self._powers = DaemonPowers(
             self._station,
@@ -346,6 +351,10 @@ class Daemon:
         config = now.config
         if plan.log:
             logs.install(config.log.level, config.log.format)
+        if plan.publishing:
+            self._uplink.send_samples(telemetry=config.mqtt.telemetry)
+            devices = assembly.device_facts(config, now.loaded.profiles)
+            self._publish(self._station.configure(assembly.line_facts(config.line), devices, self._now()))
         if plan.polling or plan.realtime or now.places != before.places:
             self._line.take(self._physical.polled(), now.loaded.profiles, line=plan.line, realtime=plan.realtime)
             if plan.line:
@@ -355,7 +364,9 @@ class Daemon:
             self._yield({name: why for name, why in now.conflicts.items() if name not in before.conflicts})
         self._service.allow(frozenset(config.commands))
         self._storage.look()
-        self._facts = replace(self._facts, config_hash=assembly.config_hash(config), changes=now.changes.count)
+        self._facts = replace(
+            self._facts, config_hash=assembly.config_hash(config), changes=now.changes.count, features=_features(config)
+        )
         self._publish(self._station.introduce(self._facts, self._now()))
         self._powers.reconfigured(before.config, config)
         await self._physical.reconfigured(before.config, config)

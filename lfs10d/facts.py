@@ -103,6 +103,8 @@ class DeviceFacts:
     units: Mapping[str, str]
     offline_after: int
     request_gap: float = 0.0
+    state_every: float = 1.0
+    """Seconds from one state of the same quality and error to the next, at least."""
 
     def entry(self) -> dict[str, object]:
         """Return the device's place in the array `devices`."""

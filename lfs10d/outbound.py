@@ -65,7 +65,7 @@ OUTBOUND = (
         SamplePayload,
         retain=True,
         qos=1,
-        when="the newest at most once a second; a change of quality or error at once",
+        when="the newest at most every `mqtt.state_every`; a change of quality or error at once",
     ),
     Outbound(_device(telemetry.TELEMETRY), SamplePayload, retain=False, qos=1, when="each poll"),
     Outbound(

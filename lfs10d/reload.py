@@ -14,6 +14,7 @@ from lfs10d.regularfile import read_regular
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from lfs10d.config import MqttConfig
     from lfs10d.configfile import Loaded
 
 
@@ -39,6 +40,8 @@ class Plan:
     """Devices came, went or changed, or how they are polled."""
     broker: bool
     """The connection is to be made anew."""
+    publishing: bool
+    """What is published, or how often, is another."""
     log: bool
 
 
@@ -91,6 +94,19 @@ def plan(running: Files, found: Files) -> Plan:
         line=line,
         realtime=before.config.line.realtime is not target.line.realtime,
         polling=bool(line or profiles or changes.sections & {"slaves", "poll"}),
-        broker=bool(login) or before.config.mqtt != target.mqtt,
+        broker=bool(login) or _connection(before.config.mqtt) != _connection(target.mqtt),
+        publishing=_publishing(before.config.mqtt) != _publishing(target.mqtt),
         log=before.config.log != target.log,
     )
+
+
+PUBLISHING = {"telemetry", "state_every"}
+"""Keys of `mqtt` that the connection does not depend on."""
+
+
+def _connection(mqtt: MqttConfig) -> dict[str, object]:
+    return mqtt.model_dump(exclude=PUBLISHING)
+
+
+def _publishing(mqtt: MqttConfig) -> dict[str, object]:
+    return mqtt.model_dump(include=PUBLISHING)

@@ -6,7 +6,7 @@ Rules
    added again.
 2. A number is published only with a good reading, and availability is `online` while one is shown: it goes
    before a good state and after a bad one.
-3. The state shows the newest sample at most once a second, but a change of quality or error at once.
+3. The state shows the newest sample at most every `state_every`, but a change of quality or error at once.
 4. Before its first sample a device's state has no value and the error `starting` (a disabled one `disabled`), which
    is never in its error topic.
 5. A disabled device has one sample that says so, and then none but those of polls that a request wants; of these
@@ -40,9 +40,6 @@ from lfs10d.telemetry import (
 if TYPE_CHECKING:
     from lfs10d.facts import DeviceFacts, Instant
     from lfs10d.reading import AnsweredTwice
-
-STATE_EVERY: Final = 1.0
-"""s between two states of the same quality and error."""
 
 STATE_EARLY: Final = 0.01
 """So many s a state may come before its time (the next one then waits as much longer): a device polled every
@@ -150,6 +147,9 @@ class Standing:
         self._alarm.rise_after = facts.offline_after
         if facts.request_gap != before.request_gap:
             self._gap = facts.request_gap
+        self._state_from = min(self._state_from, now.mono + facts.state_every)
+        if self.state_due is not None:
+            self.state_due = self._state_from
         published = [self._config()] if facts.payload() != before.payload() else []
         if before.enabled and not facts.enabled:
             published += self.disable(now)
@@ -241,7 +241,7 @@ class Standing:
     def _state(self, now: Instant, *, refresh: bool = False) -> Publication:
         """Return the newest state, which is then shown; `refresh`: quality and error are those shown before."""
         on_time = abs(now.mono - self._state_from) <= STATE_EARLY
-        self._state_from = (self._state_from if on_time else now.mono) + STATE_EVERY
+        self._state_from = (self._state_from if on_time else now.mono) + self.facts.state_every
         self.state_due = None
         return retained(self._topics[STATE], self._payload, refresh=refresh)
 

@@ -125,10 +125,7 @@ class Station:
                 state = standing.due_state(now)
                 if state is not None:
                     published.append(state)
-            self._states_due = min(
-                (standing.state_due for standing in self._standings.values() if standing.state_due is not None),
-                default=None,
-            )
+            self._states_due = self._next_state()
         if self._stats_due <= now.mono:
             self._stats_due += STATS_EVERY
             if self._stats_due <= now.mono:  # we slept: no statistics are made up for what was missed
@@ -136,6 +133,10 @@ class Station:
             published.append(self._line_stats(now))
             published += [standing.stats(now) for standing in self._standings.values()]
         return published
+
+    def _next_state(self) -> float | None:
+        dues = (standing.state_due for standing in self._standings.values())
+        return min((due for due in dues if due is not None), default=None)
 
     def due(self) -> float:
         """Return the monotonic time at which `tick` is wanted next."""
@@ -183,6 +184,7 @@ class Station:
                 published += standing.reconfigure(facts, now)
             standings[facts.name] = standing
         self._standings = standings
+        self._states_due = self._next_state()
         before, self._line = self._line, line
         if line.gap_required != before.gap_required:
             self._tally.retimed()

@@ -37,7 +37,7 @@ def planned(running: Files, old: str, new: str) -> Plan:
 
 def wanted(found: Plan) -> set[str]:
     """Return what there is to do."""
-    return {name for name in ("line", "realtime", "polling", "broker", "log") if getattr(found, name)}
+    return {name for name in ("line", "realtime", "polling", "broker", "publishing", "log") if getattr(found, name)}
 
 
 @pytest.mark.parametrize(
@@ -52,6 +52,14 @@ def wanted(found: Plan) -> set[str]:
         ("ttyUSB0", "ttyUSB0, extra_gap: 5ms", {"line", "polling"}, ("line.extra_gap",)),
         ("ttyUSB0", "ttyUSB0, realtime: true", {"realtime"}, ("line.realtime",)),
         ("host: localhost", "host: elsewhere", {"broker"}, ("mqtt.host",)),
+        ("host: localhost", "host: localhost, telemetry: false", {"publishing"}, ("mqtt.telemetry",)),
+        ("host: localhost", "host: localhost, state_every: 1m", {"publishing"}, ("mqtt.state_every",)),
+        (
+            "host: localhost",
+            "host: elsewhere, state_every: 1m",
+            {"broker", "publishing"},
+            ("mqtt.host", "mqtt.state_every"),
+        ),
         ("slaves:", "log: {level: debug}\nslaves:", {"log"}, ("log.level",)),
         ("slaves:", "commands: []\nslaves:", set(), ("commands",)),
     ],

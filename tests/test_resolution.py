@@ -59,6 +59,8 @@ def test_the_smallest_file_gets_every_default() -> None:
             "version": "5",
             "base_topic": "lfs10d",
             "client_id": "lfs10d-gateway-line0",
+            "telemetry": True,
+            "state_every": 1.0,
             "username": None,
             "password_file": None,
             "tls": None,

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, cast
 
 import pytest
 
-from lfs10d.facts import Instant
+from lfs10d.facts import DeviceFacts, Instant
 from lfs10d.reading import AnsweredTwice, Fault, FaultCode, Reading
 from lfs10d.standing import STATE_EARLY, Standing
-from lfs10d.telemetry import Kind
+from lfs10d.telemetry import STATE, Kind
 from tests.stations import ONE_VALUE
 
 if TYPE_CHECKING:
@@ -437,3 +437,41 @@ def test_an_id_answered_twice_is_an_event_and_an_error_beside_good_samples() -> 
     watched.standing.answered_twice(twice, instant(10.0))
     assert leaves(watched.standing.mask(instant(11.0))) == ["error"]
     assert fields(watched.shown["error"], "active") == (False,)
+
+
+def every(state_every: float) -> DeviceFacts:
+    return replace(FACTS, state_every=state_every)
+
+
+def test_the_state_comes_as_often_as_it_is_wanted_and_a_change_at_once() -> None:
+    watched = Watched()
+    watched.standing.reconfigure(every(10.0), instant(0))
+    watched.poll(1.0, 5.0)
+    seconds = [second for second in range(2, 32) if STATE in watched.poll(float(second), 5.0 + second)]
+    assert seconds == [11, 21, 31]
+    assert STATE in watched.poll(32.0, TIMEOUT)
+    assert STATE in watched.poll(33.0, 4.0)
+    assert STATE not in watched.poll(34.0, 4.0)
+    assert watched.standing.state_due == 43.0
+
+
+def test_a_shorter_pace_of_states_takes_effect_at_once() -> None:
+    watched = Watched()
+    watched.standing.reconfigure(every(3600.0), instant(0))
+    watched.poll(1.0, 5.0)
+    watched.poll(2.0, 6.0)
+    assert watched.standing.state_due == 3601.0
+    watched.standing.reconfigure(every(2.0), instant(3.0))
+    assert watched.standing.state_due == 5.0
+    state = watched.standing.due_state(instant(5.0))
+    assert state is not None
+    assert state.refresh
+
+
+def test_only_newer_figures_are_a_refresh() -> None:
+    watched = Watched()
+    said = [each for at, outcome in ((1.0, 5.0), (2.0, 5.1), (3.0, TIMEOUT)) for each in watched.publish(at, outcome)]
+    states = [each.refresh for each in said if each.topic.endswith(STATE)]
+    assert states == [False, True, False]
+    assert watched.standing.stats(instant(4.0)).refresh
+    assert not any(each.refresh for each in watched.standing.burst(instant(5.0))[:-1])

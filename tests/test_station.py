@@ -497,3 +497,14 @@ def test_everything_that_changes_at_once_is_told() -> None:
     told = topics(running.configure(LINE, [replace(THIRD, label="x")], instant(1)))
     assert {"device/a/state", "device/b/state", "device/c/config", "devices"} <= set(told)
     assert told.count("event") == 2
+
+
+def test_another_pace_of_states_is_taken_up_by_a_reload() -> None:
+    slow = replace(ONE_VALUE, state_every=600.0)
+    running = station(slow)
+    running.heard(good("a", 1.0), instant(1.0))
+    running.heard(good("a", 2.0), instant(2.0))
+    assert running.due() == 30.0
+    running.configure(LINE, [replace(slow, state_every=5.0)], instant(3.0))
+    assert running.due() == 8.0
+    assert [each.topic for each in running.tick(instant(8.0))] == ["device/a/state"]

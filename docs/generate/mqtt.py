@@ -12,6 +12,7 @@ from docs.generate.configuration import kind_of, kinds_within, written
 from docs.generate.examples import Story, events, responses, trace
 from docs.generate.markdown import example, plain, table
 from docs.generate.meanings import ERROR_CODES, FAULT_CODES
+from docs.generate.uplink import bytes_table
 from lfs10d.commands import ErrorCode
 from lfs10d.outbound import OUTBOUND
 from lfs10d.payloads import Availability
@@ -43,6 +44,7 @@ def parts() -> Mapping[str, str]:
         "fault_codes": table(("code", "it means"), _meanings(FAULT_CODES, tuple(FaultCode))),
         "error_codes": table(("code", "it means"), _meanings(ERROR_CODES, get_args(ErrorCode))),
         "responses": "\n\n".join(map(example, responses())),
+        "bytes_a_day": bytes_table(),
     }
 
 

@@ -106,6 +106,8 @@ class Outbox:
         self._alone_went = False
         self.suspects = Suspects()
         """What may have ended the last connection."""
+        self.telemetry = True
+        """False: samples are not taken, and what waits of the past stays where it is."""
         self.past = Past(capacity=capacity, detection=detection)
         """What is no longer live."""
         self._classes: dict[int, Callable[[float], Letter | None]] = {
@@ -131,6 +133,8 @@ class Outbox:
         `shift` is the wall clock less the monotonic one now, in ms.
         """
         if publication.sample is not None:
+            if not self.telemetry:
+                return
             self._live.add(Live(publication, Kept(publication.sample, now, shift=shift)))
             self.age(now)
             self._make_room()
@@ -292,7 +296,7 @@ class Outbox:
 
     def _next_past(self, now: float) -> Letter | None:
         self._repeat(now)
-        return self.past.next(now, self._refused) if self._past_may_go else None
+        return self.past.next(now, self._refused) if self._past_may_go and self.telemetry else None
 
     def _wait_for_topic(self, letter: Message | Live) -> None:
         """Let a letter wait until its topic is passed over no longer; a sample may go with the past."""
@@ -327,7 +331,7 @@ class Outbox:
         """Return when `next` may have something though nothing happens before; None: not by time alone."""
         if self._alone is not None or len(self._under_way) >= self._window:
             return None
-        times = (self.past.due(self._refused), self._refusals.due())
+        times = (self.past.due(self._refused) if self.telemetry else None, self._refusals.due())
         return min((each for each in times if each is not None), default=None)
 
     # What became of it

@@ -153,6 +153,11 @@ class Uplink:
         """
         self._earlier = EarlierLife(self._topics, wanted, told)
 
+    def send_samples(self, *, telemetry: bool) -> None:
+        """Take whether samples are sent: `telemetry`, and as `history` what waits; the rest is sent in any case."""
+        self._outbox.telemetry = telemetry
+        self._dispatch.wake()
+
     def limit(self, limits: Limits) -> None:
         """Take other limits for what is kept on disk."""
         if self._stowage is not None:

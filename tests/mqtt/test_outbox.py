@@ -1140,3 +1140,27 @@ def test_a_burst_that_lasts_takes_turns_with_the_rest_after_ten_seconds() -> Non
     assert kinds[:3] == [Retained] * 3
     assert Live in kinds[3:]
     assert Retained in kinds[3:]
+
+
+def test_without_telemetry_samples_are_not_taken_and_the_backlog_stays_where_it_is() -> None:
+    outbox = Outbox()
+    outbox.add(sample(1), 0.0)
+    connect(outbox, 50.0)
+    outbox.telemetry = False
+    outbox.add(sample(2), 55.0)
+    assert outbox.next(60.0) is None
+    assert outbox.due() is None
+    assert not outbox.waits
+    outbox.add(state(1), 61.0)
+    assert take(outbox, 61.0, Retained).topic == "device/a/state"
+    outbox.telemetry = True
+    assert seqs(take(outbox, 62.0, Array)) == [1]
+
+
+def test_what_carries_no_sample_counts_for_nothing_in_the_depth() -> None:
+    outbox = connected()
+    outbox.add(state(1), 0.0)
+    outbox.add(sample(1), 0.0)
+    take(outbox, 0.0, Retained)
+    take(outbox, 0.0, Live)
+    assert outbox.depth == 1
