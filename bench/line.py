@@ -7,12 +7,10 @@ import signal
 import struct
 import subprocess
 from dataclasses import dataclass
-from typing import IO, TYPE_CHECKING, Any, Self, cast
+from pathlib import Path
+from typing import IO, Any, Self, cast
 
 from bench.programs import build_line, end
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 @dataclass(frozen=True)

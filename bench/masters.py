@@ -8,12 +8,9 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from bench.programs import HERE, MOSQUITTO_HEADER, build_reference
-
-if TYPE_CHECKING:
-    from bench.rows import Master, Row
+from bench.rows import Master, Row
 
 BASE = "bench"
 DAEMON = (str(Path(sys.executable).with_name("lfs10d")),)

@@ -9,16 +9,14 @@ import time
 from collections import defaultdict
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from bench import backlog
 from bench.broker import Heard, Subscriber, missing_seqs
 from bench.line import PacedLine, Sent, read_log
 from bench.masters import BASE, command, scratch, start
 from bench.programs import end, weigh
-
-if TYPE_CHECKING:
-    from bench.rows import Master, Row
+from bench.rows import Master, Row
 
 TAIL = 0.5
 """Seconds given to the last samples to arrive."""

@@ -12,8 +12,8 @@ import json
 import sys
 import tempfile
 import time
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion, MQTTProtocolVersion
@@ -26,9 +26,6 @@ from lfs10d.store.backlog import Store
 from lfs10d.store.opening import Limits
 from lfs10d.store.samplefile import Entry, SampleFile
 from lfs10d.telemetry import Kind, Publication, Sample
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 LIMITS = Limits(size=10**12, age=10**12)
 DEVICES = 32

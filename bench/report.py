@@ -7,15 +7,12 @@ import os
 import platform
 import statistics
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from bench.measure import Run
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from bench.rows import Row
+from bench.rows import Row
 
 Runs: TypeAlias = dict[tuple[str, str], list[Run]]
 """Runs by row and master."""

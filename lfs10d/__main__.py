@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import signal
 import sys
-from typing import TYPE_CHECKING, NoReturn
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from types import FrameType
+from collections.abc import Sequence
+from types import FrameType
+from typing import NoReturn
 
 LASTING = frozenset({"run", "watch", "trace", "simulate", "demo"})
 """Verbs that go on until they are told to end, which is no failure then; `read --watch` is one more."""

@@ -14,9 +14,10 @@ Rules
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from lfs10d import commands
 from lfs10d.commands import (
@@ -30,9 +31,6 @@ from lfs10d.commands import (
     RequestClass,
     rejected,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 RATE = 20.0
 """Requests a second, in the long run."""

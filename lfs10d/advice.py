@@ -3,22 +3,16 @@
 from __future__ import annotations
 
 import ipaddress
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
-from lfs10d.budget import ASSUMED_TURNAROUND
+from lfs10d.budget import ASSUMED_TURNAROUND, Budget
 from lfs10d.config import LATER_SECTIONS, default_line_name
+from lfs10d.configfile import Loaded
 from lfs10d.credentials import missing_in_authorities
-from lfs10d.errors import ConfigError
+from lfs10d.errors import ConfigError, Problem
 from lfs10d.kinds import quoted
 from lfs10d.quantities import duration_text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from lfs10d.budget import Budget
-    from lfs10d.configfile import Loaded
-    from lfs10d.errors import Problem
-    from lfs10d.wording import KeyPath
+from lfs10d.wording import KeyPath
 
 COMMON_HOST_NAMES = frozenset({"localhost", "raspberrypi", "debian", "raspbian", "ubuntu", "linux", "openwrt"})
 """Names that systems come with: two gateways soon have the same."""

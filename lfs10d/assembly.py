@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from lfs10d.budget import request_gap, timing_of
+from lfs10d.config import Config, LineConfig, PollConfig, SlaveConfig, StoreConfig
+from lfs10d.configfile import Loaded
 from lfs10d.facts import DeviceFacts, LineFacts
 from lfs10d.jobs.register import Target
 from lfs10d.jobs.search import Search
@@ -15,17 +17,10 @@ from lfs10d.modbus.bus import LineRules
 from lfs10d.modbus.frames import Checksum, Codec, Framing
 from lfs10d.modbus.settings import PortSettings, Rs485
 from lfs10d.profiles.library import builtin_names, load_profile
+from lfs10d.profiles.schema import Profile
 from lfs10d.reading import Fault, FaultCode, Reading
 from lfs10d.roster import FIRST_TIMEOUTS, DeviceSpec, PollRules
 from lfs10d.store.opening import Limits
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from lfs10d.config import Config, LineConfig, PollConfig, SlaveConfig, StoreConfig
-    from lfs10d.configfile import Loaded
-    from lfs10d.profiles.schema import Profile
-
 
 GREATEST_SHARE = 0.95
 """A scan takes at most this share of the line, whatever is asked for, so that polling goes on."""

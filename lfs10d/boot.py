@@ -5,12 +5,9 @@ from __future__ import annotations
 import re
 import string
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from lfs10d.disk import Disk
+from lfs10d.disk import Disk
 
 LENGTH = 8
 FILE_NAME = "boot"

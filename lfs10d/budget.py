@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from lfs10d.config import Config, LineConfig, SlaveConfig
 from lfs10d.modbus.frames import Checksum, Codec, Framing, ReadRegisters
 from lfs10d.modbus.timing import LineTiming
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from lfs10d.config import Config, LineConfig, SlaveConfig
-    from lfs10d.profiles.schema import Profile
+from lfs10d.profiles.schema import Profile
 
 ASSUMED_TURNAROUND = 0.005
 """Seconds a slave thinks before it answers, where a figure is wanted before it was measured."""

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from pathlib import Path
+from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, ValidationError
 from pydantic_core import PydanticCustomError
@@ -17,15 +18,11 @@ from lfs10d.changes import OPTIONS, Changes, DeviceChange, Place, Rate, Saying, 
 from lfs10d.config import LineConfig, Section, SlaveConfig
 from lfs10d.coreschema import render
 from lfs10d.credentials import reason
+from lfs10d.disk import Disk
 from lfs10d.document import LARGEST_FILE, decode, parse
 from lfs10d.errors import ConfigError, StateError
 from lfs10d.kinds import Choice, Name, Whole
 from lfs10d.quantities import duration_text
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from lfs10d.disk import Disk
 
 FILE_NAME = "changes.yaml"
 VERSION = 1

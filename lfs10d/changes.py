@@ -6,12 +6,9 @@ mapping of keys of `SlaveConfig`, without its name, to values as the program use
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, TypeAlias
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
+from typing import Any, TypeAlias
 
 OPTIONS = ("interval", "enabled", "label", "response_timeout")
 """What a request may change of a device, in the order of the file."""

@@ -6,10 +6,7 @@ person. The monotonic clock goes on evenly, so that the time between a sample an
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from lfs10d.clock import ClockState
+from lfs10d.clock import ClockState
 
 STEP_MS = 1000
 """A wall clock that moves so far at once against the monotonic one has been set; slewed it moves 0.5 ms in a second."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import socket
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
@@ -17,15 +18,11 @@ from lfs10d.document import Document, decode, parse, path_text
 from lfs10d.errors import ConfigError, Problem
 from lfs10d.kinds import quoted, shown
 from lfs10d.profiles.library import builtin_names, load_profile
+from lfs10d.profiles.schema import Profile
 from lfs10d.regularfile import read_regular
 from lfs10d.resolution import resolved, unfit
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from lfs10d.profiles.schema import Profile
-    from lfs10d.secret import Secret
-    from lfs10d.wording import KeyPath
+from lfs10d.secret import Secret
+from lfs10d.wording import KeyPath
 
 DEFAULT_FILE = Path("/etc/lfs10d/lfs10d.yaml")
 

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from lfs10d.config import device_name
+from lfs10d.config import Config, SlaveConfig, device_name
+from lfs10d.profiles.schema import Profile
 from lfs10d.quantities import duration_text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from lfs10d.config import Config, SlaveConfig
-    from lfs10d.profiles.schema import Profile
-    from lfs10d.wording import KeyPath
+from lfs10d.wording import KeyPath
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,23 +6,20 @@
 from __future__ import annotations
 
 import copy
+import io
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import yaml
 from yaml.composer import Composer
 from yaml.emitter import Emitter
+from yaml.nodes import Node
 from yaml.parser import Parser
 from yaml.reader import Reader
 from yaml.representer import SafeRepresenter
 from yaml.resolver import BaseResolver
 from yaml.scanner import Scanner
 from yaml.serializer import Serializer
-
-if TYPE_CHECKING:
-    import io
-
-    from yaml.nodes import Node
 
 DEEPEST_NESTING = 20
 """Levels of lists and mappings; the configuration needs four."""

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from codecs import BOM_UTF8
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from lfs10d.config import MqttConfig, TlsConfig
 from lfs10d.kinds import quoted
 from lfs10d.regularfile import read_regular
 from lfs10d.secret import Secret
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from lfs10d.config import MqttConfig, TlsConfig
-    from lfs10d.wording import KeyPath
+from lfs10d.wording import KeyPath
 
 CREDENTIAL = "mqtt-password"
 """Name of the systemd credential (LoadCredential=) that holds the broker's password."""

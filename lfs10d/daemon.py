@@ -11,30 +11,36 @@ import logging
 import os
 import socket
 import sys
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from math import inf
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from lfs10d import __version__, assembly, logs, signals
-from lfs10d.boot import keep
+from lfs10d.boot import Boot, keep
 from lfs10d.changefile import ChangeFile
+from lfs10d.config import Config
+from lfs10d.configfile import Loaded
 from lfs10d.disk import Disk
+from lfs10d.effective import Effective
 from lfs10d.errors import StateError
 from lfs10d.facts import DaemonFacts
 from lfs10d.firstburst import FirstBurst
 from lfs10d.journal import Journal
 from lfs10d.line import Line
-from lfs10d.logbook import Logbook
+from lfs10d.logbook import Entry, Logbook
 from lfs10d.moments import Moments
 from lfs10d.mqtt.settings import BrokerSettings
 from lfs10d.mqtt.uplink import Uplink
 from lfs10d.physical.losing import Losing
 from lfs10d.physical.place import Physical
 from lfs10d.powers import DaemonPowers
-from lfs10d.reading import Exchanged, FaultCode, PortChanged, Reading
+from lfs10d.reading import Event, Exchanged, FaultCode, PortChanged, Reading
 from lfs10d.recalling import Recalling
+from lfs10d.reload import Plan
 from lfs10d.requests.table import REQUESTS
-from lfs10d.running import Running
+from lfs10d.running import Edit, Running
+from lfs10d.secret import Secret
 from lfs10d.service import Service
 from lfs10d.signals import Signals
 from lfs10d.startreport import WITHIN, StartReport
@@ -46,21 +52,7 @@ from lfs10d.store.backlog import Store
 from lfs10d.supervision import Supervision
 from lfs10d.systemd import Notifier
 from lfs10d.tasks import BackgroundTasks
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-    from pathlib import Path
-
-    from lfs10d.boot import Boot
-    from lfs10d.config import Config
-    from lfs10d.configfile import Loaded
-    from lfs10d.effective import Effective
-    from lfs10d.logbook import Entry
-    from lfs10d.reading import Event
-    from lfs10d.reload import Plan
-    from lfs10d.running import Edit
-    from lfs10d.secret import Secret
-    from lfs10d.telemetry import Publication
+from lfs10d.telemetry import Publication
 
 log = logging.getLogger(__name__)
 

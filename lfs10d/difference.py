@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from lfs10d.config import Config, SlaveConfig
 from lfs10d.configfile import leaves
-
-if TYPE_CHECKING:
-    from lfs10d.config import Config, SlaveConfig
 
 RESTART_KEYS = frozenset({"line.name", "mqtt.base_topic"})
 """Left for a restart: under them stands every topic."""

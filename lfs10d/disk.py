@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import contextlib
 import os
-from typing import TYPE_CHECKING, Protocol
+from pathlib import Path
+from typing import Protocol
 
 from lfs10d.regularfile import read_regular, write_new
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 class Files(Protocol):

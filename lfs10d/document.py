@@ -10,22 +10,19 @@ given twice, a key that is a list) is kept in `Document.problems`, so that a per
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import yaml
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
 from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from lfs10d.coreschema import DEEPEST_NESTING, FORMS, TAG, Loader
 from lfs10d.errors import ConfigError, Problem
 from lfs10d.kinds import quoted, shown
 from lfs10d.wording import KeyPath, in_words, keys_at, missing, unknown_key
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from pydantic import BaseModel, ValidationError
-    from pydantic_core import ErrorDetails
 
 LARGEST_FILE = 256 * 1024
 """Bytes: three times a file with every key of 255 slaves written out."""

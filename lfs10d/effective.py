@@ -7,25 +7,21 @@ devices never poll one id.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lfs10d.changefile import in_words
 from lfs10d.changes import Changes, Place, Said
-from lfs10d.config import SlaveConfig
+from lfs10d.config import Config, SlaveConfig
 from lfs10d.configfile import DEFAULT, Loaded, Origin, leaves
 from lfs10d.contradictions import contradictions
 from lfs10d.document import path_text
 from lfs10d.errors import ConfigError
 from lfs10d.profiles.library import load_profile
+from lfs10d.profiles.schema import Profile
 from lfs10d.resolution import inherited
 from lfs10d.threeway import Dropped, Merged, merge
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from lfs10d.config import Config
-    from lfs10d.profiles.schema import Profile
 
 CHANGED = Origin("changes.yaml")
 """Of a value that a request changed."""

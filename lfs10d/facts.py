@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
-from lfs10d.telemetry import VERSION
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from lfs10d.telemetry import Clock
+from lfs10d.telemetry import VERSION, Clock
 
 
 @dataclass(frozen=True, slots=True)

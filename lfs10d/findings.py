@@ -5,17 +5,12 @@ Pure. Each message says what was heard and what to do next, and names the other 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
-from lfs10d.commands import Answer, failed, ok, rejected
-from lfs10d.jobs.readdress import NOTHING_WRITTEN, Ending
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from lfs10d.commands import ErrorCode
-    from lfs10d.jobs.readdress import Verdict, Wish
-    from lfs10d.profiles.schema import Profile
+from lfs10d.commands import Answer, ErrorCode, failed, ok, rejected
+from lfs10d.jobs.readdress import NOTHING_WRITTEN, Ending, Verdict, Wish
+from lfs10d.profiles.schema import Profile
 
 _READDRESSED: Mapping[Ending, tuple[ErrorCode, str]] = {
     Ending.TAKEN: (

@@ -7,16 +7,11 @@ error `starting`, a disabled one's too: whatever was retained before, a restart 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from lfs10d.reading import FaultCode
-from lfs10d.telemetry import AVAILABILITY, ERROR, STATE, device_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from lfs10d.telemetry import Publication
+from lfs10d.telemetry import AVAILABILITY, ERROR, STATE, Publication, device_of
 
 _LEAVES = (STATE, AVAILABILITY, ERROR)
 

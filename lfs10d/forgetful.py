@@ -8,12 +8,9 @@ from __future__ import annotations
 
 import errno
 import os
+from collections.abc import Container
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Container
-    from pathlib import Path
+from pathlib import Path
 
 
 class PowerCutError(BaseException):

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import count
-from typing import TYPE_CHECKING
 
-from lfs10d.telemetry import Kind
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Mapping
-
-    from lfs10d.reading import Fault, Reading
-    from lfs10d.telemetry import Payload, Publication
+from lfs10d.reading import Fault, Reading
+from lfs10d.telemetry import Kind, Payload, Publication
 
 
 @dataclass(frozen=True, slots=True)

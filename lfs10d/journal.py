@@ -10,17 +10,14 @@ A file that cannot be understood (damaged, of a newer lfs10d) is put aside and r
 from __future__ import annotations
 
 import contextlib
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from lfs10d.disk import Disk
 from lfs10d.errors import StateError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    from lfs10d.disk import Disk
 
 FILE_NAME = "journal.json"
 ASIDE = "journal.json.unreadable"

@@ -12,15 +12,12 @@ import unicodedata
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
-from pydantic import TypeAdapter
+from pydantic import GetCoreSchemaHandler, TypeAdapter
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from lfs10d.quantities import duration_text, seconds, size, size_text
-
-if TYPE_CHECKING:
-    from pydantic import GetCoreSchemaHandler
 
 _SHOWN_CHARACTERS = 40
 

@@ -10,27 +10,23 @@ import contextlib
 import logging
 import time
 from collections import deque
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
 
 from lfs10d import assembly
 from lfs10d.budget import timing_of
+from lfs10d.config import Config
+from lfs10d.jobs.course import Course
+from lfs10d.jobs.job import Job
 from lfs10d.linethread import WAKING, WAKING_REALTIME, LineThread
 from lfs10d.modbus.bus import Bus
 from lfs10d.modbus.exchange import Echo
 from lfs10d.modbus.port import SerialPort
 from lfs10d.modbus.realtime import sharpen_timers, take_precedence, yield_precedence
+from lfs10d.modbus.unanswered import Unanswered
 from lfs10d.poller import Poller
+from lfs10d.profiles.schema import Profile
+from lfs10d.reading import Event
 from lfs10d.schedule import Schedule
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from lfs10d.config import Config
-    from lfs10d.jobs.course import Course
-    from lfs10d.jobs.job import Job
-    from lfs10d.modbus.unanswered import Unanswered
-    from lfs10d.profiles.schema import Profile
-    from lfs10d.reading import Event
 
 log = logging.getLogger(__name__)
 

@@ -7,13 +7,10 @@ import os
 import select
 import threading
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from lfs10d.modbus.bus import Wait
-    from lfs10d.poller import Poller
+from lfs10d.modbus.bus import Wait
+from lfs10d.poller import Poller
 
 IDLE_MOST = 5.0
 """The thread passes a turn at least so often, in s, so that a watchdog can tell idle from wedged."""

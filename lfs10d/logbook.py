@@ -7,18 +7,12 @@ does to the devices is one line, the port's.
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 from lfs10d.quantities import duration_text
-from lfs10d.reading import Exchanged, PortChanged, Reading
-from lfs10d.telemetry import ERROR, device_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from lfs10d.reading import Event
-    from lfs10d.telemetry import Publication
+from lfs10d.reading import Event, Exchanged, PortChanged, Reading
+from lfs10d.telemetry import ERROR, Publication, device_of
 
 
 class Entry(NamedTuple):

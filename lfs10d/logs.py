@@ -14,11 +14,9 @@ import sys
 import threading
 import time
 import traceback
+from collections.abc import Mapping
 from enum import StrEnum
-from typing import TYPE_CHECKING, TypeVar
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
+from typing import TypeVar
 
 T = TypeVar("T")
 

@@ -5,14 +5,11 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from lfs10d import clock, clockstep
 from lfs10d.aside import aside
 from lfs10d.facts import Instant
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 
 class Moments:

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING
+from collections.abc import Awaitable, Callable
 
 from lfs10d.station import PAUSED
-
-if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable
 
 
 class Pausing:

@@ -7,23 +7,19 @@ virtual one. Other threads only `post`.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable, Iterable
 from dataclasses import astuple
 from math import inf
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
+from lfs10d.jobs.job import Ask, Job
 from lfs10d.jobs.poll import Poll
-from lfs10d.modbus.bus import Order, Wait
+from lfs10d.modbus.bus import Bus, LineRules, Order, Wait
+from lfs10d.modbus.exchange import Outcome
+from lfs10d.modbus.port import PortSettings
 from lfs10d.reading import Errand, Event, Exchanged, Fault, FaultCode, PortChanged, UartCounted, UartCounters
+from lfs10d.roster import DeviceSpec, PollRules
 from lfs10d.schedule import Rest, Schedule
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-
-    from lfs10d.jobs.job import Ask, Job
-    from lfs10d.modbus.bus import Bus, LineRules
-    from lfs10d.modbus.exchange import Outcome
-    from lfs10d.modbus.port import PortSettings
-    from lfs10d.roster import DeviceSpec, PollRules
 
 COUNTERS_EVERY = 10.0
 """How often the driver's counters are read, in s."""

@@ -9,18 +9,14 @@ start is polled again at once, but not before the first poll of each other devic
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable
 from heapq import heappop, heappush
 from math import floor, inf
-from typing import TYPE_CHECKING
 
 from lfs10d.jobs.poll import Poll
+from lfs10d.modbus.unanswered import Unanswered
 from lfs10d.reading import Errand
 from lfs10d.roster import Device
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from lfs10d.modbus.unanswered import Unanswered
 
 FLAT_OUT_PATIENCE = 5.0
 """A device with interval 0 goes as one that became due so many s after it was asked last."""

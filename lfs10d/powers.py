@@ -5,46 +5,39 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections import defaultdict
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from lfs10d import assembly
 from lfs10d.aside import aside
-from lfs10d.commands import rejected
+from lfs10d.commands import Answer, Call, rejected
+from lfs10d.config import Config, SlaveConfig
+from lfs10d.effective import Effective
+from lfs10d.facts import Instant
 from lfs10d.inquiries import Inquiries, Inquiry, altered
+from lfs10d.jobs.job import Job
 from lfs10d.jobs.knock import Knock
 from lfs10d.jobs.register import Access
+from lfs10d.jobs.scan import Scan
+from lfs10d.line import Line
 from lfs10d.modbus.exchange import Echo
+from lfs10d.modbus.frames import Request as RegisterRequest
+from lfs10d.mqtt.uplink import Uplink
 from lfs10d.pausing import Pausing
 from lfs10d.physical.adoption import Newcomer
-from lfs10d.reading import Exchanged, Reading
+from lfs10d.physical.place import Physical
+from lfs10d.profiles.schema import Profile
+from lfs10d.reading import Event, Exchanged, Reading
+from lfs10d.reload import Plan
 from lfs10d.requests.request import RefusedError
+from lfs10d.running import Edit, Running
 from lfs10d.scanning import Scanning
-from lfs10d.station import PAUSED, POLLING
-from lfs10d.telemetry import event
+from lfs10d.station import PAUSED, POLLING, Station
+from lfs10d.telemetry import Publication, event
 from lfs10d.tracing import Trace, TracedDevice
 
-if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Iterable, Mapping
-
-    from lfs10d.commands import Answer, Call
-    from lfs10d.config import Config, SlaveConfig
-    from lfs10d.effective import Effective
-    from lfs10d.facts import Instant
-    from lfs10d.jobs.job import Job
-    from lfs10d.jobs.scan import Scan
-    from lfs10d.line import Line
-    from lfs10d.modbus.frames import Request as RegisterRequest
-    from lfs10d.mqtt.uplink import Uplink
-    from lfs10d.physical.place import Physical
-    from lfs10d.profiles.schema import Profile
-    from lfs10d.reading import Event
-    from lfs10d.reload import Plan
-    from lfs10d.running import Edit, Running
-    from lfs10d.station import Station
-    from lfs10d.telemetry import Publication
-
-    J = TypeVar("J", bound=Job)
+J = TypeVar("J", bound=Job)
 
 
 class DaemonPowers:

@@ -7,15 +7,11 @@ answer then makes all of them due at once, share or no share: after a power cut 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from math import inf
-from typing import TYPE_CHECKING
 
+from lfs10d.roster import Device
 from lfs10d.share import Share
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from lfs10d.roster import Device
 
 PROBE_SHARE = 0.04
 """The part of the line that probes are given while any device answers: what one of them takes beyond that, and the

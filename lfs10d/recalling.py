@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 
 from lfs10d import recollection
-
-if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Iterable, Mapping
-
-    from lfs10d.changes import Changes, Place
-    from lfs10d.effective import Effective
-    from lfs10d.roster import Device
-    from lfs10d.running import Edit
+from lfs10d.changes import Changes, Place
+from lfs10d.effective import Effective
+from lfs10d.roster import Device
+from lfs10d.running import Edit
 
 log = logging.getLogger(__name__)
 

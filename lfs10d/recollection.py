@@ -13,23 +13,19 @@ Rules
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import from_json
 
-from lfs10d.changes import Place, Rate, Verified
+from lfs10d.changes import Changes, Place, Rate, Verified
 from lfs10d.config import LineConfig
+from lfs10d.effective import Effective
 from lfs10d.kinds import Choice, Whole
 from lfs10d.telemetry import CONFIG, LINE_STATE, device_of, device_topic
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from collections.abc import Set as AbstractSet
-
-    from lfs10d.changes import Changes
-    from lfs10d.effective import Effective
 
 LARGEST = 4096
 """Bytes of a payload that is looked at; ours have a few hundred."""

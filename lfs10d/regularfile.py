@@ -6,10 +6,7 @@ import contextlib
 import errno
 import os
 import stat
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from pathlib import Path
+from pathlib import Path
 
 _KINDS = (
     (stat.S_ISFIFO, "it is a pipe, and must be a regular file"),

@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from lfs10d.configfile import load
+from lfs10d.config import MqttConfig
+from lfs10d.configfile import Loaded, load
 from lfs10d.difference import difference
 from lfs10d.regularfile import read_regular
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from lfs10d.config import MqttConfig
-    from lfs10d.configfile import Loaded
 
 
 @dataclass(frozen=True, slots=True)

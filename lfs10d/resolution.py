@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import Any
 
-from lfs10d.config import LONGEST_CLIENT_ID, TLS_PORT, default_line_name, device_name
-from lfs10d.kinds import BaseTopic, RefusedError, Text, quoted
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from lfs10d.config import Config, MqttConfig, PollConfig, SlaveConfig
-    from lfs10d.kinds import Kind
-    from lfs10d.wording import KeyPath
+from lfs10d.config import (
+    LONGEST_CLIENT_ID,
+    TLS_PORT,
+    Config,
+    MqttConfig,
+    PollConfig,
+    SlaveConfig,
+    default_line_name,
+    device_name,
+)
+from lfs10d.kinds import BaseTopic, Kind, RefusedError, Text, quoted
+from lfs10d.wording import KeyPath
 
 
 def resolved(config: Config, *, stem: str, host: str) -> Config:

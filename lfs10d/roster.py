@@ -32,14 +32,11 @@ from collections import deque
 from dataclasses import dataclass, field
 from enum import StrEnum
 from math import ceil
-from typing import TYPE_CHECKING
 
+from lfs10d.modbus.frames import Codec
+from lfs10d.profiles.schema import Profile
 from lfs10d.reading import ALIVE_CODES, Fault, FaultCode
 from lfs10d.requestgap import RequestGap
-
-if TYPE_CHECKING:
-    from lfs10d.modbus.frames import Codec
-    from lfs10d.profiles.schema import Profile
 
 START_POLLS = 3
 """So many polls at once decide at the start whether a device answers."""

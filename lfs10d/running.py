@@ -6,25 +6,20 @@ A request's change is on the disk before anything of it takes effect, and a pers
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from lfs10d.aside import aside
-from lfs10d.changefile import FILE_NAME
+from lfs10d.changefile import FILE_NAME, ChangeFile
+from lfs10d.changes import Changes
+from lfs10d.configfile import Loaded
 from lfs10d.effective import Effective, effective
 from lfs10d.errors import StateError
 from lfs10d.reload import Files, Plan, imprint, plan, read
-from lfs10d.telemetry import event
+from lfs10d.telemetry import Publication, event
 from lfs10d.threeway import Dropped
-
-if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Mapping
-
-    from lfs10d.changefile import ChangeFile
-    from lfs10d.changes import Changes
-    from lfs10d.configfile import Loaded
-    from lfs10d.telemetry import Publication
 
 Edit: TypeAlias = "Callable[[Effective], Changes]"
 """What a request makes of the changes, given what holds; raises what refuses the request. Called in any thread."""

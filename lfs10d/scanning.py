@@ -7,15 +7,12 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable, Mapping
+from typing import Final
 
+from lfs10d.jobs.job import Job
 from lfs10d.jobs.scan import Scan
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from lfs10d.jobs.job import Job
-    from lfs10d.jobs.search import Search
+from lfs10d.jobs.search import Search
 
 SCANNING: Final = "scanning"
 """The activity of the line while it lasts."""

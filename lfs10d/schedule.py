@@ -16,8 +16,9 @@ Rules
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from lfs10d.jobs.job import Again, Ask, Hold, Job, Later
 from lfs10d.jobs.poll import Poll
@@ -25,21 +26,16 @@ from lfs10d.jobs.queue import JobQueue
 from lfs10d.jobs.telling import tell, tell_lost
 from lfs10d.jobs.toll import Toll
 from lfs10d.modbus import verdict
+from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import EXCEPTION_FLAG, ReadRegisters
 from lfs10d.modbus.overhearing import Overhearing
+from lfs10d.modbus.timing import LineTiming
 from lfs10d.modbus.unanswered import Unanswered
 from lfs10d.pollqueue import PollQueue, back_on_grid, spread
 from lfs10d.probing import Probing
-from lfs10d.reading import AnsweredTwice, Errand, Fault, FaultCode
+from lfs10d.reading import AnsweredTwice, Errand, Fault, FaultCode, Reading
 from lfs10d.roster import LEARNED_MOST, Device, DeviceSpec, Health, PollRules
 from lfs10d.slaverests import SlaveRests
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from lfs10d.modbus.exchange import Outcome
-    from lfs10d.modbus.timing import LineTiming
-    from lfs10d.reading import Reading
 
 
 @dataclass(frozen=True, slots=True)

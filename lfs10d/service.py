@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 from lfs10d.admission import Admission, Answered, Ignored, Ticket, Waiting
 from lfs10d.commands import LARGEST_CORRELATION, Answer, Call, failed, rejected
 from lfs10d.logs import escape
+from lfs10d.mqtt.inbound import InboundRequest
 from lfs10d.requests import audit
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from lfs10d.mqtt.inbound import InboundRequest
-    from lfs10d.requests.request import Powers, Request
+from lfs10d.requests.request import Powers, Request
 
 log = logging.getLogger(__name__)
 

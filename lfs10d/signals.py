@@ -5,16 +5,12 @@ from __future__ import annotations
 import asyncio
 import logging
 import signal
-from typing import TYPE_CHECKING
+from collections.abc import Awaitable, Callable
 
 from lfs10d.errors import ConfigError
+from lfs10d.reload import Plan
+from lfs10d.systemd import Notifier
 from lfs10d.tasks import BackgroundTasks
-
-if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable
-
-    from lfs10d.reload import Plan
-    from lfs10d.systemd import Notifier
 
 log = logging.getLogger(__name__)
 

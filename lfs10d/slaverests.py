@@ -11,18 +11,14 @@ Rules
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import inf
-from typing import TYPE_CHECKING
 
+from lfs10d.jobs.job import Ask, Job
 from lfs10d.jobs.poll import Poll
+from lfs10d.modbus.exchange import Outcome
 from lfs10d.reading import FaultCode
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from lfs10d.jobs.job import Ask, Job
-    from lfs10d.modbus.exchange import Outcome
-    from lfs10d.roster import Device
+from lfs10d.roster import Device
 
 
 class SlaveRests:

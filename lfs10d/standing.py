@@ -16,10 +16,11 @@ Rules
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from lfs10d.alarms import DeviceAlarm
-from lfs10d.reading import PORT_CODES, FaultCode, Reading
+from lfs10d.facts import DeviceFacts, Instant
+from lfs10d.reading import PORT_CODES, AnsweredTwice, FaultCode, Reading
 from lfs10d.tally import DeviceTally
 from lfs10d.telemetry import (
     AVAILABILITY,
@@ -36,10 +37,6 @@ from lfs10d.telemetry import (
     event,
     retained,
 )
-
-if TYPE_CHECKING:
-    from lfs10d.facts import DeviceFacts, Instant
-    from lfs10d.reading import AnsweredTwice
 
 STATE_EARLY: Final = 0.01
 """So many s a state may come before its time (the next one then waits as much longer): a device polled every

@@ -6,17 +6,12 @@ It is due when every device has answered or failed its polls of the start, at th
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterable, Sequence
 from math import inf
-from typing import TYPE_CHECKING
 
 from lfs10d.logbook import Entry
-from lfs10d.reading import PORT_CODES
+from lfs10d.reading import PORT_CODES, Reading
 from lfs10d.roster import SILENT_CODES, START_POLLS
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from lfs10d.reading import Reading
 
 WITHIN = 9.5
 """The report comes at the latest so many s after the opening of the port."""

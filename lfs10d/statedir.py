@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from lfs10d.config import DEFAULT_STEM
 from lfs10d.errors import StateError
 from lfs10d.regularfile import write_new
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 SYSTEM_FOLDER = Path("/etc/lfs10d")
 STATUS_FILE = "status.json"

@@ -10,7 +10,8 @@ one reading with the port's fault, which takes it offline.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, Literal, TypeAlias, assert_never
+from collections.abc import Callable, Sequence
+from typing import Final, Literal, TypeAlias, assert_never
 
 from lfs10d.alarms import LineAlarm
 from lfs10d.facts import DaemonFacts, DeviceFacts, Instant, LineFacts
@@ -21,6 +22,7 @@ from lfs10d.reading import (
     Exchanged,
     Fault,
     FaultCode,
+    LineFaultCode,
     PortChanged,
     Reading,
     UartCounted,
@@ -41,11 +43,6 @@ from lfs10d.telemetry import (
     iso_time,
     retained,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from lfs10d.reading import LineFaultCode
 
 __all__ = ["PAUSED", "POLLING", "DaemonFacts", "DeviceFacts", "Instant", "LineFacts", "Requests", "Station"]
 

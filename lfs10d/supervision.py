@@ -6,15 +6,11 @@ import asyncio
 import logging
 import threading
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
 
+from lfs10d.statusfile import StatusFile
+from lfs10d.systemd import Notifier
 from lfs10d.watchdog import progressing, stacks
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from lfs10d.statusfile import StatusFile
-    from lfs10d.systemd import Notifier
 
 log = logging.getLogger(__name__)
 

@@ -9,12 +9,9 @@ from __future__ import annotations
 import os
 import socket
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 from lfs10d.logs import escape
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 
 class Notifier:

@@ -7,17 +7,12 @@ are asked for. What is not known is None, never 0 and never NaN. Times are monot
 from __future__ import annotations
 
 from collections import Counter, deque
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import ceil, floor
-from typing import TYPE_CHECKING
 
 from lfs10d.reading import PORT_CODES, Errand, Exchanged, FaultCode, Reading, UartCounters
-from lfs10d.telemetry import VERSION
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from lfs10d.telemetry import Backlog
+from lfs10d.telemetry import VERSION, Backlog
 
 WINDOW = 30
 """Rates are of the last so many s."""

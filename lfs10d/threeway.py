@@ -13,13 +13,11 @@ Rules
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lfs10d.changes import OPTIONS, Changes, DeviceChange, Place, Rate, Said, Saying, Verified, value_of
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 _NOTHING: Saying = {}
 _UNSAID = object()

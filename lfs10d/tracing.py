@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from lfs10d.modbus.frames import READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS, describe
-from lfs10d.reading import Fault
+from lfs10d.facts import Instant
+from lfs10d.modbus.frames import READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS, Codec, describe
+from lfs10d.profiles.schema import Profile
+from lfs10d.reading import Exchanged, Fault
 from lfs10d.telemetry import TRACE, VERSION, Kind, Publication
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from lfs10d.facts import Instant
-    from lfs10d.modbus.frames import Codec
-    from lfs10d.profiles.schema import Profile
-    from lfs10d.reading import Exchanged
 
 LONGEST = 600
 """Bytes of one piece that are told; the longest frame, in ASCII, has 513 (Modbus over Serial Line V1.02, 2.5.2)."""

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import sys
+import threading
 import traceback
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    import threading
 
 GRACE = 2.0
 """How much later than declared the line thread may be, in s: opening a port and draining it may block that long."""

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import difflib
-from typing import TYPE_CHECKING, TypeAlias, get_args
+from typing import TypeAlias, get_args
 
 from pydantic import BaseModel
+from pydantic_core import ErrorDetails
 
 from lfs10d.kinds import PLAIN_ERROR, shown
-
-if TYPE_CHECKING:
-    from pydantic_core import ErrorDetails
 
 KeyPath: TypeAlias = tuple[str | int, ...]
 """Where a value stands: keys of mappings and indexes of lists."""

@@ -17,18 +17,15 @@ import json
 import struct
 import time
 from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lfs10d.simulator.burst import MASTER
+from lfs10d.simulator.line import Answer, Request
 from lfs10d.simulator.wire import SECOND, unseal
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
-
-    from lfs10d.simulator.line import Answer, Request
 
 ANSWER = 9
 """Bytes of an answer with one number."""

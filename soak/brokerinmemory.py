@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import asyncio
+from collections.abc import Sequence
 
 from lfs10d.mqtt.connection import Connection
 from lfs10d.mqtt.endings import Ended, Ending
-from lfs10d.mqtt.messages import Accepted
-
-if TYPE_CHECKING:
-    import asyncio
-    from collections.abc import Sequence
-
-    from lfs10d.mqtt.messages import Events, Filter, Will
-    from lfs10d.mqtt.settings import BrokerSettings, Version
+from lfs10d.mqtt.messages import Accepted, Events, Filter, Will
+from lfs10d.mqtt.settings import BrokerSettings, Version
 
 
 class BrokerInMemory:

@@ -7,15 +7,12 @@ import os
 import subprocess
 import sys
 import time
+from pathlib import Path
 from signal import SIGHUP, SIGKILL, SIGTERM
-from typing import TYPE_CHECKING
 
 from soak.gauges import Gauge, read
 from soak.ledger import Life
 from soak.line import BAUDRATE, SLAVES
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 STARTS_WITHIN = 30.0
 ENDS_WITHIN = 5.0

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from operator import itemgetter
 from pathlib import Path
 from random import Random
 from random import seed as seed_the_uplink
-from typing import TYPE_CHECKING
 
 from lfs10d.config import Config
 from lfs10d.profiles.library import load_profile
@@ -23,15 +23,9 @@ from lfs10d.simulator.inturn import InTurn
 from lfs10d.simulator.judge import Verdict
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.wire import SECOND, Format
-from soak.attestation import Oracle, codes, parsed
-from soak.troubles import FAMILY, mix
+from soak.attestation import Oracle, Samples, codes, parsed
+from soak.troubles import FAMILY, Fault, mix
 from soak.virtual import EPOCH, DaemonInMemory
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from soak.attestation import Samples
-    from soak.troubles import Fault
 
 DEVICES = (1, 2, 3, 4)
 ILL = 2

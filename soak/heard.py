@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterable
+from typing import Any, NamedTuple
 
 from soak.ledger import Told
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 
 class Message(NamedTuple):

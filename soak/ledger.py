@@ -8,11 +8,8 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import Counter, OrderedDict
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
 
 REMEMBERED = 12_000
 """Contents kept per device and boot to compare a duplicate with: more than the daemon keeps in memory."""

@@ -10,10 +10,8 @@ import struct
 from bisect import bisect_left, insort
 from collections import Counter
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from soak.ledger import Told
+from soak.ledger import Told
 
 FIRST_BITS = 0x0080_0000
 """The smallest normal float32 (IEEE 754-2019, section 3.4)."""

@@ -12,13 +12,10 @@ them, so that each can be recovered from; smaller ones are laid into larger ones
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from random import Random
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
 
 HOUR = 3600.0
 FIRST_AFTER = 4.0

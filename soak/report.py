@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from soak.run import Soak
+from soak.run import Soak
 
 
 def figures(soak: Soak) -> Iterable[tuple[str, str]]:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import time
 from collections import Counter, deque
+from collections.abc import Callable
+from pathlib import Path
 from signal import SIGCONT, SIGSTOP
-from typing import TYPE_CHECKING
 
 from bench.broker import Broker
 from soak.daemon import Daemon
@@ -17,10 +18,6 @@ from soak.line import Line
 from soak.oracle import KEPT_FOR, Excuse, Oracle
 from soak.plan import Act, Step, steps
 from soak.shown import Shown
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
 
 BASE = "lfs10d/line0"
 

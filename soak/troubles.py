@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from random import Random
+from typing import TypeAlias
 
 from lfs10d.simulator.faults import Window
 from lfs10d.simulator.troubles import babble, second_master, stray
 from lfs10d.simulator.wire import nanoseconds
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-    from random import Random
-
-    from soak.virtual import DaemonInMemory
+from soak.virtual import DaemonInMemory
 
 Particulars: TypeAlias = "Mapping[str, float]"
 Begin: TypeAlias = "Callable[[DaemonInMemory, float], None]"

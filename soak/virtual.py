@@ -10,31 +10,26 @@ from __future__ import annotations
 import asyncio
 import selectors
 from collections import Counter
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Mapping
 
 from lfs10d import assembly
 from lfs10d.budget import timing_of
+from lfs10d.config import Config
 from lfs10d.facts import DaemonFacts, Instant
 from lfs10d.firstburst import FirstBurst
 from lfs10d.modbus.bus import Bus
 from lfs10d.mqtt.settings import BrokerSettings
 from lfs10d.mqtt.uplink import Uplink
 from lfs10d.poller import Poller
-from lfs10d.reading import Reading
+from lfs10d.profiles.schema import Profile
+from lfs10d.reading import Event, Reading
 from lfs10d.schedule import Schedule
+from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.port import STANDSTILL, SimulatedPort, VirtualClock
 from lfs10d.simulator.wire import nanoseconds
 from lfs10d.station import Station
+from lfs10d.telemetry import Publication
 from soak.brokerinmemory import BrokerInMemory
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
-
-    from lfs10d.config import Config
-    from lfs10d.profiles.schema import Profile
-    from lfs10d.reading import Event
-    from lfs10d.simulator.line import SimulatedLine
-    from lfs10d.telemetry import Publication
 
 EPOCH = 1_700_000_000
 """Wall clock at the virtual time 0, in s."""

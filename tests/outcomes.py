@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lfs10d.modbus.exchange import Outcome
-
-if TYPE_CHECKING:
-    from lfs10d.modbus.frames import Request
+from lfs10d.modbus.frames import Request
 
 
 def ended(request: Request, **facts: Any) -> Outcome:  # noqa: ANN401  # passed on to a dataclass, which checks names

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from lfs10d.jobs.job import Again, Ask, Done, Hold, Later, Next
 from lfs10d.jobs.poll import Poll
@@ -14,9 +14,6 @@ from lfs10d.profiles.library import load_profile
 from lfs10d.reading import Errand, Fault, FaultCode, Reading
 from lfs10d.roster import DeviceSpec, PollRules
 from lfs10d.schedule import Rest, Schedule
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 RTU = Codec(Framing.RTU)
 LFS10 = load_profile("lfs10", relative_to=Path())

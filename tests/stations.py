@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 from lfs10d.reading import Fault, FaultCode, Reading
 from lfs10d.station import DaemonFacts, DeviceFacts, Instant, LineFacts, Station
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from lfs10d.telemetry import Clock, Payload, Publication
+from lfs10d.telemetry import Clock, Payload, Publication
 
 WALL = 1_795_298_000.0
 DAEMON = DaemonFacts("0.1", "gw", "k3f9a2c7", "k3f9a2c6", "abc", 0, {"version": "5"}, ("store",))

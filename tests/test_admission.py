@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import pytest
 from hypothesis import given
@@ -22,11 +22,8 @@ from lfs10d.admission import (
     Ticket,
     Waiting,
 )
-from lfs10d.commands import LARGEST, LARGEST_CORRELATION, Call, Parameters, failed, ok
+from lfs10d.commands import LARGEST, LARGEST_CORRELATION, Answer, Call, Parameters, failed, ok
 from lfs10d.kinds import Whole
-
-if TYPE_CHECKING:
-    from lfs10d.commands import Answer
 
 NOW = 1000.0
 DAY = 86_400.0

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
 from lfs10d import assembly, profiles
 from lfs10d.budget import timing_of
-from lfs10d.configfile import load
+from lfs10d.configfile import Loaded, load
 from lfs10d.modbus.frames import Checksum, Framing
 from lfs10d.modbus.settings import PortSettings, Rs485
-
-if TYPE_CHECKING:
-    from lfs10d.configfile import Loaded
 
 FILE = """
 line:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
@@ -12,9 +13,6 @@ from lfs10d.config import Config, SlaveConfig
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.schema import Profile
 from lfs10d.resolution import resolved
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 VALUES = [
     {"name": name, "register": register, "type": "uint16", "unit": "1"} for name, register in (("a", 1), ("b", 0x900))

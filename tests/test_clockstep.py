@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import pytest
 
+from lfs10d.clock import ClockState
 from lfs10d.clockstep import STEP_MS, corrects, stepped
-
-if TYPE_CHECKING:
-    from lfs10d.clock import ClockState
 
 
 @pytest.mark.parametrize(("by", "set_"), [(0, 0), (300, 0), (STEP_MS - 1, 0), (STEP_MS, 1), (400 * 86_400_000, 1)])

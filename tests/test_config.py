@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, get_args
+from collections.abc import Iterator
+from typing import Any, get_args
 
 import pytest
 from hypothesis import given
@@ -12,9 +13,6 @@ from pydantic import BaseModel, ValidationError
 
 from lfs10d.config import Config, MqttConfig, default_line_name, device_name
 from lfs10d.kinds import Duration, Kind, Name, RefusedError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 SMALL: dict[str, Any] = {"line": {"port": "/dev/x"}, "slaves": [2, 3, 4], "mqtt": {"host": "localhost"}}
 

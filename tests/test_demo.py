@@ -16,13 +16,11 @@ import termios
 import threading
 import time
 import uuid
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import pytest
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 PATIENCE = 60.0
 """Seconds after which something awaited counts as not happening: three interpreters start, on any machine."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -14,9 +15,6 @@ from lfs10d.changes import Changes, DeviceChange, Place, Rate, Verified
 from lfs10d.configfile import Loaded, load
 from lfs10d.coreschema import render
 from lfs10d.effective import effective, merged_data, said
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 TEXT = """\
 line: {port: /dev/x}

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING
+from collections.abc import Coroutine
 
 from lfs10d.inquiries import Inquiries, Inquiry, altered
 from lfs10d.reading import Fault, FaultCode, Reading
 from lfs10d.telemetry import Kind, Publication, retained
-
-if TYPE_CHECKING:
-    from collections.abc import Coroutine
 
 SAMPLE = {"device": "a", "wind_speed": 7.5}
 PUBLISHED = [

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from lfs10d.configfile import load
 from lfs10d.line import Line
 from lfs10d.linethread import WAKING, WAKING_REALTIME
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 @pytest.mark.parametrize(("refusal", "awake"), [(None, WAKING_REALTIME), ("not permitted", WAKING)])

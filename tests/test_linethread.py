@@ -6,8 +6,8 @@ import os
 import threading
 import time
 import tty
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -22,9 +22,6 @@ from lfs10d.profiles.library import load_profile
 from lfs10d.reading import Event, PortChanged, Reading
 from lfs10d.roster import DeviceSpec, PollRules
 from lfs10d.schedule import Schedule
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 PATIENCE = 10.0
 """Seconds after which something awaited counts as not happening."""

@@ -10,8 +10,9 @@ import re
 import sys
 import threading
 import warnings
+from collections.abc import Iterator
 from contextlib import suppress
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -29,10 +30,6 @@ from lfs10d.logs import (
     shortened,
     style_of,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
 
 WHEN = 1_795_298_022.003
 """2026-11-21T21:53:42.003Z."""

@@ -5,16 +5,13 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import click
 import pytest
 
 from lfs10d import __main__
 from lfs10d.cli import outcome
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 SLOW = ("traceback", "click", "lfs10d.cli", "lfs10d.errors", "pydantic")
 

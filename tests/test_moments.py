@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import time
-from typing import TYPE_CHECKING
 
 import pytest
 
 from lfs10d import clock
+from lfs10d.clock import ClockState
 from lfs10d.moments import Moments
-
-if TYPE_CHECKING:
-    from lfs10d.clock import ClockState
 
 
 def nothing() -> None:

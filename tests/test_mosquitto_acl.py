@@ -5,18 +5,14 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
 from lfs10d.outbound import OUTBOUND
 from lfs10d.requests.table import REQUESTS
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from tests.conftest import Listener, Mosquitto
+from tests.conftest import Listener, Mosquitto
 
 pytestmark = pytest.mark.needs("mosquitto", "mosquitto_passwd")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -13,9 +13,6 @@ from lfs10d.changes import Changes, DeviceChange, Place, Rate, Verified
 from lfs10d.configfile import load
 from lfs10d.effective import Effective, effective
 from lfs10d.recollection import LARGEST, Recollection, Settled, recollect, remembering, topics
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 TEXT = """\
 line: {port: x}

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from lfs10d.configfile import load
 from lfs10d.errors import ConfigError
 from lfs10d.reload import Files, Plan, imprint, plan, read
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 BEFORE = """
 line: {port: /dev/ttyUSB0}

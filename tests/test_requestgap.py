@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from math import inf
-from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from lfs10d.requestgap import AWAKE, HELPED, LONG_PAUSE, STEPS, RequestGap
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 
 class Line:

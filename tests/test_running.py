@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Coroutine
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
@@ -12,17 +13,13 @@ from lfs10d.changefile import FILE_NAME, ChangeFile
 from lfs10d.changes import Changes, Place
 from lfs10d.configfile import load
 from lfs10d.disk import Disk
+from lfs10d.effective import Effective
 from lfs10d.errors import ConfigError, StateError
 from lfs10d.forgetful import ForgetfulFiles, PowerCutError
+from lfs10d.reload import Plan
+from lfs10d.requests.request import Edit
 from lfs10d.running import News, Running
 from lfs10d.threeway import Dropped
-
-if TYPE_CHECKING:
-    from collections.abc import Coroutine
-
-    from lfs10d.effective import Effective
-    from lfs10d.reload import Plan
-    from lfs10d.requests.request import Edit
 
 STATE = Path("/state")
 TEXT = "line: {port: x}\nslaves: [{id: 2, interval: 1s}, 3]\n"

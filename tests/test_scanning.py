@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 from lfs10d import scanning
 from lfs10d.assembly import search
 from lfs10d.configfile import load
+from lfs10d.jobs.scan import Scan
 from lfs10d.modbus.bus import Bus, LineRules
 from lfs10d.modbus.settings import PortSettings
 from lfs10d.poller import Poller
+from lfs10d.reading import Event
 from lfs10d.scanning import Scanning
 from lfs10d.schedule import Schedule
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.port import SimulatedPort, VirtualClock, run
 from lfs10d.simulator.sensor import Sensor
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
-
-    from lfs10d.jobs.scan import Scan
-    from lfs10d.reading import Event
 
 IDS = tuple(range(1, 41))
 

@@ -5,21 +5,17 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
+from collections.abc import Coroutine
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import pytest
 
 from lfs10d.admission import BURST, Form
-from lfs10d.commands import LARGEST, LARGEST_CORRELATION, Answer, NoParameters, Parameters, ok
+from lfs10d.commands import LARGEST, LARGEST_CORRELATION, Answer, Call, NoParameters, Parameters, ok
 from lfs10d.mqtt.inbound import InboundRequest
 from lfs10d.requests.request import Powers, Request
 from lfs10d.service import Service
-
-if TYPE_CHECKING:
-    from collections.abc import Coroutine
-
-    from lfs10d.commands import Call
 
 
 class Text(Parameters):

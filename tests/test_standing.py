@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import pytest
 
 from lfs10d.facts import DeviceFacts, Instant
 from lfs10d.reading import AnsweredTwice, Fault, FaultCode, Reading
 from lfs10d.standing import STATE_EARLY, Standing
-from lfs10d.telemetry import STATE, Kind
+from lfs10d.telemetry import STATE, Kind, Publication
 from tests.stations import ONE_VALUE
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from lfs10d.telemetry import Publication
 
 FACTS = replace(ONE_VALUE, slave=3, label="Mast", interval=0.25)
 TIMEOUT = Fault(FaultCode.TIMEOUT, "no answer in 200 ms")

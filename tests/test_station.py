@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import pytest
 
 from lfs10d.outbound import outbound
 from lfs10d.reading import Errand, Exchanged, FaultCode, PortChanged, UartCounted, UartCounters
 from lfs10d.station import Instant, Station
-from lfs10d.telemetry import Backlog, Kind
+from lfs10d.telemetry import Backlog, Kind, Payload
 from tests.stations import (
     DAEMON,
     LINE,
@@ -32,11 +33,6 @@ from tests.stations import (
     station,
     topics,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from lfs10d.telemetry import Payload
 
 # -- the burst ----------------------------------------------------------------------------------------------------
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -12,12 +13,8 @@ from hypothesis import strategies as st
 from lfs10d.outbound import check
 from lfs10d.reading import Errand, Exchanged, Fault, FaultCode, PortChanged, Reading
 from lfs10d.station import DeviceFacts, Instant, Station
+from lfs10d.telemetry import Clock, Payload, Publication
 from tests.stations import DAEMON, LINE, LOCKED, LOST, ONE_VALUE, THIRD, TWO_VALUES, fields, good, instant
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from lfs10d.telemetry import Clock, Payload, Publication
 
 FLEET = (ONE_VALUE, TWO_VALUES, THIRD)
 FAULTS = [Fault(code, "why", 6 if code is FaultCode.EXCEPTION else None, b"\x01\xff") for code in FaultCode] + [

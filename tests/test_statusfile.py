@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import json
 import os
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from lfs10d.statusfile import StatusFile
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 STATUS = {"v": 1, "line": {"name": "line0", "open": True}, "devices": [{"name": "a"}, {"name": "b"}], "none": []}
 

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from lfs10d import storage as module
 from lfs10d.storage import Storage
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 @pytest.fixture

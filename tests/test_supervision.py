@@ -6,7 +6,8 @@ import asyncio
 import json
 import logging
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
@@ -14,10 +15,6 @@ from lfs10d.statusfile import StatusFile
 from lfs10d.supervision import Supervision
 from lfs10d.systemd import Notifier
 from lfs10d.watchdog import GRACE
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
 
 
 class Told(Notifier):

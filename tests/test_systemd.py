@@ -8,17 +8,14 @@ import subprocess
 import sys
 import time
 import tomllib
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from lfs10d.systemd import Notifier, notify_address, watchdog_seconds
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 
 class Manager:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 import pytest
 from hypothesis import given
@@ -12,9 +13,6 @@ from hypothesis import strategies as st
 from lfs10d.reading import Errand, Exchanged, Fault, FaultCode, Reading, UartCounters
 from lfs10d.tally import DeviceTally, LineTally, percentile, scaled
 from lfs10d.telemetry import Backlog
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 START = 1000.0
 TIMEOUT = Fault(FaultCode.TIMEOUT, "")

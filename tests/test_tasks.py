@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING
+
+import pytest
 
 from lfs10d.tasks import BackgroundTasks
-
-if TYPE_CHECKING:
-    import pytest
 
 
 async def broken() -> None:

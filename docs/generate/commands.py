@@ -8,17 +8,15 @@ from __future__ import annotations
 
 import json
 import shlex
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, get_args
+from typing import Any, Final, get_args
 
 from docs.generate.markdown import example, table
 from docs.generate.meanings import ADVICE, ERROR_CODES
 from lfs10d.commands import ErrorCode
 from lfs10d.requests.table import REQUESTS
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
 
 RECORDED: Final = Path(__file__).with_name("recorded.json")
 

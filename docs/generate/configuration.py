@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator, Mapping
 from types import UnionType
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, Union, get_args, get_origin
+from typing import Annotated, Any, TypeAlias, Union, get_args, get_origin
 
 from pydantic import BaseModel
+from pydantic.fields import FieldInfo
 
 from docs.generate.markdown import plain
 from lfs10d.config import LATER_SECTIONS, Config
@@ -14,11 +16,6 @@ from lfs10d.difference import RESTART_KEYS
 from lfs10d.kinds import Duration, Kind, Size
 from lfs10d.profiles.library import builtin_names
 from lfs10d.quantities import duration_text, size_text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from pydantic.fields import FieldInfo
 
 Model: TypeAlias = type[BaseModel]
 

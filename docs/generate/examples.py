@@ -6,8 +6,9 @@ a fixed moment, so the page is the same each time.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from lfs10d import telemetry
 from lfs10d.commands import Call, ok, rejected
@@ -18,9 +19,6 @@ from lfs10d.payloads import Trace
 from lfs10d.reading import Errand, Exchanged, Fault, FaultCode, PortChanged, Reading, UartCounted, UartCounters
 from lfs10d.station import Station
 from lfs10d.telemetry import Backlog, Publication, Sample
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 LINE: Final = "line0"
 BOOT: Final = "k3f9a2c7"

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import inspect
 import json
-from typing import TYPE_CHECKING, Any, get_args, get_origin
+from collections.abc import Iterator, Mapping
+from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel, TypeAdapter
+from pydantic.fields import FieldInfo
 
 from docs.generate.configuration import kind_of, kinds_within, written
 from docs.generate.examples import Story, events, responses, trace
@@ -14,18 +16,11 @@ from docs.generate.markdown import example, plain, table
 from docs.generate.meanings import ERROR_CODES, FAULT_CODES
 from docs.generate.uplink import bytes_table
 from lfs10d.commands import ErrorCode
-from lfs10d.outbound import OUTBOUND
+from lfs10d.outbound import OUTBOUND, Outbound
 from lfs10d.payloads import Availability
 from lfs10d.reading import FaultCode
+from lfs10d.requests.request import Request
 from lfs10d.requests.table import REQUESTS
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from pydantic.fields import FieldInfo
-
-    from lfs10d.outbound import Outbound
-    from lfs10d.requests.request import Request
 
 SHOWN_BEFORE = {"device/+/telemetry": "device/+/state", "device/+/history": "device/+/state"}
 SHOWN_BEFORE |= {"device/+/error": "line/error", "response/+": "response/+/+"}

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from docs.generate import architecture, commands, configuration, mqtt
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
 
 FOLDER = Path(__file__).resolve().parent.parent
 TEMPLATES = Path(__file__).resolve().parent / "templates"

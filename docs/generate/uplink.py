@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from docs.generate.markdown import table
 from lfs10d.facts import DaemonFacts, DeviceFacts, Instant, LineFacts
@@ -11,12 +11,7 @@ from lfs10d.mqtt.encoding import encode, packet_size
 from lfs10d.mqtt.settings import Version
 from lfs10d.reading import Reading
 from lfs10d.station import Station
-from lfs10d.telemetry import Kind
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from lfs10d.telemetry import Publication
+from lfs10d.telemetry import Kind, Publication
 
 DAY = 86_400
 MEASURED = 120

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from lfs10d import __version__, startup
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 EXIT_FAILED = 1
 EXIT_USAGE = 2

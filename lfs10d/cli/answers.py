@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping
+from datetime import tzinfo
+from typing import Any
 
 from lfs10d.cli.local_time import stamp
 from lfs10d.logs import escape
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-    from datetime import tzinfo
 
 INDENT = "  "
 SAMPLE = frozenset({"device", "seq", "quality", "error"})

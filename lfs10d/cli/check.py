@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import socket
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import click
 
@@ -16,10 +18,6 @@ from lfs10d.configfile import Loaded, load
 from lfs10d.errors import ConfigError, Problem
 from lfs10d.logs import escape
 from lfs10d.quantities import duration_text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
 
 EXAMPLES = """\b
 Examples:

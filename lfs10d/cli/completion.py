@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import click
+from click.shell_completion import CompletionItem
 
 from lfs10d.profiles.library import builtin_names
-
-if TYPE_CHECKING:
-    from click.shell_completion import CompletionItem
 
 PORT = click.Path(readable=False)
 """Any path, completed as one; whether it can be opened is told in our words."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import os
 import stat
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -27,9 +28,6 @@ from lfs10d.kinds import Duration, Size
 from lfs10d.logs import escape
 from lfs10d.quantities import duration_text, size_text
 from lfs10d.statedir import state_directory
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 DENIED = "permission denied"
 """What the system says of a directory that is not for us, in the words of `lfs10d.credentials.reason`."""

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from lfs10d.cli.lineoptions import LineOptions
+from lfs10d.jobs.interview import Finding
 from lfs10d.modbus.frames import EXCEPTION_NAMES, Framing
 from lfs10d.quantities import duration_text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
-    from lfs10d.cli.lineoptions import LineOptions
-    from lfs10d.jobs.interview import Finding
 
 HEAD = ("id", "baud", "answers in", "what it is", "remark")
 RIGHT = (0, 1, 2)

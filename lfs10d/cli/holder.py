@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from lfs10d.configfile import load
 from lfs10d.errors import ConfigError
 from lfs10d.logs import escape
 from lfs10d.modbus.claim import PROC, Holder, holder
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 DAEMON = "lfs10d"
 SERVICE_FILE = "/etc/lfs10d/lfs10d.yaml"

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import json
 import re
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator
+from typing import Any
 
 from pydantic import ValidationError
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from lfs10d.commands import Parameters
+from lfs10d.commands import Parameters
 
 IDS = ("id", "transaction")
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -11,9 +12,6 @@ from lfs10d.modbus.frames import Framing
 from lfs10d.modbus.settings import BAUDRATES, PARITIES, PortSettings
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.quantities import seconds
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection
 
 TIMEOUTS = (0.01, 10.0)
 """The shortest and the longest time-out that can be asked for, in s."""

@@ -7,14 +7,12 @@ Ages are by the daemon's clock: how far it is off ours is learned from samples a
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import isfinite
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from lfs10d.cli.answers import BESIDES
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
 
 MOVES_WITHIN: Final = 3.0
 """s in which a value's movement is looked at: a turn of the hand."""

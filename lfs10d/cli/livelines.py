@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping
+from datetime import tzinfo
+from typing import Any
 
-from lfs10d.cli.live import Live
+from lfs10d.cli.live import Device, Live
 from lfs10d.cli.livetable import Line, Row, Source, header, rows, table
 from lfs10d.cli.local_time import stamp, zone_name
 from lfs10d.telemetry import iso_time
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-    from datetime import tzinfo
-
-    from lfs10d.cli.live import Device
 
 WIDE = 10_000
 """Columns: a line in a pipe is never wrapped."""

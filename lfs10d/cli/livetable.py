@@ -5,17 +5,14 @@ A line is a tuple of pieces, each a text and its style in rich's words ("" is pl
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, TypeAlias
+from datetime import tzinfo
+from typing import Final, TypeAlias
 
+from lfs10d.cli.live import Device, Live
 from lfs10d.cli.local_time import since_text, zone_name
 from lfs10d.logs import escape
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
-    from datetime import tzinfo
-
-    from lfs10d.cli.live import Device, Live
 
 Piece: TypeAlias = tuple[str, str]
 Line: TypeAlias = tuple[Piece, ...]

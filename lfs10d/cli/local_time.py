@@ -6,11 +6,7 @@ shown as dashes.
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from datetime import tzinfo
+from datetime import UTC, datetime, tzinfo
 
 NO_CLOCK = "--:--:--.---"
 

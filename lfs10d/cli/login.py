@@ -4,27 +4,21 @@ from __future__ import annotations
 
 import logging
 import secrets
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import click
 
-from lfs10d.configfile import load
+from lfs10d.config import Config
+from lfs10d.configfile import Loaded, load
 from lfs10d.credentials import UnreadableError, password_in, service_password
 from lfs10d.errors import ConfigError
 from lfs10d.mqtt.settings import BrokerSettings
 from lfs10d.mqtt.topics import Topics
-from lfs10d.secret import leave_no_core
+from lfs10d.secret import Secret, leave_no_core
 from lfs10d.statedir import service_unit
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from lfs10d.config import Config
-    from lfs10d.configfile import Loaded
-    from lfs10d.secret import Secret
-
 
 DENIED: Final = "permission denied"
 """What the system says of a file that is not for us, in the words of `lfs10d.credentials.reason`."""

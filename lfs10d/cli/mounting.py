@@ -13,14 +13,11 @@ Rules
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from lfs10d.logs import escape
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
 
 AGAIN: Final = 1.0
 """s until it is looked for again."""

@@ -7,17 +7,14 @@ import io
 import os
 import sys
 import traceback
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from lfs10d import startup
 from lfs10d.cli import EXIT_CONFIG, EXIT_FAILED, EXIT_UNAVAILABLE, lfs10d
 from lfs10d.errors import BrokerError, ConfigError, Lfs10dError, PortError
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 STANDARD_ERROR = 2
 TRACEBACK = "LFS10D_TRACEBACK"

@@ -4,24 +4,21 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Iterable
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING, Self, TypeAlias
+from typing import Self, TypeAlias
 
 from lfs10d.errors import PortBusyError, PortLostError
+from lfs10d.jobs.job import Job
 from lfs10d.linethread import LineThread
 from lfs10d.modbus.bus import Bus, LineRules
 from lfs10d.modbus.port import SerialPort
 from lfs10d.modbus.realtime import sharpen_timers
+from lfs10d.modbus.settings import PortSettings
 from lfs10d.poller import Poller
 from lfs10d.reading import Event, FaultCode, PortChanged, UartCounters
+from lfs10d.roster import DeviceSpec, PollRules
 from lfs10d.schedule import Schedule
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from lfs10d.jobs.job import Job
-    from lfs10d.modbus.settings import PortSettings
-    from lfs10d.roster import DeviceSpec, PollRules
 
 SWITCH_INTERVAL = 1e-4
 """Seconds the interpreter lets one thread run on, so that drawing does not delay the line."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import click
 
@@ -15,12 +16,8 @@ from lfs10d.cli.columns import columns
 from lfs10d.cli.completion import profile_names
 from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.profiles.registers import span
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from lfs10d.profiles.schema import Profile
-    from lfs10d.profiles.values import Fact, Setting, Value
+from lfs10d.profiles.schema import Profile
+from lfs10d.profiles.values import Fact, Setting, Value
 
 Row: TypeAlias = tuple[str, ...]
 

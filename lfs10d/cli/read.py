@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import sys
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -20,14 +21,10 @@ from lfs10d.cli.ownline import OwnLine
 from lfs10d.errors import PortBusyError
 from lfs10d.modbus.frames import Checksum, Codec, describe
 from lfs10d.profiles.library import load_profile
+from lfs10d.profiles.schema import Profile
 from lfs10d.quantities import duration_text, seconds
 from lfs10d.reading import ALIVE_CODES, Exchanged, Fault, FaultCode, Reading, UartCounters
 from lfs10d.roster import DeviceSpec, PollRules
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from lfs10d.profiles.schema import Profile
 
 ATTEMPTS = 3
 """So many polls are tried, with 200, 400, 1000 ms of patience (`lfs10d.roster.FIRST_TIMEOUTS`)."""

@@ -6,22 +6,18 @@ import asyncio
 import contextlib
 import json
 import secrets
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Sequence
+from typing import Any, Final
 
 import click
 
 from lfs10d.cli import EXIT_FAILED
 from lfs10d.cli.columns import columns
-from lfs10d.cli.mounting import FIRST, NEXT
+from lfs10d.cli.login import Login
+from lfs10d.cli.mounting import FIRST, NEXT, Adopted, Mounting
 from lfs10d.cli.spinner import spinning
 from lfs10d.cli.visitor import Visitor
 from lfs10d.errors import BrokerError, FailedError
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from lfs10d.cli.login import Login
-    from lfs10d.cli.mounting import Adopted, Mounting
 
 ADOPT: Final = "line/adopt"
 HEALTH_WITHIN: Final = 10.0

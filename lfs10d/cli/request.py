@@ -5,11 +5,13 @@ from __future__ import annotations
 import asyncio
 import json
 import secrets
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from lfs10d.cli import EXIT_FAILED, config_option, interruptible, json_option, request_words
 from lfs10d.cli.answers import told, verdict
@@ -31,11 +33,6 @@ from lfs10d.profiles.library import builtin_names
 from lfs10d.quantities import duration_text, seconds
 from lfs10d.requests.table import REQUESTS
 from lfs10d.telemetry import DEVICES
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from click.shell_completion import CompletionItem
 
 USUAL_TIMEOUT = 10.0
 """Seconds after which the response no longer comes."""

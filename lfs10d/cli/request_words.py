@@ -5,17 +5,15 @@ from __future__ import annotations
 import inspect
 import json
 import textwrap
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Final, get_args, get_origin
+from typing import Annotated, Any, Final, get_args, get_origin
+
+from pydantic.fields import FieldInfo
 
 from lfs10d.kinds import Choice, Duration, Flag, Kind
 from lfs10d.quantities import duration_text
 from lfs10d.requests.table import REQUESTS
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Mapping, Sequence
-
-    from pydantic.fields import FieldInfo
 
 WIDTH: Final = 79
 """Columns of a line, so that none is broken on a terminal of 80."""

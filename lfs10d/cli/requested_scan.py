@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import secrets
 import sys
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Protocol
@@ -14,23 +15,19 @@ import click
 from lfs10d.cli import EXIT_FAILED, findings
 from lfs10d.cli.answers import told, verdict
 from lfs10d.cli.json_text import json_text
+from lfs10d.cli.login import Login
 from lfs10d.cli.scan import show_table
 from lfs10d.cli.scanview import TELL_EVERY, progress_bar, span
 from lfs10d.cli.visitor import Visitor, parsed
 from lfs10d.errors import FailedError
 from lfs10d.logs import escape
-from lfs10d.mqtt.messages import Filter
+from lfs10d.mqtt.messages import Filter, Incoming
 from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.quantities import duration_text
 from lfs10d.telemetry import EVENT
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
     from rich.progress import Progress as Bar
-
-    from lfs10d.cli.login import Login
-    from lfs10d.mqtt.messages import Incoming
 
 SCAN: Final = "line/scan"
 CANCEL: Final = "line/cancel"

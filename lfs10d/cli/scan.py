@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -23,9 +24,6 @@ from lfs10d.jobs.search import FIRST_TIMEOUT, Search, ids_of
 from lfs10d.modbus.frames import Checksum, Codec, Framing
 from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.reading import FaultCode
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 LOOK_EVERY = 0.1
 """How often the progress is drawn, in s."""

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Protocol
 
 import click
 
 from lfs10d.cli import findings
+from lfs10d.jobs.interview import Finding
+from lfs10d.jobs.scan import Scan
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from rich.progress import Progress as Bar
-
-    from lfs10d.jobs.interview import Finding
-    from lfs10d.jobs.scan import Scan
 
 TELL_EVERY = 10.0
 """Percent between two lines where no bar can be drawn."""

@@ -8,7 +8,7 @@ import signal
 import threading
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -18,12 +18,10 @@ from lfs10d.profiles.library import load_profile
 from lfs10d.quantities import seconds
 from lfs10d.simulator.build import Plan, build, slave_ids
 from lfs10d.simulator.faultfile import BAUDRATES, FaultFile, load_faults
+from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.registers import LFS10, blueprint_of
 from lfs10d.simulator.wire import SECOND, Format, Framing, Parity
-
-if TYPE_CHECKING:
-    from lfs10d.simulator.line import SimulatedLine
 
 EXAMPLES = """\b
 Examples:

@@ -6,11 +6,9 @@ import asyncio
 import contextlib
 import os
 import sys
+from collections.abc import AsyncIterator
 from itertools import cycle
-from typing import TYPE_CHECKING, Final
-
-if TYPE_CHECKING:
-    from collections.abc import AsyncIterator
+from typing import Final
 
 AFTER: Final = 0.3
 """s after which a person wants to see that something is going on."""

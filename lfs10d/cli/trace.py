@@ -9,7 +9,10 @@ import shutil
 import sys
 import textwrap
 from collections import deque
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Mapping
+from datetime import tzinfo
+from pathlib import Path
+from typing import Any, Final
 
 import click
 
@@ -23,16 +26,9 @@ from lfs10d.cli.spinner import spinning
 from lfs10d.cli.visitor import Visitor, parsed
 from lfs10d.errors import BrokerError, FailedError
 from lfs10d.logs import escape
-from lfs10d.mqtt.messages import Filter
+from lfs10d.mqtt.messages import Filter, Incoming
 from lfs10d.quantities import duration_text, seconds
 from lfs10d.requests.line import LONGEST, USUAL
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from datetime import tzinfo
-    from pathlib import Path
-
-    from lfs10d.mqtt.messages import Incoming
 
 ANSWERS_WITHIN: Final = 10.0
 LAST_FRAMES: Final = 0.5

@@ -8,20 +8,15 @@ from __future__ import annotations
 import asyncio
 import json
 import secrets
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable, Iterable
+from typing import Any, Final
 
+from lfs10d.cli.login import Login
 from lfs10d.errors import BrokerError, FailedError
-from lfs10d.mqtt.endings import REFUSED_FROM, reason_in_words
+from lfs10d.mqtt.endings import REFUSED_FROM, Ended, reason_in_words
 from lfs10d.mqtt.link import Link
-from lfs10d.mqtt.messages import Filter
+from lfs10d.mqtt.messages import Accepted, Filter, Incoming
 from lfs10d.mqtt.topics import OFFLINE, ONLINE
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-
-    from lfs10d.cli.login import Login
-    from lfs10d.mqtt.endings import Ended
-    from lfs10d.mqtt.messages import Accepted, Incoming
 
 CONNECTS_WITHIN: Final = 15.0
 """s for the broker to accept us: one that does not know MQTT 5 and says nothing costs 5 of them."""

@@ -7,7 +7,9 @@ import contextlib
 import os
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import click
@@ -22,17 +24,12 @@ from lfs10d.cli.login import Login, login, login_options
 from lfs10d.cli.spinner import spinning
 from lfs10d.cli.visitor import RETAINED_WITHIN, Visitor, parsed
 from lfs10d.errors import BrokerError, FailedError
-from lfs10d.mqtt.messages import Filter
+from lfs10d.mqtt.messages import Filter, Incoming
 from lfs10d.regularfile import read_regular
 from lfs10d.statedir import status_places
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
     from rich.live import Live as Screen
-
-    from lfs10d.mqtt.messages import Incoming
 
 EVERY: Final = 0.5
 """s between two looks: fast enough for a hand at a cup."""

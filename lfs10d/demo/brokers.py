@@ -6,19 +6,15 @@ import importlib.util
 import os
 import shutil
 import socket
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-from lfs10d.demo.children import PYTHON
+from lfs10d.demo.children import PYTHON, Children
 from lfs10d.errors import FailedError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from lfs10d.demo.children import Children
 
 LOOPBACK: Final = "127.0.0.1"
 USUAL_PORT: Final = 1883

@@ -14,16 +14,14 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from lfs10d.demo import leash
 from lfs10d.errors import FailedError
 from lfs10d.logs import escape
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 LOOK_AGAIN: Final = 0.02
 START_WITHIN: Final = 20.0

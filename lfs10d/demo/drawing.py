@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, Self
+from collections.abc import Iterable, Iterator
+from typing import Final, Self
 
 from rich import box
 from rich.console import Console, Group
@@ -11,12 +12,8 @@ from rich.table import Table
 from rich.text import Text
 
 from lfs10d.demo import wording
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from lfs10d.demo.brokers import Broker
-    from lfs10d.demo.picture import Picture, Row
+from lfs10d.demo.brokers import Broker
+from lfs10d.demo.picture import Picture, Row
 
 LEAST_WIDTH: Final = 80
 LEAST_HEIGHT: Final = 20

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Final, Self
+from collections.abc import Iterator
+from typing import Final, Self
 
 import click
 
 from lfs10d.demo import wording
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from lfs10d.demo.brokers import Broker
-    from lfs10d.demo.picture import Picture, Row
+from lfs10d.demo.brokers import Broker
+from lfs10d.demo.picture import Picture, Row
 
 COLUMN: Final = 9
 """With eight sensors and the time a line has 80 characters."""

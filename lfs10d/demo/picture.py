@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import json
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
-from lfs10d.demo.cast import CAST
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from lfs10d.demo.cast import Role
+from lfs10d.demo.cast import CAST, Role
 
 KEPT: Final = 60
 """Samples of the trend."""

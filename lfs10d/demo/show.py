@@ -8,8 +8,9 @@ import select
 import signal
 import sys
 import time
+from collections.abc import Coroutine
 from contextlib import AbstractContextManager, suppress
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import Final, Protocol
 
 import click
 
@@ -21,14 +22,10 @@ from lfs10d.demo.lines import LinesView
 from lfs10d.demo.picture import TOPICS, Picture
 from lfs10d.errors import FailedError
 from lfs10d.mqtt.connection import Connection
+from lfs10d.mqtt.endings import Ended
 from lfs10d.mqtt.messages import Accepted, Filter, Incoming
 from lfs10d.mqtt.settings import BrokerSettings, Version
 from lfs10d.mqtt.topics import Topics
-
-if TYPE_CHECKING:
-    from collections.abc import Coroutine
-
-    from lfs10d.mqtt.endings import Ended
 
 STANDARD_OUTPUT: Final = 1
 

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from collections.abc import Iterator, Sequence
+from typing import Final
 
-from lfs10d.demo.cast import BASE_TOPIC, BAUDRATE
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from lfs10d.demo.brokers import Broker
-    from lfs10d.demo.cast import Role
-    from lfs10d.demo.picture import LineFigures, Picture
+from lfs10d.demo.brokers import Broker
+from lfs10d.demo.cast import BASE_TOPIC, BAUDRATE, Role
+from lfs10d.demo.picture import LineFigures, Picture
 
 SUBJECT: Final = f"eight LFS10 wind sensors on a simulated RS485 line, {BAUDRATE} baud"
 FAREWELL: Final = "Ctrl-C ends it and leaves nothing behind."

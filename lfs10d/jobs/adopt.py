@@ -14,11 +14,13 @@ Rules
 
 from __future__ import annotations
 
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from lfs10d.jobs.asking import Asking
 from lfs10d.jobs.baudrate import Sensor, restored, shifted
-from lfs10d.jobs.course import Aside, LineLostError
+from lfs10d.jobs.course import Aside, LineLostError, Step
 from lfs10d.jobs.readdress import (
     ECHO_READS,
     Ending,
@@ -34,12 +36,6 @@ from lfs10d.jobs.readdress import (
 )
 from lfs10d.jobs.recognition import recognised
 from lfs10d.journal import Spot
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Generator
-
-    from lfs10d.jobs.asking import Asking
-    from lfs10d.jobs.course import Step
 
 
 @dataclass(frozen=True, slots=True)

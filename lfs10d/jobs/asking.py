@@ -11,24 +11,19 @@ Rules
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
+from lfs10d.jobs.course import Now, Step
 from lfs10d.jobs.interview import shortest_answer, strangers
 from lfs10d.jobs.job import Ask, Hold
-from lfs10d.modbus.frames import NOT_FINAL, ReadRegisters
+from lfs10d.journal import Spot
+from lfs10d.modbus.exchange import Outcome
+from lfs10d.modbus.frames import NOT_FINAL, Codec, ReadRegisters
+from lfs10d.modbus.unanswered import Unanswered
+from lfs10d.profiles.blocks import Block
+from lfs10d.profiles.schema import Profile
 from lfs10d.reading import FaultCode
-
-if TYPE_CHECKING:
-    from collections.abc import Generator
-
-    from lfs10d.jobs.course import Now, Step
-    from lfs10d.journal import Spot
-    from lfs10d.modbus.exchange import Outcome
-    from lfs10d.modbus.frames import Codec
-    from lfs10d.modbus.unanswered import Unanswered
-    from lfs10d.profiles.blocks import Block
-    from lfs10d.profiles.schema import Profile
 
 QUICK = 0.2
 """How long a sensor is usually waited for, in s."""

@@ -15,21 +15,16 @@ Rules
 
 from __future__ import annotations
 
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from lfs10d.jobs.asking import PATIENT
-from lfs10d.jobs.course import Aside, LineLostError
+from lfs10d.jobs.asking import PATIENT, Asking
+from lfs10d.jobs.course import Aside, LineLostError, Step
 from lfs10d.jobs.job import Hold
 from lfs10d.jobs.readdress import ECHO_READS, TRIES, VERIFY, present, verified, written
 from lfs10d.journal import Spot
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Mapping, Sequence
-
-    from lfs10d.jobs.asking import Asking
-    from lfs10d.jobs.course import Step
 
 ROLL_BACK = 60.0
 """How long sensors are moved back, in s."""

@@ -8,17 +8,14 @@ until the configuration says who has them. Where the port is lost `LineLostError
 
 from __future__ import annotations
 
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from math import inf
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 from lfs10d.jobs.job import Again, Ask, Done, Hold, Later, Next
+from lfs10d.modbus.exchange import Outcome
 from lfs10d.reading import Errand
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Generator
-
-    from lfs10d.modbus.exchange import Outcome
 
 SLICE = 0.25
 """The longest stay at another rate than the line's, in s; one question may take longer."""

@@ -14,19 +14,15 @@ Rules
 
 from __future__ import annotations
 
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
-from lfs10d.modbus.frames import READ_HOLDING_REGISTERS, ReadRegisters
+from lfs10d.modbus.exchange import Outcome
+from lfs10d.modbus.frames import READ_HOLDING_REGISTERS, Codec, ReadRegisters
+from lfs10d.profiles.blocks import Block
+from lfs10d.profiles.schema import Profile
 from lfs10d.reading import Fault, FaultCode, Number
-
-if TYPE_CHECKING:
-    from collections.abc import Generator, Mapping, Sequence
-
-    from lfs10d.modbus.exchange import Outcome
-    from lfs10d.modbus.frames import Codec
-    from lfs10d.profiles.blocks import Block
-    from lfs10d.profiles.schema import Profile
 
 TRIES = 5
 """How often a read is asked once something spoilt it."""

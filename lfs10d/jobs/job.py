@@ -7,12 +7,11 @@ outcome of what it asked; between the two and after them others may have had the
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, TypeAlias
+from typing import Protocol, TypeAlias
 
-if TYPE_CHECKING:
-    from lfs10d.modbus.exchange import Outcome
-    from lfs10d.modbus.frames import Codec, Request
-    from lfs10d.reading import Errand
+from lfs10d.modbus.exchange import Outcome
+from lfs10d.modbus.frames import Codec, Request
+from lfs10d.reading import Errand
 
 
 @dataclass(frozen=True, slots=True)

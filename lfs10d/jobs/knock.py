@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from lfs10d.jobs.interview import first_read, speaks
 from lfs10d.jobs.job import Ask, Done, Later, Next
-from lfs10d.reading import Errand
+from lfs10d.modbus.exchange import Outcome
+from lfs10d.modbus.frames import Codec
+from lfs10d.profiles.schema import Profile
+from lfs10d.reading import Errand, Fault
 from lfs10d.roster import FIRST_TIMEOUTS
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from lfs10d.modbus.exchange import Outcome
-    from lfs10d.modbus.frames import Codec
-    from lfs10d.profiles.schema import Profile
-    from lfs10d.reading import Fault
 
 
 class Knock:

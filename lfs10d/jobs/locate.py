@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Generator, Sequence
+from typing import Any
 
-from lfs10d.jobs.course import Aside
+from lfs10d.jobs.asking import Asking
+from lfs10d.jobs.course import Aside, Step
 from lfs10d.jobs.job import Hold
 from lfs10d.jobs.readdress import present
-
-if TYPE_CHECKING:
-    from collections.abc import Generator, Sequence
-
-    from lfs10d.jobs.asking import Asking
-    from lfs10d.jobs.course import Step
-    from lfs10d.journal import Spot
+from lfs10d.journal import Spot
 
 FIRST_PAUSE = 1.0
 """Between the first look and the first probes, in s; doubled after each."""

@@ -7,19 +7,15 @@ It says what was found and uses nothing of it: a line that speaks at the wrong r
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable, Generator, Iterable
 from math import inf
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
-from lfs10d.jobs.course import Aside
+from lfs10d.jobs.course import Aside, Now, Step
 from lfs10d.jobs.interview import first_read, speaks
 from lfs10d.jobs.job import Ask, Hold
 from lfs10d.probing import PROBE_SPACING
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterable
-
-    from lfs10d.jobs.course import Now, Step
-    from lfs10d.roster import Device
+from lfs10d.roster import Device
 
 LOST_AFTER = 30.0
 """Seconds for which every sensor must be offline."""

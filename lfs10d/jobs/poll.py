@@ -15,22 +15,17 @@ Rules
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 from lfs10d.jobs.job import Ask, Done, Hold, Later, Next
-from lfs10d.modbus.exchange import FAULT_HEARD
+from lfs10d.modbus.exchange import FAULT_HEARD, Outcome
 from lfs10d.modbus.frames import ReadRegisters
+from lfs10d.modbus.unanswered import Unanswered
+from lfs10d.profiles.blocks import Block
 from lfs10d.reading import ALIVE_CODES, Errand, Fault, FaultCode, Number
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from lfs10d.modbus.exchange import Outcome
-    from lfs10d.modbus.unanswered import Unanswered
-    from lfs10d.profiles.blocks import Block
-    from lfs10d.roster import Device
+from lfs10d.roster import Device
 
 WAKES = 3
 """So often within one poll a silence after a pause is taken for sleep."""

@@ -5,17 +5,12 @@ A poll asked for by a request is a job too; it waits while its slave id is anoth
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import inf
-from typing import TYPE_CHECKING
 
+from lfs10d.jobs.job import Account, Hold, Job
 from lfs10d.jobs.poll import Poll
 from lfs10d.share import Share
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from lfs10d.jobs.job import Account, Hold, Job
-
 
 JOB_CREDIT = 0.1
 """Line time in s that a job may take ahead of its share: what it could not use while another spoke is not lost."""

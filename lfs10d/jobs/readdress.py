@@ -28,24 +28,19 @@ silent            silent, garbage                            not_verified, stays
 
 from __future__ import annotations
 
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from lfs10d.jobs.asking import PATIENT, SILENCE, Reply
-from lfs10d.jobs.course import Aside, LineLostError
+from lfs10d.jobs.asking import PATIENT, SILENCE, Asking, Reply
+from lfs10d.jobs.course import Aside, LineLostError, Step
 from lfs10d.jobs.job import Ask, Hold
 from lfs10d.jobs.recognition import one_alone
 from lfs10d.journal import Spot
+from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import WriteRegister
 from lfs10d.reading import FaultCode
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Sequence
-
-    from lfs10d.jobs.asking import Asking
-    from lfs10d.jobs.course import Step
-    from lfs10d.modbus.exchange import Outcome
 
 VERIFY = 5.0
 """How long after the write both places are asked, in s."""

@@ -17,23 +17,18 @@ Rules
 
 from __future__ import annotations
 
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
-from lfs10d.jobs.asking import PATIENT, QUICK, SILENCE
+from lfs10d.jobs.asking import PATIENT, QUICK, SILENCE, Asking, Reply
+from lfs10d.jobs.course import Step
 from lfs10d.jobs.interview import rate_fits
+from lfs10d.journal import Spot
+from lfs10d.modbus.exchange import Outcome
+from lfs10d.profiles.blocks import Block
+from lfs10d.profiles.values import Value
 from lfs10d.reading import Fault
-
-if TYPE_CHECKING:
-    from collections.abc import Generator, Sequence
-
-    from lfs10d.jobs.asking import Asking, Reply
-    from lfs10d.jobs.course import Step
-    from lfs10d.journal import Spot
-    from lfs10d.modbus.exchange import Outcome
-    from lfs10d.profiles.blocks import Block
-    from lfs10d.profiles.values import Value
 
 READS = 3
 """How often a value is read."""

@@ -13,24 +13,19 @@ Rules
 
 from __future__ import annotations
 
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from lfs10d.jobs.job import Ask, Done, Hold, Later, Next
 from lfs10d.jobs.poll import told_busy
-from lfs10d.modbus.frames import ReadRegisters, WriteRegister
-from lfs10d.profiles.schema import BUSY_EXCEPTIONS
+from lfs10d.modbus.exchange import Outcome
+from lfs10d.modbus.frames import Codec, ReadRegisters, Request, WriteRegister
+from lfs10d.modbus.unanswered import Unanswered
+from lfs10d.profiles.schema import BUSY_EXCEPTIONS, Profile
 from lfs10d.reading import Errand, Fault, FaultCode
 from lfs10d.roster import FIRST_TIMEOUTS
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Generator
-
-    from lfs10d.modbus.exchange import Outcome
-    from lfs10d.modbus.frames import Codec, Request
-    from lfs10d.modbus.unanswered import Unanswered
-    from lfs10d.profiles.schema import Profile
 
 BUSY_PAUSE = 0.3
 """A busy slave is left alone for so long, in s; so is one whose register does not hold yet what was written."""

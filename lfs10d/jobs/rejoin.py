@@ -8,20 +8,15 @@ somebody answers at the old rate too there are two of that slave id, and one of 
 
 from __future__ import annotations
 
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lfs10d.jobs.asking import PATIENT
-from lfs10d.jobs.baudrate import FIRST_PAUSE, Ended, RateVerdict, found_at, restored, written_back
-from lfs10d.jobs.course import Aside
+from lfs10d.jobs.baudrate import FIRST_PAUSE, Ended, RateVerdict, Sensor, found_at, restored, written_back
+from lfs10d.jobs.course import Aside, Step
 from lfs10d.jobs.job import Hold
-
-if TYPE_CHECKING:
-    from collections.abc import Generator, Mapping, Sequence
-
-    from lfs10d.jobs.baudrate import Sensor
-    from lfs10d.jobs.course import Step
 
 PATIENT_EVERY = 4
 """Every so many rounds a lost sensor is waited for long, at each rate in turn: it may be slow."""

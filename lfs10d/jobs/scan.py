@@ -16,20 +16,15 @@ Rules
 
 from __future__ import annotations
 
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from math import inf
-from typing import TYPE_CHECKING
 
 from lfs10d.jobs.interview import Finding, Interview, shortest_answer, speaks, spoilt, strangers
 from lfs10d.jobs.job import Again, Ask, Done, Later, Next
-from lfs10d.jobs.search import LAST_TIMEOUT, RESERVED_FROM
+from lfs10d.jobs.search import LAST_TIMEOUT, RESERVED_FROM, Search
+from lfs10d.modbus.exchange import Outcome
 from lfs10d.reading import Errand, Fault, FaultCode
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Generator
-
-    from lfs10d.jobs.search import Search
-    from lfs10d.modbus.exchange import Outcome
 
 PATIENT_TIMEOUT = 0.4
 """How long an id is waited for in an interview or asked once more, in s."""

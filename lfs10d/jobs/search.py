@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from lfs10d.jobs.interview import first_read
-
-if TYPE_CHECKING:
-    from lfs10d.modbus.frames import Codec, ReadRegisters
-    from lfs10d.modbus.timing import LineTiming
-    from lfs10d.profiles.schema import Profile
+from lfs10d.modbus.frames import Codec, ReadRegisters
+from lfs10d.modbus.timing import LineTiming
+from lfs10d.profiles.schema import Profile
 
 FIRST_TIMEOUT = 0.1
 """How long each id is waited for, in s: twenty times the usual turnaround, USB adapter included."""

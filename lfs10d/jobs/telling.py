@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
+from lfs10d.jobs.poll import Poll
 from lfs10d.reading import Errand, Fault, Reading
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from lfs10d.jobs.poll import Poll
-    from lfs10d.roster import Device
+from lfs10d.roster import Device
 
 
 def tell(poll: Poll) -> Reading:

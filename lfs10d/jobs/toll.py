@@ -11,11 +11,8 @@ Rules
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from math import inf
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Collection
 
 MISSED = 0.08
 """The greatest part of the others' polls that a change makes them miss: what is left of a tenth is for chance."""

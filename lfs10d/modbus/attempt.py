@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
+from lfs10d.modbus.frames import Codec, Request
 from lfs10d.modbus.request import NOT_FINAL
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from lfs10d.modbus.frames import Codec, Request
-    from lfs10d.modbus.timing import LineTiming
-    from lfs10d.reading import Fault
+from lfs10d.modbus.timing import LineTiming
+from lfs10d.reading import Fault
 
 
 class Echo(StrEnum):

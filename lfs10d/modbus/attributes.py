@@ -8,10 +8,9 @@ transmitter by RTS, and a drop of it would jam the pair). A break is heard as a 
 from __future__ import annotations
 
 import termios
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
-if TYPE_CHECKING:
-    from lfs10d.modbus.settings import PortSettings
+from lfs10d.modbus.settings import PortSettings
 
 Attributes: TypeAlias = list[Any]
 """As `termios.tcgetattr` gives them: iflag, oflag, cflag, lflag, ispeed, ospeed (int), control characters (list)."""

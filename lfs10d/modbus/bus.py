@@ -7,24 +7,18 @@ time nobody does.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from math import inf
-from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 from lfs10d.errors import PortBusyError, PortError
 from lfs10d.modbus.echo import EchoLearner
-from lfs10d.modbus.exchange import Attempt, Echo, Exchange, Listen, Outcome, Quiet, Settled
-from lfs10d.modbus.frames import ReadRegisters
+from lfs10d.modbus.exchange import Attempt, Echo, Exchange, Listen, Outcome, Pending, Quiet, Settled
+from lfs10d.modbus.frames import Codec, ReadRegisters, Request
+from lfs10d.modbus.port import Port, PortSettings
 from lfs10d.modbus.timing import LineTiming
-from lfs10d.reading import Fault, FaultCode, PortChanged
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from lfs10d.modbus.exchange import Pending
-    from lfs10d.modbus.frames import Codec, Request
-    from lfs10d.modbus.port import Port, PortSettings
-    from lfs10d.reading import UartCounters
+from lfs10d.reading import Fault, FaultCode, PortChanged, UartCounters
 
 REOPEN_FIRST = 0.2
 """How long after the loss of the port it is tried again first, in s; doubled up to the last."""

@@ -14,12 +14,9 @@ import struct
 import termios
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from lfs10d.modbus.settings import Rs485
 from lfs10d.reading import UartCounters
-
-if TYPE_CHECKING:
-    from lfs10d.modbus.settings import Rs485
 
 SYSFS = Path("/sys")
 

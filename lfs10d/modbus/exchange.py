@@ -39,9 +39,9 @@ Rules
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import StrEnum
 from math import isfinite
-from typing import TYPE_CHECKING
 
 from lfs10d.modbus import verdict
 from lfs10d.modbus.attempt import (
@@ -57,14 +57,10 @@ from lfs10d.modbus.attempt import (
     Settled,
 )
 from lfs10d.modbus.frames import BROADCAST, EXCEPTION_FLAG, Framing
+from lfs10d.modbus.hunt import Catch
 from lfs10d.modbus.reception import HEARD_KEPT, Reception
+from lfs10d.modbus.verdict import Verdict
 from lfs10d.reading import Fault
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from lfs10d.modbus.hunt import Catch
-    from lfs10d.modbus.verdict import Verdict
 
 __all__ = [
     "TRANSITIONS",

@@ -14,11 +14,11 @@ from __future__ import annotations
 import re
 from binascii import Error as NotHexError
 from binascii import a2b_hex, b2a_hex
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
 from struct import unpack
-from typing import TYPE_CHECKING
 
 from pymodbus.framer import FramerAscii, FramerRTU
 from pymodbus.pdu import DecodePDU, ExceptionResponse, ModbusPDU
@@ -40,9 +40,6 @@ from lfs10d.modbus.request import (
     Request,
     WriteRegister,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 __all__ = [
     "BROADCAST",

@@ -8,13 +8,10 @@ Positions count characters from the beginning of the exchange.
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from lfs10d.modbus.frames import Codec, Shape
+from lfs10d.modbus.frames import Codec, Shape
 
 KEPT = 1024
 """Characters kept while the line babbles: more than twice the longest frame (513, ASCII)."""

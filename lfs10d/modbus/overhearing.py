@@ -7,8 +7,8 @@ words), answers (a byte count that is even) and exceptions. Whatever else is on 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from lfs10d.modbus.frames import (
     EXCEPTION_FLAG,
@@ -19,9 +19,6 @@ from lfs10d.modbus.frames import (
     Framing,
     ReadRegisters,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
 
 KEPT = 600
 """Characters kept of a frame whose end has not come: more than the longest has (513, ASCII)."""

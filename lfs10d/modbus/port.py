@@ -16,7 +16,7 @@ import struct
 import termios
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from lfs10d.errors import PortError, PortLostError
 from lfs10d.modbus.attributes import attributes, differences
@@ -24,9 +24,7 @@ from lfs10d.modbus.claim import claim, holder, is_pty, release
 from lfs10d.modbus.driver import USB_LATENCY, lower_latency, read_counters, switch_rs485
 from lfs10d.modbus.refusal import Facts, hung_up, look, number_of, refusal
 from lfs10d.modbus.settings import PortSettings, Rs485
-
-if TYPE_CHECKING:
-    from lfs10d.reading import UartCounters
+from lfs10d.reading import UartCounters
 
 __all__ = ["Port", "PortSettings", "Rs485", "SerialPort", "attributes"]
 

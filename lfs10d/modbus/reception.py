@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import inf
-from typing import TYPE_CHECKING
 
 from lfs10d.modbus.attempt import Attempt, Echo, LateAnswer, Pending
 from lfs10d.modbus.frames import BROADCAST, EXCEPTION_FLAG, ReadRegisters, Shape, WriteRegister
 from lfs10d.modbus.hunt import Catch, Hunt, Quarry
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 HEARD_KEPT = 1024
 """Bytes remembered as heard, the last ones; the longest frame has 513 (ASCII)."""

@@ -11,15 +11,12 @@ import grp
 import os
 import pwd
 import stat
+import termios
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from lfs10d.errors import PortBusyError, PortError, PortLostError
 from lfs10d.logs import escape
-
-if TYPE_CHECKING:
-    import termios
 
 GROUP_MAY_USE = stat.S_IRGRP | stat.S_IWGRP
 

@@ -25,17 +25,12 @@ Rules
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping
 
 from lfs10d.modbus.duplicates import Duplicates
-from lfs10d.modbus.exchange import Pending
+from lfs10d.modbus.exchange import LateAnswer, Outcome, Pending
+from lfs10d.modbus.frames import Codec, Request
 from lfs10d.reading import FaultCode
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from lfs10d.modbus.exchange import LateAnswer, Outcome
-    from lfs10d.modbus.frames import Codec, Request
 
 QUIET_LEAST = 1.0
 """How long a slave is left alone where no barrier can tell, at least; in s."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+from lfs10d.modbus.attempt import Attempt
+from lfs10d.modbus.duplicates import Twice
 from lfs10d.modbus.frames import (
     BROADCAST,
     EXCEPTION_FLAG,
@@ -13,12 +15,8 @@ from lfs10d.modbus.frames import (
     ReadRegisters,
     Request,
 )
+from lfs10d.modbus.reception import Reception
 from lfs10d.reading import FaultCode
-
-if TYPE_CHECKING:
-    from lfs10d.modbus.attempt import Attempt
-    from lfs10d.modbus.duplicates import Twice
-    from lfs10d.modbus.reception import Reception
 
 _REQUEST_BODY = 6
 """Slave, function, address and count: what a master sends, and no answer of a read can be."""

@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable
+from collections.abc import Set as AbstractSet
 
-from lfs10d.mqtt.messages import Filter
+from lfs10d.mqtt.connection import Connection
+from lfs10d.mqtt.messages import Filter, Incoming
 from lfs10d.mqtt.orphans import Sweep
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-    from collections.abc import Set as AbstractSet
-
-    from lfs10d.mqtt.connection import Connection
-    from lfs10d.mqtt.messages import Incoming
-    from lfs10d.mqtt.topics import Topics
+from lfs10d.mqtt.topics import Topics
 
 log = logging.getLogger(__name__)
 

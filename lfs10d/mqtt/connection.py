@@ -14,12 +14,14 @@ import contextlib
 import socket
 import threading
 from collections import deque
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
+from paho.mqtt.client import Client, ConnectFlags, DisconnectFlags, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode, MQTTProtocolVersion
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
+from paho.mqtt.reasoncodes import ReasonCode
 from paho.mqtt.subscribeoptions import SubscribeOptions
 
 from lfs10d.mqtt.endings import (
@@ -32,20 +34,11 @@ from lfs10d.mqtt.endings import (
     gone,
     reason_in_words,
 )
-from lfs10d.mqtt.messages import RECEIVE_MAXIMUM_UNSAID, Accepted, Incoming
+from lfs10d.mqtt.messages import RECEIVE_MAXIMUM_UNSAID, Accepted, Events, Filter, Incoming, Will
 from lfs10d.mqtt.pahoclient import LARGEST_PACKET, BoundedClient
 from lfs10d.mqtt.pump import Pump
-from lfs10d.mqtt.settings import Version
+from lfs10d.mqtt.settings import BrokerSettings, Version
 from lfs10d.mqtt.tls import tls_context
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from paho.mqtt.client import Client, ConnectFlags, DisconnectFlags, MQTTMessage
-    from paho.mqtt.reasoncodes import ReasonCode
-
-    from lfs10d.mqtt.messages import Events, Filter, Will
-    from lfs10d.mqtt.settings import BrokerSettings
 
 CONNECT_TIMEOUT = 5.0
 """Seconds for each address of the broker to answer, and for each step of the TLS handshake."""

@@ -8,28 +8,21 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import islice
-from typing import TYPE_CHECKING
 
 from lfs10d import telemetry
+from lfs10d.mqtt.connection import Connection
 from lfs10d.mqtt.encoding import array, encode, packet_size
-from lfs10d.mqtt.endings import NO_MATCHING_SUBSCRIBERS, REFUSED_FROM, reason_in_words
-from lfs10d.mqtt.letters import Array, Declaration, Message
-from lfs10d.mqtt.outbox import IN_FLIGHT_MOST
+from lfs10d.mqtt.endings import NO_MATCHING_SUBSCRIBERS, REFUSED_FROM, Ended, reason_in_words
+from lfs10d.mqtt.letters import Array, Declaration, Letter, Live, Message, Retained
+from lfs10d.mqtt.messages import Accepted
+from lfs10d.mqtt.outbox import IN_FLIGHT_MOST, Outbox
 from lfs10d.mqtt.past import ARRAY_BYTES
 from lfs10d.mqtt.refusals import Refusal, refusal_of
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from lfs10d.mqtt.connection import Connection
-    from lfs10d.mqtt.endings import Ended
-    from lfs10d.mqtt.letters import Letter, Live, Retained
-    from lfs10d.mqtt.messages import Accepted
-    from lfs10d.mqtt.outbox import Outbox
-    from lfs10d.mqtt.suspects import Culprit
-    from lfs10d.mqtt.topics import Topics
+from lfs10d.mqtt.suspects import Culprit
+from lfs10d.mqtt.topics import Topics
 
 log = logging.getLogger(__name__)
 

@@ -5,19 +5,14 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-from typing import TYPE_CHECKING
+from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Set as AbstractSet
 
+from lfs10d.mqtt.connection import Connection
 from lfs10d.mqtt.endings import REFUSED_FROM
 from lfs10d.mqtt.lookback import Lookback
-from lfs10d.mqtt.messages import Filter
-
-if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Mapping
-    from collections.abc import Set as AbstractSet
-
-    from lfs10d.mqtt.connection import Connection
-    from lfs10d.mqtt.messages import Incoming
-    from lfs10d.mqtt.topics import Topics
+from lfs10d.mqtt.messages import Filter, Incoming
+from lfs10d.mqtt.topics import Topics
 
 log = logging.getLogger(__name__)
 

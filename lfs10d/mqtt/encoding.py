@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
 from lfs10d.mqtt.settings import Version
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from lfs10d.telemetry import Payload
+from lfs10d.telemetry import Payload
 
 _JSON = json.JSONEncoder(ensure_ascii=False, allow_nan=False, check_circular=False, separators=(",", ":"))
 

@@ -6,12 +6,9 @@ import socket
 import ssl
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING
 
 from lfs10d.errors import Lfs10dError
-
-if TYPE_CHECKING:
-    from lfs10d.mqtt.settings import BrokerSettings
+from lfs10d.mqtt.settings import BrokerSettings
 
 NO_MATCHING_SUBSCRIBERS = 0x10
 """The broker took a message that nobody listens to (MQTT 5.0, section 3.4.2.1)."""

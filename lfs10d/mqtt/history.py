@@ -8,17 +8,13 @@ these go first, and their going is no loss.
 from __future__ import annotations
 
 from bisect import insort
+from collections.abc import Iterable
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 from lfs10d.clockstep import corrects
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-    from collections.abc import Set as AbstractSet
-
-    from lfs10d.loss import Key
-    from lfs10d.telemetry import Clock, Sample
+from lfs10d.loss import Key
+from lfs10d.telemetry import Clock, Sample
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from lfs10d.mqtt.messages import Incoming
-    from lfs10d.mqtt.topics import Topics
+from lfs10d.mqtt.messages import Incoming
+from lfs10d.mqtt.topics import Topics
 
 
 @dataclass(frozen=True, slots=True)

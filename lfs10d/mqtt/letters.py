@@ -6,14 +6,12 @@ Topics are under `B`. Two letters are never equal, whatever they say: each is on
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 from lfs10d import telemetry
-
-if TYPE_CHECKING:
-    from lfs10d.loss import Loss
-    from lfs10d.mqtt.history import Kept
-    from lfs10d.telemetry import Publication
+from lfs10d.loss import Loss
+from lfs10d.mqtt.history import Kept
+from lfs10d.telemetry import Publication
 
 
 @dataclass(frozen=True, slots=True, eq=False)

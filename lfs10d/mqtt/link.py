@@ -8,18 +8,14 @@ from __future__ import annotations
 import asyncio
 import logging
 import random
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from lfs10d.errors import BrokerError
 from lfs10d.mqtt.connection import Connection
 from lfs10d.mqtt.endings import Ended, Ending
+from lfs10d.mqtt.messages import Accepted, Events, Incoming, Will
 from lfs10d.mqtt.reconnect import Reconnect
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from lfs10d.mqtt.messages import Accepted, Events, Incoming, Will
-    from lfs10d.mqtt.settings import BrokerSettings, Version
+from lfs10d.mqtt.settings import BrokerSettings, Version
 
 log = logging.getLogger(__name__)
 

@@ -6,12 +6,9 @@ A device that is polled often delays no other: each waits for at most one sample
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from lfs10d.mqtt.letters import Live
+from lfs10d.mqtt.letters import Live
 
 
 class LiveQueue:

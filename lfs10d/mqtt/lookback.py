@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from lfs10d import telemetry
-
-if TYPE_CHECKING:
-    from collections.abc import Set as AbstractSet
-
-    from lfs10d.mqtt.topics import Topics
+from lfs10d.mqtt.topics import Topics
 
 QUIET_LEAST, QUIET_MOST = 0.05, 0.5
 """Seconds after the broker's answer to the subscription, or after the last message, in which no more came."""

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
-from lfs10d.loss import Loss, joined
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from lfs10d.loss import Key
-    from lfs10d.telemetry import Sample
+from lfs10d.loss import Key, Loss, joined
+from lfs10d.telemetry import Sample
 
 MOST_RANGES = 8
 """Ranges kept apart per device and boot; beyond that the last two become one, whose `count` is below its span."""

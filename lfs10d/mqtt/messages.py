@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
-if TYPE_CHECKING:
-    from lfs10d.mqtt.endings import Ended
-    from lfs10d.mqtt.settings import Version
+from lfs10d.mqtt.endings import Ended
+from lfs10d.mqtt.settings import Version
 
 RECEIVE_MAXIMUM_UNSAID = 65_535
 """What the broker takes where it says nothing (MQTT 5.0, section 3.2.2.3.3)."""

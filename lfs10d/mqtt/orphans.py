@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from collections.abc import Set as AbstractSet
-
-    from lfs10d.mqtt.topics import Topics
+from lfs10d.mqtt.topics import Topics
 
 QUIET = 0.5
 """Seconds without a retained message after which the broker has sent them all."""

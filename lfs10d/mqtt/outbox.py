@@ -35,28 +35,22 @@ letter                settled                    connection lost               r
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Set as AbstractSet
 from dataclasses import replace
 from itertools import chain
-from typing import TYPE_CHECKING
 
 from lfs10d import telemetry
-from lfs10d.mqtt.congestion import Congestion
+from lfs10d.mqtt.congestion import Congested, Congestion
 from lfs10d.mqtt.history import Kept
 from lfs10d.mqtt.letters import Array, Declaration, Letter, Live, Message, Retained, samples_of
 from lfs10d.mqtt.livequeue import LiveQueue
 from lfs10d.mqtt.past import Past
 from lfs10d.mqtt.refusals import BANNED_FOR, Refusals
 from lfs10d.mqtt.retention import Retention
-from lfs10d.mqtt.suspects import Suspects
+from lfs10d.mqtt.suspects import Culprit, Suspects
 from lfs10d.mqtt.turns import Turns
 from lfs10d.telemetry import Kind, Publication
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
-    from collections.abc import Set as AbstractSet
-
-    from lfs10d.mqtt.congestion import Congested
-    from lfs10d.mqtt.suspects import Culprit
 
 CAPACITY = 10_000
 """Samples that wait in memory (contract, section 3)."""

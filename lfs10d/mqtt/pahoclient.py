@@ -7,15 +7,12 @@ table, for it calls that packet malformed; and it says only in its log what went
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import MQTTErrorCode, MQTTProtocolVersion
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.reasoncodes import ReasonCode
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 LARGEST_PACKET = 128 * 1024
 """Bytes of a packet that are taken, the rest is passed over. By MQTT 5 the broker is asked to send none larger."""

@@ -20,23 +20,18 @@ So everything in the store is older than everything in memory.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterator
+from collections.abc import Set as AbstractSet
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from lfs10d import telemetry
+from lfs10d.loss import Loss
 from lfs10d.mqtt.drain import Drain
 from lfs10d.mqtt.history import History, Kept
-from lfs10d.mqtt.letters import Array, Declaration, samples_of
+from lfs10d.mqtt.letters import Array, Declaration, Letter, samples_of
 from lfs10d.mqtt.losses import Losses
 from lfs10d.mqtt.stored import AGAIN_WITHIN, Stored
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from collections.abc import Set as AbstractSet
-
-    from lfs10d.loss import Loss
-    from lfs10d.mqtt.letters import Letter
-    from lfs10d.telemetry import Clock
+from lfs10d.telemetry import Clock
 
 ARRAY_MOST = 100
 """Samples in one history array (contract, section 3)."""

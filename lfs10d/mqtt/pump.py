@@ -6,11 +6,9 @@ paho offers `loop_read`, `loop_write` and `loop_misc` for this (docs/decisions/0
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING, Protocol
-
-if TYPE_CHECKING:
-    import socket
-    from collections.abc import Callable
+import socket
+from collections.abc import Callable
+from typing import Protocol
 
 UPKEEP_EVERY = 1.0
 """Seconds between two looks at the keepalive."""

@@ -21,16 +21,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
-from lfs10d.mqtt.endings import Ending
+from lfs10d.mqtt.endings import Ended, Ending
 from lfs10d.mqtt.settings import Version
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from lfs10d.mqtt.endings import Ended
 
 AWAY_EVERY = 1.0
 """Seconds from the beginning of one attempt to the next where a node is not there."""

@@ -8,14 +8,10 @@ retains, flagged as such (section 3.8.4), which is then rejected and cleared as 
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
+from lfs10d.mqtt.inbound import InboundRequest
 from lfs10d.mqtt.settings import Version
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from lfs10d.mqtt.inbound import InboundRequest
 
 ASK_AFTER = 0.5
 """Seconds from a request to the question; those that come meanwhile share it."""

@@ -8,15 +8,11 @@ kept apart until its topic is tried again.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
+from collections.abc import Set as AbstractSet
 
 from lfs10d.mqtt.letters import Retained
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-    from collections.abc import Set as AbstractSet
-
-    from lfs10d.telemetry import Publication
+from lfs10d.telemetry import Publication
 
 
 class Retention:

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING
 
+from lfs10d.config import MqttConfig
 from lfs10d.kinds import node_text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from lfs10d.config import MqttConfig
-    from lfs10d.secret import Secret
+from lfs10d.secret import Secret
 
 
 class Version(StrEnum):

@@ -8,16 +8,12 @@ the connection is lost in that time it is read and sent once more. Nothing of a 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
-from typing import TYPE_CHECKING
 
 from lfs10d.mqtt.history import History, Kept
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from lfs10d.store.samplefile import Row
+from lfs10d.store.samplefile import Row
 
 PAGE_ROWS = 3200
 """Samples of a page: for up to 32 devices its arrays are full."""

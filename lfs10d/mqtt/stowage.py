@@ -7,23 +7,17 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from typing import TYPE_CHECKING
+from collections.abc import Awaitable, Callable
 
 from lfs10d import telemetry
-from lfs10d.mqtt.past import SPILL_EVERY
+from lfs10d.mqtt.outbox import Outbox
+from lfs10d.mqtt.past import SPILL_EVERY, Past
 from lfs10d.mqtt.stored import PAGE_ROWS
 from lfs10d.ownthread import OwnThread
-from lfs10d.store.backlog import StoreError
+from lfs10d.store.backlog import Store, StoreError
+from lfs10d.store.opening import Limits
 from lfs10d.store.samplefile import Entry
-
-if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable
-
-    from lfs10d.mqtt.outbox import Outbox
-    from lfs10d.mqtt.past import Past
-    from lfs10d.store.backlog import Store
-    from lfs10d.store.opening import Limits
-    from lfs10d.telemetry import Publication
+from lfs10d.telemetry import Publication
 
 log = logging.getLogger(__name__)
 

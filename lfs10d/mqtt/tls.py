@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import ssl
-from typing import TYPE_CHECKING
 
 from lfs10d.errors import BrokerError
-
-if TYPE_CHECKING:
-    from lfs10d.mqtt.settings import Tls
+from lfs10d.mqtt.settings import Tls
 
 
 class _Socket(ssl.SSLSocket):

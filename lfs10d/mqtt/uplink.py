@@ -9,34 +9,27 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Awaitable, Callable, Iterable, Mapping
+from collections.abc import Set as AbstractSet
 from functools import partial
-from typing import TYPE_CHECKING
 
 from lfs10d import telemetry
 from lfs10d.mqtt.clearing import Clearing
 from lfs10d.mqtt.connection import Connection
 from lfs10d.mqtt.dispatch import Dispatch
 from lfs10d.mqtt.earlier import EarlierLife
-from lfs10d.mqtt.endings import REFUSED_FROM, reason_in_words
-from lfs10d.mqtt.inbound import inbound
+from lfs10d.mqtt.endings import REFUSED_FROM, Ended, reason_in_words
+from lfs10d.mqtt.inbound import InboundRequest, inbound
 from lfs10d.mqtt.link import Link
-from lfs10d.mqtt.messages import Filter, Will
+from lfs10d.mqtt.messages import Accepted, Filter, Incoming, Will
 from lfs10d.mqtt.outbox import Outbox
 from lfs10d.mqtt.retained_requests import RetainedRequests
+from lfs10d.mqtt.settings import BrokerSettings, Version
 from lfs10d.mqtt.stowage import Stowage
 from lfs10d.mqtt.topics import OFFLINE, ONLINE, Topics
+from lfs10d.store.backlog import Store
+from lfs10d.store.opening import Limits
 from lfs10d.telemetry import Kind, Publication
-
-if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Iterable, Mapping
-    from collections.abc import Set as AbstractSet
-
-    from lfs10d.mqtt.endings import Ended
-    from lfs10d.mqtt.inbound import InboundRequest
-    from lfs10d.mqtt.messages import Accepted, Incoming
-    from lfs10d.mqtt.settings import BrokerSettings, Version
-    from lfs10d.store.backlog import Store
-    from lfs10d.store.opening import Limits
 
 log = logging.getLogger(__name__)
 

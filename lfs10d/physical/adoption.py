@@ -3,28 +3,24 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from lfs10d.assembly import DEFAULT_PROFILE
-from lfs10d.commands import Answer, failed, ok, rejected
-from lfs10d.config import SlaveConfig, default_device_name
+from lfs10d.commands import Answer, ErrorCode, failed, ok, rejected
+from lfs10d.config import LineConfig, SlaveConfig, default_device_name
+from lfs10d.effective import Effective
 from lfs10d.errors import StateError
 from lfs10d.jobs import adopt
 from lfs10d.jobs.course import Now
 from lfs10d.jobs.readdress import NOTHING_WRITTEN, Ending, Verdict, Write
-from lfs10d.journal import Move, Spot
+from lfs10d.journal import Asked, Move, OpenChange, Spot
+from lfs10d.profiles.schema import Profile
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from lfs10d.commands import ErrorCode
-    from lfs10d.config import LineConfig
-    from lfs10d.effective import Effective
-    from lfs10d.journal import Asked, OpenChange
     from lfs10d.physical.place import Physical
-    from lfs10d.profiles.schema import Profile
 
 log = logging.getLogger(__name__)
 

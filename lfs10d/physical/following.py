@@ -13,19 +13,18 @@ from lfs10d.errors import ConfigError, StateError
 from lfs10d.jobs.course import Now, Over
 from lfs10d.jobs.follow import follow
 from lfs10d.jobs.readdress import Ending, Verdict, Wish
-from lfs10d.journal import Spot
+from lfs10d.journal import Move, OpenChange, Spot, Told
 from lfs10d.physical import adoption, asked
+from lfs10d.physical.talk import Talk
+from lfs10d.profiles.schema import Profile
 from lfs10d.reading import Errand
 from lfs10d.requests import audit
 from lfs10d.tasks import BackgroundTasks
 
 if TYPE_CHECKING:
-    from lfs10d.journal import Move, OpenChange, Told
     from lfs10d.physical.place import Physical
     from lfs10d.physical.ratechange import RateChange
     from lfs10d.physical.readdressing import Readdressing
-    from lfs10d.physical.talk import Talk
-    from lfs10d.profiles.schema import Profile
 
 log = logging.getLogger(__name__)
 

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
 from lfs10d.changes import Changes, Place, Rate
+from lfs10d.effective import Effective
 from lfs10d.jobs.course import Now, Over
 from lfs10d.jobs.locate import locate
 from lfs10d.journal import Spot
+from lfs10d.physical.talk import Talk
 from lfs10d.reading import Errand
 from lfs10d.tasks import BackgroundTasks
 
 if TYPE_CHECKING:
-    import asyncio
-    from collections.abc import Callable, Mapping
-
-    from lfs10d.effective import Effective
     from lfs10d.physical.place import Physical
-    from lfs10d.physical.talk import Talk
 
 log = logging.getLogger(__name__)
 

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable
 
+from lfs10d.effective import Effective
 from lfs10d.jobs.course import Now, Over
 from lfs10d.jobs.lost import in_words, seek
+from lfs10d.physical.talk import Talk
 from lfs10d.reading import Errand
+from lfs10d.roster import Device
 from lfs10d.tasks import BackgroundTasks
-
-if TYPE_CHECKING:
-    import asyncio
-    from collections.abc import Callable, Iterable
-
-    from lfs10d.effective import Effective
-    from lfs10d.physical.talk import Talk
-    from lfs10d.roster import Device
 
 log = logging.getLogger(__name__)
 

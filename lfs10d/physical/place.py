@@ -5,18 +5,22 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+from collections.abc import Awaitable, Callable, Coroutine, Iterator, Mapping
 from functools import partial
 from math import inf
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from lfs10d import assembly
 from lfs10d.aside import aside
-from lfs10d.changes import Place
-from lfs10d.commands import Answer, failed, rejected
+from lfs10d.changes import Changes, Place, Saying
+from lfs10d.commands import Answer, Call, failed, rejected
+from lfs10d.config import Config, SlaveConfig
+from lfs10d.effective import Effective
 from lfs10d.errors import StateError
+from lfs10d.facts import Instant
 from lfs10d.jobs.asking import Asking
-from lfs10d.jobs.course import Over
-from lfs10d.journal import REMEMBERED_FOR_MS
+from lfs10d.jobs.course import Now, Over
+from lfs10d.journal import REMEMBERED_FOR_MS, Asked, Journal, OpenChange, Spot, Told
 from lfs10d.physical import adoption, asked, ratechange, readdressing
 from lfs10d.physical.adoption import Adoption
 from lfs10d.physical.following import Following
@@ -24,24 +28,14 @@ from lfs10d.physical.locating import Locating
 from lfs10d.physical.ratechange import RateChange
 from lfs10d.physical.readdressing import Readdressing
 from lfs10d.physical.reserving import Reserving
-from lfs10d.physical.talk import Talk
+from lfs10d.physical.talk import Talk, Wire
 from lfs10d.profiles.library import load_profile
+from lfs10d.profiles.schema import Profile
+from lfs10d.requests.request import Edit
 from lfs10d.tasks import BackgroundTasks
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Coroutine, Iterator, Mapping
-
-    from lfs10d.changes import Changes, Saying
-    from lfs10d.commands import Call
-    from lfs10d.config import Config, SlaveConfig
-    from lfs10d.effective import Effective
-    from lfs10d.facts import Instant
-    from lfs10d.jobs.course import Now
-    from lfs10d.journal import Asked, Journal, OpenChange, Spot, Told
     from lfs10d.physical.adoption import Newcomer
-    from lfs10d.physical.talk import Wire
-    from lfs10d.profiles.schema import Profile
-    from lfs10d.requests.request import Edit
 
 log = logging.getLogger(__name__)
 T = TypeVar("T")

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from math import inf
 from typing import TYPE_CHECKING, Any
 
 from lfs10d.changes import Changes, Rate
-from lfs10d.commands import Answer, failed, ok, rejected
+from lfs10d.commands import Answer, ErrorCode, failed, ok, rejected
+from lfs10d.effective import Effective
 from lfs10d.errors import StateError
 from lfs10d.jobs.baudrate import (
     FIRST_PAUSE,
@@ -24,17 +26,12 @@ from lfs10d.jobs.baudrate import (
 )
 from lfs10d.jobs.course import Now, Over
 from lfs10d.jobs.rejoin import CameUp, Twins, await_lost, await_power, look_back, put_back
-from lfs10d.journal import Move
+from lfs10d.journal import Asked, Move, OpenChange
+from lfs10d.physical.talk import Talk
 from lfs10d.reading import Errand
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from lfs10d.commands import ErrorCode
-    from lfs10d.effective import Effective
-    from lfs10d.journal import Asked, OpenChange
     from lfs10d.physical.place import Physical
-    from lfs10d.physical.talk import Talk
 
 log = logging.getLogger(__name__)
 

@@ -8,17 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 from lfs10d import findings
 from lfs10d.commands import Answer, failed, rejected
+from lfs10d.config import SlaveConfig
+from lfs10d.effective import Effective
 from lfs10d.errors import StateError
 from lfs10d.jobs.course import Now
 from lfs10d.jobs.readdress import NOTHING_WRITTEN, Ending, Verdict, Wish, Write, readdress
-from lfs10d.journal import Move, Spot
+from lfs10d.journal import Asked, Move, OpenChange, Spot
+from lfs10d.profiles.schema import Profile
 
 if TYPE_CHECKING:
-    from lfs10d.config import SlaveConfig
-    from lfs10d.effective import Effective
-    from lfs10d.journal import Asked, OpenChange
     from lfs10d.physical.place import Physical
-    from lfs10d.profiles.schema import Profile
 
 log = logging.getLogger(__name__)
 

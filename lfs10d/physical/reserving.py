@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from lfs10d.commands import Answer, rejected
+from lfs10d.journal import OpenChange
 from lfs10d.requests.request import RefusedError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
-
-    from lfs10d.journal import OpenChange
 
 
 class Reserving:

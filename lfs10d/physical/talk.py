@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 from lfs10d.jobs.course import Course, Now, Steps
-
-if TYPE_CHECKING:
-    from lfs10d.jobs.job import Job
-    from lfs10d.modbus.unanswered import Unanswered
+from lfs10d.jobs.job import Job
+from lfs10d.modbus.unanswered import Unanswered
 
 
 class Wire(Protocol):

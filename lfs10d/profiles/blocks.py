@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
+from lfs10d.profiles.registers import Cell
+from lfs10d.profiles.values import ReadFunction, Value
 from lfs10d.reading import Fault, FaultCode, Number
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from lfs10d.profiles.registers import Cell
-    from lfs10d.profiles.values import ReadFunction, Value
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,8 @@ plausible wrong number.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, get_args
+from collections.abc import Iterable
+from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_validator
 
@@ -25,11 +26,7 @@ from lfs10d.profiles.values import (
     Value,
     refuse,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from lfs10d.reading import Fault, Number
+from lfs10d.reading import Fault, Number
 
 FramingName: TypeAlias = Literal["rtu", "ascii"]
 ChecksumName: TypeAlias = Literal["crc", "sum"]

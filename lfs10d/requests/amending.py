@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from lfs10d.commands import rejected
+from lfs10d.commands import Answer, ErrorCode, rejected
+from lfs10d.config import SlaveConfig
 from lfs10d.difference import difference
+from lfs10d.effective import Effective
 from lfs10d.errors import StateError
-from lfs10d.requests.request import RefusedError
-
-if TYPE_CHECKING:
-    from lfs10d.commands import Answer, ErrorCode
-    from lfs10d.config import SlaveConfig
-    from lfs10d.effective import Effective
-    from lfs10d.requests.request import Edit, Powers
+from lfs10d.requests.request import Edit, Powers, RefusedError
 
 
 async def amend(edit: Edit, powers: Powers) -> tuple[Effective, Effective]:

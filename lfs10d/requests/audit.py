@@ -6,14 +6,11 @@ One line for each, whatever it holds came over the network and is escaped.
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
+from lfs10d.commands import Answer, Call
 from lfs10d.logs import escape
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
-
-    from lfs10d.commands import Answer, Call
 
 LONGEST = 300
 """Characters of one value that are logged."""

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Mapping
+from typing import Annotated
 
 from lfs10d import changes as changed
 from lfs10d.admission import Form
-from lfs10d.commands import Answer, NoParameters, Parameters, ok, rejected
-from lfs10d.effective import effective
+from lfs10d.changes import Changes
+from lfs10d.commands import Answer, Call, NoParameters, Parameters, ok, rejected
+from lfs10d.effective import Effective, effective
 from lfs10d.errors import ConfigError
 from lfs10d.kinds import Name, Text, quoted
 from lfs10d.requests.amending import altered, amend, known_device, refuse
 from lfs10d.requests.request import Powers, RefusedError, Request
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from lfs10d.changes import Changes
-    from lfs10d.commands import Call
-    from lfs10d.effective import Effective
 
 LONGEST_KEY = 100
 _KEY_OF_A_DEVICE = 3

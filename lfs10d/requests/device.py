@@ -2,32 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from lfs10d.admission import Form
 from lfs10d.aside import aside
-from lfs10d.changes import OPTIONS, Place
-from lfs10d.commands import Answer, Parameters, failed, ok
+from lfs10d.changes import OPTIONS, Changes, Place
+from lfs10d.commands import Answer, Call, ErrorCode, Parameters, failed, ok
 from lfs10d.config import Interval, Label, ResponseTimeout, SlaveConfig, SlaveId, default_device_name
 from lfs10d.contradictions import contradictions
-from lfs10d.effective import effective
+from lfs10d.effective import Effective, effective
 from lfs10d.errors import ConfigError
 from lfs10d.kinds import FilePath, Flag, Name, quoted
 from lfs10d.profiles.library import builtin_names, load_profile
+from lfs10d.profiles.schema import Profile
 from lfs10d.reading import FaultCode
 from lfs10d.requests.amending import amend, known_device, plainly, refuse, unknown_device
 from lfs10d.requests.request import Powers, RefusedError, Request
 from lfs10d.resolution import inherited
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from lfs10d.changes import Changes
-    from lfs10d.commands import Call, ErrorCode
-    from lfs10d.effective import Effective
-    from lfs10d.profiles.schema import Profile
 
 SHOWN = ("label", "profile", "interval", "enabled", "response_timeout")
 """What the answer tells of a device that was added."""

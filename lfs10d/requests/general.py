@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 from lfs10d.admission import Form
-from lfs10d.commands import Answer, NoParameters, ok
+from lfs10d.commands import Answer, Call, NoParameters, ok
 from lfs10d.requests.request import Powers, Request
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from lfs10d.commands import Call
 
 
 async def health(_: NoParameters, powers: Powers, __: Call) -> Answer:

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Mapping
+from typing import Annotated
 
 from pydantic import Field
 
 from lfs10d.admission import Form
-from lfs10d.commands import Answer, NoParameters, Parameters, ok
+from lfs10d.commands import Answer, Call, NoParameters, Parameters, ok
 from lfs10d.kinds import Duration
 from lfs10d.requests.request import Powers, RefusedError, Request
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from lfs10d.commands import Call
 
 LONGEST = 600.0
 """s for which a trace or a pause may go on."""

@@ -11,29 +11,24 @@ Rules
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any
 
 from pydantic import Field
 
 from lfs10d.admission import Form
-from lfs10d.commands import Answer, Parameters, failed, ok, rejected
-from lfs10d.jobs.register import End
+from lfs10d.commands import Answer, Call, ErrorCode, Parameters, failed, ok, rejected
+from lfs10d.config import SlaveConfig
+from lfs10d.effective import Effective
+from lfs10d.jobs.register import Access, End
 from lfs10d.kinds import Name, Whole
 from lfs10d.modbus.frames import READ_COUNT_MAX, ReadRegisters, WriteRegister
 from lfs10d.profiles.library import builtin_names, load_profile
+from lfs10d.profiles.schema import Profile
+from lfs10d.profiles.values import Setting
 from lfs10d.reading import FaultCode
 from lfs10d.requests.amending import known_device, refuse
 from lfs10d.requests.request import Powers, RefusedError, Request
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from lfs10d.commands import Call, ErrorCode
-    from lfs10d.config import SlaveConfig
-    from lfs10d.effective import Effective
-    from lfs10d.jobs.register import Access
-    from lfs10d.profiles.schema import Profile
-    from lfs10d.profiles.values import Setting
 
 REGISTERS = 0x1_0000
 """Register addresses and contents have 16 bits (Modbus Application Protocol V1.1b3, section 4.4)."""

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Coroutine, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine, Mapping
-
-    from lfs10d.admission import Form
-    from lfs10d.changes import Changes
-    from lfs10d.commands import Answer, Call
-    from lfs10d.config import SlaveConfig
-    from lfs10d.effective import Effective
-    from lfs10d.inquiries import Inquiry
-    from lfs10d.jobs.knock import Knock
-    from lfs10d.jobs.register import Access
-    from lfs10d.jobs.scan import Scan
-    from lfs10d.modbus.frames import Request as RegisterRequest
-    from lfs10d.profiles.schema import Profile
+from lfs10d.admission import Form
+from lfs10d.changes import Changes
+from lfs10d.commands import Answer, Call
+from lfs10d.config import SlaveConfig
+from lfs10d.effective import Effective
+from lfs10d.inquiries import Inquiry
+from lfs10d.jobs.knock import Knock
+from lfs10d.jobs.register import Access
+from lfs10d.jobs.scan import Scan
+from lfs10d.modbus.frames import Request as RegisterRequest
+from lfs10d.profiles.schema import Profile
 
 Edit: TypeAlias = "Callable[[Effective], Changes]"
 """What a request makes of the changes, given what holds. Called in a thread of its own; raises what refuses it."""

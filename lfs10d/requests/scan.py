@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from pydantic import Field
 
 from lfs10d.admission import Form
-from lfs10d.commands import Answer, Parameters, failed, ok
+from lfs10d.commands import Answer, Call, Parameters, failed, ok
+from lfs10d.jobs.interview import Finding
+from lfs10d.jobs.scan import Scan
 from lfs10d.jobs.search import LAST_ID, ids_of
 from lfs10d.kinds import Choice, Flag, Kind, Whole
 from lfs10d.requests import device
 from lfs10d.requests.request import Powers, RefusedError, Request
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from lfs10d.commands import Call
-    from lfs10d.jobs.interview import Finding
-    from lfs10d.jobs.scan import Scan
 
 BAUDRATES = Choice((1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200))
 

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Mapping
+from typing import Annotated
 
 from pydantic import Field
 
 from lfs10d.admission import Form
-from lfs10d.commands import Answer, Parameters
+from lfs10d.commands import Answer, Call, Parameters
 from lfs10d.kinds import Choice, FilePath, Flag, Name, Text, Whole
 from lfs10d.requests import device
 from lfs10d.requests.request import Powers, RefusedError, Request
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from lfs10d.commands import Call
 
 REMEMBERED_FOR = 86_400.0
 """How long the answer to a physical change is kept for its repeats, in s."""

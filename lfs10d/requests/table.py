@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 from lfs10d.requests import config, device, general, line, register, scan, sensors
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from lfs10d.requests.request import Request
+from lfs10d.requests.request import Request
 
 REQUESTS: Mapping[str, Request] = {
     **general.REQUESTS,

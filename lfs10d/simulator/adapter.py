@@ -7,10 +7,10 @@ from collections import deque
 from typing import TYPE_CHECKING
 
 from lfs10d.simulator.burst import MASTER, Burst, as_heard
+from lfs10d.simulator.wire import Format
 
 if TYPE_CHECKING:
     from lfs10d.simulator.line import SimulatedLine
-    from lfs10d.simulator.wire import Format
 
 
 class Adapter:

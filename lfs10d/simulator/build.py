@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 from lfs10d.simulator.faultfile import FaultFile, SlaveEntry
 from lfs10d.simulator.faults import window
@@ -13,9 +13,6 @@ from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.troubles import babble, second_master, stray
 from lfs10d.simulator.wind import Wind
 from lfs10d.simulator.wire import Format, Framing
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 LAST_ID = 255
 

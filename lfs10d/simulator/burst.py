@@ -8,13 +8,10 @@ same cannot be told apart.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, TypeAlias
+from typing import Final, TypeAlias
 
-from lfs10d.simulator.wire import misheard
-
-if TYPE_CHECKING:
-    from lfs10d.simulator.sensor import Sensor
-    from lfs10d.simulator.wire import Format
+from lfs10d.simulator.sensor import Sensor
+from lfs10d.simulator.wire import Format, misheard
 
 MASTER: Final = "master"
 NOISE: Final = "noise"

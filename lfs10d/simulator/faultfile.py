@@ -19,7 +19,9 @@ The kinds of faults are those of `lfs10d.simulator.faults.Kind`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
+from collections.abc import Collection
+from pathlib import Path
+from typing import Annotated, Literal, TypeAlias
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
@@ -27,10 +29,6 @@ from lfs10d.document import decode, parse
 from lfs10d.errors import ConfigError, Problem
 from lfs10d.kinds import Choice, Duration, Flag, Whole
 from lfs10d.simulator.faults import Ailment, Kind, ailment
-
-if TYPE_CHECKING:
-    from collections.abc import Collection
-    from pathlib import Path
 
 DAY = 86400
 MOST_COPIES = 8

@@ -9,12 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING, Literal
+from random import Random
+from typing import Literal
 
 from lfs10d.simulator.wire import nanoseconds
-
-if TYPE_CHECKING:
-    from random import Random
 
 
 class Kind(StrEnum):

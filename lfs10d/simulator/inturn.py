@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from lfs10d.simulator.sensor import Sensor
-
-if TYPE_CHECKING:
-    from lfs10d.simulator.sensor import Reply
+from lfs10d.simulator.sensor import Reply, Sensor
 
 
 class InTurn(Sensor):

@@ -6,22 +6,20 @@ collects what has arrived by a time. In virtual time and on a pseudo terminal it
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
 from random import Random
 from typing import TYPE_CHECKING
 
-from lfs10d.simulator.burst import MASTER, Burst, collide
+from lfs10d.simulator.burst import MASTER, Burst, Speaker, collide
 from lfs10d.simulator.judge import Hearing, Judge, Verdict
+from lfs10d.simulator.sensor import Reply, Sensor
 from lfs10d.simulator.wind import Unique
 from lfs10d.simulator.wire import Format, Framing, nanoseconds, unseal
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-
     from lfs10d.simulator.adapter import Adapter
-    from lfs10d.simulator.burst import Speaker
-    from lfs10d.simulator.sensor import Reply, Sensor
 
 
 @dataclass(frozen=True, slots=True)

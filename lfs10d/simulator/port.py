@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, Protocol
+from collections.abc import Callable
+from typing import Final, Protocol
 
 from lfs10d.errors import PortBusyError, PortLostError
+from lfs10d.modbus.port import PortSettings
 from lfs10d.reading import UartCounters
 from lfs10d.simulator.adapter import Adapter
+from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.wire import SECOND, Format, Parity, nanoseconds
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from lfs10d.modbus.port import PortSettings
-    from lfs10d.simulator.line import SimulatedLine
 
 LOW_LATENCY: Final = 0.004
 """What a port reports as adapter latency where low latency was confirmed (s)."""

@@ -15,21 +15,18 @@ import termios
 import threading
 import time
 import tty
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import Any, Final, Self
 
 from lfs10d.errors import FailedError
 from lfs10d.modbus.realtime import sharpen_timers, take_precedence
 from lfs10d.simulator.adapter import Adapter
+from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.wire import SECOND, nanoseconds
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    from lfs10d.simulator.line import SimulatedLine
 
 READ_SIZE: Final = 4096
 LOOK_FOR_MASTER: Final = 0.002

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final, Literal, TypeAlias
+from typing import Final, Literal, TypeAlias
 
-if TYPE_CHECKING:
-    from collections.abc import Container, Mapping
-
-    from lfs10d.profiles.schema import Profile
-    from lfs10d.profiles.values import Setting
-    from lfs10d.simulator.wire import Check, Framing
+from lfs10d.profiles.schema import Profile
+from lfs10d.profiles.values import Setting
+from lfs10d.simulator.wire import Check, Framing
 
 Type: TypeAlias = Literal["float32", "uint16", "int16", "uint32", "int32"]
 

@@ -17,9 +17,10 @@ echo_losing          new              at once             none
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from random import Random
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from lfs10d.simulator.faults import (
     STRIKES_ANSWERS,
@@ -30,13 +31,8 @@ from lfs10d.simulator.faults import (
     ailment,
 )
 from lfs10d.simulator.registers import LFS10, READ_HOLDING, READ_INPUT, WRITE_SINGLE, Blueprint, Signal
-from lfs10d.simulator.wind import Unique
+from lfs10d.simulator.wind import Source, Unique
 from lfs10d.simulator.wire import Format, Framing, nanoseconds, seal
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from lfs10d.simulator.wind import Source
 
 BROADCAST: Final = 0
 WILDCARD_ID: Final = 255

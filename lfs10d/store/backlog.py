@@ -18,24 +18,19 @@ from __future__ import annotations
 import errno
 import sqlite3
 from collections import deque
+from collections.abc import Callable, Collection, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from lfs10d.disk import Disk
 from lfs10d.errors import StateError
-from lfs10d.store.opening import ForeignError
+from lfs10d.loss import Loss
+from lfs10d.store.opening import ForeignError, Limits
 from lfs10d.store.row import DamagedError
-from lfs10d.store.samplefile import SampleFile
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Sequence
-    from collections.abc import Set as AbstractSet
-
-    from lfs10d.loss import Loss
-    from lfs10d.store.opening import Limits
-    from lfs10d.store.samplefile import Entry, Row
-    from lfs10d.telemetry import Clock
+from lfs10d.store.samplefile import Entry, Row, SampleFile
+from lfs10d.telemetry import Clock
 
 T = TypeVar("T")
 

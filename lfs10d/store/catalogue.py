@@ -6,16 +6,12 @@ clock. A sample's `ts` is counted from its era's base, so that setting the clock
 
 from __future__ import annotations
 
+import sqlite3
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from lfs10d.clockstep import corrects
 from lfs10d.store.row import DamagedError, Series, check
-
-if TYPE_CHECKING:
-    import sqlite3
-
-    from lfs10d.telemetry import Clock, Sample
+from lfs10d.telemetry import Clock, Sample
 
 EVEN_WITHIN = 20
 """ms by which the distance of wall and monotonic clock may differ within one era: more is a step."""

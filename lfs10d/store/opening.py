@@ -14,15 +14,12 @@ from __future__ import annotations
 
 import contextlib
 import sqlite3
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from lfs10d.regularfile import create_private, make_private
 from lfs10d.store.row import DamagedError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
 
 APPLICATION_ID = 0x4C465364
 """`LFSd` in the header says that a file is ours (https://www.sqlite.org/fileformat.html#application_id)."""

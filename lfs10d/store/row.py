@@ -11,13 +11,11 @@ import json
 import struct
 import zlib
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, TypeAlias, cast
+from typing import Literal, TypeAlias, cast
 
 from lfs10d.profiles.registers import shortest
-
-if TYPE_CHECKING:
-    from lfs10d.reading import Number
-    from lfs10d.telemetry import Sample
+from lfs10d.reading import Number
+from lfs10d.telemetry import Sample
 
 Cell: TypeAlias = int | float | bytes | str | None
 """A number as SQLite keeps it; None where there is none."""

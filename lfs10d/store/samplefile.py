@@ -6,8 +6,10 @@ sqlite3.Error or DamagedError; then the file is to be closed, since nobody knows
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from lfs10d.loss import Loss, joined
 from lfs10d.store import opening
@@ -15,11 +17,6 @@ from lfs10d.store.catalogue import Catalogue
 from lfs10d.store.opening import PAGE, Limits, number, transaction
 from lfs10d.store.row import Cell, DamagedError, check, pack_rtt, unpack_rtt, values_from, values_of
 from lfs10d.telemetry import Clock, Sample
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator, Sequence
-    from collections.abc import Set as AbstractSet
-    from pathlib import Path
 
 EVICTED_AT_ONCE = 256
 """Samples evicted in one go: two pages."""

@@ -7,16 +7,14 @@ import select
 import termios
 import time
 import tty
-from typing import TYPE_CHECKING, Self
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Self
 
 import pytest
 
 from bench.engine import crc16
 from bench.line import PacedLine
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
 
 BAUDRATE = 1200
 CHARACTER = 10 / BAUDRATE

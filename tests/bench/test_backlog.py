@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from bench import backlog
 from lfs10d.store.opening import Limits
 from lfs10d.store.samplefile import SampleFile
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 def test_so_many_samples_wait_and_each_run_has_its_own_copy(tmp_path: Path) -> None:

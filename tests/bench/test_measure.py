@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -12,10 +11,7 @@ from bench.broker import Broker, Heard, missing_seqs
 from bench.line import Sent
 from bench.measure import Run, jitter, judge_samples, measure, rates
 from bench.report import markdown, results, table
-from bench.rows import ROWS, Row, engine_rows
-
-if TYPE_CHECKING:
-    from bench.rows import Master
+from bench.rows import ROWS, Master, Row, engine_rows
 
 DOUBLE = (sys.executable, str(Path(__file__).with_name("daemon_double.py")))
 SHORT = Row("short", "two at 115200", baudrate=115200, sensors=2, warm=1.5, seconds=1.0)

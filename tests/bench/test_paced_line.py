@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 import termios
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import pytest
 
@@ -13,10 +13,7 @@ from bench.engine import crc16
 from bench.line import PacedLine, read_log
 from tests.bench.conftest import CHARACTER, ID, T35, Terminal, request
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    Starter = Callable[..., PacedLine]
+Starter = Callable[..., PacedLine]
 
 pytestmark = pytest.mark.needs("gcc")
 

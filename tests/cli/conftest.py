@@ -11,16 +11,14 @@ import struct
 import subprocess
 import sys
 import termios
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Protocol
 
 import pytest
 
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
 
 
 class Lfs10d(Protocol):

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 from click.testing import CliRunner
 
 from lfs10d.cli.check import command
-
-if TYPE_CHECKING:
-    from tests.cli.conftest import Lfs10d
+from tests.cli.conftest import Lfs10d
 
 
 @pytest.fixture(autouse=True)

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import click
 import pytest
 
 from lfs10d.cli import VERBS, lfs10d
 from lfs10d.requests.table import REQUESTS
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 COLUMNS = 80
 

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from lfs10d.cli.holder import Daemon, config_of, daemon_behind, device_name, instead
 from lfs10d.modbus.claim import Holder
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 def process(proc: Path, pid: int, *argv: str) -> Holder:

@@ -5,16 +5,14 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
-from typing import TYPE_CHECKING, NoReturn
+from collections.abc import Iterator
+from types import FrameType
+from typing import NoReturn
 
 import pytest
 
 from lfs10d.cli import interruptible
 from lfs10d.signals import ENDING
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from types import FrameType
 
 
 def before_and_after(signum: int, frame: FrameType | None) -> NoReturn:

@@ -9,7 +9,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 from click.testing import CliRunner
@@ -18,14 +17,12 @@ from lfs10d.cli.lineoptions import take
 from lfs10d.cli.read import _Course, _explained, _Wanted, command
 from lfs10d.profiles.library import load_profile
 from lfs10d.reading import Errand, Exchanged, Fault, FaultCode
+from lfs10d.simulator.line import SimulatedLine
+from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.registers import blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
-
-if TYPE_CHECKING:
-    from lfs10d.simulator.line import SimulatedLine
-    from lfs10d.simulator.pty import PtyLine
-    from tests.cli.conftest import AtTerminal, Lfs10d
+from tests.cli.conftest import AtTerminal, Lfs10d
 
 
 def watching(sensors: PtyLine, *arguments: str) -> subprocess.Popen[str]:

@@ -9,7 +9,8 @@ import signal
 import subprocess
 import sys
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -17,16 +18,11 @@ from click.testing import CliRunner
 from lfs10d.cli.scan import command
 from lfs10d.cli.scanview import span
 from lfs10d.configfile import load
+from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.troubles import stray
 from lfs10d.simulator.wire import Format
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from lfs10d.simulator.pty import PtyLine
-    from tests.cli.conftest import AtTerminal, Lfs10d
+from tests.cli.conftest import AtTerminal, Lfs10d
 
 
 def wild(slave: int) -> Sensor:

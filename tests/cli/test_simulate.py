@@ -12,18 +12,15 @@ import sys
 import termios
 import time
 import tty
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
 from lfs10d.simulator.wire import seal, unseal
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from tests.cli.conftest import Lfs10d
+from tests.cli.conftest import Lfs10d
 
 
 @contextmanager

@@ -6,7 +6,6 @@ import importlib
 import json
 import subprocess
 import sys
-from typing import TYPE_CHECKING
 
 import click
 import pytest
@@ -15,9 +14,7 @@ from click.testing import CliRunner
 from lfs10d import __version__
 from lfs10d.cli import VERBS
 from lfs10d.cli import lfs10d as group
-
-if TYPE_CHECKING:
-    from tests.cli.conftest import Lfs10d
+from tests.cli.conftest import Lfs10d
 
 BUILT = group.list_commands(click.Context(group))
 

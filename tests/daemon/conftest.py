@@ -14,21 +14,18 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
 from lfs10d.simulator.build import Plan, build
+from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.wire import Format
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
-
-    from lfs10d.simulator.line import SimulatedLine
-    from tests.conftest import Heard, Listener, Mosquitto
+from tests.conftest import Heard, Listener, Mosquitto
 
 PATIENCE = 20.0
 """Seconds after which something awaited counts as not happening; no test waits this long when all is well."""

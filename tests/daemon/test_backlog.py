@@ -9,19 +9,14 @@ import sqlite3
 import subprocess
 import time
 from collections import Counter
+from collections.abc import Iterator
 from contextlib import closing
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
-from tests.daemon.conftest import ENDS_WITHIN, View, eventually, good
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from tests.conftest import Mosquitto
-    from tests.daemon.conftest import Site
+from tests.conftest import Mosquitto
+from tests.daemon.conftest import ENDS_WITHIN, Site, View, eventually, good
 
 COMMITTED_WITHIN = 8.0
 """Seconds after which a sample is on the disk while the broker is away: 3 s of youth, 5 s between two commits."""

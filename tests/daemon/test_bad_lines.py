@@ -8,7 +8,6 @@ from __future__ import annotations
 import signal
 import time
 from functools import partial
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -19,10 +18,7 @@ from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.wire import SECOND, Format
 from soak.attestation import Oracle, epoch_of, parsed
 from soak.troubles import KINDS
-from tests.daemon.conftest import eventually, tell
-
-if TYPE_CHECKING:
-    from tests.daemon.conftest import Site, View
+from tests.daemon.conftest import Site, View, eventually, tell
 
 pytestmark = pytest.mark.needs("mosquitto")
 

@@ -7,20 +7,15 @@ import select
 import socket
 import threading
 import time
+from collections.abc import Iterator
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.daemon.conftest import PATIENCE, View, eventually, good
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from tests.conftest import Mosquitto
-    from tests.daemon.conftest import Site
+from tests.conftest import Mosquitto
+from tests.daemon.conftest import PATIENCE, Site, View, eventually, good
 
 LIVE_FOR = 3.0
 """Seconds after which a sample is history (contract, section 3)."""

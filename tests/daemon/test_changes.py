@@ -5,17 +5,13 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 
-from tests.daemon.conftest import eventually, good
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from tests.conftest import Mosquitto
-    from tests.daemon.conftest import Run, Site, View
+from tests.conftest import Mosquitto
+from tests.daemon.conftest import Run, Site, View, eventually, good
 
 pytestmark = pytest.mark.needs("mosquitto", "mosquitto_pub")
 

@@ -5,21 +5,17 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
-from docs.generate.commands import BAUDRATE, CONFIG, SLAVES, WALK, recorded
+from docs.generate.commands import BAUDRATE, CONFIG, SLAVES, WALK, Step, recorded
 from lfs10d.outbound import check
 from lfs10d.requests.table import REQUESTS
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
-from tests.daemon.conftest import eventually, good, tell
-
-if TYPE_CHECKING:
-    from docs.generate.commands import Step
-    from tests.conftest import Mosquitto
-    from tests.daemon.conftest import Site, View
+from tests.conftest import Mosquitto
+from tests.daemon.conftest import Site, View, eventually, good, tell
 
 BASE = "lfs10d/line0"
 QUICK = [number for number, step in enumerate(WALK) if not step.slow]

@@ -6,15 +6,11 @@ import signal
 import socket
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.daemon.conftest import ENDS_WITHIN, eventually, good
-
-if TYPE_CHECKING:
-    from tests.conftest import Mosquitto
-    from tests.daemon.conftest import Site, View
+from tests.conftest import Mosquitto
+from tests.daemon.conftest import ENDS_WITHIN, Site, View, eventually, good
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])

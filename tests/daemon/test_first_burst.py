@@ -6,13 +6,9 @@ import json
 import signal
 import time
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
-from tests.daemon.conftest import View, good
-
-if TYPE_CHECKING:
-    from tests.conftest import Mosquitto
-    from tests.daemon.conftest import Site
+from tests.conftest import Mosquitto
+from tests.daemon.conftest import Site, View, good
 
 LINE_TOPICS = {"info", "devices", "line/state", "line/error", "line/stats"}
 DEVICE_LEAVES = {"state", "config", "availability", "error", "stats"}

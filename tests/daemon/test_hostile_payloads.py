@@ -5,19 +5,14 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import pytest
 
 from lfs10d.outbound import check
 from soak.attestation import Oracle, epoch_of, parsed
-from tests.daemon.conftest import eventually, good
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from tests.conftest import Mosquitto
-    from tests.daemon.conftest import Site, View
+from tests.conftest import Mosquitto
+from tests.daemon.conftest import Site, View, eventually, good
 
 pytestmark = [pytest.mark.needs("mosquitto"), pytest.mark.needs("mosquitto_pub")]
 

@@ -5,18 +5,13 @@ from __future__ import annotations
 import contextlib
 import signal
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.daemon.conftest import View, eventually, good
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from tests.conftest import Authority, Mosquitto
-    from tests.daemon.conftest import Run, Site
+from tests.conftest import Authority, Mosquitto
+from tests.daemon.conftest import Run, Site, View, eventually, good
 
 SECRET = "s3cret-and-long-enough"  # noqa: S105 - of a broker that lives for one test
 WRONG = "wr0ng-and-long-enough"

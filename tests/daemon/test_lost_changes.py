@@ -5,18 +5,14 @@ from __future__ import annotations
 import json
 import shutil
 import signal
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 
-from tests.daemon.conftest import View, eventually, good, tell
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from lfs10d.simulator.pty import PtyLine
-    from tests.conftest import Mosquitto
-    from tests.daemon.conftest import Run, Site
+from lfs10d.simulator.pty import PtyLine
+from tests.conftest import Mosquitto
+from tests.daemon.conftest import Run, Site, View, eventually, good, tell
 
 pytestmark = pytest.mark.needs("mosquitto")
 

@@ -10,20 +10,17 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 
+from lfs10d.simulator.line import SimulatedLine
+from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
+from tests.conftest import Mosquitto
 from tests.daemon.conftest import Site, View, eventually, good, tell
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from lfs10d.simulator.line import SimulatedLine
-    from lfs10d.simulator.pty import PtyLine
-    from tests.conftest import Mosquitto
 
 BASE = "lfs10d/line0"
 

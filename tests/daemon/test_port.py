@@ -5,14 +5,11 @@ from __future__ import annotations
 import fcntl
 import os
 import time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
-from tests.daemon.conftest import good
-
-if TYPE_CHECKING:
-    from tests.daemon.conftest import Site, View
+from tests.daemon.conftest import Site, View, good
 
 BACK_WITHIN = 2.0
 """Seconds from the return of the port to its use (issue A)."""

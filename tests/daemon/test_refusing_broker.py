@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import json
 import time
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 import pytest
 
 from tests.brokers import Capricious
-from tests.daemon.conftest import View, eventually, good
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from tests.conftest import Mosquitto
-    from tests.daemon.conftest import Site
+from tests.conftest import Mosquitto
+from tests.daemon.conftest import Site, View, eventually, good
 
 HISTORY_WITHIN = 40.0
 """Seconds in which the backlog of these tests is out: it begins 10 s after a connect, also after a second and third."""

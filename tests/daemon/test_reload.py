@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Iterator
 from dataclasses import replace
 from importlib.resources import files
+from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
+from lfs10d.simulator.line import SimulatedLine
 from tests.conftest import Mosquitto
-from tests.daemon.conftest import View, eventually, good, tell
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from lfs10d.simulator.line import SimulatedLine
-    from tests.daemon.conftest import Site
+from tests.daemon.conftest import Site, View, eventually, good, tell
 
 INTERVAL = 200
 """ms between two polls of a device, unless a test says otherwise."""

@@ -6,21 +6,17 @@ import json
 import signal
 import subprocess
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import count
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
 from lfs10d.outbound import check
-from tests.daemon.conftest import eventually, good, tell
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from lfs10d.simulator.line import SimulatedLine
-    from tests.conftest import Heard, Listener, Mosquitto
-    from tests.daemon.conftest import Run, Site, View
+from lfs10d.simulator.line import SimulatedLine
+from tests.conftest import Heard, Listener, Mosquitto
+from tests.daemon.conftest import Run, Site, View, eventually, good, tell
 
 BASE = "lfs10d/line0"
 

@@ -5,18 +5,15 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
 from lfs10d.outbound import check
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
-from tests.daemon.conftest import eventually, good, tell
-
-if TYPE_CHECKING:
-    from tests.conftest import Mosquitto
-    from tests.daemon.conftest import Site, View
+from tests.conftest import Mosquitto
+from tests.daemon.conftest import Site, View, eventually, good, tell
 
 pytestmark = pytest.mark.needs("mosquitto_pub")
 

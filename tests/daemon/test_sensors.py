@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
 from lfs10d.simulator.faults import Kind
 from lfs10d.simulator.line import SimulatedLine
-from tests.daemon.conftest import eventually, good, tell
-
-if TYPE_CHECKING:
-    from tests.daemon.conftest import Site, View
+from tests.daemon.conftest import Site, View, eventually, good, tell
 
 
 def failing(error: dict[str, Any]) -> bool:

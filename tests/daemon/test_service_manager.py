@@ -7,17 +7,13 @@ import re
 import signal
 import time
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 from lfs10d.simulator.faults import Kind
-from tests.daemon.conftest import eventually, good
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tests.daemon.conftest import Run, Site, View
+from tests.daemon.conftest import Run, Site, View, eventually, good
 
 START = "from lfs10d.__main__ import main; main()"
 

@@ -7,17 +7,13 @@ import os
 import re
 import socket
 import termios
-from typing import TYPE_CHECKING
 
 import pytest
 
 from lfs10d.simulator.faults import Kind
 from lfs10d.simulator.wire import Format
-from tests.daemon.conftest import View, eventually, good, tell
-
-if TYPE_CHECKING:
-    from tests.conftest import Mosquitto
-    from tests.daemon.conftest import Site
+from tests.conftest import Mosquitto
+from tests.daemon.conftest import Site, View, eventually, good, tell
 
 NOT_PERMITTED = """
 import errno, os, sys

@@ -6,14 +6,10 @@ import re
 import shlex
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.daemon.conftest import eventually, good
-
-if TYPE_CHECKING:
-    from tests.daemon.conftest import Site, View
+from tests.daemon.conftest import Site, View, eventually, good
 
 EXIT_CONFIG = 78
 EXIT_USAGE = 2

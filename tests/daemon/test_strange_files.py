@@ -4,16 +4,11 @@ from __future__ import annotations
 
 import os
 import stat
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
-from tests.daemon.conftest import good
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tests.daemon.conftest import Site, View
+from tests.daemon.conftest import Site, View, good
 
 
 @pytest.mark.parametrize("what", ["configuration", "profile", "password"])

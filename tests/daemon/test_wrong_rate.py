@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from lfs10d.simulator.wire import Format
-from tests.daemon.conftest import good
-
-if TYPE_CHECKING:
-    from tests.daemon.conftest import Site, View
+from tests.daemon.conftest import Site, View, good
 
 LOST_SOON = """
 import lfs10d.jobs.lost

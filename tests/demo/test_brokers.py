@@ -6,7 +6,7 @@ import asyncio
 import os
 import socket
 import sys
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
@@ -14,9 +14,6 @@ from lfs10d.demo import brokers
 from lfs10d.demo.brokers import is_free, known, listens, start_broker
 from lfs10d.demo.children import Children
 from lfs10d.errors import FailedError
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 def test_a_port_somebody_listens_on_is_not_free(unused_port: int) -> None:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from lfs10d.configfile import load
 from lfs10d.demo.cast import CAST, configuration, faults, slaves
 from lfs10d.simulator.build import slave_ids
 from lfs10d.simulator.faultfile import parse_faults
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 def test_the_daemon_accepts_its_file(tmp_path: Path) -> None:

@@ -7,7 +7,8 @@ import os
 import signal
 import subprocess
 import sys
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
@@ -15,10 +16,6 @@ from lfs10d.demo import children as module
 from lfs10d.demo.children import Children, passing_folder
 from lfs10d.demo.leash import ITSELF
 from lfs10d.errors import FailedError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
 
 SLEEPS = (sys.executable, "-S", "-c", "import time; print('awake', flush=True); time.sleep(600)")
 STUBBORN = (

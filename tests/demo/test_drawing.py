@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import io
-from typing import TYPE_CHECKING
 
 import pytest
 from rich.console import Console
 
 from lfs10d.demo.brokers import Broker
 from lfs10d.demo.drawing import LEAST_HEIGHT, LEAST_WIDTH, TableView, draw
-
-if TYPE_CHECKING:
-    from tests.demo.conftest import Told
+from tests.demo.conftest import Told
 
 BROKER = Broker("mosquitto", "5", 18830)
 

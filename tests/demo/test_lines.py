@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import pytest
 
 from lfs10d.demo.brokers import Broker
 from lfs10d.demo.lines import HEAD_EVERY, Lines, LinesView
-
-if TYPE_CHECKING:
-    import pytest
-
-    from tests.demo.conftest import Told
+from tests.demo.conftest import Told
 
 BROKER = Broker("mosquitto", "5", 18830)
 NOW = "21:53:42"

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import pytest
 
 from lfs10d.demo.picture import KEPT, LineFigures
-
-if TYPE_CHECKING:
-    from tests.demo.conftest import Told
+from tests.demo.conftest import Told
 
 
 def test_a_sensor_not_heard_of_yet_claims_nothing(told: Told) -> None:

@@ -10,29 +10,24 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
 from lfs10d.profiles.library import load_profile
-from lfs10d.simulator.line import SimulatedLine
+from lfs10d.profiles.schema import Profile
+from lfs10d.simulator.line import Request, SimulatedLine
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.registers import blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wind import Unique
-from lfs10d.simulator.wire import Format, unseal
+from lfs10d.simulator.wire import Check, Format, Framing, unseal
 from tests.conftest import Mosquitto, path_of
 from tests.daemon.conftest import Site, View, good, tell
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-
-    from lfs10d.profiles.schema import Profile
-    from lfs10d.simulator.line import Request
-    from lfs10d.simulator.wire import Check, Framing
 
 ROOT = Path(__file__).parents[2]
 BAUDRATE = 19200

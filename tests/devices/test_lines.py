@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
-from lfs10d.simulator.wire import unseal
+from lfs10d.simulator.wire import Check, unseal
 from tests.daemon.conftest import good
-from tests.devices.conftest import ASCII, AT_ONCE, ILL, RTU, WELL_SAMPLES
-
-if TYPE_CHECKING:
-    from lfs10d.simulator.wire import Check
-    from tests.devices.conftest import Recording
+from tests.devices.conftest import ASCII, AT_ONCE, ILL, RTU, WELL_SAMPLES, Recording
 
 CHECKS: tuple[Check, ...] = ("crc", "sum")
 

@@ -8,15 +8,12 @@ import shlex
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
 from tests.conftest import eventually
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 PAGE = (Path(__file__).parents[2] / "docs" / "profiles.md").read_text()
 COMMANDS = re.findall(r"^    \$ lfs10d (.+)$", PAGE, re.MULTILINE)

@@ -8,9 +8,11 @@ import re
 import subprocess
 import threading
 import time
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 from pymodbus import FramerType
@@ -22,15 +24,9 @@ from lfs10d.profiles.library import load_profile
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.wire import Format
-from tests.conftest import eventually
+from tests.conftest import Mosquitto, eventually
 from tests.daemon.conftest import Site, View
 from tests.devices.conftest import RTU, TANK, simulated
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
-    from pathlib import Path
-
-    from tests.conftest import Mosquitto
 
 LONGEST_REQUEST = 17 * 11 / 9600
 """s that a request in ASCII takes at 9600 baud and 11 bits."""

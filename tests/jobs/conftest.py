@@ -5,27 +5,23 @@ It knows no bytes; how each sensor takes a write is set in the test.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import pytest
 
 from lfs10d.jobs.asking import Asking
-from lfs10d.jobs.course import Aside, LineLostError, Now
+from lfs10d.jobs.course import Aside, LineLostError, Now, Step
 from lfs10d.jobs.job import Ask, Hold
+from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters, Request, WriteRegister
 from lfs10d.modbus.unanswered import Unanswered
 from lfs10d.profiles.library import load_profile
+from lfs10d.profiles.schema import Profile
 from lfs10d.reading import Fault, FaultCode
 from tests.outcomes import ended
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Generator
-
-    from lfs10d.jobs.course import Step
-    from lfs10d.modbus.exchange import Outcome
-    from lfs10d.profiles.schema import Profile
 
 T = TypeVar("T")
 CODEC = Codec(Framing.RTU)

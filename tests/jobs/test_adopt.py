@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
@@ -11,10 +11,7 @@ from lfs10d.jobs.readdress import Ending, Verdict, Write
 from lfs10d.jobs.recognition import READS
 from lfs10d.journal import Spot
 from lfs10d.modbus.frames import ReadRegisters, WriteRegister
-from tests.jobs.conftest import Mimic
-
-if TYPE_CHECKING:
-    from tests.jobs.conftest import Pretence
+from tests.jobs.conftest import Mimic, Pretence
 
 WISH = Newcomer(1, (2, 3), 9600, (9600, 19200))
 AT_9600, AT_19200 = Spot(slave=1, baudrate=9600), Spot(slave=1, baudrate=19200)

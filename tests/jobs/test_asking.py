@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -14,11 +14,7 @@ from lfs10d.modbus.exchange import LateAnswer, Outcome
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
 from lfs10d.profiles.library import load_profile, parse_profile
 from lfs10d.reading import FaultCode
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from tests.jobs.conftest import Pretence
+from tests.jobs.conftest import Pretence
 
 RTU = Codec(Framing.RTU)
 HERE = Spot(slave=3, baudrate=9600)

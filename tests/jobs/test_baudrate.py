@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -21,11 +22,7 @@ from lfs10d.jobs.baudrate import (
 from lfs10d.jobs.readdress import ECHO_READS
 from lfs10d.modbus.frames import WriteRegister
 from lfs10d.profiles.library import load_profile
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tests.jobs.conftest import Pretence
+from tests.jobs.conftest import Pretence
 
 UP = (9600, 19200)
 BARE = """

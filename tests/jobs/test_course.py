@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Generator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
-from lfs10d.jobs.course import SLICE, Aside, Course, LineLostError, Now, Over
+from lfs10d.jobs.course import SLICE, Aside, Course, LineLostError, Now, Over, Step
 from lfs10d.jobs.job import Again, Ask, Done, Hold, Later
+from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
 from lfs10d.reading import Errand
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Generator
-
-    from lfs10d.jobs.course import Step
-    from lfs10d.modbus.exchange import Outcome
 
 RTU = Codec(Framing.RTU)
 WHO = ReadRegisters(3, 5, 1)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -11,9 +10,7 @@ from lfs10d.jobs.follow import follow
 from lfs10d.jobs.readdress import Ending, Verdict
 from lfs10d.journal import Spot
 from lfs10d.modbus.frames import WriteRegister
-
-if TYPE_CHECKING:
-    from tests.jobs.conftest import Pretence
+from tests.jobs.conftest import Pretence
 
 OLD, NEW = Spot(slave=3, baudrate=9600), Spot(slave=9, baudrate=9600)
 BEFORE = Spot(slave=3, baudrate=19200)

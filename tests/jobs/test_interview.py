@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
 from lfs10d.jobs.interview import Finding, Interview, first_read, rate_fits, speaks, spoilt, strangers
+from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
 from lfs10d.profiles.library import builtin_names, load_profile
+from lfs10d.profiles.schema import Profile
 from lfs10d.reading import Fault, FaultCode
 from tests.outcomes import ended
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from lfs10d.modbus.exchange import Outcome
-    from lfs10d.profiles.schema import Profile
 
 CODEC = Codec(Framing.RTU)
 PROFILES = tuple(load_profile(name, relative_to=Path()) for name in builtin_names())

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
 from lfs10d.jobs.job import Ask, Done, Later
 from lfs10d.jobs.knock import Knock
+from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
 from lfs10d.profiles.library import load_profile
 from lfs10d.reading import Fault, FaultCode
 from tests.outcomes import ended
-
-if TYPE_CHECKING:
-    from lfs10d.modbus.exchange import Outcome
 
 CODEC = Codec(Framing.RTU)
 LFS10 = load_profile("lfs10", relative_to=Path())

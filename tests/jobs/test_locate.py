@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from lfs10d.jobs.locate import locate
 from lfs10d.journal import Spot
-
-if TYPE_CHECKING:
-    from tests.jobs.conftest import Pretence
+from tests.jobs.conftest import Pretence
 
 FILE, LAST = Spot(slave=3, baudrate=9600), Spot(slave=7, baudrate=19200)
 

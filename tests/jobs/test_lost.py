@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
@@ -12,11 +13,7 @@ from lfs10d.jobs.lost import LOST_AFTER, in_words, seek
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.profiles.library import load_profile
 from lfs10d.roster import Device, DeviceSpec, Health, PollRules
-
-if TYPE_CHECKING:
-    from collections.abc import Generator
-
-    from tests.jobs.conftest import Pretence
+from tests.jobs.conftest import Pretence
 
 RTU = Codec(Framing.RTU)
 

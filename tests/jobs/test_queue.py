@@ -4,22 +4,19 @@ from __future__ import annotations
 
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
 from lfs10d.jobs.job import Ask, Done, Hold, Next
 from lfs10d.jobs.poll import Poll
 from lfs10d.jobs.queue import JOB_CREDIT, JobQueue
+from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.unanswered import Unanswered
 from lfs10d.profiles.library import load_profile
 from lfs10d.reading import Errand
 from lfs10d.roster import Device, DeviceSpec, PollRules
 from lfs10d.share import Share
-
-if TYPE_CHECKING:
-    from lfs10d.modbus.exchange import Outcome
 
 NONE: frozenset[int] = frozenset()
 

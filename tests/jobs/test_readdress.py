@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -31,9 +29,7 @@ from lfs10d.jobs.readdress import (
 )
 from lfs10d.journal import Spot
 from lfs10d.modbus.frames import ReadRegisters, WriteRegister
-
-if TYPE_CHECKING:
-    from tests.jobs.conftest import Pretence
+from tests.jobs.conftest import Pretence
 
 OLD, NEW = Spot(slave=3, baudrate=9600), Spot(slave=9, baudrate=9600)
 WISH = Wish(OLD, 9, (9600, 19200))

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterable, Iterator
 from itertools import chain, cycle, repeat
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 
 from lfs10d.jobs.asking import QUICK, Reply
 from lfs10d.jobs.interview import rate_fits
+from lfs10d.jobs.job import Ask
 from lfs10d.jobs.recognition import (
     CROSSINGS,
     LEAST,
@@ -24,17 +26,11 @@ from lfs10d.jobs.recognition import (
     recognised,
 )
 from lfs10d.journal import Spot
+from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import ReadRegisters
 from lfs10d.profiles.library import parse_profile
 from lfs10d.reading import FaultCode
-from tests.jobs.conftest import CODEC, LFS10, Mimic, heard
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from lfs10d.jobs.job import Ask
-    from lfs10d.modbus.exchange import Outcome
-    from tests.jobs.conftest import Pretence
+from tests.jobs.conftest import CODEC, LFS10, Mimic, Pretence, heard
 
 HERE, SILENT = Spot(slave=3, baudrate=9600), Spot(slave=9, baudrate=9600)
 SAYS_3 = Reply(answers=True, register=3)

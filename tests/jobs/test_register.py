@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Literal
 
 import pytest
 
@@ -13,9 +13,11 @@ from lfs10d.jobs.register import DIFFERING, ECHO_READS, VERIFY_WITHIN, Access, E
 from lfs10d.modbus.bus import Bus, LineRules
 from lfs10d.modbus.exchange import Echo
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters, WriteRegister
+from lfs10d.modbus.request import Request
 from lfs10d.modbus.settings import PortSettings
 from lfs10d.poller import Poller
 from lfs10d.profiles.library import load_profile
+from lfs10d.profiles.schema import Profile
 from lfs10d.reading import Errand, Event, Exchanged, Fault, FaultCode, Reading
 from lfs10d.roster import DeviceSpec, PollRules
 from lfs10d.schedule import Schedule
@@ -23,12 +25,6 @@ from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.port import SimulatedPort, VirtualClock, run
 from lfs10d.simulator.registers import blueprint_of
 from lfs10d.simulator.sensor import Sensor
-
-if TYPE_CHECKING:
-    from typing import Literal
-
-    from lfs10d.modbus.request import Request
-    from lfs10d.profiles.schema import Profile
 
 ROOT = Path(__file__).parents[2]
 VANE = load_profile("config/profiles/wind-vane.yaml", relative_to=ROOT)

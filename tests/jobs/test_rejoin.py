@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from functools import partial
 from math import inf
-from typing import TYPE_CHECKING
 
 import pytest
 
 from lfs10d.jobs.baudrate import Ended, RateVerdict, Sensor
 from lfs10d.jobs.rejoin import CameUp, StillLost, Twins, await_lost, await_power, look_back, put_back
-
-if TYPE_CHECKING:
-    from tests.jobs.conftest import Pretence
+from tests.jobs.conftest import Pretence
 
 UP = (9600, 19200)
 

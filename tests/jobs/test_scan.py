@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
+from lfs10d.jobs.interview import Finding
 from lfs10d.jobs.job import Again, Ask, Done, Later
 from lfs10d.jobs.scan import SLICE, Scan
 from lfs10d.jobs.search import Search
 from lfs10d.modbus.bus import Bus, LineRules
+from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.settings import PortSettings
 from lfs10d.modbus.timing import LineTiming
@@ -27,12 +29,6 @@ from lfs10d.simulator.registers import blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.troubles import babble, second_master, stray
 from lfs10d.simulator.wire import Format
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from lfs10d.jobs.interview import Finding
-    from lfs10d.modbus.exchange import Outcome
 
 PROFILES = tuple(load_profile(name, relative_to=Path()) for name in builtin_names())
 RTU = Codec(Framing.RTU)

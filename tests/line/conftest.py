@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -15,21 +15,16 @@ from lfs10d.modbus.settings import PortSettings
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.poller import Poller
 from lfs10d.profiles.library import load_profile
+from lfs10d.profiles.schema import Profile
 from lfs10d.reading import Event, Exchanged, FaultCode, PortChanged, Reading
 from lfs10d.roster import DeviceSpec, PollRules
 from lfs10d.schedule import Schedule
 from lfs10d.simulator.burst import MASTER
 from lfs10d.simulator.inturn import InTurn
-from lfs10d.simulator.line import SimulatedLine
+from lfs10d.simulator.line import Answer, Request, SimulatedLine
 from lfs10d.simulator.port import SimulatedPort, VirtualClock, run
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from lfs10d.profiles.schema import Profile
-    from lfs10d.simulator.line import Answer, Request
 
 LFS10 = load_profile("lfs10", relative_to=Path())
 NAMES = {slave: f"slave-{slave}" for slave in range(256)}

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -14,11 +14,7 @@ from lfs10d.reading import ALIVE_CODES, FaultCode
 from lfs10d.roster import PollRules
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.troubles import babble, second_master, stray
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from tests.line.conftest import Rig, Rigs
+from tests.line.conftest import Rig, Rigs
 
 LASTS = 40.0
 """Virtual seconds of one scenario."""

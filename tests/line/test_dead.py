@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import pytest
 
 from lfs10d.reading import Errand
-
-if TYPE_CHECKING:
-    from tests.line.conftest import Rigs
+from tests.line.conftest import Rigs
 
 ALL = range(1, 33)
 

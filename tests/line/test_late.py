@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import pytest
 
 from lfs10d.profiles.schema import Profile
 from lfs10d.reading import FaultCode
-
-if TYPE_CHECKING:
-    from tests.line.conftest import Rigs
+from tests.line.conftest import Rigs
 
 
 @pytest.mark.parametrize("in_turn", [True, False], ids=["in turn", "out of turn"])

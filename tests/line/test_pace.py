@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import pytest
 
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.roster import PollRules
-
-if TYPE_CHECKING:
-    from tests.line.conftest import Rigs
+from tests.line.conftest import Rigs
 
 
 @pytest.mark.parametrize("baudrate", [9600, 19200])

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import pytest
 
 from lfs10d.modbus.bus import LineRules
 from lfs10d.modbus.settings import PortSettings
 from lfs10d.reading import FaultCode
-
-if TYPE_CHECKING:
-    from tests.line.conftest import Rig, Rigs
+from tests.line.conftest import Rig, Rigs
 
 
 def without_port(rig: Rig, since: float, until: float) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -11,9 +9,7 @@ from hypothesis import strategies as st
 from lfs10d.jobs.poll import Poll
 from lfs10d.reading import Errand
 from lfs10d.roster import PollRules
-
-if TYPE_CHECKING:
-    from tests.line.conftest import Rig, Rigs
+from tests.line.conftest import Rig, Rigs
 
 RULES = PollRules()
 

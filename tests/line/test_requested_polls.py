@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from lfs10d.reading import FaultCode
+from lfs10d.reading import FaultCode, Reading
 from lfs10d.roster import PollRules
-
-if TYPE_CHECKING:
-    from lfs10d.reading import Reading
-    from tests.line.conftest import Rig, Rigs
+from tests.line.conftest import Rig, Rigs
 
 DAILY = 86_400.0
 

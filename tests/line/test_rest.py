@@ -4,21 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import pytest
 
-from lfs10d.jobs.register import Access, Target
-from lfs10d.modbus.frames import Codec, Framing, ReadRegisters, WriteRegister
+from lfs10d.jobs.register import Access, End, Target
+from lfs10d.modbus.frames import Codec, Framing, ReadRegisters, Request, WriteRegister
 from lfs10d.reading import FaultCode
-from lfs10d.roster import PollRules
+from lfs10d.roster import DeviceSpec, PollRules
 from lfs10d.simulator.burst import MASTER
 from tests.line.conftest import LFS10, Rig, Rigs, a_spec
-
-if TYPE_CHECKING:
-    from lfs10d.jobs.register import End
-    from lfs10d.modbus.frames import Request
-    from lfs10d.roster import DeviceSpec
 
 HEALTHY = (2, 3, 4)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -16,9 +15,7 @@ from lfs10d.reading import FaultCode
 from lfs10d.roster import PollRules
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
-
-if TYPE_CHECKING:
-    from tests.line.conftest import Rig, Rigs
+from tests.line.conftest import Rig, Rigs
 
 PROFILES = tuple(load_profile(name, relative_to=Path()) for name in builtin_names())
 WIRE = 0.0314

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from typing import TYPE_CHECKING
 
 import pytest
 
 from lfs10d.reading import AnsweredTwice, FaultCode
 from lfs10d.simulator.troubles import second_master
-
-if TYPE_CHECKING:
-    from tests.line.conftest import Rig, Rigs
+from tests.line.conftest import Rig, Rigs
 
 WIND_OF_2 = bytes((2, 3, 0, 1, 0, 2))
 

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import pytest
 
 from lfs10d.reading import Errand
-
-if TYPE_CHECKING:
-    from tests.line.conftest import Rigs
+from tests.line.conftest import Rigs
 
 BAD = (2, 4, 6, 8)
 GOOD = (1, 3, 5, 7)

@@ -5,8 +5,8 @@ A transcript is checked in as text. To write one anew, delete it, run the test (
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -14,11 +14,7 @@ from lfs10d.modbus.bus import LineRules
 from lfs10d.reading import Event, Exchanged, PortChanged, Reading
 from lfs10d.roster import PollRules
 from lfs10d.simulator.troubles import babble
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from tests.line.conftest import Rig, Rigs
+from tests.line.conftest import Rig, Rigs
 
 FOLDER = Path(__file__).parent / "transcripts"
 

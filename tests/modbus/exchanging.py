@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from lfs10d.modbus.exchange import (
     Attempt,
@@ -17,9 +16,7 @@ from lfs10d.modbus.exchange import (
 )
 from lfs10d.modbus.frames import Checksum, Codec, Framing, ReadRegisters, WriteRegister
 from lfs10d.modbus.timing import LineTiming
-
-if TYPE_CHECKING:
-    from lfs10d.reading import FaultCode
+from lfs10d.reading import FaultCode
 
 RTU, SUM, ASCII = Codec(Framing.RTU), Codec(Framing.RTU, Checksum.SUM), Codec(Framing.ASCII)
 T9600 = LineTiming.of(9600)

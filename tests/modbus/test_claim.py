@@ -8,8 +8,9 @@ import os
 import subprocess
 import sys
 import termios
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -17,12 +18,7 @@ from hypothesis import strategies as st
 
 from lfs10d.modbus import claim as module
 from lfs10d.modbus.claim import TIOCGEXCL, Holder, claim, holder, is_pty, locked_by, program_name, release
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from tests.modbus.conftest import FarEnd
+from tests.modbus.conftest import FarEnd
 
 LOCKING = """
 import fcntl, os, sys

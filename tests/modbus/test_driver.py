@@ -7,8 +7,9 @@ import fcntl
 import os
 import struct
 import termios
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -26,12 +27,7 @@ from lfs10d.modbus.driver import (
 )
 from lfs10d.modbus.settings import Rs485
 from lfs10d.reading import UartCounters
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from tests.modbus.conftest import FarEnd
+from tests.modbus.conftest import FarEnd
 
 
 @dataclass

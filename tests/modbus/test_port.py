@@ -8,8 +8,9 @@ import os
 import select
 import subprocess
 import termios
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
@@ -18,12 +19,7 @@ from lfs10d.modbus import claim
 from lfs10d.modbus import port as module
 from lfs10d.modbus.port import Port, PortSettings, Rs485, SerialPort
 from lfs10d.modbus.settings import BAUDRATES
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from tests.modbus.conftest import FarEnd
+from tests.modbus.conftest import FarEnd
 
 FRAME = bytes.fromhex("01 03 00 01 00 02 95 CB")
 NOBODY = 65534

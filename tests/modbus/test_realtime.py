@@ -6,15 +6,13 @@ import errno
 import os
 import resource
 import threading
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import pytest
 
 from lfs10d.modbus.realtime import PRIORITY, sharpen_timers, take_precedence, yield_precedence
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 T = TypeVar("T")
 

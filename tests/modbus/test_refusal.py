@@ -7,15 +7,12 @@ import grp
 import os
 import pwd
 import termios
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from lfs10d.errors import PortBusyError, PortLostError
 from lfs10d.modbus.refusal import Facts, hung_up, look, number_of, refusal
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 FACTS = Facts(user="wind", group="dialout")
 

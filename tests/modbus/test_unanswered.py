@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from lfs10d.modbus.exchange import LateAnswer
-from lfs10d.modbus.frames import Codec, Framing, ReadRegisters, WriteRegister
+from lfs10d.modbus.frames import Codec, Framing, ReadRegisters, Request, WriteRegister
 from lfs10d.modbus.unanswered import EQUALS_KEPT, Unanswered
 from lfs10d.reading import Fault, FaultCode
 from tests.outcomes import ended
-
-if TYPE_CHECKING:
-    from lfs10d.modbus.frames import Request
 
 RTU = Codec(Framing.RTU)
 WIND, WHO = ReadRegisters(1, 0x0001, 2), ReadRegisters(1, 0x0005, 1)

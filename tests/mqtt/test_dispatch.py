@@ -5,12 +5,13 @@ from __future__ import annotations
 import asyncio
 import json
 import selectors
+from collections.abc import Coroutine
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import pytest
 
 from lfs10d import telemetry
+from lfs10d.mqtt.connection import Connection
 from lfs10d.mqtt.dispatch import ACKNOWLEDGED_WITHIN, LETTERS_AT_ONCE, SAMPLES_AT_ONCE, Dispatch
 from lfs10d.mqtt.endings import NO_MATCHING_SUBSCRIBERS, Ended, Ending, reason_in_words
 from lfs10d.mqtt.messages import Accepted
@@ -19,11 +20,6 @@ from lfs10d.mqtt.past import ARRAY_BYTES, PAST_AFTER
 from lfs10d.mqtt.settings import Version
 from lfs10d.mqtt.topics import Topics
 from lfs10d.telemetry import Kind, Publication, Sample
-
-if TYPE_CHECKING:
-    from collections.abc import Coroutine
-
-    from lfs10d.mqtt.connection import Connection
 
 ONLINE = telemetry.retained("availability", "online")
 LOST = Ended(Ending.LOST, "broker b:1: the connection is lost")

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from typing import TYPE_CHECKING, Any, cast
+from collections.abc import Mapping, Sequence
+from typing import Any, cast
 
+import pytest
+
+from lfs10d.mqtt.connection import Connection
 from lfs10d.mqtt.earlier import EarlierLife
 from lfs10d.mqtt.messages import Filter, Incoming
 from lfs10d.mqtt.topics import Topics
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    import pytest
-
-    from lfs10d.mqtt.connection import Connection
 
 WANTED = frozenset({"line/state", "device/a/config"})
 STATE = Incoming("b/l/line/state", b"s", retained=True)

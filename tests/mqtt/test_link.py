@@ -9,27 +9,23 @@ import socket
 import subprocess
 import threading
 import time
-from typing import TYPE_CHECKING, TypeAlias
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import AbstractAsyncContextManager
+from pathlib import Path
+from typing import TypeAlias
 
 import pytest
 
 from lfs10d.errors import BrokerError
-from lfs10d.mqtt.endings import Ending
+from lfs10d.mqtt.endings import Ended, Ending
 from lfs10d.mqtt.link import Link
 from lfs10d.mqtt.messages import Accepted, Filter, Incoming
 from lfs10d.mqtt.settings import BrokerSettings, Tls, Version
 from lfs10d.secret import Secret
+from tests.conftest import Authority, Mosquitto
+from tests.mqtt.conftest import Answer, OldBroker
 
-if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Callable, Iterator
-    from contextlib import AbstractAsyncContextManager
-    from pathlib import Path
-
-    from lfs10d.mqtt.endings import Ended
-    from tests.conftest import Authority, Mosquitto
-    from tests.mqtt.conftest import Answer, OldBroker
-
-    Serving: TypeAlias = Callable[[Answer], AbstractAsyncContextManager[int]]
+Serving: TypeAlias = Callable[[Answer], AbstractAsyncContextManager[int]]
 
 PATIENCE = 10.0
 

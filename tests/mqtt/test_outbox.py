@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import pytest
 from hypothesis import settings
@@ -19,9 +20,6 @@ from lfs10d.mqtt.outbox import LIVE_FOR, MESSAGES_MOST, Outbox
 from lfs10d.mqtt.past import ARRAY_MOST, PAST_AFTER, SAMPLE_EVERY, TURN_EVERY
 from lfs10d.mqtt.refusals import BANNED_FOR
 from lfs10d.telemetry import Kind, Publication, Sample
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 ARRAY_EVERY = ARRAY_MOST * SAMPLE_EVERY
 NOT_AUTHORIZED = 0x87

@@ -5,27 +5,23 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import errno
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from contextlib import AbstractAsyncContextManager
+from typing import TypeAlias
 
 import pytest
 from paho.mqtt.enums import CallbackAPIVersion, LogLevel, MQTTErrorCode
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.reasoncodes import ReasonCode
 
+from lfs10d.mqtt.endings import Ended
 from lfs10d.mqtt.link import Link
 from lfs10d.mqtt.messages import Accepted, Filter, Incoming
 from lfs10d.mqtt.pahoclient import LARGEST_PACKET, BoundedClient, every_reason
 from lfs10d.mqtt.settings import BrokerSettings, Version
+from tests.mqtt.conftest import Answer
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from contextlib import AbstractAsyncContextManager
-    from typing import TypeAlias
-
-    from lfs10d.mqtt.endings import Ended
-    from tests.mqtt.conftest import Answer
-
-    Serving: TypeAlias = Callable[[Answer], AbstractAsyncContextManager[int]]
+Serving: TypeAlias = Callable[[Answer], AbstractAsyncContextManager[int]]
 
 
 @pytest.mark.parametrize(

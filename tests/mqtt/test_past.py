@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 from hypothesis import settings
 from hypothesis import strategies as st
@@ -12,16 +11,12 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 
 from lfs10d import telemetry
 from lfs10d.loss import Loss
-from lfs10d.mqtt.letters import Array, Declaration, Live, samples_of
+from lfs10d.mqtt.letters import Array, Declaration, Letter, Live, samples_of
 from lfs10d.mqtt.losses import DECLARED_EVERY
 from lfs10d.mqtt.outbox import Outbox
 from lfs10d.mqtt.past import AWAY_AFTER, PAST_AFTER, SPILL_EVERY, SPILL_MOST
 from lfs10d.store.samplefile import Row
-from lfs10d.telemetry import Kind, Publication, Sample
-
-if TYPE_CHECKING:
-    from lfs10d.mqtt.letters import Letter
-    from lfs10d.telemetry import Clock
+from lfs10d.telemetry import Clock, Kind, Publication, Sample
 
 NOT_AUTHORIZED, QUOTA_EXCEEDED = 0x87, 0x97
 ONLINE = telemetry.retained("availability", "online")

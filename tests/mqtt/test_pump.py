@@ -5,17 +5,14 @@ from __future__ import annotations
 import asyncio
 import socket
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import pytest
 
 from lfs10d.mqtt.pump import Pump
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    Ends = tuple[socket.socket, socket.socket]
+Ends = tuple[socket.socket, socket.socket]
 
 PATIENCE = 5.0
 

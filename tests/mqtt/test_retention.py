@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING
 
 from lfs10d import telemetry
+from lfs10d.mqtt.letters import Retained
 from lfs10d.mqtt.retention import Retention
-
-if TYPE_CHECKING:
-    from lfs10d.mqtt.letters import Retained
 
 NONE: frozenset[str] = frozenset()
 ONLINE = telemetry.retained("availability", "online")

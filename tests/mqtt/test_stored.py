@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from lfs10d.mqtt.history import Kept
 from lfs10d.mqtt.stored import AGAIN_WITHIN, RELEASE_EVERY, RELEASE_MOST, Stored
 from lfs10d.store.samplefile import Row
 from lfs10d.telemetry import Sample
-
-if TYPE_CHECKING:
-    from lfs10d.mqtt.history import Kept
 
 
 def row(number: int, *, repeated: bool = False) -> Row:

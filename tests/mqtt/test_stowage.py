@@ -6,8 +6,11 @@ import asyncio
 import contextlib
 import threading
 import time
+from collections.abc import AsyncIterator, Callable, Coroutine
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from pathlib import Path
+
+import pytest
 
 from lfs10d import telemetry
 from lfs10d.loss import Loss
@@ -18,15 +21,7 @@ from lfs10d.mqtt.stored import AGAIN_WITHIN
 from lfs10d.mqtt.stowage import Stowage
 from lfs10d.store.backlog import Store, StoreError
 from lfs10d.store.opening import Limits
-from lfs10d.telemetry import Kind, Publication, Sample
-
-if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Callable, Coroutine
-    from pathlib import Path
-
-    import pytest
-
-    from lfs10d.telemetry import Clock
+from lfs10d.telemetry import Clock, Kind, Publication, Sample
 
 ROOMY = Limits(size=512_000_000, age=7 * 86_400_000)
 ONLINE = telemetry.retained("availability", "online")

@@ -5,16 +5,13 @@ from __future__ import annotations
 import ssl
 import subprocess
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
 from lfs10d.errors import BrokerError
 from lfs10d.mqtt.settings import Tls
 from lfs10d.mqtt.tls import tls_context
-
-if TYPE_CHECKING:
-    from tests.conftest import Authority
+from tests.conftest import Authority
 
 
 def test_certificate_and_name_are_checked_from_tls_1_2_on() -> None:

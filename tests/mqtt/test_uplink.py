@@ -8,9 +8,13 @@ import json
 import logging
 import signal
 import time
-from typing import TYPE_CHECKING
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+
+import pytest
 
 from lfs10d import telemetry
+from lfs10d.mqtt.inbound import InboundRequest
 from lfs10d.mqtt.retained_requests import ASK_AFTER
 from lfs10d.mqtt.settings import BrokerSettings, Version
 from lfs10d.mqtt.uplink import Uplink
@@ -18,16 +22,8 @@ from lfs10d.store.backlog import Store
 from lfs10d.store.opening import Limits
 from lfs10d.store.samplefile import Entry
 from lfs10d.telemetry import Kind, Publication, Sample
-
-if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Callable
-    from pathlib import Path
-
-    import pytest
-
-    from lfs10d.mqtt.inbound import InboundRequest
-    from tests.conftest import Listener, Mosquitto
-    from tests.mqtt.conftest import OldBroker
+from tests.conftest import Listener, Mosquitto
+from tests.mqtt.conftest import OldBroker
 
 B = "site/line0"
 PATIENCE = 10.0

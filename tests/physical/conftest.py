@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import asyncio
 import json
+from collections.abc import Awaitable, Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import pytest
 
@@ -20,19 +21,25 @@ from lfs10d.changefile import ChangeFile
 from lfs10d.commands import Answer, Call
 from lfs10d.configfile import load
 from lfs10d.disk import Disk
+from lfs10d.effective import Effective
 from lfs10d.facts import Instant
 from lfs10d.forgetful import ForgetfulFiles, PowerCutError
+from lfs10d.jobs.course import Course
+from lfs10d.jobs.job import Job
 from lfs10d.journal import Journal
 from lfs10d.modbus.bus import Bus
 from lfs10d.modbus.exchange import Echo
 from lfs10d.modbus.settings import PortSettings
+from lfs10d.modbus.unanswered import Unanswered
 from lfs10d.mqtt.inbound import InboundRequest
 from lfs10d.physical.adoption import Newcomer
 from lfs10d.physical.place import Physical
 from lfs10d.poller import Poller
 from lfs10d.reading import Event, PortChanged, Reading
+from lfs10d.reload import Plan
+from lfs10d.requests.request import Powers
 from lfs10d.requests.table import REQUESTS
-from lfs10d.running import Running
+from lfs10d.running import Edit, Running
 from lfs10d.schedule import Schedule
 from lfs10d.service import Service
 from lfs10d.simulator.line import SimulatedLine
@@ -40,17 +47,6 @@ from lfs10d.simulator.port import SimulatedPort, VirtualClock, run
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from tests.physical.loop import Loop
-
-if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Iterator, Mapping
-
-    from lfs10d.effective import Effective
-    from lfs10d.jobs.course import Course
-    from lfs10d.jobs.job import Job
-    from lfs10d.modbus.unanswered import Unanswered
-    from lfs10d.reload import Plan
-    from lfs10d.requests.request import Powers
-    from lfs10d.running import Edit
 
 T = TypeVar("T")
 STATE = Path("/state")

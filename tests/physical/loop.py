@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import heapq
-from typing import TYPE_CHECKING, TypeVarTuple
+from collections.abc import Callable
+from contextvars import Context
+from typing import TypeVarTuple
 
 from lfs10d.simulator.port import VirtualClock
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from contextvars import Context
 
 Ts = TypeVarTuple("Ts")
 ENDLESS = 10_000

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lfs10d.forgetful import PowerCutError
 from lfs10d.simulator.registers import Blueprint
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from tests.physical.conftest import Bench, Life
+from tests.physical.conftest import Bench, Life
 
 IDS = (3, 4, 5)
 RATES = 9600 + 19200

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
@@ -14,9 +14,7 @@ from lfs10d.profiles.library import parse_profile
 from lfs10d.simulator.registers import Blueprint, blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
-
-if TYPE_CHECKING:
-    from tests.physical.conftest import Bench, Life
+from tests.physical.conftest import Bench, Life
 
 
 def plugged(bench: Bench, baudrate: int = 9600, slave: int = 1) -> Sensor:

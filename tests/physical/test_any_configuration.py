@@ -5,35 +5,31 @@ The whole daemon but its thread, its port and its broker, in virtual time: `Daem
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from functools import partial
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from lfs10d import assembly
+from lfs10d.effective import Effective
 from lfs10d.facts import Instant
+from lfs10d.line import Line
+from lfs10d.mqtt.uplink import Uplink
 from lfs10d.powers import DaemonPowers
 from lfs10d.profiles.library import load_profile
+from lfs10d.reading import Event
+from lfs10d.reload import Plan
 from lfs10d.requests.table import REQUESTS
 from lfs10d.service import Service
 from lfs10d.simulator.registers import blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.station import Station
 from lfs10d.telemetry import Backlog
-from tests.physical.conftest import EPOCH, Life, Wire
+from tests.physical.conftest import EPOCH, Bench, Life, Wire
 from tests.stations import DAEMON
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from lfs10d.effective import Effective
-    from lfs10d.line import Line
-    from lfs10d.mqtt.uplink import Uplink
-    from lfs10d.reading import Event
-    from lfs10d.reload import Plan
-    from tests.physical.conftest import Bench
 
 CONFIGURATIONS = {
     "none": "[]",

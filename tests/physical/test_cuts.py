@@ -7,17 +7,15 @@ exchanges is cut at each of its steps. What was not synced is lost.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
 from lfs10d.forgetful import PowerCutError
+from lfs10d.simulator.line import Request
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
-
-if TYPE_CHECKING:
-    from lfs10d.simulator.line import Request
-    from tests.physical.conftest import Bench, Life
+from tests.physical.conftest import Bench, Life
 
 LONGEST = 3000
 """Turns of 50 ms after which a change counts as endless."""

@@ -10,15 +10,13 @@ each time, and one that fails is made shorter. Those that once failed are in tes
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
+from tests.physical.conftest import Bench
 from tests.physical.story import FOREIGN, Story
-
-if TYPE_CHECKING:
-    from tests.physical.conftest import Bench
 
 SEARCHED = os.environ.get("LFS10D_EXAMPLES")
 """So many stories are searched for one that fails; None: see above."""

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import pytest
 
-if TYPE_CHECKING:
-    from tests.physical.conftest import Bench, Life
+from tests.physical.conftest import Bench, Life
 
 
 def moved_and_edited(bench: Bench) -> Life:

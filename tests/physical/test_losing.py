@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from lfs10d.physical.losing import Losing
 from lfs10d.simulator.wire import Format
-
-if TYPE_CHECKING:
-    from tests.physical.conftest import Bench, Life
+from tests.physical.conftest import Bench, Life
 
 
 def looking_out(bench: Bench, life: Life) -> list[str | None]:

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
+from collections.abc import Callable
 from contextlib import ExitStack
-from typing import TYPE_CHECKING
 
 import pytest
 
 from lfs10d.requests.request import RefusedError
-
-if TYPE_CHECKING:
-    import asyncio
-    from collections.abc import Callable
-
-    from tests.physical.conftest import Bench
+from tests.physical.conftest import Bench
 
 
 def test_while_a_scan_has_the_place_nothing_is_changed_and_no_other_scan_begun(bench: Bench) -> None:

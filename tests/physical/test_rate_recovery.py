@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import pytest
 
 from lfs10d.forgetful import PowerCutError
-
-if TYPE_CHECKING:
-    from tests.physical.conftest import Bench, Life
+from tests.physical.conftest import Bench, Life
 
 SLAVES = tuple(range(3, 11))
 CODE_9600 = 1

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
 from lfs10d.commands import Answer, Call
 from lfs10d.physical.adoption import Newcomer
+from lfs10d.simulator.line import Request
 from lfs10d.simulator.sensor import Sensor
-
-if TYPE_CHECKING:
-    from lfs10d.simulator.line import Request
-    from tests.physical.conftest import Bench, Life
+from tests.physical.conftest import Bench, Life
 
 
 def change(bench: Bench, life: Life, to: int = 19200, *, power_cycle: bool = False, dry_run: bool = False) -> Answer:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wind import Wind
-
-if TYPE_CHECKING:
-    from tests.physical.conftest import Bench
+from tests.physical.conftest import Bench
 
 
 def calm(bench: Bench) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -12,12 +12,9 @@ from lfs10d.changefile import FILE_NAME
 from lfs10d.changes import Place
 from lfs10d.physical.locating import in_turn
 from lfs10d.recalling import Recalling
+from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
-from tests.physical.conftest import STATE
-
-if TYPE_CHECKING:
-    from lfs10d.simulator.sensor import Sensor
-    from tests.physical.conftest import Bench, Life
+from tests.physical.conftest import STATE, Bench, Life
 
 
 def recalled(bench: Bench, life: Life, baudrate: int = 9600, **slaves: int) -> None:

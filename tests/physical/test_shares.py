@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import pytest
 
 from lfs10d.commands import Call
 from lfs10d.physical.adoption import Newcomer
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
-
-if TYPE_CHECKING:
-    from tests.physical.conftest import Bench, Life
+from tests.physical.conftest import Bench, Life
 
 WIRE = 0.0314
 """s that one poll takes at 9600 baud with 5 ms of turnaround."""

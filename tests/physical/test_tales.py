@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import pytest
 
+from tests.physical.conftest import Bench
 from tests.physical.story import Story
-
-if TYPE_CHECKING:
-    from tests.physical.conftest import Bench
 
 Ails: TypeAlias = tuple[str, dict[str, Any]]
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 
 from lfs10d.profiles.schema import Profile
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 
 @pytest.fixture

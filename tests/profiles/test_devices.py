@@ -5,22 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
 from lfs10d.modbus.frames import Checksum, Codec, Framing
-from lfs10d.modbus.request import ReadRegisters, WriteRegister
+from lfs10d.modbus.request import ReadRegisters, Request, WriteRegister
 from lfs10d.profiles.library import builtin_names, load_profile
-from lfs10d.reading import Fault
+from lfs10d.profiles.schema import ChecksumName, FramingName, Profile
+from lfs10d.reading import Fault, Number
 from lfs10d.simulator.registers import blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import unseal
-
-if TYPE_CHECKING:
-    from lfs10d.modbus.request import Request
-    from lfs10d.profiles.schema import ChecksumName, FramingName, Profile
-    from lfs10d.reading import Number
 
 RTU = Codec(Framing.RTU)
 SUM = Codec(Framing.RTU, Checksum.SUM)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
 
 from lfs10d.errors import ConfigError
 from lfs10d.profiles import library
@@ -14,10 +15,6 @@ from lfs10d.profiles.schema import Barrier, Factory, IdRegister, Profile, RateRe
 from lfs10d.profiles.values import Fact, Setting, Value
 from lfs10d.reading import Fault
 from lfs10d.simulator.registers import blueprint_of
-
-if TYPE_CHECKING:
-    from pydantic import BaseModel
-    from pydantic.fields import FieldInfo
 
 ROOT = Path(__file__).parents[2]
 WIND_VANE = ROOT / "config" / "profiles" / "wind-vane.yaml"

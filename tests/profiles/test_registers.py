@@ -5,17 +5,13 @@ from __future__ import annotations
 import struct
 from fractions import Fraction
 from itertools import product
-from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from lfs10d.profiles.registers import WORDS, Cell, Linear, shortest, span, spell
+from lfs10d.profiles.registers import WORDS, ByteOrder, Cell, Linear, RegisterType, WordOrder, shortest, span, spell
 from lfs10d.reading import Fault, FaultCode
-
-if TYPE_CHECKING:
-    from lfs10d.profiles.registers import ByteOrder, RegisterType, WordOrder
 
 FORMATS: dict[RegisterType, str] = {"int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "float32": "f"}
 WIRE_ORDER: dict[tuple[WordOrder, ByteOrder], str] = {

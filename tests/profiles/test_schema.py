@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 from pydantic import ValidationError
 
+from lfs10d.profiles.schema import Profile
 from lfs10d.reading import Fault, FaultCode
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from lfs10d.profiles.schema import Profile
-
-    Build = Callable[..., Profile]
+Build = Callable[..., Profile]
 
 TWO_VALUES = [
     {"name": "level", "register": 1, "type": "uint16", "unit": "m"},

@@ -5,39 +5,35 @@ from __future__ import annotations
 import asyncio
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import pytest
 
 from lfs10d.admission import Admission, Answered, Ticket
 from lfs10d.changefile import ChangeFile
-from lfs10d.commands import ok, rejected
+from lfs10d.commands import Answer, Call, ok, rejected
+from lfs10d.config import SlaveConfig
 from lfs10d.configfile import load
 from lfs10d.disk import Disk
+from lfs10d.effective import Effective
 from lfs10d.forgetful import ForgetfulFiles
+from lfs10d.inquiries import Inquiry
+from lfs10d.jobs.interview import Finding
 from lfs10d.jobs.knock import Knock
 from lfs10d.jobs.register import Access, Target
 from lfs10d.jobs.scan import Scan
 from lfs10d.jobs.search import Search
 from lfs10d.modbus.frames import Codec, Framing
+from lfs10d.modbus.frames import Request as RegisterRequest
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.modbus.unanswered import Unanswered
 from lfs10d.profiles.library import load_profile
-from lfs10d.requests.request import RefusedError
+from lfs10d.profiles.schema import Profile
+from lfs10d.reading import Fault
+from lfs10d.reload import Plan
+from lfs10d.requests.request import Edit, RefusedError
 from lfs10d.requests.table import REQUESTS
 from lfs10d.running import Running
-
-if TYPE_CHECKING:
-    from lfs10d.commands import Answer, Call
-    from lfs10d.config import SlaveConfig
-    from lfs10d.effective import Effective
-    from lfs10d.inquiries import Inquiry
-    from lfs10d.jobs.interview import Finding
-    from lfs10d.modbus.frames import Request as RegisterRequest
-    from lfs10d.profiles.schema import Profile
-    from lfs10d.reading import Fault
-    from lfs10d.reload import Plan
-    from lfs10d.requests.request import Edit
 
 FILE = """\
 line: {port: tty, baudrate: 9600}

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
 from lfs10d.changes import Changes, DeviceChange, Place, Verified
 from lfs10d.effective import effective
 from lfs10d.errors import ConfigError, Problem
-
-if TYPE_CHECKING:
-    from tests.requests.conftest import Ask, Asked, FakePowers
+from tests.requests.conftest import Ask, Asked, FakePowers
 
 
 def test_the_configuration_is_told(ask: Ask) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
@@ -12,16 +12,14 @@ from lfs10d import profiles
 from lfs10d.changefile import FILE_NAME
 from lfs10d.changes import Place
 from lfs10d.commands import Call
+from lfs10d.config import SlaveConfig
 from lfs10d.inquiries import Inquiry
+from lfs10d.jobs.knock import Knock
+from lfs10d.profiles.schema import Profile
 from lfs10d.reading import Fault, FaultCode
 from lfs10d.requests.device import NewDevice
 from lfs10d.requests.table import REQUESTS
-
-if TYPE_CHECKING:
-    from lfs10d.config import SlaveConfig
-    from lfs10d.jobs.knock import Knock
-    from lfs10d.profiles.schema import Profile
-    from tests.requests.conftest import Ask, Asked, FakePowers
+from tests.requests.conftest import Ask, Asked, FakePowers
 
 GOOD = {"device": "mast-top", "wind_speed": 12.5, "error": None}
 BAD = {"device": "mast-top", "wind_speed": None, "error": "timeout"}

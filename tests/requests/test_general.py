@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from tests.requests.conftest import Ask, FakePowers
+from tests.requests.conftest import Ask, FakePowers
 
 
 def test_health_is_told(ask: Ask) -> None:

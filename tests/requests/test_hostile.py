@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from lfs10d.requests.table import REQUESTS
-
-if TYPE_CHECKING:
-    from tests.requests.conftest import Ask, FakePowers
+from tests.requests.conftest import Ask, FakePowers
 
 WORDS = st.sampled_from(
     [

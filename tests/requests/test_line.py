@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import pytest
 
-if TYPE_CHECKING:
-    from tests.requests.conftest import Ask, FakePowers
+from tests.requests.conftest import Ask, FakePowers
 
 
 @pytest.mark.parametrize(

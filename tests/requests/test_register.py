@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from lfs10d.commands import Answer
 from lfs10d.jobs.register import End
 from lfs10d.modbus.frames import ReadRegisters, WriteRegister
 from lfs10d.profiles.library import builtin_names
 from lfs10d.reading import Fault, FaultCode
-
-if TYPE_CHECKING:
-    from lfs10d.commands import Answer
-    from tests.requests.conftest import Ask, FakePowers
+from tests.requests.conftest import Ask, FakePowers
 
 VANE = """\
 name: vane

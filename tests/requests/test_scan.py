@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
 from lfs10d.changes import Place
 from lfs10d.jobs.interview import Finding
 from lfs10d.profiles.library import load_profile
-
-if TYPE_CHECKING:
-    from tests.requests.conftest import Ask, Asked, FakePowers
+from tests.requests.conftest import Ask, Asked, FakePowers
 
 LFS10 = load_profile("lfs10", relative_to=Path())
 LD_E = load_profile("ld-e", relative_to=Path())

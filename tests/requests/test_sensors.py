@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import pytest
 
 from lfs10d.requests.table import REQUESTS
-
-if TYPE_CHECKING:
-    from tests.requests.conftest import Ask, FakePowers
+from tests.requests.conftest import Ask, FakePowers
 
 
 def test_a_readdress_is_handed_on_with_its_call(ask: Ask, powers: FakePowers) -> None:

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import pytest
 
 from lfs10d.modbus.settings import PortSettings
-from lfs10d.simulator.line import SimulatedLine
+from lfs10d.simulator.line import Answer, SimulatedLine
 from lfs10d.simulator.port import SimulatedPort, VirtualClock
+from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Framing, seal, unseal
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from lfs10d.simulator.line import Answer
-    from lfs10d.simulator.sensor import Sensor
 
 READ, WRITE = 3, 6
 WIND, RATE, ID = 1, 4, 5

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import pytest
 
 from lfs10d.simulator.build import Plan, build, slave_ids
 from lfs10d.simulator.faultfile import parse_faults
+from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.registers import Blueprint, Signal
 from lfs10d.simulator.wind import Unique
 from lfs10d.simulator.wire import SECOND, Format, seal
-
-if TYPE_CHECKING:
-    from lfs10d.simulator.line import SimulatedLine
 
 
 def ask(line: SimulatedLine, body: str, now: int) -> None:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from lfs10d.errors import ConfigError
 from lfs10d.simulator.faultfile import FaultFile, load_faults, parse_faults
 from lfs10d.simulator.faults import Kind, ailment
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 def problems(text: str) -> list[str]:

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from lfs10d.simulator.judge import ROUNDING, Judge, Verdict
-from lfs10d.simulator.line import SimulatedLine
+from lfs10d.simulator.line import Request, SimulatedLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import SECOND, Format, seal
-
-if TYPE_CHECKING:
-    from lfs10d.simulator.line import Request
 
 SLOW, FAST = Format(9600), Format(19200)
 REQUEST = seal(bytes.fromhex("01 03 00 01 00 02"))

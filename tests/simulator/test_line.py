@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import pytest
 
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
+from tests.simulator.conftest import Bench
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from tests.simulator.conftest import Bench
-
-    Maker = Callable[..., Bench]
+Maker = Callable[..., Bench]
 
 ID = 5
 

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import pytest
 
 from lfs10d.errors import PortBusyError, PortLostError
+from lfs10d.modbus.port import Port
 from lfs10d.modbus.settings import PortSettings
 from lfs10d.reading import UartCounters
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.port import SimulatedPort, VirtualClock, format_of, run
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format, seal, unseal
+from tests.simulator.conftest import Bench
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from lfs10d.modbus.port import Port
-    from tests.simulator.conftest import Bench
-
-    Maker = Callable[..., Bench]
+Maker = Callable[..., Bench]
 
 REQUEST = seal(bytes.fromhex("010300050001"))
 SENT = 8 / 960

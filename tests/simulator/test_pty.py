@@ -8,22 +8,18 @@ import termios
 import threading
 import time
 import tty
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from lfs10d.errors import FailedError
+from lfs10d.simulator.burst import Burst
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import SECOND, seal, unseal
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
-
-    from lfs10d.simulator.burst import Burst
 
 PATIENCE = 5.0
 T35 = 0.0037

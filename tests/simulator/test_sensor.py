@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Callable
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -13,13 +13,9 @@ from lfs10d.simulator.faults import Kind
 from lfs10d.simulator.registers import Blueprint, Signal
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format, unseal
+from tests.simulator.conftest import Bench
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from tests.simulator.conftest import Bench
-
-    Maker = Callable[..., Bench]
+Maker = Callable[..., Bench]
 
 WIND, RATE, ID = 1, 4, 5
 

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from lfs10d.simulator.burst import SECOND_MASTER
 from lfs10d.simulator.faults import window
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.troubles import babble, second_master, stray
 from lfs10d.simulator.wire import unseal
+from tests.simulator.conftest import Bench
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from tests.simulator.conftest import Bench
-
-    Maker = Callable[..., Bench]
+Maker = Callable[..., Bench]
 
 
 def test_babble_fills_its_time_without_a_pause(bench: Maker) -> None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from random import Random
-from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import given
@@ -13,9 +13,6 @@ from hypothesis import strategies as st
 from soak import ledger as books
 from soak.ledger import Ledger, Life, Series, Told
 from soak.oracle import Oracle, Sent, value_of
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 BOOT = "k0000001"
 STARTED = 1_000.0

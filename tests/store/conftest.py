@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
+from lfs10d.reading import Number
 from lfs10d.store.opening import Limits
 from lfs10d.store.samplefile import Entry
-from lfs10d.telemetry import Sample
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from lfs10d.reading import Number
-    from lfs10d.telemetry import Clock
+from lfs10d.telemetry import Clock, Sample
 
 BOOT = "k0000002"
 START = 1_795_298_022_000

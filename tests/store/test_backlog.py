@@ -7,23 +7,19 @@ import errno
 import os
 import sqlite3
 import subprocess
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from lfs10d.disk import Disk, SystemFiles
 from lfs10d.loss import Loss
 from lfs10d.store.backlog import ASIDE_MOST, SMALLEST, Aside, Store, StoreError
+from lfs10d.store.samplefile import SampleFile
+from lfs10d.telemetry import Sample
 from tests.store.conftest import BOOT, ROOMY, START, entries, sample
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
-
-    from lfs10d.store.samplefile import SampleFile
-    from lfs10d.telemetry import Sample
 
 NOW = START + 60_000
 

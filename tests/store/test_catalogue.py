@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import closing
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
@@ -11,9 +11,6 @@ from lfs10d.store.catalogue import Catalogue
 from lfs10d.store.opening import connect, transaction
 from lfs10d.store.row import DamagedError
 from tests.store.conftest import BOOT, ROOMY, START, sample
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 def test_an_era_ends_where_the_clock_is_set_and_a_series_where_anything_differs(tmp_path: Path) -> None:

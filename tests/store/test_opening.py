@@ -5,16 +5,13 @@ from __future__ import annotations
 import sqlite3
 from contextlib import closing
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from lfs10d.store.opening import APPLICATION_ID, PAGE, SCHEMA, ForeignError, connect, number, transaction
 from lfs10d.store.row import DamagedError
 from tests.store.conftest import BOOT, ROOMY
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 @pytest.fixture

@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import shutil
 import sqlite3
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 
 from lfs10d.loss import Loss
+from lfs10d.store.opening import Limits
 from lfs10d.store.row import DamagedError
 from lfs10d.store.samplefile import SampleFile, runs
+from lfs10d.telemetry import Clock, Sample
 from tests.store.conftest import BOOT, ROOMY, START, entries, sample
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from lfs10d.store.opening import Limits
-    from lfs10d.telemetry import Clock, Sample
 
 NOW = START + 60_000
 

@@ -12,18 +12,14 @@ import subprocess
 import sys
 import termios
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 
-from tests.daemon.conftest import ENDS_WITHIN, PATIENCE, Run, eventually
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from tests.daemon.conftest import Site
+from tests.daemon.conftest import ENDS_WITHIN, PATIENCE, Run, Site, eventually
 
 BASE = "lfs10d/line0"
 

@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import json
 import signal
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
+from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
-from tests.daemon.conftest import eventually, tell
-from tests.daemon.verbs.conftest import BASE, typed
-
-if TYPE_CHECKING:
-    from lfs10d.simulator.pty import PtyLine
-    from tests.conftest import Mosquitto
-    from tests.daemon.conftest import Run, Site
-    from tests.daemon.verbs.conftest import Shell
+from tests.conftest import Mosquitto
+from tests.daemon.conftest import Run, Site, eventually, tell
+from tests.daemon.verbs.conftest import BASE, Shell, typed
 
 REPEAT = ("line/adopt", "--repeat")
 FIRST = "Plug in a sensor. Ctrl-C when all are mounted.\n"

@@ -6,20 +6,14 @@ import json
 import re
 import signal
 import subprocess
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
-from tests.daemon.conftest import eventually
-from tests.daemon.verbs.conftest import BASE, running, typed
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    from tests.conftest import Mosquitto
-    from tests.daemon.conftest import Site, View
-    from tests.daemon.verbs.conftest import Shell
+from tests.conftest import Mosquitto
+from tests.daemon.conftest import Site, View, eventually
+from tests.daemon.verbs.conftest import BASE, Shell, running, typed
 
 
 def test_a_request_prints_what_came_of_it_for_people(site: Site, mosquitto: Mosquitto) -> None:

@@ -5,16 +5,12 @@ from __future__ import annotations
 import json
 import re
 import signal
-from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.daemon.verbs.conftest import running, typed
-
-if TYPE_CHECKING:
-    from tests.conftest import Mosquitto
-    from tests.daemon.conftest import Site, View
-    from tests.daemon.verbs.conftest import Shell
+from tests.conftest import Mosquitto
+from tests.daemon.conftest import Site, View
+from tests.daemon.verbs.conftest import Shell, running, typed
 
 CLOCK = r"\d\d:\d\d:\d\d\.\d{3} [A-Z]+"
 

@@ -5,19 +5,14 @@ from __future__ import annotations
 import json
 import re
 import signal
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import pytest
 
-from tests.daemon.conftest import eventually, tell
-from tests.daemon.verbs.conftest import running, typed
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from tests.conftest import Mosquitto
-    from tests.daemon.conftest import Site
-    from tests.daemon.verbs.conftest import Shell
+from tests.conftest import Mosquitto
+from tests.daemon.conftest import Site, eventually, tell
+from tests.daemon.verbs.conftest import Shell, running, typed
 
 
 def test_watch_shows_every_slave_on_80_columns(site: Site, mosquitto: Mosquitto, shell: Shell) -> None:
