@@ -27,8 +27,8 @@ test: $(VENV)/.dev
 
 # The ranges of pyproject.toml begin with versions that work: the lowest of each, in an environment of its own.
 OLDEST := $(VENV)/oldest
-TESTED_OLDEST := tests/mqtt tests/modbus tests/test_config.py tests/test_configfile.py tests/test_contradictions.py \
-  tests/test_document.py tests/test_kinds.py tests/test_resolution.py
+TESTED_OLDEST := tests/mqtt tests/modbus tests/config/test_models.py tests/config/test_loader.py tests/config/test_validation.py \
+  tests/schema/test_document.py tests/schema/test_fields.py tests/config/test_defaults.py
 
 $(OLDEST)/.installed: pyproject.toml tests/oldest.py
 	@$(PYTHON) -m venv --clear $(OLDEST)

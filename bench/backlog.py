@@ -9,9 +9,9 @@ import time
 from functools import cache
 from pathlib import Path
 
-from lfs10d.store.opening import Limits
-from lfs10d.store.samplefile import Entry, SampleFile
-from lfs10d.telemetry import Sample
+from lfs10d.outbox.store.database import Limits
+from lfs10d.outbox.store.sample_file import Entry, SampleFile
+from lfs10d.telemetry.publication import Sample
 
 BOOT = "k0000000"
 """Of the life before; its samples are no answers of this run's sensors."""

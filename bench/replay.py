@@ -19,13 +19,13 @@ from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion, MQTTProtocolVersion
 
 from bench.broker import Broker
-from lfs10d import telemetry
 from lfs10d.mqtt.settings import BrokerSettings
 from lfs10d.mqtt.uplink import Uplink
-from lfs10d.store.backlog import Store
-from lfs10d.store.opening import Limits
-from lfs10d.store.samplefile import Entry, SampleFile
-from lfs10d.telemetry import Kind, Publication, Sample
+from lfs10d.outbox.store.database import Limits
+from lfs10d.outbox.store.sample_file import Entry, SampleFile
+from lfs10d.outbox.store.store import Store
+from lfs10d.telemetry import publication
+from lfs10d.telemetry.publication import Kind, Publication, Sample
 
 LIMITS = Limits(size=10**12, age=10**12)
 DEVICES = 32
@@ -111,7 +111,7 @@ async def live(uplink: Uplink, rate: float, seconds: float) -> None:
         device = number % DEVICES + 1
         measured = sample(device, number // DEVICES + 1, "k0000002")
         payload = measured.payload("line0") | {"ts": int(time.time() * 1000)}
-        topic = telemetry.device_topic(measured.device, telemetry.TELEMETRY)
+        topic = publication.device_topic(measured.device, publication.TELEMETRY)
         uplink.publish([Publication(topic, payload, Kind.SAMPLE, retain=False, qos=1, sample=measured)])
         await asyncio.sleep(max(0.0, began + number / rate - loop.time()))
 

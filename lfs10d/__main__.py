@@ -22,7 +22,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
         # Also where whoever started us ignores SIGINT, as a shell does for what it puts into the background.
         for number in ENDING:
             signal.signal(number, _interrupted)
-        from lfs10d.cli.outcome import conclude  # noqa: PLC0415  # a tenth of a second, in which a signal may come
+        from lfs10d.cli.exit_status import conclude  # noqa: PLC0415  # a tenth of a second, in which a signal may come
 
         code = conclude(words, interrupted=interrupted)
     except KeyboardInterrupt:

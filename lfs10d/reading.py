@@ -171,3 +171,11 @@ class AnsweredTwice:
 
 
 Event: TypeAlias = Reading | Exchanged | PortChanged | UartCounted | AnsweredTwice
+
+
+START_POLLS = 3
+"""So many polls at once decide at the start whether a device answers."""
+
+
+SILENT_CODES = frozenset({FaultCode.TIMEOUT, FaultCode.LATE, FaultCode.COLLISION, FaultCode.WRONG_SLAVE})
+"""With these faults the device itself said nothing that came in time, and its time-out was waited for."""

@@ -15,7 +15,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from lfs10d.quantities import seconds as duration
+from lfs10d.schema.quantities import seconds as duration
 from soak.family import Account, run_family
 from soak.plan import steps
 from soak.report import figures

@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import Sequence
 
 from lfs10d.mqtt.connection import Connection
-from lfs10d.mqtt.endings import Ended, Ending
 from lfs10d.mqtt.messages import Accepted, Events, Filter, Will
+from lfs10d.mqtt.reasons import Ended, Ending
 from lfs10d.mqtt.settings import BrokerSettings, Version
 
 

@@ -15,13 +15,13 @@ from pathlib import Path
 from random import Random
 from random import seed as seed_the_uplink
 
-from lfs10d.config import Config
+from lfs10d.config.defaults import resolved
+from lfs10d.config.models import Config
 from lfs10d.profiles.library import load_profile
-from lfs10d.resolution import resolved
 from lfs10d.simulator.burst import MASTER
-from lfs10d.simulator.inturn import InTurn
 from lfs10d.simulator.judge import Verdict
 from lfs10d.simulator.line import SimulatedLine
+from lfs10d.simulator.queued_sensor import InTurn
 from lfs10d.simulator.wire import SECOND, Format
 from soak.attestation import Oracle, Samples, codes, parsed
 from soak.troubles import FAMILY, Fault, mix

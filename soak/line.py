@@ -8,13 +8,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 
-from lfs10d.simulator.build import Plan, build
+from lfs10d.simulator.builder import Plan, build
 from lfs10d.simulator.burst import MASTER
 from lfs10d.simulator.faults import Kind
 from lfs10d.simulator.line import Request, SimulatedLine
+from lfs10d.simulator.line_faults import stray
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.sensor import Sensor
-from lfs10d.simulator.troubles import stray
 from lfs10d.simulator.wire import SECOND, Format
 from soak.attestation import epoch_of
 from soak.oracle import Numbered, Sent, number_of

@@ -8,7 +8,7 @@ from random import Random
 from typing import TypeAlias
 
 from lfs10d.simulator.faults import Window
-from lfs10d.simulator.troubles import babble, second_master, stray
+from lfs10d.simulator.line_faults import babble, second_master, stray
 from lfs10d.simulator.wire import nanoseconds
 from soak.virtual import DaemonInMemory
 

@@ -12,23 +12,25 @@ import selectors
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 
-from lfs10d import assembly
-from lfs10d.budget import timing_of
-from lfs10d.config import Config
-from lfs10d.facts import DaemonFacts, Instant
-from lfs10d.firstburst import FirstBurst
+from lfs10d.config.models import Config
+from lfs10d.daemon.settings import config_hash, device_facts, line_facts
+from lfs10d.line.budget import timing_of
+from lfs10d.line.poller import Poller
+from lfs10d.line.scheduler import Schedule
+from lfs10d.line.settings import device_specs, line_rules, poll_rules, port_settings
 from lfs10d.modbus.bus import Bus
 from lfs10d.mqtt.settings import BrokerSettings
 from lfs10d.mqtt.uplink import Uplink
-from lfs10d.poller import Poller
-from lfs10d.profiles.schema import Profile
+from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Event, Reading
-from lfs10d.schedule import Schedule
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.port import STANDSTILL, SimulatedPort, VirtualClock
 from lfs10d.simulator.wire import nanoseconds
-from lfs10d.station import Station
-from lfs10d.telemetry import Publication
+from lfs10d.system.clock import Instant
+from lfs10d.telemetry.first_burst import FirstBurst
+from lfs10d.telemetry.info import DaemonFacts
+from lfs10d.telemetry.publication import Publication
+from lfs10d.telemetry.station import Station
 from soak.brokerinmemory import BrokerInMemory
 
 EPOCH = 1_700_000_000
@@ -103,7 +105,7 @@ class DaemonInMemory:
         self.line = line
         self.clock = VirtualClock()
         self.loop = VirtualLoop(self.clock, self._advance)
-        self.port = Recorder(line, self.clock, assembly.port_settings(config.line), echo=echo, latency=latency)
+        self.port = Recorder(line, self.clock, port_settings(config.line), echo=echo, latency=latency)
         self.readings: Counter[str] = Counter()
         """How many readings of each device the line told."""
         self.good: dict[str, float] = {}
@@ -114,14 +116,12 @@ class DaemonInMemory:
         self.mistakes: list[str] = []
         """What ended by a mistake in the loop."""
         schedule = Schedule(timing_of(config.line), 0.0)
-        schedule.replace(assembly.device_specs(config, profiles), assembly.poll_rules(config.poll), 0.0)
-        self.poller = Poller(
-            Bus(self.port, assembly.line_rules(config.line), self.clock), schedule, self._take_over, self.clock
-        )
-        facts = DaemonFacts("0", "soak", boot, None, assembly.config_hash(config))
-        devices = assembly.device_facts(config, profiles)
+        schedule.replace(device_specs(config, profiles), poll_rules(config.poll), 0.0)
+        self.poller = Poller(Bus(self.port, line_rules(config.line), self.clock), schedule, self._take_over, self.clock)
+        facts = DaemonFacts("0", "soak", boot, None, config_hash(config))
+        devices = device_facts(config, profiles)
         self._station = Station(
-            facts, assembly.line_facts(config.line), devices, self.now(), backlog=lambda: self._uplink.backlog
+            facts, line_facts(config.line), devices, self.now(), backlog=lambda: self._uplink.backlog
         )
         settings = BrokerSettings.of(config.mqtt, client_id="soak", password=lambda: None)
         self._uplink = Uplink(
@@ -181,7 +181,7 @@ class DaemonInMemory:
         self._told = True
         self.loop.call_soon(self._heard, events)
 
-    # -- the loop, as in `lfs10d.daemon`
+    # -- the loop, as in `lfs10d.daemon.daemon`
 
     async def _begin(self) -> None:
         await self._uplink.start()

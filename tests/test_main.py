@@ -11,7 +11,7 @@ import click
 import pytest
 
 from lfs10d import __main__
-from lfs10d.cli import outcome
+from lfs10d.cli import exit_status
 
 SLOW = ("traceback", "click", "lfs10d.cli", "lfs10d.errors", "pydantic")
 
@@ -59,7 +59,7 @@ def test_a_signal_ends_each_verb_with_its_code(
         del words
         signal.raise_signal(number)
 
-    monkeypatch.setattr(outcome, "lfs10d", verb)
+    monkeypatch.setattr(exit_status, "lfs10d", verb)
     assert exit_code(arguments) == code
 
 
@@ -75,7 +75,7 @@ def test_a_signal_among_the_imports_ends_each_verb_with_its_code(
                 signal.raise_signal(signal.SIGTERM)
             raise AttributeError(name)
 
-    monkeypatch.setitem(sys.modules, "lfs10d.cli.outcome", Signal())
+    monkeypatch.setitem(sys.modules, "lfs10d.cli.exit_status", Signal())
     assert exit_code(arguments) == code
 
 
@@ -85,7 +85,7 @@ def test_sigint_is_heard_where_whoever_started_us_ignores_it(monkeypatch: pytest
         signal.raise_signal(signal.SIGINT)
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    monkeypatch.setattr(outcome, "lfs10d", verb)
+    monkeypatch.setattr(exit_status, "lfs10d", verb)
     assert exit_code([]) == 1
 
 
@@ -101,14 +101,14 @@ def test_a_second_signal_changes_nothing_of_the_end(number: signal.Signals, monk
             signal.raise_signal(number)
             tidied.append(True)
 
-    monkeypatch.setattr(outcome, "lfs10d", verb)
+    monkeypatch.setattr(exit_status, "lfs10d", verb)
     assert exit_code([]) == 1
     signal.raise_signal(number)
     assert tidied == [True]
 
 
 def test_a_verb_that_comes_to_its_end_gives_its_own_code(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(outcome, "lfs10d", click.command()(lambda: 69))
+    monkeypatch.setattr(exit_status, "lfs10d", click.command()(lambda: 69))
     assert exit_code([]) == 69
 
 

@@ -15,8 +15,8 @@ from typing import Any, Final, get_args
 
 from docs.generate.markdown import example, table
 from docs.generate.meanings import ADVICE, ERROR_CODES
-from lfs10d.commands import ErrorCode
-from lfs10d.requests.table import REQUESTS
+from lfs10d.command import ErrorCode
+from lfs10d.commands.handlers.registry import REQUESTS
 
 RECORDED: Final = Path(__file__).with_name("recorded.json")
 

@@ -11,11 +11,11 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from docs.generate.markdown import plain
-from lfs10d.config import LATER_SECTIONS, Config
-from lfs10d.difference import RESTART_KEYS
-from lfs10d.kinds import Duration, Kind, Size
+from lfs10d.config.diff import RESTART_KEYS
+from lfs10d.config.models import LATER_SECTIONS, Config
 from lfs10d.profiles.library import builtin_names
-from lfs10d.quantities import duration_text, size_text
+from lfs10d.schema.fields import Duration, Kind, Size
+from lfs10d.schema.quantities import duration_text, size_text
 
 Model: TypeAlias = type[BaseModel]
 

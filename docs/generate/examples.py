@@ -10,15 +10,16 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Final
 
-from lfs10d import telemetry
-from lfs10d.commands import Call, ok, rejected
-from lfs10d.facts import DaemonFacts, DeviceFacts, Instant, LineFacts
-from lfs10d.modbus import verdict
+from lfs10d.command import Call, ok, rejected
+from lfs10d.modbus import diagnosis
 from lfs10d.modbus.timing import LineTiming
-from lfs10d.payloads import Trace
 from lfs10d.reading import Errand, Exchanged, Fault, FaultCode, PortChanged, Reading, UartCounted, UartCounters
-from lfs10d.station import Station
-from lfs10d.telemetry import Backlog, Publication, Sample
+from lfs10d.system.clock import Instant
+from lfs10d.telemetry import publication
+from lfs10d.telemetry.info import DaemonFacts, DeviceFacts, LineFacts
+from lfs10d.telemetry.payloads import Trace
+from lfs10d.telemetry.publication import Backlog, Publication, Sample
+from lfs10d.telemetry.station import Station
 
 LINE: Final = "line0"
 BOOT: Final = "k3f9a2c7"
@@ -88,7 +89,7 @@ class Story:
         )  # fmt: skip
         values = {"wind_speed": (12.99, 12.34, 11.87)[second % 3]}
         good = Reading("mast-top", at, values, None, rtt=0.0182, online=True, response_timeout=0.062)
-        silence = Fault(FaultCode.TIMEOUT, verdict.silent(0.2).message)
+        silence = Fault(FaultCode.TIMEOUT, diagnosis.silent(0.2).message)
         if second == 20:  # noqa: PLR2004  # two thirds into the story
             other = Reading("slave-3", at + 0.04, values, None, rtt=0.0191, online=True, response_timeout=0.05)
         else:
@@ -124,8 +125,8 @@ class Story:
 def events() -> Iterator[object]:
     """Yield events as they go out."""
     ts = _at(31).ts()
-    yield telemetry.event("device_added", ts, device="vane", slave=7).payload
-    yield telemetry.dropped("mast-top", BOOT, 9001, 9100, count=100, ts=ts).payload
+    yield publication.event("device_added", ts, device="vane", slave=7).payload
+    yield publication.dropped("mast-top", BOOT, 9001, 9100, count=100, ts=ts).payload
 
 
 def trace() -> object:

@@ -57,7 +57,7 @@ ERROR_CODES: Final = {
     "cancelled": "It was ended before its end.",
     "internal": "A fault of lfs10d itself; its log says more. Please report it.",
 }
-"""Why a request was not carried out (lfs10d.commands.ErrorCode)."""
+"""Why a request was not carried out (lfs10d.command.ErrorCode)."""
 
 ADVICE: Final = {
     "invalid_json": "Send one JSON object in UTF-8; in a shell put it in single quotes.",

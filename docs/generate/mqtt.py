@@ -15,12 +15,12 @@ from docs.generate.examples import Story, events, responses, trace
 from docs.generate.markdown import example, plain, table
 from docs.generate.meanings import ERROR_CODES, FAULT_CODES
 from docs.generate.uplink import bytes_table
-from lfs10d.commands import ErrorCode
-from lfs10d.outbound import OUTBOUND, Outbound
-from lfs10d.payloads import Availability
+from lfs10d.command import ErrorCode
+from lfs10d.commands.context import Request
+from lfs10d.commands.handlers.registry import REQUESTS
 from lfs10d.reading import FaultCode
-from lfs10d.requests.request import Request
-from lfs10d.requests.table import REQUESTS
+from lfs10d.telemetry.contract import OUTBOUND, Outbound
+from lfs10d.telemetry.payloads import Availability
 
 SHOWN_BEFORE = {"device/+/telemetry": "device/+/state", "device/+/history": "device/+/state"}
 SHOWN_BEFORE |= {"device/+/error": "line/error", "response/+": "response/+/+"}

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from docs.generate.commands import BAUDRATE, CONFIG, RECORDED, SLAVES, WALK
-from lfs10d.simulator.build import Plan, build
+from lfs10d.simulator.builder import Plan, build
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format

@@ -6,12 +6,13 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from docs.generate.markdown import table
-from lfs10d.facts import DaemonFacts, DeviceFacts, Instant, LineFacts
 from lfs10d.mqtt.encoding import encode, packet_size
 from lfs10d.mqtt.settings import Version
 from lfs10d.reading import Reading
-from lfs10d.station import Station
-from lfs10d.telemetry import Kind, Publication
+from lfs10d.system.clock import Instant
+from lfs10d.telemetry.info import DaemonFacts, DeviceFacts, LineFacts
+from lfs10d.telemetry.publication import Kind, Publication
+from lfs10d.telemetry.station import Station
 
 DAY = 86_400
 MEASURED = 120

@@ -10,7 +10,8 @@ from typing import Any
 
 import click
 
-from lfs10d import __version__, startup
+from lfs10d import __version__
+from lfs10d.system import startup
 
 EXIT_FAILED = 1
 EXIT_USAGE = 2

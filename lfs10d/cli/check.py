@@ -10,14 +10,14 @@ from typing import Any
 
 import click
 
-from lfs10d.advice import advice
-from lfs10d.budget import Budget, budget
 from lfs10d.cli import EXIT_CONFIG, config_option, json_option
-from lfs10d.cli.columns import columns
-from lfs10d.configfile import Loaded, load
+from lfs10d.cli.advice import advice
+from lfs10d.cli.render.table import columns
+from lfs10d.config.loader import Loaded, load
 from lfs10d.errors import ConfigError, Problem
-from lfs10d.logs import escape
-from lfs10d.quantities import duration_text
+from lfs10d.line.budget import Budget, budget
+from lfs10d.schema.quantities import duration_text
+from lfs10d.system.logs import escape
 
 EXAMPLES = """\b
 Examples:

@@ -11,26 +11,26 @@ from typing import Any
 
 import click
 
-from lfs10d.changefile import ChangeFile
-from lfs10d.changes import Changes
 from lfs10d.cli import EXIT_FAILED, config_option, json_option
-from lfs10d.cli.columns import columns
 from lfs10d.cli.json_text import json_text
-from lfs10d.config import Config, Section
-from lfs10d.configfile import Loaded, leaves, load
-from lfs10d.coreschema import render
-from lfs10d.credentials import reason
-from lfs10d.disk import Disk
-from lfs10d.document import path_text
-from lfs10d.effective import Effective, effective, merged_data
+from lfs10d.cli.render.table import columns
+from lfs10d.config.changes import Changes
+from lfs10d.config.changes_file import ChangeFile
+from lfs10d.config.credentials import reason
+from lfs10d.config.effective import Effective, effective, merged_data
+from lfs10d.config.loader import Loaded, leaves, load
+from lfs10d.config.models import Config, Section
+from lfs10d.daemon.state_directory import state_directory
 from lfs10d.errors import FailedError, StateError
-from lfs10d.kinds import Duration, Size
-from lfs10d.logs import escape
-from lfs10d.quantities import duration_text, size_text
-from lfs10d.statedir import state_directory
+from lfs10d.schema.document import path_text
+from lfs10d.schema.fields import Duration, Size
+from lfs10d.schema.quantities import duration_text, size_text
+from lfs10d.schema.yaml12 import render
+from lfs10d.system.disk import Disk
+from lfs10d.system.logs import escape
 
 DENIED = "permission denied"
-"""What the system says of a directory that is not for us, in the words of `lfs10d.credentials.reason`."""
+"""What the system says of a directory that is not for us, in the words of `lfs10d.config.credentials.reason`."""
 
 EXAMPLES = """\b
 Examples:

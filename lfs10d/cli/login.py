@@ -11,17 +11,17 @@ from typing import Any, Final
 
 import click
 
-from lfs10d.config import Config
-from lfs10d.configfile import Loaded, load
-from lfs10d.credentials import UnreadableError, password_in, service_password
+from lfs10d.config.credentials import UnreadableError, password_in, service_password
+from lfs10d.config.loader import Loaded, load
+from lfs10d.config.models import Config
+from lfs10d.daemon.state_directory import service_unit
 from lfs10d.errors import ConfigError
 from lfs10d.mqtt.settings import BrokerSettings
 from lfs10d.mqtt.topics import Topics
-from lfs10d.secret import Secret, leave_no_core
-from lfs10d.statedir import service_unit
+from lfs10d.system.secret import Secret, leave_no_core
 
 DENIED: Final = "permission denied"
-"""What the system says of a file that is not for us, in the words of `lfs10d.credentials.reason`."""
+"""What the system says of a file that is not for us, in the words of `lfs10d.config.credentials.reason`."""
 REMEDY: Final = "call it as root or as a member of the service's group, or give --username and --password-file"
 
 

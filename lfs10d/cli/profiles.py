@@ -12,11 +12,11 @@ from typing import TypeAlias
 import click
 
 from lfs10d.cli import json_option
-from lfs10d.cli.columns import columns
-from lfs10d.cli.completion import profile_names
+from lfs10d.cli.options import profile_names
+from lfs10d.cli.render.table import columns
 from lfs10d.profiles.library import builtin_names, load_profile
+from lfs10d.profiles.profile import Profile
 from lfs10d.profiles.registers import span
-from lfs10d.profiles.schema import Profile
 from lfs10d.profiles.values import Fact, Setting, Value
 
 Row: TypeAlias = tuple[str, ...]

@@ -12,22 +12,22 @@ from typing import Any
 
 import click
 
-from lfs10d.cli import EXIT_FAILED, EXIT_UNAVAILABLE, json_option, roof
-from lfs10d.cli.completion import PORT, SlaveId, profile_names
-from lfs10d.cli.holder import instead
-from lfs10d.cli.lineoptions import LineOptions, baudrate_of, line_options, take
+from lfs10d.cli import EXIT_FAILED, EXIT_UNAVAILABLE, json_option
+from lfs10d.cli.direct_line import OwnLine
 from lfs10d.cli.local_time import clock_text, stamp
-from lfs10d.cli.ownline import OwnLine
+from lfs10d.cli.options import PORT, LineOptions, SlaveId, baudrate_of, line_options, profile_names, take
+from lfs10d.cli.port_holder import instead
+from lfs10d.cli.render import troubleshooting
 from lfs10d.errors import PortBusyError
+from lfs10d.line.device import DeviceSpec, PollRules
 from lfs10d.modbus.frames import Checksum, Codec, describe
 from lfs10d.profiles.library import load_profile
-from lfs10d.profiles.schema import Profile
-from lfs10d.quantities import duration_text, seconds
+from lfs10d.profiles.profile import Profile
 from lfs10d.reading import ALIVE_CODES, Exchanged, Fault, FaultCode, Reading, UartCounters
-from lfs10d.roster import DeviceSpec, PollRules
+from lfs10d.schema.quantities import duration_text, seconds
 
 ATTEMPTS = 3
-"""So many polls are tried, with 200, 400, 1000 ms of patience (`lfs10d.roster.FIRST_TIMEOUTS`)."""
+"""So many polls are tried, with 200, 400, 1000 ms of patience (`lfs10d.line.device.FIRST_TIMEOUTS`)."""
 AT_ONCE = 0.05
 """Seconds between two of them, at least."""
 LOOK_EVERY = 0.1
@@ -245,8 +245,10 @@ def _explained(wanted: _Wanted, course: _Course, fault: Fault, uart: UartCounter
     yield ""
     echoed = any(each.sent and each.heard.startswith(each.sent) for each in course.exchanges)
     framing = None if uart is None else uart.framing
-    seen = roof.Symptoms(fault.code, echoed, framing)
-    yield from roof.lines(roof.meaning(seen), (*_own_advice(wanted, fault), *roof.checks(seen)))
+    seen = troubleshooting.Symptoms(fault.code, echoed, framing)
+    yield from troubleshooting.lines(
+        troubleshooting.meaning(seen), (*_own_advice(wanted, fault), *troubleshooting.checks(seen))
+    )
 
 
 def _meant(frame: bytes, wanted: _Wanted) -> str:

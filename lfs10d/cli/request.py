@@ -4,35 +4,36 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 import secrets
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
+from pydantic import ValidationError
 
-from lfs10d.cli import EXIT_FAILED, config_option, interruptible, json_option, request_words
-from lfs10d.cli.answers import told, verdict
+from lfs10d.cli import EXIT_FAILED, config_option, event_loop, json_option, request_words
+from lfs10d.cli.adopt_loop import Mounting
+from lfs10d.cli.adopt_repeat import ADOPT, mount
+from lfs10d.cli.client import RETAINED_WITHIN, Visitor, parsed
 from lfs10d.cli.json_text import json_text
-from lfs10d.cli.keyvalue import IDS, KeyValueError, content_of
-from lfs10d.cli.livelines import health
 from lfs10d.cli.login import Login, login, login_options
-from lfs10d.cli.mounting import Mounting
-from lfs10d.cli.repeating import ADOPT, mount
+from lfs10d.cli.render.live_lines import health
+from lfs10d.cli.render.response import told, verdict
+from lfs10d.cli.render.spinner import spinning
 from lfs10d.cli.requested_scan import SCAN, scan
-from lfs10d.cli.spinner import spinning
-from lfs10d.cli.visitor import RETAINED_WITHIN, Visitor, parsed
-from lfs10d.commands import LARGEST
-from lfs10d.configfile import load
+from lfs10d.commands.handlers.registry import REQUESTS
+from lfs10d.commands.message import LARGEST, Parameters
+from lfs10d.config.loader import load
 from lfs10d.errors import ConfigError, FailedError
-from lfs10d.kinds import Name
 from lfs10d.mqtt.messages import Filter
 from lfs10d.profiles.library import builtin_names
-from lfs10d.quantities import duration_text, seconds
-from lfs10d.requests.table import REQUESTS
-from lfs10d.telemetry import DEVICES
+from lfs10d.schema.fields import Name
+from lfs10d.schema.quantities import duration_text, seconds
+from lfs10d.telemetry.publication import DEVICES
 
 USUAL_TIMEOUT = 10.0
 """Seconds after which the response no longer comes."""
@@ -152,12 +153,12 @@ def command(**options: Any) -> int:  # noqa: ANN401  # nine options; `_Wanted` n
     if wanted.repeat:
         mounting = wanted.mounting
         visited = login(wanted.config, "adopt", username=wanted.username, password_file=wanted.password_file)
-        return interruptible.run(mount(visited, mounting, as_json=wanted.as_json))
+        return event_loop.run(mount(visited, mounting, as_json=wanted.as_json))
     content = wanted.content
     visited = login(wanted.config, "request", username=wanted.username, password_file=wanted.password_file)
     if wanted.name == SCAN:
-        return interruptible.run(scan(visited, content, wanted.patience, as_json=wanted.as_json))
-    response = interruptible.run(_ask(wanted, visited, content))
+        return event_loop.run(scan(visited, content, wanted.patience, as_json=wanted.as_json))
+    response = event_loop.run(_ask(wanted, visited, content))
     if response is None:
         message = f"no response to {wanted.name} within {duration_text(wanted.patience or 0)}"
         raise FailedError(f"{message}; whether it was obeyed is not known")
@@ -254,3 +255,61 @@ async def _ask(wanted: _Wanted, visited: Login, content: dict[str, Any]) -> dict
         raise
     finally:
         await visitor.leave()
+
+
+IDS = ("id", "transaction")
+
+
+_HEXADECIMAL = re.compile(r"0x[0-9A-Fa-f]{1,8}")
+
+
+class KeyValueError(ValueError):
+    """An argument is no `KEY=VALUE`, or its key came before; the message is for the person who typed it."""
+
+
+def content_of(arguments: Iterable[str], form: type[Parameters] | None) -> dict[str, Any]:
+    """Return the parameters that the arguments mean; `form` is None for a request that is not known.
+
+    What no reading of a value makes right is passed on as it is: the daemon says what is wrong with it.
+    """
+    content: dict[str, Any] = {}
+    for argument in arguments:
+        key, equals, text = argument.partition("=")
+        if not key or not equals:
+            raise KeyValueError(f"{argument!r} is no KEY=VALUE; write device=mast-top for example")
+        if key in content:
+            raise KeyValueError(f"{key} is given twice")
+        content[key] = text if key in IDS else _value(key, text, form)
+    return content
+
+
+def _value(key: str, text: str, form: type[Parameters] | None) -> Any:  # noqa: ANN401  # any JSON
+    readings = list(_readings(text))
+    if form is not None:
+        return next((value for value in readings if _fits(key, value, form)), readings[-1])
+    return readings[-1]
+
+
+def _readings(text: str) -> Iterator[Any]:
+    """Yield what the text may mean: null, the text itself, a hexadecimal number, JSON; where nothing fits, the last."""
+    if text == "null":
+        yield None
+    yield text
+    if _HEXADECIMAL.fullmatch(text):  # as registers are written in manuals and profiles
+        yield int(text, 16)
+    try:
+        yield json.loads(text, parse_constant=_refuse)
+    except (ValueError, RecursionError):
+        return
+
+
+def _refuse(constant: str) -> None:
+    raise ValueError(constant)  # NaN and Infinity are no JSON
+
+
+def _fits(key: str, value: object, form: type[Parameters]) -> bool:
+    try:
+        form.model_validate({key: value})
+    except ValidationError as error:
+        return all(detail["loc"][:1] != (key,) for detail in error.errors(include_url=False))
+    return True

@@ -11,9 +11,9 @@ from typing import Annotated, Any, Final, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from lfs10d.kinds import Choice, Duration, Flag, Kind
-from lfs10d.quantities import duration_text
-from lfs10d.requests.table import REQUESTS
+from lfs10d.commands.handlers.registry import REQUESTS
+from lfs10d.schema.fields import Choice, Duration, Flag, Kind
+from lfs10d.schema.quantities import duration_text
 
 WIDTH: Final = 79
 """Columns of a line, so that none is broken on a terminal of 80."""

@@ -12,19 +12,20 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import click
 
-from lfs10d.cli import EXIT_FAILED, findings
-from lfs10d.cli.answers import told, verdict
+from lfs10d.cli import EXIT_FAILED
+from lfs10d.cli.client import Visitor, parsed
 from lfs10d.cli.json_text import json_text
 from lfs10d.cli.login import Login
+from lfs10d.cli.render import scan_findings
+from lfs10d.cli.render.response import told, verdict
+from lfs10d.cli.render.scan_progress import TELL_EVERY, progress_bar, span
 from lfs10d.cli.scan import show_table
-from lfs10d.cli.scanview import TELL_EVERY, progress_bar, span
-from lfs10d.cli.visitor import Visitor, parsed
 from lfs10d.errors import FailedError
-from lfs10d.logs import escape
 from lfs10d.mqtt.messages import Filter, Incoming
 from lfs10d.profiles.library import builtin_names, load_profile
-from lfs10d.quantities import duration_text
-from lfs10d.telemetry import EVENT
+from lfs10d.schema.quantities import duration_text
+from lfs10d.system.logs import escape
+from lfs10d.telemetry.publication import EVENT
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
@@ -109,7 +110,7 @@ def _remarks(entry: Mapping[str, Any]) -> Iterator[str]:
         yield "DUPLICATE? garbled answers: two sensors with this id?"
     if entry.get("suspect") is True:
         yield "SUSPECT: others answer too, so it may be no sensor of its own"
-    if entry.get("id") == findings.FACTORY_ID and isinstance(entry.get("profile"), str):
+    if entry.get("id") == scan_findings.FACTORY_ID and isinstance(entry.get("profile"), str):
         yield "the factory id"
 
 

@@ -13,14 +13,15 @@ from pathlib import Path
 
 import click
 
-from lfs10d import boot, logs
 from lfs10d.cli import config_option
-from lfs10d.configfile import load
-from lfs10d.daemon import run
-from lfs10d.disk import Disk
+from lfs10d.config.loader import load
+from lfs10d.daemon import boot
+from lfs10d.daemon.daemon import run
+from lfs10d.daemon.state_directory import prepare, state_directory
 from lfs10d.errors import StateError
-from lfs10d.secret import leave_no_core
-from lfs10d.statedir import prepare, state_directory
+from lfs10d.system import logs
+from lfs10d.system.disk import Disk
+from lfs10d.system.secret import leave_no_core
 
 STANDARD_ERROR = 2
 

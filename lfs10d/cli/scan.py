@@ -11,16 +11,16 @@ from typing import Any
 
 import click
 
-from lfs10d.cli import EXIT_FAILED, EXIT_UNAVAILABLE, findings, json_option, roof
-from lfs10d.cli.columns import columns
-from lfs10d.cli.completion import PORT
-from lfs10d.cli.holder import instead
-from lfs10d.cli.lineoptions import LineOptions, baudrate_of, line_options, take
-from lfs10d.cli.ownline import OwnLine
-from lfs10d.cli.scanview import view
+from lfs10d.cli import EXIT_FAILED, EXIT_UNAVAILABLE, json_option
+from lfs10d.cli.direct_line import OwnLine
+from lfs10d.cli.options import PORT, LineOptions, baudrate_of, line_options, take
+from lfs10d.cli.port_holder import instead
+from lfs10d.cli.render import scan_findings, troubleshooting
+from lfs10d.cli.render.scan_progress import view
+from lfs10d.cli.render.table import columns
 from lfs10d.errors import PortBusyError, PortError
-from lfs10d.jobs.scan import Scan
-from lfs10d.jobs.search import FIRST_TIMEOUT, Search, ids_of
+from lfs10d.line.jobs.scan import Scan
+from lfs10d.line.jobs.scan_plan import FIRST_TIMEOUT, Search, ids_of
 from lfs10d.modbus.frames import Checksum, Codec, Framing
 from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.reading import FaultCode
@@ -87,7 +87,7 @@ def command(ids: tuple[int, ...], rates: tuple[int, ...], profiles: tuple[str, .
     )
     if not search.profiles:
         raise click.UsageError(f"none of these profiles speaks {line.framing.value}")
-    asked = findings.Asked(checksum, {profile.name: file for file, profile in own.items()})
+    asked = scan_findings.Asked(checksum, {profile.name: file for file, profile in own.items()})
     result = _Result(Scan(search), line, asked)
     code = _scan(result, as_json=as_json)
     if not result.opened:
@@ -103,7 +103,7 @@ def command(ids: tuple[int, ...], rates: tuple[int, ...], profiles: tuple[str, .
 class _Result:
     scan: Scan
     line: LineOptions
-    asked: findings.Asked
+    asked: scan_findings.Asked
     framing_errors: int | None = None
     opened: bool = False
 
@@ -111,11 +111,11 @@ class _Result:
         """Return everything for JSON."""
         progress = self.scan.progress
         return {
-            "port": findings.lasting_name(self.line.port),
+            "port": scan_findings.lasting_name(self.line.port),
             "complete": self.scan.complete,
             "asked": progress.asked,
             "total": progress.total,
-            "found": [findings.plain(finding) for finding in self.scan.found],
+            "found": [scan_findings.plain(finding) for finding in self.scan.found],
             "noisy_ids": self.scan.noise.ids,
             "echo": self.scan.noise.echoed,
             "framing_errors": self.framing_errors,
@@ -125,10 +125,10 @@ class _Result:
         """Print what was found, or what it means that nobody was."""
         found = self.scan.found
         if found:
-            show_table([findings.row(finding) for finding in found])
+            show_table([scan_findings.row(finding) for finding in found])
             click.echo()
             click.echo("# To poll them, save this as lfs10d.yaml, then: lfs10d run -c lfs10d.yaml")
-            for text in findings.snippet(found, self.line, asked=self.asked):
+            for text in scan_findings.snippet(found, self.line, asked=self.asked):
                 click.echo(text)
         if found and not self.scan.noise.ids:
             return
@@ -145,9 +145,9 @@ class _Result:
         if self.scan.found or not self.scan.complete:
             return
         code = FaultCode.TIMEOUT if noise.last is None else noise.last.code
-        seen = roof.Symptoms(code, noise.echoed, self.framing_errors)
+        seen = troubleshooting.Symptoms(code, noise.echoed, self.framing_errors)
         other = "Do the sensors speak at another rate, or with parity? See --baudrate and --parity."
-        yield from roof.lines(roof.meaning(seen), (*roof.checks(seen), other))
+        yield from troubleshooting.lines(troubleshooting.meaning(seen), (*troubleshooting.checks(seen), other))
 
 
 def _scan(result: _Result, *, as_json: bool) -> int:
@@ -159,7 +159,7 @@ def _scan(result: _Result, *, as_json: bool) -> int:
             while not line.events(LOOK_EVERY):
                 pass  # until the port is open
             result.opened = True
-            with view(scan, findings.lasting_name(port), quiet=as_json) as drawn:
+            with view(scan, scan_findings.lasting_name(port), quiet=as_json) as drawn:
                 line.submit(scan)
                 while not scan.over:
                     line.events(LOOK_EVERY)
@@ -183,7 +183,7 @@ def _scan(result: _Result, *, as_json: bool) -> int:
 def show_table(rows: list[tuple[str, ...]]) -> None:
     """Print what was found."""
     if not sys.stdout.isatty():
-        for text in columns(findings.HEAD, rows, right=findings.RIGHT):
+        for text in columns(scan_findings.HEAD, rows, right=scan_findings.RIGHT):
             click.echo(text)
         return
     # Only a terminal needs rich; importing it takes longer than the rest of the verb.
@@ -193,8 +193,8 @@ def show_table(rows: list[tuple[str, ...]]) -> None:
     from rich.text import Text  # noqa: PLC0415 - for a terminal only
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for index, head in enumerate(findings.HEAD):
-        right = index in findings.RIGHT
+    for index, head in enumerate(scan_findings.HEAD):
+        right = index in scan_findings.RIGHT
         table.add_column(head, justify="right" if right else "left", no_wrap=right, style="cyan" if not index else None)
     for row in rows:
         *cells, remark = (Text(cell) for cell in row)

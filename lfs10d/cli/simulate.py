@@ -13,11 +13,11 @@ from typing import Any
 import click
 
 from lfs10d.cli import json_option
-from lfs10d.cli.completion import profile_names
+from lfs10d.cli.options import profile_names
 from lfs10d.profiles.library import load_profile
-from lfs10d.quantities import seconds
-from lfs10d.simulator.build import Plan, build, slave_ids
-from lfs10d.simulator.faultfile import BAUDRATES, FaultFile, load_faults
+from lfs10d.schema.quantities import seconds
+from lfs10d.simulator.builder import Plan, build, slave_ids
+from lfs10d.simulator.fault_file import BAUDRATES, FaultFile, load_faults
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.registers import LFS10, blueprint_of

@@ -16,19 +16,19 @@ from typing import Any, Final
 
 import click
 
-from lfs10d import telemetry
-from lfs10d.cli import EXIT_FAILED, config_option, interruptible, json_option
-from lfs10d.cli.answers import verdict
+from lfs10d.cli import EXIT_FAILED, config_option, event_loop, json_option
+from lfs10d.cli.client import Visitor, parsed
 from lfs10d.cli.json_text import json_text
 from lfs10d.cli.local_time import NO_CLOCK, clock_text
 from lfs10d.cli.login import Login, login, login_options
-from lfs10d.cli.spinner import spinning
-from lfs10d.cli.visitor import Visitor, parsed
+from lfs10d.cli.render.response import verdict
+from lfs10d.cli.render.spinner import spinning
+from lfs10d.commands.handlers.line import LONGEST, USUAL
 from lfs10d.errors import BrokerError, FailedError
-from lfs10d.logs import escape
 from lfs10d.mqtt.messages import Filter, Incoming
-from lfs10d.quantities import duration_text, seconds
-from lfs10d.requests.line import LONGEST, USUAL
+from lfs10d.schema.quantities import duration_text, seconds
+from lfs10d.system.logs import escape
+from lfs10d.telemetry import publication
 
 ANSWERS_WITHIN: Final = 10.0
 LAST_FRAMES: Final = 0.5
@@ -81,12 +81,12 @@ def command(config: Path, duration: float, username: str | None, password_file: 
     """
     with contextlib.suppress(KeyboardInterrupt):
         visited = login(config, "trace", username=username, password_file=password_file)
-        return interruptible.run(_trace(visited, duration, as_json=as_json))
+        return event_loop.run(_trace(visited, duration, as_json=as_json))
     return 0
 
 
 async def _trace(visited: Login, duration: float, *, as_json: bool) -> int:
-    topic = visited.topics.full(telemetry.TRACE)
+    topic = visited.topics.full(publication.TRACE)
     frames: deque[Any] = deque()
 
     def arrived(message: Incoming) -> None:

@@ -14,19 +14,19 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from lfs10d import telemetry
-from lfs10d.cli import config_option, interruptible, json_option
+from lfs10d.cli import config_option, event_loop, json_option
+from lfs10d.cli.client import RETAINED_WITHIN, Visitor, parsed
 from lfs10d.cli.json_text import json_text
-from lfs10d.cli.live import Live
-from lfs10d.cli.livelines import LiveLines
-from lfs10d.cli.livetable import Source, age_text, screen
 from lfs10d.cli.login import Login, login, login_options
-from lfs10d.cli.spinner import spinning
-from lfs10d.cli.visitor import RETAINED_WITHIN, Visitor, parsed
+from lfs10d.cli.render.live_lines import LiveLines
+from lfs10d.cli.render.live_state import Live
+from lfs10d.cli.render.live_table import Source, age_text, screen
+from lfs10d.cli.render.spinner import spinning
+from lfs10d.daemon.state_directory import status_places
 from lfs10d.errors import BrokerError, FailedError
 from lfs10d.mqtt.messages import Filter, Incoming
-from lfs10d.regularfile import read_regular
-from lfs10d.statedir import status_places
+from lfs10d.system.regular_file import read_regular
+from lfs10d.telemetry import publication
 
 if TYPE_CHECKING:
     from rich.live import Live as Screen
@@ -65,7 +65,7 @@ def command(config: Path, username: str | None, password_file: Path | None, *, a
     with contextlib.suppress(KeyboardInterrupt):
         visited = login(config, "watch", username=username, password_file=password_file, needed=False)
         files = status_places(config, visited.config.line.name, os.environ)
-        interruptible.run(_Watch(visited, files).run(_output(as_json=as_json)))
+        event_loop.run(_Watch(visited, files).run(_output(as_json=as_json)))
     return 0
 
 
@@ -97,9 +97,15 @@ class _Watch:
         """When anything came by MQTT last, epoch s."""
         self._status: _Status | None = None
         topics = visited.topics
-        once = [telemetry.DEVICES, telemetry.LINE_STATE, telemetry.LINE_ERROR, telemetry.LINE_STATS]
-        leaves = (telemetry.STATE, telemetry.TELEMETRY, telemetry.AVAILABILITY, telemetry.STATS, telemetry.ERROR)
-        filters = [*once, *(telemetry.device_topic("+", leaf) for leaf in leaves)]
+        once = [publication.DEVICES, publication.LINE_STATE, publication.LINE_ERROR, publication.LINE_STATS]
+        leaves = (
+            publication.STATE,
+            publication.TELEMETRY,
+            publication.AVAILABILITY,
+            publication.STATS,
+            publication.ERROR,
+        )
+        filters = [*once, *(publication.device_topic("+", leaf) for leaf in leaves)]
         self._visitor = Visitor(
             visited, [Filter(topics.full(each), qos=0, retain_as_published=False) for each in filters], self._arrived
         )

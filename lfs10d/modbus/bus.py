@@ -51,7 +51,7 @@ class LineRules:
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """One request to put on the line; see `lfs10d.jobs.job.Ask`.
+    """One request to put on the line; see `lfs10d.line.jobs.job.Ask`.
 
     `earlier` are the requests to its slave whose answers may still come, `elsewhere` those to any slave.
     """

@@ -43,7 +43,7 @@ from collections.abc import Mapping
 from enum import StrEnum
 from math import isfinite
 
-from lfs10d.modbus import verdict
+from lfs10d.modbus import diagnosis
 from lfs10d.modbus.attempt import (
     Attempt,
     Decision,
@@ -56,10 +56,10 @@ from lfs10d.modbus.attempt import (
     Send,
     Settled,
 )
+from lfs10d.modbus.diagnosis import Verdict
+from lfs10d.modbus.frame_search import Catch
 from lfs10d.modbus.frames import BROADCAST, EXCEPTION_FLAG, Framing
-from lfs10d.modbus.hunt import Catch
 from lfs10d.modbus.reception import HEARD_KEPT, Reception
-from lfs10d.modbus.verdict import Verdict
 from lfs10d.reading import Fault
 
 __all__ = [
@@ -173,7 +173,7 @@ class Exchange:
         if now >= self._give_up:
             self._pass(Happening.BABBLED)
             self._reception.look_elsewhere()
-            return self._settle(now, None, verdict.babble(self._attempt.turn))
+            return self._settle(now, None, diagnosis.babble(self._attempt.turn))
         return Quiet(min(silent_at, self._give_up))
 
     def sent(self, begun: float, ended: float) -> None:
@@ -218,15 +218,15 @@ class Exchange:
         if reception.displaced is not None:
             self._pass(Happening.DISPLACED)
             reception.look_elsewhere()
-            return self._settle(reception.displaced.last_at, None, verdict.displaced(self._attempt.request.slave))
+            return self._settle(reception.displaced.last_at, None, diagnosis.displaced(self._attempt.request.slave))
         first, bound = self._limits()
         until = min(self._until(first), bound)
-        if until <= now < first and verdict.stranger_spoke(self._attempt, reception):
+        if until <= now < first and diagnosis.stranger_spoke(self._attempt, reception):
             until = min(first, bound)
         if now >= until:
             self._pass(Happening.EXPIRED)
             reception.look_elsewhere()
-            return self._settle(now, reception.spare, verdict.judge(self._attempt, reception))
+            return self._settle(now, reception.spare, diagnosis.judge(self._attempt, reception))
         return Listen(until, min(max(now, reception.whole_at), until))
 
     def _limits(self) -> tuple[float, float]:
@@ -268,7 +268,7 @@ class Exchange:
             answer, found = attempt.codec.decode(catch.body), None
             if catch.body[1] & EXCEPTION_FLAG:
                 (exception,) = answer
-                found = verdict.refusal(exception, attempt.request)
+                found = diagnosis.refusal(exception, attempt.request)
         fault = None
         if found is not None:
             answer = None

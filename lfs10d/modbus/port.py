@@ -19,11 +19,11 @@ from pathlib import Path
 from typing import Protocol
 
 from lfs10d.errors import PortError, PortLostError
-from lfs10d.modbus.attributes import attributes, differences
-from lfs10d.modbus.claim import claim, holder, is_pty, release
-from lfs10d.modbus.driver import USB_LATENCY, lower_latency, read_counters, switch_rs485
-from lfs10d.modbus.refusal import Facts, hung_up, look, number_of, refusal
-from lfs10d.modbus.settings import PortSettings, Rs485
+from lfs10d.modbus.port_errors import Facts, hung_up, look, number_of, refusal
+from lfs10d.modbus.port_lock import claim, holder, is_pty, release
+from lfs10d.modbus.port_settings import PortSettings, Rs485
+from lfs10d.modbus.serial_driver import USB_LATENCY, lower_latency, read_counters, switch_rs485
+from lfs10d.modbus.termios_attributes import attributes, differences
 from lfs10d.reading import UartCounters
 
 __all__ = ["Port", "PortSettings", "Rs485", "SerialPort", "attributes"]

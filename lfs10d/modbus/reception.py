@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from math import inf
 
 from lfs10d.modbus.attempt import Attempt, Echo, LateAnswer, Pending
+from lfs10d.modbus.frame_search import Catch, Hunt, Quarry
 from lfs10d.modbus.frames import BROADCAST, EXCEPTION_FLAG, ReadRegisters, Shape, WriteRegister
-from lfs10d.modbus.hunt import Catch, Hunt, Quarry
 
 HEARD_KEPT = 1024
 """Bytes remembered as heard, the last ones; the longest frame has 513 (ASCII)."""

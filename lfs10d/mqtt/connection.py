@@ -24,7 +24,10 @@ from paho.mqtt.properties import Properties
 from paho.mqtt.reasoncodes import ReasonCode
 from paho.mqtt.subscribeoptions import SubscribeOptions
 
-from lfs10d.mqtt.endings import (
+from lfs10d.mqtt.messages import RECEIVE_MAXIMUM_UNSAID, Accepted, Events, Filter, Incoming, Will
+from lfs10d.mqtt.paho_client import LARGEST_PACKET, BoundedClient
+from lfs10d.mqtt.pump import Pump
+from lfs10d.mqtt.reasons import (
     KEEP_ALIVE_TIMEOUT,
     REFUSED_FROM,
     UNSUPPORTED_VERSION,
@@ -34,9 +37,6 @@ from lfs10d.mqtt.endings import (
     gone,
     reason_in_words,
 )
-from lfs10d.mqtt.messages import RECEIVE_MAXIMUM_UNSAID, Accepted, Events, Filter, Incoming, Will
-from lfs10d.mqtt.pahoclient import LARGEST_PACKET, BoundedClient
-from lfs10d.mqtt.pump import Pump
 from lfs10d.mqtt.settings import BrokerSettings, Version
 from lfs10d.mqtt.tls import tls_context
 

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable
 
 from lfs10d.mqtt.settings import Version
-from lfs10d.telemetry import Payload
+from lfs10d.telemetry.publication import Payload
 
 _JSON = json.JSONEncoder(ensure_ascii=False, allow_nan=False, check_circular=False, separators=(",", ":"))
 

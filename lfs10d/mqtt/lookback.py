@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
 
-from lfs10d import telemetry
 from lfs10d.mqtt.topics import Topics
+from lfs10d.telemetry import publication
 
 QUIET_LEAST, QUIET_MOST = 0.05, 0.5
 """Seconds after the broker's answer to the subscription, or after the last message, in which no more came."""
@@ -17,7 +17,7 @@ QUIET_ROUNDS = 4
 LONGEST = 5.0
 """Seconds after which nothing is waited for any more, whatever the broker does."""
 
-FILTERS = (telemetry.LINE_STATE, telemetry.device_topic("+", telemetry.CONFIG))
+FILTERS = (publication.LINE_STATE, publication.device_topic("+", publication.CONFIG))
 """Two filters whatever is wanted: some brokers take eight at most."""
 
 

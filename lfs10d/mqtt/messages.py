@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from lfs10d.mqtt.endings import Ended
+from lfs10d.mqtt.reasons import Ended
 from lfs10d.mqtt.settings import Version
 
 RECEIVE_MAXIMUM_UNSAID = 65_535

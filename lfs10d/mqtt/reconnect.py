@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from lfs10d.mqtt.endings import Ended, Ending
+from lfs10d.mqtt.reasons import Ended, Ending
 from lfs10d.mqtt.settings import Version
 
 AWAY_EVERY = 1.0

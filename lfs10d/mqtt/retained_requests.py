@@ -10,8 +10,8 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-from lfs10d.mqtt.inbound import InboundRequest
 from lfs10d.mqtt.settings import Version
+from lfs10d.mqtt.topics import InboundRequest
 
 ASK_AFTER = 0.5
 """Seconds from a request to the question; those that come meanwhile share it."""

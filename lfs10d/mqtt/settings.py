@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
-from lfs10d.config import MqttConfig
-from lfs10d.kinds import node_text
-from lfs10d.secret import Secret
+from lfs10d.config.models import MqttConfig
+from lfs10d.schema.fields import node_text
+from lfs10d.system.secret import Secret
 
 
 class Version(StrEnum):

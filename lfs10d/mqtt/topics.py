@@ -1,14 +1,15 @@
 """Where full topics are spelled: `B` = `<base topic>/<line name>`, and what lies under it.
 
-What a daemon publishes is named under `B` in `lfs10d.telemetry`; here are `B` itself, the requests, the
+What a daemon publishes is named under `B` in `lfs10d.telemetry.publication`; here are `B` itself, the requests, the
 responses and the filters. Pure.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from lfs10d import telemetry
+from lfs10d.mqtt.messages import Incoming
+from lfs10d.telemetry import publication
 
 ONLINE = "online"
 OFFLINE = "offline"
@@ -17,12 +18,12 @@ REQUEST = "request"
 RESPONSE = "response"
 
 OWNED_LEAVES = (
-    telemetry.STATE,
-    telemetry.CONFIG,
-    telemetry.AVAILABILITY,
-    telemetry.ERROR,
-    telemetry.STATS,
-    telemetry.WIND,
+    publication.STATE,
+    publication.CONFIG,
+    publication.AVAILABILITY,
+    publication.ERROR,
+    publication.STATS,
+    publication.WIND,
 )
 """The last levels of the retained topics of a device; nobody but this daemon publishes them under its `B`."""
 
@@ -44,7 +45,7 @@ class Topics:
     @property
     def availability(self) -> str:
         """`online` or `offline`, retained; the last will goes here."""
-        return self.full(telemetry.AVAILABILITY)
+        return self.full(publication.AVAILABILITY)
 
     @property
     def requests(self) -> str:
@@ -54,7 +55,7 @@ class Topics:
     @property
     def retained_of_devices(self) -> tuple[str, ...]:
         """The filters under which a daemon that ran before may have left retained topics."""
-        return tuple(self.full(telemetry.device_topic("+", leaf)) for leaf in OWNED_LEAVES)
+        return tuple(self.full(publication.device_topic("+", leaf)) for leaf in OWNED_LEAVES)
 
     def full(self, relative: str) -> str:
         """Return the topic as the broker knows it: `state` under `lfs10d/line0` is `lfs10d/line0/state`."""
@@ -101,3 +102,36 @@ class Topics:
         if any(each in relative for each in "+#\0") or len(asked.encode()) > LONGEST_TOPIC:
             return None
         return relative
+
+
+@dataclass(frozen=True, slots=True)
+class InboundRequest:
+    """One message under `B/request`.
+
+    `levels` follow `request/`: `("device", "read")`; any number, of any text. `topic` and `response_topic` are
+    under `B`; `response_topic` is None where the request names none, or an invalid one. By MQTT 3.1.1
+    `retained` is True only for what was retained before we subscribed.
+    """
+
+    topic: str
+    levels: tuple[str, ...]
+    payload: bytes = field(repr=False)
+    retained: bool
+    response_topic: str | None = None
+    correlation: bytes | None = field(default=None, repr=False)
+
+
+def inbound(message: Incoming, topics: Topics) -> InboundRequest | None:
+    """Return the request a message is, None for a message that is no request."""
+    levels = topics.request_levels(message.topic)
+    relative = topics.relative(message.topic)
+    if levels is None or relative is None:
+        return None
+    return InboundRequest(
+        relative,
+        levels,
+        message.payload,
+        message.retained,
+        topics.response_topic(message.response_topic),
+        message.correlation,
+    )

@@ -13,23 +13,23 @@ from collections.abc import Awaitable, Callable, Iterable, Mapping
 from collections.abc import Set as AbstractSet
 from functools import partial
 
-from lfs10d import telemetry
-from lfs10d.mqtt.clearing import Clearing
+from lfs10d.mqtt.broker_client import Link
+from lfs10d.mqtt.cleanup import Clearing
 from lfs10d.mqtt.connection import Connection
-from lfs10d.mqtt.dispatch import Dispatch
-from lfs10d.mqtt.earlier import EarlierLife
-from lfs10d.mqtt.endings import REFUSED_FROM, Ended, reason_in_words
-from lfs10d.mqtt.inbound import InboundRequest, inbound
-from lfs10d.mqtt.link import Link
 from lfs10d.mqtt.messages import Accepted, Filter, Incoming, Will
-from lfs10d.mqtt.outbox import Outbox
+from lfs10d.mqtt.reasons import REFUSED_FROM, Ended, reason_in_words
+from lfs10d.mqtt.retained_reader import EarlierLife
 from lfs10d.mqtt.retained_requests import RetainedRequests
+from lfs10d.mqtt.sender import Dispatch
 from lfs10d.mqtt.settings import BrokerSettings, Version
-from lfs10d.mqtt.stowage import Stowage
-from lfs10d.mqtt.topics import OFFLINE, ONLINE, Topics
-from lfs10d.store.backlog import Store
-from lfs10d.store.opening import Limits
-from lfs10d.telemetry import Kind, Publication
+from lfs10d.mqtt.topics import OFFLINE, ONLINE, InboundRequest, Topics, inbound
+from lfs10d.outbox.outbox import Outbox
+from lfs10d.outbox.spooler import Stowage
+from lfs10d.outbox.store.database import Limits
+from lfs10d.outbox.store.store import Store
+from lfs10d.system.clock import ClockState
+from lfs10d.telemetry import publication as telemetry
+from lfs10d.telemetry.publication import Kind, Publication
 
 log = logging.getLogger(__name__)
 
@@ -167,7 +167,7 @@ class Uplink:
         """
         self._correct("unsynced")
 
-    def _correct(self, clock: telemetry.Clock) -> None:
+    def _correct(self, clock: ClockState) -> None:
         shift = self._shift(asyncio.get_running_loop().time())
         self._outbox.correct(shift, clock)
         if self._stowage is not None:

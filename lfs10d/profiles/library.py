@@ -7,11 +7,11 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from lfs10d import document
 from lfs10d.errors import ConfigError, Problem
-from lfs10d.kinds import quoted
-from lfs10d.profiles.schema import Profile
-from lfs10d.regularfile import read_regular
+from lfs10d.profiles.profile import Profile
+from lfs10d.schema import document
+from lfs10d.schema.fields import quoted
+from lfs10d.system.regular_file import read_regular
 
 BUILTIN_NAMES = ("lfs10", "ld-e", "fuling-dzb", "eh600")
 """The profiles that come with lfs10d, the first being a slave's default."""

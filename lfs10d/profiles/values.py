@@ -9,8 +9,8 @@ from typing import Annotated, Literal, TypeAlias
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from lfs10d.kinds import PLAIN_ERROR, Kind, RefusedError, Text, Whole
 from lfs10d.profiles.registers import WORDS, ByteOrder, Cell, Linear, RegisterType, WordOrder, span, spell
+from lfs10d.schema.fields import PLAIN_ERROR, Kind, RefusedError, Text, Whole
 
 Place: TypeAlias = tuple[str | int, ...]
 ReadFunction: TypeAlias = Literal[3, 4]

@@ -7,7 +7,7 @@ from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
 from typing import Final, Literal, TypeAlias
 
-from lfs10d.profiles.schema import Profile
+from lfs10d.profiles.profile import Profile
 from lfs10d.profiles.values import Setting
 from lfs10d.simulator.wire import Check, Framing
 

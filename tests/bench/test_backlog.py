@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from bench import backlog
-from lfs10d.store.opening import Limits
-from lfs10d.store.samplefile import SampleFile
+from lfs10d.outbox.store.database import Limits
+from lfs10d.outbox.store.sample_file import SampleFile
 
 
 def test_so_many_samples_wait_and_each_run_has_its_own_copy(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from bench.engine import crc16
 from bench.line import PacedLine, read_log
-from tests.bench.conftest import CHARACTER, ID, T35, Terminal, request
+from tests.support.terminals import CHARACTER, ID, T35, Terminal, request
 
 Starter = Callable[..., PacedLine]
 

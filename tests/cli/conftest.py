@@ -13,19 +13,12 @@ import sys
 import termios
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Protocol
 
 import pytest
 
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
-
-
-class Lfs10d(Protocol):
-    """Calls the program with arguments, in a folder of its own, without a terminal."""
-
-    def __call__(self, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
-        """Return the exit code and what was printed."""
+from tests.support.verbs import AtTerminal, Lfs10d
 
 
 @pytest.fixture
@@ -52,13 +45,6 @@ def small(tmp_path: Path) -> Path:
     file = tmp_path / "lfs10d.yaml"
     file.write_text("line: {port: /dev/x}\nslaves: [2, {id: 3, interval: 250ms}]\nmqtt: {host: localhost}\n")
     return file
-
-
-class AtTerminal(Protocol):
-    """Calls the program with arguments at a terminal of `columns`, where it prints all it has to say."""
-
-    def __call__(self, *arguments: str, columns: int = 80, until: str | None = None) -> tuple[int, str]:
-        """Return the exit code and what came to the terminal; press Ctrl-C when `until` was seen."""
 
 
 @pytest.fixture

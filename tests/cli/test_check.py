@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from lfs10d.cli.check import command
-from tests.cli.conftest import Lfs10d
+from tests.support.verbs import Lfs10d
 
 
 @pytest.fixture(autouse=True)

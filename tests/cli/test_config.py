@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from lfs10d.changefile import FILE_NAME, ChangeFile
-from lfs10d.changes import Changes
 from lfs10d.cli.config import command
-from lfs10d.configfile import load
-from lfs10d.disk import Disk
-from lfs10d.effective import said
+from lfs10d.config.changes import Changes
+from lfs10d.config.changes_file import FILE_NAME, ChangeFile
+from lfs10d.config.effective import said
+from lfs10d.config.loader import load
 from lfs10d.errors import FailedError, StateError
+from lfs10d.system.disk import Disk
 
 TEXT = """\
 line: {port: /dev/x, extra_gap: 0.5ms}

@@ -8,7 +8,7 @@ import click
 import pytest
 
 from lfs10d.cli import VERBS, lfs10d
-from lfs10d.requests.table import REQUESTS
+from lfs10d.commands.handlers.registry import REQUESTS
 
 COLUMNS = 80
 

@@ -9,7 +9,7 @@ import pytest
 from lfs10d.cli import login as logins
 from lfs10d.cli.login import DENIED, REMEDY, Login, login
 from lfs10d.errors import ConfigError
-from lfs10d.secret import Secret
+from lfs10d.system.secret import Secret
 
 MQTT = "{host: localhost, username: daemon-line0%s}"
 
@@ -17,7 +17,7 @@ MQTT = "{host: localhost, username: daemon-line0%s}"
 @pytest.fixture(autouse=True)
 def system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Have a folder of our own in place of /etc/lfs10d, and cores as they are."""
-    monkeypatch.setattr("lfs10d.statedir.SYSTEM_FOLDER", tmp_path)
+    monkeypatch.setattr("lfs10d.daemon.state_directory.SYSTEM_FOLDER", tmp_path)
     monkeypatch.setattr(logins, "leave_no_core", lambda: None)
     monkeypatch.delenv("CREDENTIALS_DIRECTORY", raising=False)
 

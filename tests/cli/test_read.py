@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from lfs10d.cli.lineoptions import take
+from lfs10d.cli.options import take
 from lfs10d.cli.read import _Course, _explained, _Wanted, command
 from lfs10d.profiles.library import load_profile
 from lfs10d.reading import Errand, Exchanged, Fault, FaultCode
@@ -22,7 +22,7 @@ from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.registers import blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
-from tests.cli.conftest import AtTerminal, Lfs10d
+from tests.support.verbs import AtTerminal, Lfs10d
 
 
 def watching(sensors: PtyLine, *arguments: str) -> subprocess.Popen[str]:

@@ -17,7 +17,7 @@ from lfs10d.cli.request_words import (
     named_device,
     parameters,
 )
-from lfs10d.requests.table import REQUESTS
+from lfs10d.commands.handlers.registry import REQUESTS
 
 DEVICES = [{"name": "mast-top", "id": 3}, {"name": "7", "id": 5}, {"name": "crane", "id": 7}, {"id": 9}, "noise"]
 

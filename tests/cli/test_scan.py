@@ -15,14 +15,14 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from lfs10d.cli.render.scan_progress import span
 from lfs10d.cli.scan import command
-from lfs10d.cli.scanview import span
-from lfs10d.configfile import load
+from lfs10d.config.loader import load
+from lfs10d.simulator.line_faults import stray
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.sensor import Sensor
-from lfs10d.simulator.troubles import stray
 from lfs10d.simulator.wire import Format
-from tests.cli.conftest import AtTerminal, Lfs10d
+from tests.support.verbs import AtTerminal, Lfs10d
 
 
 def wild(slave: int) -> Sensor:

@@ -20,7 +20,7 @@ from typing import Any
 import pytest
 
 from lfs10d.simulator.wire import seal, unseal
-from tests.cli.conftest import Lfs10d
+from tests.support.verbs import Lfs10d
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from lfs10d import __version__
 from lfs10d.cli import VERBS
 from lfs10d.cli import lfs10d as group
-from tests.cli.conftest import Lfs10d
+from tests.support.verbs import Lfs10d
 
 BUILT = group.list_commands(click.Context(group))
 
@@ -70,7 +70,7 @@ def test_a_shell_can_complete_verbs_and_options(lfs10d: Lfs10d) -> None:
     "verb", [verb for verb in ("check", "config", "run", "request", "watch", "trace") if verb in BUILT]
 )
 def test_a_verb_that_draws_nothing_imports_nothing_to_draw_with(verb: str) -> None:
-    program = f"import json, sys, lfs10d.cli.outcome, lfs10d.cli.{verb}; print(json.dumps(sorted(sys.modules)))"
+    program = f"import json, sys, lfs10d.cli.exit_status, lfs10d.cli.{verb}; print(json.dumps(sorted(sys.modules)))"
     result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     imported = {name.partition(".")[0] for name in json.loads(result.stdout)}
     assert not imported & {"rich", "amqtt"}

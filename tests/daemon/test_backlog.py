@@ -15,8 +15,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import Mosquitto
-from tests.daemon.conftest import ENDS_WITHIN, Site, View, eventually, good
+from tests.support.brokers import Mosquitto
+from tests.support.sites import ENDS_WITHIN, Site, View, eventually, good
 
 COMMITTED_WITHIN = 8.0
 """Seconds after which a sample is on the disk while the broker is away: 3 s of youth, 5 s between two commits."""

@@ -12,13 +12,13 @@ from functools import partial
 import pytest
 
 from lfs10d.simulator.burst import MASTER
-from lfs10d.simulator.inturn import InTurn
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
+from lfs10d.simulator.queued_sensor import InTurn
 from lfs10d.simulator.wire import SECOND, Format
 from soak.attestation import Oracle, epoch_of, parsed
 from soak.troubles import KINDS
-from tests.daemon.conftest import Site, View, eventually, tell
+from tests.support.sites import Site, View, eventually, tell
 
 pytestmark = pytest.mark.needs("mosquitto")
 

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import Mosquitto
-from tests.daemon.conftest import PATIENCE, Site, View, eventually, good
+from tests.support.brokers import Mosquitto
+from tests.support.sites import PATIENCE, Site, View, eventually, good
 
 LIVE_FOR = 3.0
 """Seconds after which a sample is history (contract, section 3)."""

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from tests.conftest import Mosquitto
-from tests.daemon.conftest import Run, Site, View, eventually, good
+from tests.support.brokers import Mosquitto
+from tests.support.sites import Run, Site, View, eventually, good
 
 pytestmark = pytest.mark.needs("mosquitto", "mosquitto_pub")
 

@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 
 from docs.generate.commands import BAUDRATE, CONFIG, SLAVES, WALK, Step, recorded
-from lfs10d.outbound import check
-from lfs10d.requests.table import REQUESTS
+from lfs10d.commands.handlers.registry import REQUESTS
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
-from tests.conftest import Mosquitto
-from tests.daemon.conftest import Site, View, eventually, good, tell
+from lfs10d.telemetry.contract import check
+from tests.support.brokers import Mosquitto
+from tests.support.sites import Site, View, eventually, good, tell
 
 BASE = "lfs10d/line0"
 QUICK = [number for number, step in enumerate(WALK) if not step.slow]

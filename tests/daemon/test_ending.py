@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import Mosquitto
-from tests.daemon.conftest import ENDS_WITHIN, Site, View, eventually, good
+from tests.support.brokers import Mosquitto
+from tests.support.sites import ENDS_WITHIN, Site, View, eventually, good
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])

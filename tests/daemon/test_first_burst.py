@@ -7,8 +7,8 @@ import signal
 import time
 from itertools import pairwise
 
-from tests.conftest import Mosquitto
-from tests.daemon.conftest import Site, View, good
+from tests.support.brokers import Mosquitto
+from tests.support.sites import Site, View, good
 
 LINE_TOPICS = {"info", "devices", "line/state", "line/error", "line/stats"}
 DEVICE_LEAVES = {"state", "config", "availability", "error", "stats"}

@@ -9,10 +9,10 @@ from collections.abc import Callable
 
 import pytest
 
-from lfs10d.outbound import check
+from lfs10d.telemetry.contract import check
 from soak.attestation import Oracle, epoch_of, parsed
-from tests.conftest import Mosquitto
-from tests.daemon.conftest import Site, View, eventually, good
+from tests.support.brokers import Mosquitto
+from tests.support.sites import Site, View, eventually, good
 
 pytestmark = [pytest.mark.needs("mosquitto"), pytest.mark.needs("mosquitto_pub")]
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import Authority, Mosquitto
-from tests.daemon.conftest import Run, Site, View, eventually, good
+from tests.support.brokers import Authority, Mosquitto
+from tests.support.sites import Run, Site, View, eventually, good
 
 SECRET = "s3cret-and-long-enough"  # noqa: S105 - of a broker that lives for one test
 WRONG = "wr0ng-and-long-enough"

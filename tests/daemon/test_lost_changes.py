@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from lfs10d.simulator.pty import PtyLine
-from tests.conftest import Mosquitto
-from tests.daemon.conftest import Run, Site, View, eventually, good, tell
+from tests.support.brokers import Mosquitto
+from tests.support.sites import Run, Site, View, eventually, good, tell
 
 pytestmark = pytest.mark.needs("mosquitto")
 

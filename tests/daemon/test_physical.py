@@ -19,8 +19,8 @@ from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
-from tests.conftest import Mosquitto
-from tests.daemon.conftest import Site, View, eventually, good, tell
+from tests.support.brokers import Mosquitto
+from tests.support.sites import Site, View, eventually, good, tell
 
 BASE = "lfs10d/line0"
 

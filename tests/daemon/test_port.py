@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tests.daemon.conftest import Site, View, good
+from tests.support.sites import Site, View, good
 
 BACK_WITHIN = 2.0
 """Seconds from the return of the port to its use (issue A)."""

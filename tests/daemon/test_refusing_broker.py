@@ -8,9 +8,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.brokers import Capricious
-from tests.conftest import Mosquitto
-from tests.daemon.conftest import Site, View, eventually, good
+from tests.support.answering_brokers import Capricious
+from tests.support.brokers import Mosquitto
+from tests.support.sites import Site, View, eventually, good
 
 HISTORY_WITHIN = 40.0
 """Seconds in which the backlog of these tests is out: it begins 10 s after a connect, also after a second and third."""

@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 
 from lfs10d.simulator.line import SimulatedLine
-from tests.conftest import Mosquitto
-from tests.daemon.conftest import Site, View, eventually, good, tell
+from tests.support.brokers import Mosquitto
+from tests.support.sites import Site, View, eventually, good, tell
 
 INTERVAL = 200
 """ms between two polls of a device, unless a test says otherwise."""

@@ -13,10 +13,10 @@ from typing import Any
 
 import pytest
 
-from lfs10d.outbound import check
 from lfs10d.simulator.line import SimulatedLine
-from tests.conftest import Heard, Listener, Mosquitto
-from tests.daemon.conftest import Run, Site, View, eventually, good, tell
+from lfs10d.telemetry.contract import check
+from tests.support.brokers import Heard, Listener, Mosquitto
+from tests.support.sites import Run, Site, View, eventually, good, tell
 
 BASE = "lfs10d/line0"
 

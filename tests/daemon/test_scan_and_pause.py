@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 
-from lfs10d.outbound import check
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
-from tests.conftest import Mosquitto
-from tests.daemon.conftest import Site, View, eventually, good, tell
+from lfs10d.telemetry.contract import check
+from tests.support.brokers import Mosquitto
+from tests.support.sites import Site, View, eventually, good, tell
 
 pytestmark = pytest.mark.needs("mosquitto_pub")
 

@@ -8,7 +8,7 @@ import pytest
 
 from lfs10d.simulator.faults import Kind
 from lfs10d.simulator.line import SimulatedLine
-from tests.daemon.conftest import Site, View, eventually, good, tell
+from tests.support.sites import Site, View, eventually, good, tell
 
 
 def failing(error: dict[str, Any]) -> bool:

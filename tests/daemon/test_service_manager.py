@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from lfs10d.simulator.faults import Kind
-from tests.daemon.conftest import Run, Site, View, eventually, good
+from tests.support.sites import Run, Site, View, eventually, good
 
 START = "from lfs10d.__main__ import main; main()"
 

@@ -1,245 +1,144 @@
-"""Every setting has its effect, seen on the wire, at the broker or in the log."""
+"""From the configuration to what each part is built from."""
 
 from __future__ import annotations
 
-import json
-import os
-import re
-import socket
-import termios
+from pathlib import Path
 
 import pytest
 
-from lfs10d.simulator.faults import Kind
-from lfs10d.simulator.wire import Format
-from tests.conftest import Mosquitto
-from tests.daemon.conftest import Site, View, eventually, good, tell
+from lfs10d import profiles
+from lfs10d.config.loader import Loaded, load
+from lfs10d.daemon.settings import config_hash, device_facts, line_facts
+from lfs10d.line.budget import timing_of
+from lfs10d.line.settings import access_target, device_specs, line_rules, poll_rules, port_settings, search, usual_codec
+from lfs10d.modbus.frames import Checksum, Framing
+from lfs10d.modbus.port_settings import PortSettings, Rs485
 
-NOT_PERMITTED = """
-import errno, os, sys
-def refuse(*_):
-    raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
-os.sched_setscheduler = refuse
-from lfs10d.__main__ import main
-main()
+FILE = """
+line:
+  {port: /dev/ttyUSB0, baudrate: 19200, parity: even, stopbits: 2, extra_gap: 5ms, turnaround_delay: 50ms, echo: "on",
+   low_latency: false, rs485: {rts_on_send: false, rts_after_send: true, delay_before_send: 1ms, delay_after_send: 2ms}}
+poll: {interval: 250ms, retries: 2, offline_after: 5, probe_interval_max: 30s}
+slaves:
+  - {id: 3, name: mast, label: "Mast, 10 m", response_timeout: 300ms}
+  - {id: 4, profile: eh600, interval: 5s, enabled: false, checksum: sum}
+mqtt: {host: localhost}
 """
-"""The daemon on a system that permits no real-time scheduling."""
 
 
-def realtime_permitted() -> bool:
-    """Tell whether a thread here may run under SCHED_FIFO."""
-    child = os.fork()
-    if not child:
-        try:
-            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
-        except OSError:
-            os._exit(1)
-        os._exit(0)
-    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+@pytest.fixture
+def loaded(tmp_path: Path) -> Loaded:
+    """Give a configuration in which nothing is a default."""
+    file = tmp_path / "lfs10d.yaml"
+    file.write_text(FILE)
+    return load(file)
 
 
-def scheduler(thread: int) -> int:
-    """Return the scheduler of a thread without its flags; an ordinary one if it is over."""
-    try:
-        return os.sched_getscheduler(thread) & ~os.SCHED_RESET_ON_FORK
-    except ProcessLookupError:
-        return os.SCHED_OTHER
+def test_the_port_is_opened_as_configured(loaded: Loaded) -> None:
+    assert port_settings(loaded.config.line) == PortSettings(
+        path="/dev/ttyUSB0", baudrate=19200, parity="even", databits=8, stopbits=2, low_latency=False,
+        rs485=Rs485(rts_on_send=False, rts_after_send=True, delay_before_send=0.001, delay_after_send=0.002),
+    )  # fmt: skip
 
 
-def test_parity_and_stop_bits_make_characters_and_gaps_longer(site: Site, view: View) -> None:
-    served = site.line(shape=Format(9600, parity="even", stopbits=2))
-    site.write(line={"baudrate": 9600, "parity": "even", "stopbits": 2}, poll={"interval": 0})
-    site.run()
-    view.wait_samples("slave-1", 20, good)
+def test_the_line_is_spoken_on_as_configured(loaded: Loaded) -> None:
+    rules = line_rules(loaded.config.line)
+    timing = timing_of(loaded.config.line)
 
-    control = termios.tcgetattr(served._master)[2]
-    assert control & termios.CSTOPB
-    assert control & termios.CSIZE == termios.CS8
-    gap = 3.5 * 12 / 9600
-    assert view.newest("line/stats")["gap_required_us"] == round(gap * 1e6)
-    assert served.line.judge.min_gap is not None
-    assert served.line.judge.min_gap >= gap * 1e9
-    state = view.newest("line/state")
-    assert (state["parity"], state["stopbits"], state["databits"], state["framing"]) == ("even", 2, 8, "rtu")
+    assert (rules.extra_gap, rules.turnaround_delay, rules.echo) == (0.005, 0.05, "on")
+    assert timing.bits == 12
+    assert timing.gap == pytest.approx(3.5 * 12 / 19200 + 0.005)
+    assert line_facts(loaded.config.line).gap_required == timing.gap
 
 
-def test_an_extra_gap_is_kept_before_every_request(site: Site, view: View) -> None:
-    served = site.line()
-    site.write(line={"extra_gap": "20ms"}, poll={"interval": 0})
-    site.run()
-    view.wait_samples("slave-1", 20, good)
+def test_devices_are_polled_and_described_as_configured(loaded: Loaded) -> None:
+    mast, other = device_specs(loaded.config, loaded.profiles)
+    rules = poll_rules(loaded.config.poll)
 
-    assert served.line.judge.min_excess is not None
-    assert served.line.judge.min_excess >= 0.02 * 1e9
-
-
-@pytest.mark.parametrize("echo", ["auto", "on"])
-def test_an_adapter_that_echoes_is_no_trouble(site: Site, view: View, echo: str) -> None:
-    site.line(echo=True)
-    site.write(line={"echo": echo}, poll={"interval": "50ms"})
-    site.run()
-
-    samples = view.wait_samples("slave-1", 15)
-
-    assert all(good(one) for one in samples)
-
-
-def test_intervals_are_each_slaves_own(site: Site, view: View) -> None:
-    site.line((1, 2, 3))
-    site.write(poll={"interval": "100ms"}, slaves=[1, {"id": 2, "interval": "1h"}, {"id": 3, "interval": "400ms"}])
-    site.run()
-    view.wait_samples("slave-2", 1)
-
-    view.wait_samples("slave-1", 40)
-
-    assert len(view.samples("slave-2")) == 1
-    assert 8 <= len(view.samples("slave-3")) <= 13
-
-
-def test_a_slave_that_is_not_enabled_is_not_asked(site: Site, view: View) -> None:
-    served = site.line()
-    site.write(slaves=[1, {"id": 2, "enabled": False}])
-    site.run()
-    view.wait_samples("slave-1", 5, good)
-
-    assert not view.samples("slave-2")
-    assert view.newest("device/slave-2/availability") == "offline"
-    assert view.newest("device/slave-2/state")["quality"] == "bad"
-    assert {request.frame[0] for request in list(served.line.log)} == {1}
-
-
-def test_a_fixed_time_out_is_waited_for_and_no_longer(site: Site, view: View) -> None:
-    served = site.line()
-    for sensor in served.line.sensors:
-        sensor.turnaround = 0.5
-    site.write(poll={"interval": "1s", "retries": 0}, slaves=[{"id": 1, "response_timeout": "100ms"}])
-    site.run()
-    assert view.wait_samples("slave-1", 1)[0]["error"] in {"timeout", "late"}
-    assert view.newest("device/slave-1/config")["response_timeout"] == 0.1
-
-    site.runs[0].process.kill()
-    view.wait("availability", "offline".__eq__)
-    view.clear()
-    site.write(poll={"interval": "1s", "retries": 0}, slaves=[{"id": 1, "response_timeout": "2s"}])
-    site.run()
-    first = view.wait_samples("slave-1", 1)[0]
-    assert good(first), first
-
-
-def test_a_failed_poll_is_asked_again_as_often_as_told(site: Site, view: View) -> None:
-    served = site.line((1,))
-    site.write(poll={"interval": "300ms", "retries": 2, "offline_after": 1}, slaves=[1])
-    site.run()
-    view.wait_samples("slave-1", 3, good)
-
-    tell(served, lambda line: line.sensor(1).ail(Kind.NOISY))
-    asked = len(served.line.log)
-    error = view.wait("device/slave-1/error", lambda error: error["active"])
-
-    assert (error["code"], error["count"]) == ("crc", 1)
-    assert len(served.line.log) - asked >= 3
-    view.wait("device/slave-1/availability", "offline".__eq__)
-
-
-def test_names_are_as_configured(site: Site, mosquitto: Mosquitto) -> None:
-    view = View(mosquitto.subscribe(), f"wind/{socket.gethostname()}/roof-2")
-    site.write(
-        line={"name": "roof-2"},
-        slaves=[{"id": 9, "name": "mast-top", "label": "Mast, 10 m"}],
-        mqtt={"base_topic": "wind/%H", "client_id": "gate-7", "keepalive": "7s"},
-    )
-    site.run()
-
-    assert view.wait("devices") == [
-        {"name": "mast-top", "id": 9, "label": "Mast, 10 m", "profile": "lfs10", "enabled": True, "interval": 0.2}
+    assert (mast.name, mast.slave, mast.interval, mast.enabled, mast.response_timeout) == ("mast", 3, 0.25, True, 0.3)
+    assert (mast.codec.framing, mast.codec.checksum) == (Framing.RTU, Checksum.CRC)
+    assert (other.name, other.slave, other.interval, other.enabled, other.response_timeout) == (
+        "slave-4", 4, 5.0, False, None,
+    )  # fmt: skip
+    assert other.codec.checksum is Checksum.SUM
+    assert (rules.retries, rules.offline_after, rules.probe_interval_max) == (2, 5, 30.0)
+    facts = device_facts(loaded.config, loaded.profiles)
+    assert [(one.name, one.slave, one.label, one.profile) for one in facts] == [
+        ("mast", 3, "Mast, 10 m", "lfs10"),
+        ("slave-4", 4, None, "eh600"),
     ]
-    assert re.search(r"as gate-7 \(p5, c1, k7\)", mosquitto.log)
+    assert facts[0].units == {"wind_speed": "m/s"}
+    assert facts[0].offline_after == 5
 
 
-def test_the_line_is_called_as_the_file_where_it_has_no_name(site: Site, mosquitto: Mosquitto) -> None:
-    view = View(mosquitto.subscribe(), "lfs10d/roof")
-    site.write(slaves=[])
-    site.file.rename(site.folder / "roof.yaml")
-    site.run("-c", str(site.folder / "roof.yaml"))
+def test_the_hash_tells_configurations_apart(loaded: Loaded, tmp_path: Path) -> None:
+    same, other = tmp_path / "same" / "lfs10d.yaml", tmp_path / "other" / "lfs10d.yaml"
+    for file, text in ((same, FILE + "# a comment\n"), (other, FILE.replace("250ms", "251ms"))):
+        file.parent.mkdir()
+        file.write_text(text)
 
-    view.wait("availability", "online".__eq__)
-
-
-@pytest.mark.parametrize(("form", "beginning"), [("journal", "<6>lfs10d "), ("text", "20"), ("auto", "20")])
-def test_the_log_has_the_form_that_was_asked_for(site: Site, form: str, beginning: str) -> None:
-    site.write(slaves=[], log={"format": form})
-    run = site.run()
-    run.ready()
-
-    assert run.log.startswith(beginning)
+    assert config_hash(load(same).config) == config_hash(loaded.config)
+    assert config_hash(load(other).config) != config_hash(loaded.config)
+    assert len(config_hash(loaded.config)) == 12
 
 
-def test_only_warnings_are_logged_where_only_those_are_wanted(site: Site) -> None:
-    site.write(slaves=[], log={"level": "warning"})
-    run = site.run()
-    run.says("connection refused")
-
-    assert " info " not in run.log
-
-
-def test_a_driver_without_rs485_mode_is_told_of_once_and_used(site: Site, view: View) -> None:
-    site.line()
-    site.write(line={"rs485": {"rts_on_send": True, "delay_before_send": "1ms"}})
-    run = site.run()
-
-    view.wait("device/slave-1/state", good)
-
-    told = [line for line in run.log.splitlines() if "no RS485 mode" in line]
-    assert len(told) == 1
-    assert " warning " in told[0]
+@pytest.mark.parametrize(("asked", "polled"), [(0, 2.0), (2, 2.0), (3, 3.0)])
+def test_as_fast_as_the_line_allows_is_no_faster_than_the_device_does(
+    tmp_path: Path, asked: float, polled: float
+) -> None:
+    (tmp_path / "slow.yaml").write_text(
+        "{name: slow, title: Slow, min_interval: 2s, request_gap: 300ms, "
+        "values: [{name: a, register: 1, type: uint16, unit: m}]}"
+    )
+    file = tmp_path / "lfs10d.yaml"
+    slave = f"{{id: 3, profile: slow.yaml, interval: {asked}}}"
+    file.write_text(f"line: {{port: tty}}\nslaves: [{slave}]\nmqtt: {{host: localhost}}\n")
+    config = load(file)
+    (spec,) = device_specs(config.config, config.profiles)
+    assert spec.interval == polled
+    assert spec.request_gap == device_facts(config.config, config.profiles)[0].request_gap == 0.3
 
 
-def test_realtime_puts_the_lines_thread_alone_under_fifo_where_that_is_permitted(site: Site, view: View) -> None:
-    permitted = realtime_permitted()
-    site.line()
-    site.write(line={"realtime": True})
-    run = site.run()
-    view.wait("device/slave-1/state", good)
-
-    real = [thread for thread in run.threads if scheduler(thread) == os.SCHED_FIFO]
-
-    assert len(real) == permitted
-    assert run.process.pid not in real
-    assert run.log.count("SCHED_FIFO") == (not permitted)
-
-    site.write(line={"realtime": False})
-    run.reload()
-    eventually(lambda: all(scheduler(each) == os.SCHED_OTHER for each in run.threads), "an ordinary thread again")
-    site.write(line={"realtime": True})
-    run.reload()
-    eventually(lambda: len([1 for each in run.threads if scheduler(each) == os.SCHED_FIFO]) == permitted, "FIFO again")
+def test_registers_are_accessed_as_the_device_is_polled_or_as_the_line_usually_speaks(loaded: Loaded) -> None:
+    mast, other = loaded.config.slaves
+    known = access_target(loaded, 4, other)
+    assert (known.slave, known.codec.checksum, known.profile) == (4, Checksum.SUM, loaded.profiles["eh600"])
+    assert access_target(loaded, 3, mast).response_timeout == 0.3
+    stranger = access_target(loaded, 9, None)
+    assert (stranger.slave, stranger.codec, stranger.profile) == (9, usual_codec(loaded.config.line), None)
 
 
-def test_realtime_that_is_not_permitted_is_one_warning(site: Site, view: View) -> None:
-    site.line()
-    site.write(line={"realtime": True})
-    run = site.run(program=("-c", NOT_PERMITTED))
-    view.wait("device/slave-1/state", good)
-
-    site.write(line={"realtime": True, "extra_gap": "1ms"})
-    run.reload()
-    known = view.samples("slave-1")[-1]["seq"]
-    view.wait_samples("slave-1", known + 2)
-
-    told = [line for line in run.log.splitlines() if "SCHED_FIFO" in line]
-    assert len(told) == 1
-    assert " warning " in told[0]
-    assert "realtime.conf.example" in told[0]
+def test_a_scan_looks_at_the_lines_own_rate_first_and_at_both_of_an_lfs10(loaded: Loaded) -> None:
+    found = search(loaded, (1, 2), (), share=0.3)
+    assert [timing.baudrate for timing in found.timings] == [19200, 9600]
+    assert all(timing.bits == timing_of(loaded.config.line).bits for timing in found.timings)
+    assert (found.ids, found.line_rate, found.share) == ((1, 2), 19200, 0.3)
+    assert found.codec.checksum is Checksum.CRC, "not all devices have the same one"
+    assert found.profiles[0].name == "lfs10"
+    chosen = search(loaded, (1,), (4800, 9600), share=1.0)
+    assert [timing.baudrate for timing in chosen.timings] == [4800, 9600]
+    assert chosen.share < 1, "polling goes on"
 
 
-def test_requests_of_classes_that_are_not_obeyed_are_rejected(site: Site, view: View) -> None:
-    site.write(slaves=[], commands=[])
-    site.run()
-    view.wait("availability", "online".__eq__)
+def test_a_scan_asks_with_the_check_that_all_devices_share(tmp_path: Path) -> None:
+    file = tmp_path / "lfs10d.yaml"
+    slave = "{id: 4, profile: eh600, checksum: sum}"
+    file.write_text(f"line: {{port: tty}}\nslaves: [{slave}]\nmqtt: {{host: localhost}}\n")
+    found = search(load(file), (1,), (), share=0.3)
+    assert found.codec.checksum is Checksum.SUM
+    assert {"sum"} <= {checksum for profile in found.profiles for checksum in profile.checksums}
 
-    view.listener.publish("lfs10d/line0/request/config/reload", json.dumps({"id": "a"}))
-    view.listener.publish("lfs10d/line0/request/health", "{}")
 
-    assert view.wait("response/health")["status"] == "ok"
-    answer = view.wait("response/config/reload")
-    assert (answer["id"], answer["status"], answer["error"]["code"]) == ("a", "rejected", "not_allowed")
+def test_on_an_ascii_line_those_are_looked_for_that_speak_it_own_profiles_first(tmp_path: Path) -> None:
+    own = (Path(profiles.__file__).parent / "ld-e.yaml").read_text().replace("name: ld-e", "name: mine")
+    (tmp_path / "mine.yaml").write_text(own)
+    file = tmp_path / "lfs10d.yaml"
+    file.write_text(
+        "line: {port: tty, framing: ascii, baudrate: 4800}\nslaves: [{id: 4, profile: mine.yaml}]\n"
+        "mqtt: {host: localhost}\n"
+    )
+    found = search(load(file), (1,), (), share=0.3)
+    assert found.codec.framing is Framing.ASCII
+    assert [timing.baudrate for timing in found.timings] == [4800]
+    assert found.profiles[0].name == "mine"
+    assert all("ascii" in profile.framings for profile in found.profiles)

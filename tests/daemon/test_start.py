@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.daemon.conftest import Site, View, eventually, good
+from tests.support.sites import Site, View, eventually, good
 
 EXIT_CONFIG = 78
 EXIT_USAGE = 2

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.daemon.conftest import Site, View, good
+from tests.support.sites import Site, View, good
 
 
 @pytest.mark.parametrize("what", ["configuration", "profile", "password"])

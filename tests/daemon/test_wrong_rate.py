@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from lfs10d.simulator.wire import Format
-from tests.daemon.conftest import Site, View, good
+from tests.support.sites import Site, View, good
 
 LOST_SOON = """
 import lfs10d.jobs.lost
 from lfs10d.__main__ import main
-lfs10d.jobs.lost.LOST_AFTER = 1.0
+lfs10d.reconfiguration.procedures.find_baudrate.LOST_AFTER = 1.0
 main()
 """
 BROKEN = """
@@ -16,8 +16,8 @@ import lfs10d.physical.losing
 from lfs10d.__main__ import main
 def in_words(*_, **__):
     raise KeyError("words")
-lfs10d.jobs.lost.LOST_AFTER = 1.0
-lfs10d.physical.losing.in_words = in_words
+lfs10d.reconfiguration.procedures.find_baudrate.LOST_AFTER = 1.0
+lfs10d.reconfiguration.baudrate_watch.in_words = in_words
 main()
 """
 MESSAGE = (

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from lfs10d.simulator.wire import Check, unseal
-from tests.daemon.conftest import good
-from tests.devices.conftest import ASCII, AT_ONCE, ILL, RTU, WELL_SAMPLES, Recording
+from tests.support.recordings import ASCII, AT_ONCE, ILL, RTU, WELL_SAMPLES, Recording
+from tests.support.sites import good
 
 CHECKS: tuple[Check, ...] = ("crc", "sum")
 

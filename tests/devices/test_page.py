@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import eventually
+from tests.support.brokers import eventually
 
 PAGE = (Path(__file__).parents[2] / "docs" / "profiles.md").read_text()
 COMMANDS = re.findall(r"^    \$ lfs10d (.+)$", PAGE, re.MULTILINE)

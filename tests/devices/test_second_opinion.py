@@ -24,9 +24,9 @@ from lfs10d.profiles.library import load_profile
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.wire import Format
-from tests.conftest import Mosquitto, eventually
-from tests.daemon.conftest import Site, View
-from tests.devices.conftest import RTU, TANK, simulated
+from tests.support.brokers import Mosquitto, eventually
+from tests.support.recordings import RTU, TANK, simulated
+from tests.support.sites import Site, View
 
 LONGEST_REQUEST = 17 * 11 / 9600
 """s that a request in ASCII takes at 9600 baud and 11 bits."""

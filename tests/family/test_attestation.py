@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from lfs10d.modbus.settings import PortSettings
+from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.port import SimulatedPort, VirtualClock
 from lfs10d.simulator.sensor import Sensor

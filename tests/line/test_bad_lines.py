@@ -9,12 +9,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from lfs10d.line.device import PollRules
 from lfs10d.modbus.bus import LineRules
 from lfs10d.reading import ALIVE_CODES, FaultCode
-from lfs10d.roster import PollRules
+from lfs10d.simulator.line_faults import babble, second_master, stray
 from lfs10d.simulator.sensor import Sensor
-from lfs10d.simulator.troubles import babble, second_master, stray
-from tests.line.conftest import Rig, Rigs
+from tests.support.lines import Rig, Rigs
 
 LASTS = 40.0
 """Virtual seconds of one scenario."""

@@ -7,7 +7,7 @@ from itertools import pairwise
 import pytest
 
 from lfs10d.reading import Errand
-from tests.line.conftest import Rigs
+from tests.support.lines import Rigs
 
 ALL = range(1, 33)
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from lfs10d.profiles.schema import Profile
+from lfs10d.profiles.profile import Profile
 from lfs10d.reading import FaultCode
-from tests.line.conftest import Rigs
+from tests.support.lines import Rigs
 
 
 @pytest.mark.parametrize("in_turn", [True, False], ids=["in turn", "out of turn"])

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from lfs10d.line.device import PollRules
 from lfs10d.modbus.timing import LineTiming
-from lfs10d.roster import PollRules
-from tests.line.conftest import Rigs
+from tests.support.lines import Rigs
 
 
 @pytest.mark.parametrize("baudrate", [9600, 19200])

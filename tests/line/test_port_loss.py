@@ -7,9 +7,9 @@ from itertools import pairwise
 import pytest
 
 from lfs10d.modbus.bus import LineRules
-from lfs10d.modbus.settings import PortSettings
+from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.reading import FaultCode
-from tests.line.conftest import Rig, Rigs
+from tests.support.lines import Rig, Rigs
 
 
 def without_port(rig: Rig, since: float, until: float) -> None:

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from lfs10d.jobs.poll import Poll
+from lfs10d.line.device import PollRules
+from lfs10d.line.jobs.poll import Poll
 from lfs10d.reading import Errand
-from lfs10d.roster import PollRules
-from tests.line.conftest import Rig, Rigs
+from tests.support.lines import Rig, Rigs
 
 RULES = PollRules()
 

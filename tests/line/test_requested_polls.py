@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from lfs10d.line.device import PollRules
 from lfs10d.reading import FaultCode, Reading
-from lfs10d.roster import PollRules
-from tests.line.conftest import Rig, Rigs
+from tests.support.lines import Rig, Rigs
 
 DAILY = 86_400.0
 

@@ -7,12 +7,12 @@ from itertools import pairwise
 
 import pytest
 
-from lfs10d.jobs.register import Access, End, Target
+from lfs10d.line.device import DeviceSpec, PollRules
+from lfs10d.line.jobs.register_access import Access, End, Target
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters, Request, WriteRegister
 from lfs10d.reading import FaultCode
-from lfs10d.roster import DeviceSpec, PollRules
 from lfs10d.simulator.burst import MASTER
-from tests.line.conftest import LFS10, Rig, Rigs, a_spec
+from tests.support.lines import LFS10, Rig, Rigs, a_spec
 
 HEALTHY = (2, 3, 4)
 

@@ -6,16 +6,16 @@ from pathlib import Path
 
 import pytest
 
-from lfs10d.jobs.scan import Scan
-from lfs10d.jobs.search import Search
+from lfs10d.line.device import PollRules
+from lfs10d.line.jobs.scan import Scan
+from lfs10d.line.jobs.scan_plan import Search
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.reading import FaultCode
-from lfs10d.roster import PollRules
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
-from tests.line.conftest import Rig, Rigs
+from tests.support.lines import Rig, Rigs
 
 PROFILES = tuple(load_profile(name, relative_to=Path()) for name in builtin_names())
 WIRE = 0.0314

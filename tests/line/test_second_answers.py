@@ -7,8 +7,8 @@ import itertools
 import pytest
 
 from lfs10d.reading import AnsweredTwice, FaultCode
-from lfs10d.simulator.troubles import second_master
-from tests.line.conftest import Rig, Rigs
+from lfs10d.simulator.line_faults import second_master
+from tests.support.lines import Rig, Rigs
 
 WIND_OF_2 = bytes((2, 3, 0, 1, 0, 2))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from lfs10d.reading import Errand
-from tests.line.conftest import Rigs
+from tests.support.lines import Rigs
 
 BAD = (2, 4, 6, 8)
 GOOD = (1, 3, 5, 7)

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from lfs10d.line.device import PollRules
 from lfs10d.modbus.bus import LineRules
 from lfs10d.reading import Event, Exchanged, PortChanged, Reading
-from lfs10d.roster import PollRules
-from lfs10d.simulator.troubles import babble
-from tests.line.conftest import Rig, Rigs
+from lfs10d.simulator.line_faults import babble
+from tests.support.lines import Rig, Rigs
 
 FOLDER = Path(__file__).parent / "transcripts"
 

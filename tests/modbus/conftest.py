@@ -5,23 +5,10 @@ from __future__ import annotations
 import os
 import tty
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import pytest
 
-
-@dataclass
-class FarEnd:
-    """The master of a pty; `path` is where its slave is opened."""
-
-    fd: int
-    path: str
-
-    def close(self) -> None:
-        """Pull the plug."""
-        if self.fd >= 0:
-            os.close(self.fd)
-            self.fd = -1
+from tests.support.far_end import FarEnd
 
 
 @pytest.fixture

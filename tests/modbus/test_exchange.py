@@ -26,7 +26,7 @@ from lfs10d.modbus.exchange import (
 from lfs10d.modbus.frames import ReadRegisters, WriteRegister
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.reading import FaultCode
-from tests.modbus.exchanging import (
+from tests.support.exchanges import (
     ANSWER,
     ASCII,
     BROKEN,

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from lfs10d.modbus.frames import Codec, ReadRegisters
 from lfs10d.reading import FaultCode
-from tests.modbus.exchanging import (
+from tests.support.exchanges import (
     ANSWER,
     ASCII,
     CHARACTER,

@@ -11,7 +11,7 @@ from lfs10d.modbus.exchange import (
     Echo,
 )
 from lfs10d.reading import FaultCode
-from tests.modbus.exchanging import (
+from tests.support.exchanges import (
     ANSWER,
     BROKEN,
     CONFIRMED,

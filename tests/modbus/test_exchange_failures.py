@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from lfs10d.reading import FaultCode
-from tests.modbus.exchanging import (
+from tests.support.exchanges import (
     ANSWER,
     ASCII,
     BROKEN,

@@ -12,7 +12,7 @@ from lfs10d.modbus.exchange import (
 )
 from lfs10d.modbus.frames import ReadRegisters
 from lfs10d.reading import FaultCode
-from tests.modbus.exchanging import (
+from tests.support.exchanges import (
     ANSWER,
     BROKEN,
     HUSH,

@@ -9,7 +9,7 @@ import pytest
 from lfs10d.modbus.exchange import Echo
 from lfs10d.modbus.frames import ReadRegisters
 from lfs10d.reading import FaultCode
-from tests.modbus.exchanging import (
+from tests.support.exchanges import (
     ANSWER,
     CONFIRMED,
     MOVE,

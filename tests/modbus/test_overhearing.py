@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from lfs10d.modbus.frames import Codec, ReadRegisters
 from lfs10d.modbus.overhearing import PAUSE, Overheard, Overhearing
-from tests.modbus.exchanging import ANSWER, ASCII, REFUSED, RTU, SUM, WIND, framed
+from tests.support.exchanges import ANSWER, ASCII, REFUSED, RTU, SUM, WIND, framed
 
 REQUEST = RTU.encode(WIND)
 

@@ -15,11 +15,11 @@ from pathlib import Path
 import pytest
 
 from lfs10d.errors import PortBusyError, PortError, PortLostError
-from lfs10d.modbus import claim
 from lfs10d.modbus import port as module
+from lfs10d.modbus import port_lock
 from lfs10d.modbus.port import Port, PortSettings, Rs485, SerialPort
-from lfs10d.modbus.settings import BAUDRATES
-from tests.modbus.conftest import FarEnd
+from lfs10d.modbus.port_settings import BAUDRATES
+from tests.support.far_end import FarEnd
 
 FRAME = bytes.fromhex("01 03 00 01 00 02 95 CB")
 NOBODY = 65534
@@ -356,14 +356,14 @@ def test_a_port_made_exclusive_by_another_program_is_busy(far_end: FarEnd) -> No
 
 def test_the_locks_of_who_uses_a_port_survive_our_attempt(far_end: FarEnd, monkeypatch: pytest.MonkeyPatch) -> None:
     """Root passes TIOCEXCL, and could take the flag away from its owner."""
-    monkeypatch.setattr(claim, "is_pty", lambda _fd: False)
+    monkeypatch.setattr(port_lock, "is_pty", lambda _fd: False)
     other = os.open(far_end.path, os.O_RDWR | os.O_NOCTTY)
     fcntl.ioctl(other, termios.TIOCEXCL)
 
     assert isinstance(refused(PortSettings(far_end.path)), PortBusyError)
 
     raw = bytearray(4)
-    fcntl.ioctl(other, claim.TIOCGEXCL, raw)
+    fcntl.ioctl(other, port_lock.TIOCGEXCL, raw)
     assert any(raw)
     os.close(other)
 

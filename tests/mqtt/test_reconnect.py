@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.mqtt.endings import UNSUPPORTED_VERSION, Ended, Ending
+from lfs10d.mqtt.reasons import UNSUPPORTED_VERSION, Ended, Ending
 from lfs10d.mqtt.reconnect import (
     AWAY_EVERY,
     HELD,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from lfs10d.config import MqttConfig
+from lfs10d.config.models import MqttConfig
 from lfs10d.mqtt.settings import BrokerSettings, Tls, Version, no_password
-from lfs10d.secret import Secret
+from lfs10d.system.secret import Secret
 
 
 def test_the_section_is_taken_over_key_by_key() -> None:

@@ -13,21 +13,21 @@ import pytest
 from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 
-from lfs10d import telemetry
-from lfs10d.mqtt.drain import LEVEL_MOST
-from lfs10d.mqtt.letters import Array, Letter, Live, Message, Retained, samples_of
-from lfs10d.mqtt.outbox import BURST_FIRST, IN_FLIGHT_MOST, LEAST_WEIGHT, REFRESH_WEIGHT, WEIGHT, Outbox
-from lfs10d.mqtt.past import ARRAY_MOST, PAST_AFTER, SAMPLE_EVERY, TURN_EVERY
-from lfs10d.telemetry import Kind, Publication, Sample
+from lfs10d.outbox.backlog import ARRAY_MOST, PAST_AFTER, SAMPLE_EVERY, TURN_EVERY
+from lfs10d.outbox.drain import LEVEL_MOST
+from lfs10d.outbox.items import Array, Letter, Live, Message, Retained, samples_of
+from lfs10d.outbox.outbox import BURST_FIRST, IN_FLIGHT_MOST, LEAST_WEIGHT, REFRESH_WEIGHT, WEIGHT, Outbox
+from lfs10d.telemetry import publication
+from lfs10d.telemetry.publication import Kind, Publication, Sample
 
-ONLINE = telemetry.retained("availability", "online")
+ONLINE = publication.retained("availability", "online")
 WEIGHTS = 3 * WEIGHT + WEIGHT * LEVEL_MOST + REFRESH_WEIGHT + 2 * LEAST_WEIGHT
 """The sum of all weights at the highest level of the past."""
 
 
 def sample(device: str, seq: int) -> Publication:
     measured = Sample(device, "k", seq, 1000 * seq, "synced", None, {}, (), "bad", "timeout", None)
-    topic = telemetry.device_topic(device, telemetry.TELEMETRY)
+    topic = publication.device_topic(device, publication.TELEMETRY)
     return Publication(topic, {}, Kind.SAMPLE, retain=False, qos=1, sample=measured)
 
 
@@ -75,20 +75,20 @@ class Uplink:
         """Connect; the burst has this many topics of each device."""
         self.outbox.connected(self.now, window=min(self.window, IN_FLIGHT_MOST))
         self.outbox.past._array_most = self.array_most
-        topics = [telemetry.device_topic(device, f"leaf{leaf}") for device in self.seqs for leaf in range(burst)]
-        self.outbox.burst([telemetry.retained(topic, {}) for topic in topics], ONLINE)
+        topics = [publication.device_topic(device, f"leaf{leaf}") for device in self.seqs for leaf in range(burst)]
+        self.outbox.burst([publication.retained(topic, {}) for topic in topics], ONLINE)
 
     def measure(self, device: str) -> None:
         """Finish a poll."""
         self.seqs[device] += 1
         self.outbox.add(sample(device, self.seqs[device]), self.now)
-        state = telemetry.device_topic(device, telemetry.STATE)
-        self.outbox.add(telemetry.retained(state, {"seq": self.seqs[device]}, refresh=True), self.now)
+        state = publication.device_topic(device, publication.STATE)
+        self.outbox.add(publication.retained(state, {"seq": self.seqs[device]}, refresh=True), self.now)
 
     def change(self, topic: str) -> None:
         """Publish a change of a retained topic."""
         self.asked[topic] = self.now
-        self.outbox.add(telemetry.retained(topic, {"at": self.now}), self.now)
+        self.outbox.add(publication.retained(topic, {"at": self.now}), self.now)
 
     def run(self, seconds: float, *, measuring: bool = True) -> None:
         """Let time go by."""
@@ -113,7 +113,7 @@ class Uplink:
                 self.measure(device)
             if measuring and self._event_at <= self.now:
                 self._event_at = self.now + self.events_every
-                self.outbox.add(telemetry.event("scan_progress", 0), self.now)
+                self.outbox.add(publication.event("scan_progress", 0), self.now)
 
     def _send(self) -> None:
         while (letter := self.outbox.next(self.now)) is not None:
@@ -188,12 +188,12 @@ def test_no_class_and_no_device_waits_longer_than_its_bound(round_trip: float, w
     uplink.run(seconds)
     assert uplink.changes["line/error"] <= wait.of(WEIGHT, 1)
     for device in uplink.seqs:
-        for leaf, bound in ((telemetry.STATE, states), (telemetry.TELEMETRY, live)):
-            topic = telemetry.device_topic(device, leaf)
+        for leaf, bound in ((publication.STATE, states), (publication.TELEMETRY, live)):
+            topic = publication.device_topic(device, leaf)
             since = uplink.now - uplink.last.get(topic, PAST_AFTER)
             assert max(uplink.longest.get(topic, 0.0), since) <= bound + 2 * uplink.interval + uplink.round_trip, topic
-    since = uplink.now - uplink.last.get(telemetry.EVENT, PAST_AFTER)
-    assert max(since, uplink.longest[telemetry.EVENT]) <= wait.of(WEIGHT, 2) + uplink.events_every + round_trip
+    since = uplink.now - uplink.last.get(publication.EVENT, PAST_AFTER)
+    assert max(since, uplink.longest[publication.EVENT]) <= wait.of(WEIGHT, 2) + uplink.events_every + round_trip
 
 
 @pytest.mark.parametrize(
@@ -228,8 +228,8 @@ def test_everything_measured_arrives_within_seconds_and_one_warning_says_what_th
     uplink.connect()
     uplink.run(120.0)
     assert uplink.missing() <= 8 * devices
-    assert all(uplink.last[telemetry.device_topic(each, telemetry.TELEMETRY)] > 115.0 for each in uplink.seqs)
-    assert all(uplink.longest[telemetry.device_topic(each, telemetry.STATE)] < 10.0 for each in uplink.seqs)
+    assert all(uplink.last[publication.device_topic(each, publication.TELEMETRY)] > 115.0 for each in uplink.seqs)
+    assert all(uplink.longest[publication.device_topic(each, publication.STATE)] < 10.0 for each in uplink.seqs)
     assert len(uplink.warned) == 1
 
 
@@ -300,7 +300,7 @@ def test_messages_go_in_turn_with_everything_else() -> None:
     uplink.connect(burst=0)
     uplink.run(60.0)
     for number in range(30):
-        uplink.outbox.add(telemetry.event(f"e{number}", 0), uplink.now)
+        uplink.outbox.add(publication.event(f"e{number}", 0), uplink.now)
     arrived = sum(map(len, uplink.arrived.values()))
     events = uplink.events
     uplink.run(20.0, measuring=False)

@@ -11,7 +11,7 @@ import pytest
 from lfs10d.errors import BrokerError
 from lfs10d.mqtt.settings import Tls
 from lfs10d.mqtt.tls import tls_context
-from tests.conftest import Authority
+from tests.support.brokers import Authority
 
 
 def test_certificate_and_name_are_checked_from_tls_1_2_on() -> None:

@@ -13,17 +13,17 @@ from pathlib import Path
 
 import pytest
 
-from lfs10d import telemetry
-from lfs10d.mqtt.inbound import InboundRequest
 from lfs10d.mqtt.retained_requests import ASK_AFTER
 from lfs10d.mqtt.settings import BrokerSettings, Version
+from lfs10d.mqtt.topics import InboundRequest
 from lfs10d.mqtt.uplink import Uplink
-from lfs10d.store.backlog import Store
-from lfs10d.store.opening import Limits
-from lfs10d.store.samplefile import Entry
-from lfs10d.telemetry import Kind, Publication, Sample
-from tests.conftest import Listener, Mosquitto
-from tests.mqtt.conftest import OldBroker
+from lfs10d.outbox.store.database import Limits
+from lfs10d.outbox.store.sample_file import Entry
+from lfs10d.outbox.store.store import Store
+from lfs10d.telemetry import publication
+from lfs10d.telemetry.publication import Kind, Publication, Sample
+from tests.support.brokers import Listener, Mosquitto
+from tests.support.old_brokers import OldBroker
 
 B = "site/line0"
 PATIENCE = 10.0
@@ -34,7 +34,7 @@ def sample(seq: int, device: str = "a") -> Publication:
         device, "k0000001", seq, 1000 * seq, "synced", {"wind_speed": seq / 8}, {"wind_speed": "m/s"},
         ("wind_speed",), "good", None, 18.2,
     )  # fmt: skip
-    topic = telemetry.device_topic(device, telemetry.TELEMETRY)
+    topic = publication.device_topic(device, publication.TELEMETRY)
     return Publication(topic, measured.payload("line0"), Kind.SAMPLE, retain=False, qos=1, sample=measured)
 
 
@@ -50,7 +50,7 @@ class Site:
         self.uplink = Uplink(
             self.settings,
             base=B,
-            burst=lambda: [telemetry.retained(topic, payload) for topic, payload in self.retained.items()],
+            burst=lambda: [publication.retained(topic, payload) for topic, payload in self.retained.items()],
             stands_behind=lambda: frozenset(self.retained),
             requested=self.requests.append,
             epoch_ms=lambda: 1_795_298_022_003,
@@ -382,7 +382,7 @@ def test_what_is_larger_than_the_broker_takes_is_told_once_and_stops_nothing(
         async with running(site) as uplink:
             await online(listener)
             for _ in range(2):
-                uplink.publish([telemetry.event("too_much", 0, text="x" * 1000)])
+                uplink.publish([publication.event("too_much", 0, text="x" * 1000)])
             uplink.publish([sample(1)])
             await until(lambda: seqs(listener) == {1}, "the sample")
             assert site.changes == [True]
@@ -398,7 +398,7 @@ def test_what_is_no_json_is_told_and_stops_nothing(mosquitto: Mosquitto, caplog:
         site = Site(mosquitto.port)
         async with running(site) as uplink:
             await online(listener)
-            uplink.publish([telemetry.event("odd", 0, value=float("nan")), sample(1)])
+            uplink.publish([publication.event("odd", 0, value=float("nan")), sample(1)])
             await until(lambda: seqs(listener) == {1}, "the sample")
 
     asyncio.run(scenario())
@@ -467,7 +467,7 @@ def test_beyond_ten_thousand_samples_the_oldest_go_and_that_is_told_once(
         async with running(Site(unused_port)) as uplink:
             uplink.publish(sample(seq) for seq in range(1, 10_002))
             uplink.publish([sample(10_002)])
-            assert uplink.backlog == telemetry.Backlog(depth=10_000, oldest_ts=3000, dropped=2)
+            assert uplink.backlog == publication.Backlog(depth=10_000, oldest_ts=3000, dropped=2)
 
     asyncio.run(scenario())
     assert sum("the oldest are dropped" in each for each in caplog.messages) == 1
@@ -497,7 +497,7 @@ def test_what_is_cleared_just_before_a_reload_is_cleared_once(mosquitto: Mosquit
             await until(lambda: swept(uplink), "the sweep after the connect")
             for topic in gone:
                 del site.retained[topic]
-            uplink.publish(telemetry.retained(topic, None) for topic in gone)
+            uplink.publish(publication.retained(topic, None) for topic in gone)
             await uplink.reload()
             assert not swept(uplink)
             await until(lambda: swept(uplink), "the sweep")

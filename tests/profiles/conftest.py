@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from lfs10d.profiles.schema import Profile
+from lfs10d.profiles.profile import Profile
 
 
 @pytest.fixture

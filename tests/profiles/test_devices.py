@@ -11,7 +11,7 @@ import pytest
 from lfs10d.modbus.frames import Checksum, Codec, Framing
 from lfs10d.modbus.request import ReadRegisters, Request, WriteRegister
 from lfs10d.profiles.library import builtin_names, load_profile
-from lfs10d.profiles.schema import ChecksumName, FramingName, Profile
+from lfs10d.profiles.profile import ChecksumName, FramingName, Profile
 from lfs10d.reading import Fault, Number
 from lfs10d.simulator.registers import blueprint_of
 from lfs10d.simulator.sensor import Sensor

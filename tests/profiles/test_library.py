@@ -11,7 +11,7 @@ from pydantic.fields import FieldInfo
 from lfs10d.errors import ConfigError
 from lfs10d.profiles import library
 from lfs10d.profiles.library import builtin_names, load_profile, parse_profile
-from lfs10d.profiles.schema import Barrier, Factory, IdRegister, Profile, RateRegister
+from lfs10d.profiles.profile import Barrier, Factory, IdRegister, Profile, RateRegister
 from lfs10d.profiles.values import Fact, Setting, Value
 from lfs10d.reading import Fault
 from lfs10d.simulator.registers import blueprint_of

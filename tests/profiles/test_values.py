@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from lfs10d.profiles.values import RESERVED_NAMES, Setting, Value
-from lfs10d.telemetry import Sample
+from lfs10d.telemetry.publication import Sample
 
 VALUE = {"name": "level", "register": 1, "type": "uint16", "unit": "m"}
 SETTING = {"name": "average", "register": 16}

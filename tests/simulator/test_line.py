@@ -9,7 +9,7 @@ import pytest
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
-from tests.simulator.conftest import Bench
+from tests.support.simulated import Bench
 
 Maker = Callable[..., Bench]
 

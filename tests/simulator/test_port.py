@@ -9,13 +9,13 @@ import pytest
 
 from lfs10d.errors import PortBusyError, PortLostError
 from lfs10d.modbus.port import Port
-from lfs10d.modbus.settings import PortSettings
+from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.reading import UartCounters
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.port import SimulatedPort, VirtualClock, format_of, run
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format, seal, unseal
-from tests.simulator.conftest import Bench
+from tests.support.simulated import Bench
 
 Maker = Callable[..., Bench]
 

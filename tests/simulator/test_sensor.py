@@ -13,7 +13,7 @@ from lfs10d.simulator.faults import Kind
 from lfs10d.simulator.registers import Blueprint, Signal
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format, unseal
-from tests.simulator.conftest import Bench
+from tests.support.simulated import Bench
 
 Maker = Callable[..., Bench]
 

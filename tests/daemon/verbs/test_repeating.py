@@ -11,9 +11,9 @@ import pytest
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
-from tests.conftest import Mosquitto
-from tests.daemon.conftest import Run, Site, eventually, tell
-from tests.daemon.verbs.conftest import BASE, Shell, typed
+from tests.support.brokers import Mosquitto
+from tests.support.shells import BASE, Shell, typed
+from tests.support.sites import Run, Site, eventually, tell
 
 REPEAT = ("line/adopt", "--repeat")
 FIRST = "Plug in a sensor. Ctrl-C when all are mounted.\n"

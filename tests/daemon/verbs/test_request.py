@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from tests.conftest import Mosquitto
-from tests.daemon.conftest import Site, View, eventually
-from tests.daemon.verbs.conftest import BASE, Shell, running, typed
+from tests.support.brokers import Mosquitto
+from tests.support.shells import BASE, Shell, running, typed
+from tests.support.sites import Site, View, eventually
 
 
 def test_a_request_prints_what_came_of_it_for_people(site: Site, mosquitto: Mosquitto) -> None:

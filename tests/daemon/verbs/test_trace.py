@@ -8,9 +8,9 @@ import signal
 
 import pytest
 
-from tests.conftest import Mosquitto
-from tests.daemon.conftest import Site, View
-from tests.daemon.verbs.conftest import Shell, running, typed
+from tests.support.brokers import Mosquitto
+from tests.support.shells import Shell, running, typed
+from tests.support.sites import Site, View
 
 CLOCK = r"\d\d:\d\d:\d\d\.\d{3} [A-Z]+"
 

@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
-from tests.conftest import Mosquitto
-from tests.daemon.conftest import Site, eventually, tell
-from tests.daemon.verbs.conftest import Shell, running, typed
+from tests.support.brokers import Mosquitto
+from tests.support.shells import Shell, running, typed
+from tests.support.sites import Site, eventually, tell
 
 
 def test_watch_shows_every_slave_on_80_columns(site: Site, mosquitto: Mosquitto, shell: Shell) -> None:

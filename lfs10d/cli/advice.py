@@ -1,0 +1,152 @@
+"""What is allowed but hardly meant: the warnings of `lfs10d check`, each at its place in the file."""
+
+from __future__ import annotations
+
+import ipaddress
+from collections.abc import Iterator
+
+from lfs10d.config.credentials import missing_in_authorities
+from lfs10d.config.loader import Loaded
+from lfs10d.config.models import LATER_SECTIONS, default_line_name
+from lfs10d.errors import ConfigError, Problem
+from lfs10d.line.budget import ASSUMED_TURNAROUND, Budget
+from lfs10d.schema.fields import quoted
+from lfs10d.schema.messages import KeyPath
+from lfs10d.schema.quantities import duration_text
+
+COMMON_HOST_NAMES = frozenset({"localhost", "raspberrypi", "debian", "raspbian", "ubuntu", "linux", "openwrt"})
+"""Names that systems come with: two gateways soon have the same."""
+
+
+def advice(loaded: Loaded, budget: Budget, host: str) -> tuple[Problem, ...]:
+    """Return the warnings for a valid configuration on the host of this name, in order of place."""
+    warnings = (
+        *_load(loaded, budget),
+        *_login(loaded),
+        *_files(loaded),
+        *_names(loaded, host),
+        *_unused(loaded),
+    )
+    return tuple(sorted(loaded.document.problem(path, f"warning: {message}") for path, message in warnings))
+
+
+def _load(loaded: Loaded, budget: Budget) -> Iterator[tuple[KeyPath, str]]:
+    path: KeyPath = ("poll", "interval") if loaded.document.holds(("poll", "interval")) else ("slaves",)
+    for share in budget.shares:
+        if share.rest and share.load_with_turnaround is not None and share.load_with_turnaround > 1:
+            index = [slave.name for slave in loaded.config.slaves].index(share.device)
+            needed = duration_text(round(share.load_with_turnaround * share.interval, 3))
+            yield (
+                ("slaves", index),
+                (
+                    f"one poll takes {needed} with the rest before each request (request_gap): it will be polled less "
+                    f"often than every {duration_text(share.interval)}"
+                ),
+            )
+    if budget.wire_load > 1:
+        yield (
+            path,
+            (
+                f"the intervals ask for {budget.wire_load:.1%} of what the line carries: every device will be polled "
+                "less often; use longer intervals, a higher baud rate or a second line"
+            ),
+        )
+    elif budget.wire_load_with_turnaround > 1:
+        yield (
+            path,
+            (
+                f"the intervals ask for {budget.wire_load_with_turnaround:.1%} of what the line carries if the devices "
+                f"take {duration_text(ASSUMED_TURNAROUND)} to answer (and {budget.wire_load:.1%} if they took none)"
+            ),
+        )
+    if not loaded.config.slaves:
+        yield ("slaves",), "there are no slaves: nothing will be polled until one is added"
+    elif not budget.shares:
+        yield ("slaves",), "no slave is enabled: nothing will be polled"
+
+
+def loopback(host: str) -> bool:
+    """Tell whether a broker's host is this machine, judged by its name alone."""
+    if host.lower().rstrip(".") == "localhost" or host.lower().endswith(".localhost"):
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def _login(loaded: Loaded) -> Iterator[tuple[KeyPath, str]]:
+    mqtt = loaded.config.mqtt
+    if all(loopback(host) for host, _ in mqtt.nodes):
+        return
+    certificate = mqtt.tls is not None and mqtt.tls.cert is not None
+    if mqtt.username is None and not certificate:
+        yield (
+            ("mqtt", "host"),
+            (
+                "the broker is remote and needs no login: anyone who reaches it can publish readings and requests; "
+                "set mqtt.username and mqtt.password_file, or mqtt.tls.cert"
+            ),
+        )
+    if mqtt.username is not None and mqtt.tls is None:
+        yield ("mqtt", "username"), "the password crosses the network unencrypted; set mqtt.tls"
+
+
+def _files(loaded: Loaded) -> Iterator[tuple[KeyPath, str]]:
+    """Look into the files of the login, as far as they can be read."""
+    mqtt = loaded.config.mqtt
+    try:
+        password = loaded.password()
+    except ConfigError:
+        password = None
+    if password is not None and password.reveal().rstrip(" \t") != password.reveal():
+        path: KeyPath = ("mqtt", "password_file") if mqtt.password_file is not None else ("mqtt",)
+        yield path, "the password ends with a space, which is part of it: remove it unless it is meant"
+    if mqtt.tls is not None and mqtt.tls.ca is not None and (missing := missing_in_authorities(mqtt.tls.ca)):
+        yield (
+            ("mqtt", "tls", "ca"),
+            (
+                f"an authority without {' and '.join(missing)} (RFC 5280, section 4.2.1), which strict clients refuse, "
+                "any Python from 3.13 on among them; lfs10d takes it: make the next one with "
+                "-addext keyUsage=critical,keyCertSign,cRLSign"
+            ),
+        )
+
+
+def _names(loaded: Loaded, host: str) -> Iterator[tuple[KeyPath, str]]:
+    """Two gateways at one broker must not publish under one name; a broker on this host has one gateway."""
+    document, config = loaded.document, loaded.config
+    if not document.holds(("line", "name")):
+        stem = loaded.path.stem
+        if default_line_name(stem) not in {stem, "line0"}:
+            yield (
+                ("line",),
+                f"the file's name {quoted(stem)} is no name for a line, so line.name is {config.line.name}; set it",
+            )
+    if all(loopback(host) for host, _ in config.mqtt.nodes):
+        return
+    if not any(document.holds(path) for path in (("line", "name"), ("mqtt", "base_topic"))):
+        yield (
+            ("mqtt",),
+            (
+                "line.name and mqtt.base_topic are both defaults: a second gateway at this broker would publish under "
+                f"{config.mqtt.base_topic}/{config.line.name} too; set one of them"
+            ),
+        )
+    if config.mqtt.client_id is not None and host.lower() in COMMON_HOST_NAMES:
+        given = loaded.document.data
+        written = given["mqtt"].get("client_id") if isinstance(given, dict) and "mqtt" in given else None
+        if written is None or "%H" in written:
+            yield (
+                ("mqtt", "client_id"),
+                (
+                    f"the client id {config.mqtt.client_id} comes from the host name {host}, which many hosts have; "
+                    "two clients of one id throw each other out: set mqtt.client_id or the host's name"
+                ),
+            )
+
+
+def _unused(loaded: Loaded) -> Iterator[tuple[KeyPath, str]]:
+    for section in LATER_SECTIONS:
+        if loaded.document.holds((section,)):
+            yield (section,), "has no effect yet"

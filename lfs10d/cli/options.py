@@ -1,0 +1,120 @@
+"""Options of the verbs that open a port themselves: how its characters look, and how long to wait."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from typing import Any
+
+import click
+from click.shell_completion import CompletionItem
+
+from lfs10d.modbus.frames import Framing
+from lfs10d.modbus.port_settings import BAUDRATES, PARITIES, PortSettings
+from lfs10d.modbus.timing import LineTiming
+from lfs10d.profiles.library import builtin_names
+from lfs10d.schema.quantities import seconds
+
+TIMEOUTS = (0.01, 10.0)
+"""The shortest and the longest time-out that can be asked for, in s."""
+
+
+@dataclass(frozen=True, slots=True)
+class LineOptions:
+    """How the characters on the line look; `timeout` in s, None: the verb's own."""
+
+    port: str
+    parity: str
+    databits: int
+    stopbits: int
+    framing: Framing
+    timeout: float | None
+
+    def settings(self, baudrate: int) -> PortSettings:
+        """Return how the port is to be opened."""
+        return PortSettings(self.port, baudrate, self.parity, self.databits, self.stopbits)
+
+    def timing(self, baudrate: int) -> LineTiming:
+        """Return the times at a rate."""
+        return LineTiming.of(baudrate, databits=self.databits, parity=self.parity, stopbits=self.stopbits)
+
+    @property
+    def character(self) -> str:
+        """The usual short word for it: `8N1`, `8E1`."""
+        return f"{self.databits}{self.parity[0].upper()}{self.stopbits}"
+
+
+def take(options: dict[str, Any]) -> LineOptions:
+    """Take what `line_options` added out of a command's parameters."""
+    framing = Framing(options.pop("framing"))
+    databits = options.pop("databits")
+    if framing is Framing.RTU and databits == "7":
+        raise click.BadParameter("rtu frames need 8 data bits", param_hint="'--databits'")
+    usual = "8" if framing is Framing.RTU else "7"
+    return LineOptions(
+        port=options.pop("port"),
+        parity=options.pop("parity"),
+        databits=int(databits or usual),
+        stopbits=int(options.pop("stopbits")),
+        framing=framing,
+        timeout=options.pop("timeout"),
+    )
+
+
+def baudrate_of(text: str) -> int:
+    """Return the rate that a text names; raises click.BadParameter."""
+    text = text.strip()
+    if text not in map(str, BAUDRATES):
+        raise click.BadParameter(f"{text!r} is none of {', '.join(map(str, BAUDRATES))}")
+    return int(text)
+
+
+def _duration(context: click.Context, parameter: click.Parameter, value: str | None) -> float | None:
+    if value is None:
+        return None
+    try:
+        duration = seconds(value)
+    except ValueError:
+        raise click.BadParameter(f"{value!r} is no duration; write 200ms or 1s", context, parameter) from None
+    if not TIMEOUTS[0] <= duration <= TIMEOUTS[1]:
+        raise click.BadParameter("must lie between 10ms and 10s", context, parameter)
+    return duration
+
+
+def _choice(name: str, choices: Collection[str], default: str | None, text: str) -> Callable[..., Any]:
+    return click.option(name, type=click.Choice(list(choices)), default=default, show_default=True, help=text)
+
+
+def line_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add them to a command that has the argument `port`; `take` gives them back as one value."""
+    for option in (
+        click.option("--timeout", callback=_duration, metavar="DURATION", help="How long to wait for each answer."),
+        _choice("--framing", ("rtu", "ascii"), "rtu", "How bytes become frames."),
+        _choice("--stopbits", ("1", "2"), "1", "Stop bits per character."),
+        _choice("--databits", ("8", "7"), None, "Data bits per character.  [default: 8; 7 with ascii]"),
+        _choice("--parity", PARITIES, "none", "Parity bit."),
+    ):
+        function = option(function)
+    return function
+
+
+PORT = click.Path(readable=False)
+"""Any path, completed as one; whether it can be opened is told in our words."""
+
+
+class SlaveId(click.IntRange):
+    """A slave id, and called one when it is wrong."""
+
+    name = "slave id"
+
+    def __init__(self) -> None:
+        super().__init__(1, 255)
+
+
+def profile_names(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Return the built-in profiles that begin so, or else leave it to the shell: the path of a file."""
+    from click.shell_completion import CompletionItem  # noqa: PLC0415  # only when a shell asks
+
+    del context, parameter
+    fitting = [CompletionItem(name) for name in builtin_names() if name.startswith(incomplete)]
+    return fitting or [CompletionItem(incomplete, type="file")]

@@ -1,0 +1,88 @@
+"""Who holds a busy port, and what to type instead: the daemon does more than scan and read."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from lfs10d.config.loader import load
+from lfs10d.errors import ConfigError
+from lfs10d.modbus.port_lock import PROC, Holder, holder
+from lfs10d.system.logs import escape
+
+DAEMON = "lfs10d"
+SERVICE_FILE = "/etc/lfs10d/lfs10d.yaml"
+"""Where the daemon reads when nothing else is said; then no -c is needed either."""
+
+
+@dataclass(frozen=True, slots=True)
+class Daemon:
+    """A running `lfs10d run`; `config` is the file as it was told, "" for the usual one."""
+
+    pid: int
+    config: str = ""
+
+    @property
+    def option(self) -> str:
+        """What a verb needs to talk to it."""
+        return f" -c {shlex.quote(self.config)}" if self.config else ""
+
+
+def daemon_behind(found: Holder, *, proc: Path = PROC) -> Daemon | None:
+    """Return the daemon that a holder is; None for every other program and verb."""
+    if found.program != DAEMON:
+        return None
+    try:
+        argv = (proc / str(found.pid) / "cmdline").read_text("utf-8", "replace").split("\0")
+    except OSError:
+        return None
+    return Daemon(found.pid, config_of(argv)) if "run" in argv else None
+
+
+def config_of(argv: list[str]) -> str:
+    """Return the configuration file a daemon was started with, "" for the usual one; safe to print."""
+    words = iter(argv)
+    config = ""
+    for word in words:
+        if word in ("-c", "--config"):
+            config = next(words, "")
+        elif word.startswith("--config="):
+            config = word.removeprefix("--config=")
+        elif word.startswith("-c") and not word.startswith("--"):
+            config = word.removeprefix("-c")
+    return "" if config == SERVICE_FILE else escape(config)
+
+
+def device_name(daemon: Daemon, slave: int) -> str:
+    """Return the name the daemon's configuration gives a slave id; the usual one where it cannot be read."""
+    try:
+        slaves = load(Path(daemon.config or SERVICE_FILE)).config.slaves
+    except (ConfigError, OSError):
+        slaves = ()
+    return next((each.name for each in slaves if each.id == slave), f"slave-{slave}")
+
+
+def instead(path: str, *, slave: int | None, proc: Path = PROC) -> Iterator[str]:
+    """Yield what to type instead of a scan (`slave` None) or of reading one slave, if the daemon holds the port."""
+    found = holder(path, proc=proc)
+    if found is None:
+        yield "If it is the lfs10d daemon (systemctl status lfs10d), it can do this itself: lfs10d request --help"
+        return
+    daemon = daemon_behind(found, proc=proc)
+    if daemon is None:
+        return
+    yield f"The daemon (lfs10d run, process {daemon.pid}) polls this line. Ask it instead:"
+    ways = [
+        ("watch", "what every sensor measures now"),
+        ("request line/pause for=1m", "the port is yours for a minute"),
+    ]
+    if slave is None:
+        ways.insert(0, ("request line/scan", "the same scan, while polling goes on"))
+    else:
+        ways.insert(0, (f"request device/read device={device_name(daemon, slave)}", "this sensor, now"))
+    commands = [f"lfs10d {way}{daemon.option}" for way, _ in ways]
+    width = max(map(len, commands))
+    for command, (_, meaning) in zip(commands, ways, strict=True):
+        yield f"  {command.ljust(width)}  {meaning}"

@@ -1,0 +1,89 @@
+"""The live view as lines, for pipes and programs: one for each new value, and one when something else changes. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from datetime import tzinfo
+from typing import Any
+
+from lfs10d.cli.local_time import stamp, zone_name
+from lfs10d.cli.render.live_state import Device, Live
+from lfs10d.cli.render.live_table import Line, Row, Source, header, rows, table
+from lfs10d.telemetry.publication import iso_time
+
+WIDE = 10_000
+"""Columns: a line in a pipe is never wrapped."""
+
+
+class LiveLines:
+    """Keeps what was told last; text has the times of `zone` (None: this machine's), data those of UTC."""
+
+    def __init__(self, zone: tzinfo | None = None) -> None:
+        self._zone = zone
+        self._heading: tuple[str, ...] = ()
+        self._told: dict[str, tuple[object, ...]] = {}
+
+    def news(
+        self, live: Live, source: Source, *, now: float, wall: float
+    ) -> Iterator[tuple[str, dict[str, Any] | None]]:
+        """Yield each new line as text and as data for JSON; a heading, which begins with #, has no data."""
+        heading = tuple("".join(text for text, _ in line) for line in self._header(live, source, wall))
+        if heading != self._heading:
+            self._heading = heading
+            yield from ((f"# {text}", None) for text in heading)
+        for row, device in zip(
+            rows(live, source, now=now, wall=wall, zone=self._zone), live.devices.values(), strict=True
+        ):
+            told = (device.boot, device.seq, row.state, row.value)
+            if self._told.get(device.name) != told:
+                self._told[device.name] = told
+                ts = round(wall * 1000)
+                data = _data(device, row, iso_time(ts), age=live.age(device, wall), alive=source.alive)
+                yield _text(row, stamp(ts, self._zone)), data
+
+    def _header(self, live: Live, source: Source, wall: float) -> list[Line]:
+        return header(live, source, WIDE, pace=False, wall=wall, zone=self._zone)
+
+
+def health(status: Mapping[str, Any], zone: tzinfo | None = None) -> Iterator[str]:
+    """Yield how everything is, as the daemon tells it in its status."""
+    line, broker, ts = status.get("line"), status.get("broker"), status.get("ts")
+    live = Live(str(line.get("name")) if isinstance(line, dict) else "?")
+    live.read(status, now=0.0)
+    connected = isinstance(broker, dict) and broker.get("connected") is True
+    waiting = broker.get("depth") if isinstance(broker, dict) else None
+    words = f"broker {'connected' if connected else 'away'}" + (f", {waiting} samples wait" if waiting else "")
+    wall = ts / 1000 if isinstance(ts, int) else 0.0
+    source = Source(f"{words}; times: {zone_name(wall * 1000, zone)}", alive=True)
+    shown = rows(live, source, now=0.0, wall=wall, zone=zone)
+    for pieces in (*header(live, source, WIDE, wall=wall, zone=zone), (), *table(shown, WIDE)):
+        yield "".join(text for text, _ in pieces)
+
+
+def _text(row: Row, time: str) -> str:
+    words = [time, row.name, row.slave, row.value, row.state]
+    if row.rtt:
+        words.append(f"answer {row.rtt}")
+    if row.age and not (row.good and not row.stale):
+        words.append(f"last value {row.age} ago")
+    if row.just:
+        words.append(row.just)
+    return "  ".join(words)
+
+
+def _data(device: Device, row: Row, time: str, *, age: float | None, alive: bool) -> dict[str, Any]:
+    return {
+        "time": time,
+        "device": device.name,
+        "slave": device.slave,
+        "label": device.label,
+        "values": device.values,
+        "units": device.units,
+        "state": row.state,
+        "error": device.error,
+        "online": device.online,
+        "age_s": None if age is None else round(age, 1),
+        "rtt_ms": device.rtt_ms,
+        "just": row.just or None,
+        "live": alive and not row.stale,
+    }

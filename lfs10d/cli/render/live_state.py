@@ -1,0 +1,258 @@
+"""What a visitor knows of a line and its devices, from MQTT or from the daemon's status file. Pure.
+
+Whatever comes in may come from anybody: what is not of the promised form is passed over, text is escaped when shown.
+Ages are by the daemon's clock: how far it is off ours is learned from samples as they come in.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import Any, Final
+
+from lfs10d.cli.render.response import BESIDES
+
+MOVES_WITHIN: Final = 3.0
+"""s in which a value's movement is looked at: a turn of the hand."""
+STANDS_OUT: Final = 3.0
+"""So many times as far as the next one a value must have moved to be marked."""
+LATE_AFTER: Final = 3.0
+"""s beyond three intervals after which a good value is no longer that of now."""
+
+
+@dataclass(slots=True)
+class Device:
+    """One slave. `values` are those of the last sample, `good_ts` (epoch ms, its clock) when there were any."""
+
+    name: str
+    slave: int | None = None
+    label: str | None = None
+    enabled: bool = True
+    interval: float = 1.0
+    online: bool = False
+    seq: int = -1
+    boot: str = ""
+    values: dict[str, float] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+    good: bool = False
+    error: str | None = None
+    rtt_ms: float | None = None
+    good_ts: float | None = None
+    since: float | None = None
+    """When its error rose, epoch ms of the daemon's clock; None while it has none."""
+    trail: deque[tuple[float, float]] = field(default_factory=deque)
+    turned: tuple[float, bool] | None = None
+    """When it came or went last, and whether it came."""
+
+    @property
+    def value(self) -> float | None:
+        """The first of its values; None where it has none now."""
+        return next(iter(self.values.values()), None)
+
+    @property
+    def unit(self) -> str:
+        """That value's unit."""
+        return next((self.units.get(name, "") for name in self.values), "")
+
+    def moved(self, now: float) -> float:
+        """Return how far its value went to and fro in the last seconds."""
+        while self.trail and self.trail[0][0] < now - MOVES_WITHIN:
+            self.trail.popleft()
+        values = [value for _, value in self.trail]
+        return max(values) - min(values) if values else 0.0
+
+
+class Live:
+    """One line as it is known from one source. `now` is monotonic, `wall` epoch s of our own clock."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.devices: dict[str, Device] = {}
+        """Those that are configured, in order."""
+        self.line: dict[str, Any] = {}
+        """`line/state` and `line/stats`."""
+        self.line_error: str | None = None
+        self.line_error_code: str | None = None
+        self.line_error_since: float | None = None
+        """Epoch ms of the daemon's clock."""
+        self.known = False
+        """Something of a daemon was heard."""
+        self._met: dict[str, Device] = {}
+        """Every device something was heard of: a broker sends what is retained in any order."""
+        self._ahead = 0.0
+        """Seconds our clock is ahead of the daemon's."""
+
+    # -- from MQTT
+
+    def heard(self, topic: str, payload: Any, *, old: bool, now: float, wall: float) -> None:  # noqa: ANN401 - parsed JSON
+        """Take a message under B; `payload` is its JSON or its bare word, `old` that it was retained before."""
+        match topic.split("/"):
+            case ["devices"] if isinstance(payload, list):
+                self._list([entry for entry in payload if isinstance(entry, dict)])
+            case ["line", "state" | "stats"] if isinstance(payload, dict):
+                self.line.update(payload)
+            case ["line", "error"] if isinstance(payload, dict):
+                self._line_failed(payload)
+            case ["device", name, leaf]:
+                self._told(self._device(name), leaf, payload, old=old, now=now, wall=wall)
+
+    def _line_failed(self, error: Mapping[str, Any] | None) -> None:
+        """Take the line's error object; None: there is none."""
+        error = {} if error is None else error
+        self.line_error = _active(error)
+        self.line_error_code = str(error.get("code")) if self.line_error is not None else None
+        self.line_error_since = _since(error)
+
+    def _list(self, entries: list[dict[str, Any]]) -> None:
+        self.known = True
+        self.devices = {}
+        for entry in entries:
+            name = entry.get("name")
+            if isinstance(name, str):
+                self.devices[name] = device = self._device(name)
+                _describe(device, entry, slave=entry.get("id"))
+
+    def _device(self, name: str) -> Device:
+        return self._met.setdefault(name, Device(name))
+
+    def _told(self, device: Device, leaf: str, payload: Any, *, old: bool, now: float, wall: float) -> None:  # noqa: ANN401 - parsed JSON
+        if leaf == "availability":
+            self._available(device, payload == "online", now=None if old else now)
+        elif isinstance(payload, dict):
+            if leaf == "stats":
+                last = _number(payload.get("last_good_ts"))
+                if last is not None and (device.good_ts is None or last > device.good_ts):
+                    device.good_ts = last
+            elif leaf == "error":
+                device.since = _since(payload)
+            elif leaf in {"state", "telemetry"}:
+                self._sampled(device, payload, old=old, now=now, wall=wall)
+
+    def _sampled(self, device: Device, sample: Mapping[str, Any], *, old: bool, now: float, wall: float) -> None:
+        seq, boot, ts = sample.get("seq"), str(sample.get("boot")), _number(sample.get("ts"))
+        if not isinstance(seq, int) or ts is None or (boot == device.boot and seq <= device.seq):
+            return  # the state of a sample that telemetry has told, or none
+        if not device.enabled and sample.get("error") != "disabled":
+            return  # polled for a request alone
+        values = {name: value for name, value in sample.items() if name not in BESIDES}
+        units = sample.get("units")
+        if not isinstance(units, dict):
+            units = dict.fromkeys(values, sample.get("unit") or "")
+        if not old:
+            self._ahead = wall - ts / 1000
+        device.seq, device.boot = seq, boot
+        _sample(device, sample, values, units)
+        if device.good:
+            device.good_ts = ts
+        if not old:
+            _trail(device, now)
+
+    def _available(self, device: Device, online: bool, *, now: float | None) -> None:  # noqa: FBT001 - what it says
+        if now is not None and online is not device.online:
+            device.turned = now, online
+        device.online = online
+
+    # -- from the status file
+
+    def read(self, status: Mapping[str, Any], *, now: float) -> None:
+        """Take the daemon's status as it was written, by the clock of this machine."""
+        ts = _number(status.get("ts")) or 0.0
+        self.known = True
+        line = status.get("line")
+        if isinstance(line, dict):
+            self.line = line
+            error = line.get("error")
+            self._line_failed(error if isinstance(error, dict) else None)
+        self.devices = {}
+        entries = status.get("devices")
+        for entry in entries if isinstance(entries, list) else ():
+            if isinstance(entry, dict) and isinstance(entry.get("name"), str):
+                name = entry["name"]
+                known = name in self._met
+                self.devices[name] = device = self._device(name)
+                self._restate(device, entry, ts, now=now if known else None)
+
+    def _restate(self, device: Device, entry: Mapping[str, Any], ts: float, *, now: float | None) -> None:
+        _describe(device, entry, slave=entry.get("slave"))
+        self._available(device, entry.get("online") is True, now=now)
+        values, units, seq = entry.get("values"), entry.get("units"), entry.get("seq")
+        fresh = seq != device.seq
+        device.seq = seq if isinstance(seq, int) else -1
+        _sample(device, entry, values if isinstance(values, dict) else {}, units if isinstance(units, dict) else {})
+        alarm = entry.get("alarm")
+        device.since = _since(alarm) if isinstance(alarm, dict) else None
+        age = _number(entry.get("age_s"))
+        device.good_ts = None if age is None else ts - age * 1000
+        if fresh and now is not None:
+            _trail(device, now)
+
+    # -- what is to be shown
+
+    def age(self, device: Device, wall: float) -> float | None:
+        """Return how many s ago it gave its last good value; None: never as far as we know."""
+        if device.good_ts is None:
+            return None
+        return max(0.0, wall - self._ahead - device.good_ts / 1000)
+
+    def late(self, device: Device, wall: float) -> bool:
+        """Whether its last good value is older than it should be."""
+        age = self.age(device, wall)
+        return age is None or age > 3 * device.interval + LATE_AFTER
+
+    def movers(self, now: float) -> Iterator[Device]:
+        """Yield the devices that just moved: of each unit the one that went farther than all others by much."""
+        moved: dict[str, list[tuple[float, Device]]] = {}
+        for device in self.devices.values():
+            moved.setdefault(device.unit, []).append((device.moved(now), device))
+        for ranking in moved.values():
+            ranking.sort(key=lambda each: each[0], reverse=True)
+            (farthest, device), second = ranking[0], ranking[1][0] if len(ranking) > 1 else 0.0
+            if farthest > 0 and farthest >= STANDS_OUT * second and device.good:
+                yield device
+
+
+def _describe(device: Device, entry: Mapping[str, Any], *, slave: object) -> None:
+    device.slave = slave if isinstance(slave, int) else None
+    label = entry.get("label")
+    device.label = label if isinstance(label, str) else None
+    device.enabled = entry.get("enabled") is not False
+    device.interval = _number(entry.get("interval")) or 1.0
+
+
+def _sample(device: Device, sample: Mapping[str, Any], values: Mapping[str, Any], units: Mapping[str, Any]) -> None:
+    error = sample.get("error")
+    device.good = sample.get("quality") == "good"
+    device.error = error if isinstance(error, str) else None
+    device.rtt_ms = _number(sample.get("rtt_ms"))
+    device.values = {str(name): value for name, value in values.items() if _number(value) is not None}
+    device.units = {str(name): unit for name, unit in units.items() if isinstance(unit, str)}
+
+
+def _trail(device: Device, now: float) -> None:
+    if device.value is not None:
+        device.trail.append((now, device.value))
+
+
+def _number(value: object) -> float | None:
+    """Return a value that is a finite number; whole ones stay whole."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    try:
+        return value if isfinite(value) else None
+    except OverflowError:
+        return None
+
+
+def _active(error: Mapping[str, Any]) -> str | None:
+    """Return the words of an error object; None where there is no error."""
+    if error.get("active") is not True:
+        return None
+    message = error.get("message")
+    return message if isinstance(message, str) and message else str(error.get("code"))
+
+
+def _since(error: Mapping[str, Any]) -> float | None:
+    """Return when an error object's error rose, epoch ms; None where there is no error."""
+    return _number(error.get("since")) if error.get("active") is True else None

@@ -1,0 +1,312 @@
+"""The live table: what is known of a line as lines of styled text, for a terminal of any size. Pure.
+
+A line is a tuple of pieces, each a text and its style in rich's words ("" is plain).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import tzinfo
+from typing import Final, TypeAlias
+
+from lfs10d.cli.local_time import since_text, zone_name
+from lfs10d.cli.render.live_state import Device, Live
+from lfs10d.system.logs import escape
+
+Piece: TypeAlias = tuple[str, str]
+Line: TypeAlias = tuple[Piece, ...]
+
+LONGEST_WORD: Final = 200
+"""Characters of one thing about the line: enough for the path of a port."""
+
+JUST: Final = 5.0
+"""s for which it is marked that a device came or went."""
+
+_TROUBLES: Final = {
+    "timeout": "no answer",
+    "crc": "garbled answer",
+    "malformed": "broken answer",
+    "wrong_slave": "another slave answers",
+    "wrong_function": "answers something else",
+    "exception": "refuses",
+    "out_of_range": "impossible value",
+    "not_finite": "not a number",
+    "unavailable": "has no value now",
+    "starting": "not polled yet",
+    "late": "answers too late",
+    "collision": "line never silent",
+    "port_lost": "no port",
+    "port_busy": "another program has the port",
+    "config_conflict": "two devices with one id",
+}
+"""What a code says, in a word or two; the code itself stands before it, as in docs/when-it-goes-wrong.md."""
+_OF_THE_LINE: Final = frozenset({"starting", "port_lost", "port_busy", "config_conflict"})
+"""Codes that say nothing of the device itself."""
+_MARKS: Final = {"moved": ">", "came": "+", "went": "-"}
+_MARK_STYLES: Final = {"moved": "bold black on green", "came": "bold green", "went": "bold red"}
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """Where it comes from, in words; `alive`: what is shown is of now."""
+
+    words: str
+    alive: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One device as it is shown. `stale`: what is shown is not of now."""
+
+    name: str
+    slave: str
+    label: str
+    value: str
+    state: str
+    age: str
+    rtt: str
+    just: str
+    stale: bool
+    good: bool
+
+
+@dataclass(frozen=True, slots=True)
+class _Moment:
+    """When it is shown: monotonic s, epoch s, and the zone of its times."""
+
+    now: float
+    wall: float
+    zone: tzinfo | None
+
+
+def rows(live: Live, source: Source, *, now: float, wall: float, zone: tzinfo | None = None) -> list[Row]:
+    """Return the devices as they are to be shown, times in `zone` (None: this machine's)."""
+    movers = {device.name for device in live.movers(now)} if source.alive else set()
+    return [
+        _row(live, device, source, _Moment(now, wall, zone), moved=device.name in movers)
+        for device in live.devices.values()
+    ]
+
+
+def _with_unit(device: Device, name: str, value: float) -> str:
+    """Return a value with its unit; a bare number among others with its name."""
+    unit = device.units.get(name, "")
+    if unit != "1":
+        return f"{_number(value)} {escape(unit)}".rstrip()
+    return _number(value) if len(device.values) == 1 else f"{escape(name)} {_number(value)}"
+
+
+def _row(live: Live, device: Device, source: Source, moment: _Moment, *, moved: bool) -> Row:
+    stale = not source.alive or (device.good and live.late(device, moment.wall))
+    just = "moved" if moved else ""
+    if source.alive and device.turned is not None and moment.now - device.turned[0] < JUST:
+        just = "came" if device.turned[1] else "went"
+    values = [_with_unit(device, name, value) for name, value in device.values.items()]
+    age = live.age(device, moment.wall) if device.enabled else None
+    return Row(
+        name=escape(device.name),
+        slave="" if device.slave is None else str(device.slave),
+        label=escape(device.label or ""),
+        value=", ".join(values) or "-",
+        state=_state(device, moment, stale=stale),
+        age="" if age is None else age_text(age),
+        rtt="" if device.rtt_ms is None or stale else f"{device.rtt_ms:.0f} ms",
+        just=just,
+        stale=stale,
+        good=device.good,
+    )
+
+
+def _number(value: float) -> str:
+    """Return a number as it is, a fraction with two decimals: figures that stand still are read at a glance."""
+    return str(value) if isinstance(value, int) else f"{value:.2f}"
+
+
+def _state(device: Device, moment: _Moment, *, stale: bool) -> str:
+    """Return availability and what ails it, as code and words, and since when."""
+    if not device.enabled:
+        return "disabled"
+    if device.good:
+        return "old value" if stale else "good"
+    if device.error is None:
+        return "not heard yet"
+    code = escape(device.error)
+    trouble = f"{code}, {_TROUBLES[code]}" if code in _TROUBLES else code
+    if not device.online and code not in _OF_THE_LINE:
+        trouble = f"offline: {trouble}"
+    return trouble + _since(device.since, moment.wall, moment.zone)
+
+
+def _since(ts: float | None, wall: float, zone: tzinfo | None) -> str:
+    return "" if ts is None else f"; since {since_text(ts, wall * 1000, zone)}"
+
+
+def age_text(seconds: float) -> str:
+    """Return an age in at most four characters: 0.4s, 12s, 5m, 3h, 20d."""
+    if seconds < 9.95:  # noqa: PLR2004 - the largest with one decimal
+        return f"{seconds:.1f}s"
+    for unit, length in (("s", 1), ("m", 60), ("h", 3600)):
+        if seconds < 100 * length:
+            return f"{seconds / length:.0f}{unit}"
+    return f"{seconds / 86_400:.0f}d"
+
+
+# The table
+
+
+@dataclass(frozen=True, slots=True)
+class _Column:
+    head: str
+    of: Callable[[Row], str]
+    right: bool = False
+    least: int = 0
+    most: int = 40
+
+
+_NAME = _Column("sensor", lambda row: row.name, least=6, most=20)
+_ID = _Column("id", lambda row: row.slave, right=True, least=3)
+_VALUE = _Column("value", lambda row: row.value, right=True, least=9, most=24)
+_STATE = _Column("state", lambda row: row.state, least=9, most=60)
+_AGE = _Column("age", lambda row: row.age, right=True, least=4)
+_RTT = _Column("answer", lambda row: row.rtt, right=True, least=6)
+_LABEL = _Column("label", lambda row: row.label, most=30)
+
+_ALL: Final = (_NAME, _ID, _VALUE, _STATE, _AGE, _RTT, _LABEL)
+_GIVEN_UP_FIRST: Final = (_LABEL, _RTT, _AGE, _ID)
+"""What a narrow terminal does without, in this order."""
+LEAST_LABEL: Final = 6
+"""A label cut shorter than this tells nothing."""
+
+
+def table(shown: Sequence[Row], width: int) -> list[Line]:
+    """Return head and rows for a terminal `width` columns wide; none of the lines is longer."""
+    widths = _widths(shown, width)
+    head: list[Piece] = [("  ", "")]
+    head += [(_cell(column.head, size, right=column.right) + " ", "bold dim") for column, size in widths.items()]
+    return [_cut(tuple(head), width), *(_cut(_line(row, widths), width) for row in shown)]
+
+
+def _line(row: Row, widths: dict[_Column, int]) -> Line:
+    pieces: list[Piece] = [(f"{_MARKS.get(row.just, ' ')} ", _MARK_STYLES.get(row.just, ""))]
+    for column, size in widths.items():
+        style = ""
+        if row.stale or row.state == "disabled":
+            style = "dim"
+        elif column is _STATE:
+            style = "green" if row.good else "bold red"
+        elif row.just == "moved" and column in (_NAME, _VALUE):
+            style = "bold green"
+        elif column is _VALUE and row.good:
+            style = "bold"
+        pieces.append((_cell(column.of(row), size, right=column.right) + " ", style))
+    return tuple(pieces)
+
+
+def _widths(shown: Sequence[Row], width: int) -> dict[_Column, int]:
+    """Return the columns there is room for and how wide they are; the label has what is left."""
+    wanted = {
+        column: min(column.most, max(column.least, len(column.head), *(len(column.of(row)) for row in shown), 0))
+        for column in _ALL
+        if column is not _LABEL or any(row.label for row in shown)
+    }
+    for column in _GIVEN_UP_FIRST:
+        excess = 2 + sum(wanted.values()) + len(wanted) - width
+        if excess <= 1:  # the last column needs no space behind it
+            break
+        if column is _LABEL and wanted.get(column, 0) - excess + 1 >= LEAST_LABEL:
+            wanted[column] -= excess - 1
+        else:
+            wanted.pop(column, None)
+    return wanted
+
+
+def _cell(text: str, size: int, *, right: bool) -> str:
+    cut = text if len(text) <= size else text[: size - 1] + "~"
+    return cut.rjust(size) if right else cut.ljust(size)
+
+
+def _cut(line: Line, width: int) -> Line:
+    """Return the line without what does not fit and without spaces at its end."""
+    pieces: list[Piece] = []
+    for text, style in line:
+        if width > 0:
+            pieces.append((text[:width], style))
+        width -= len(text)
+    while pieces and not pieces[-1][0].strip():
+        pieces.pop()
+    if pieces:
+        pieces[-1] = pieces[-1][0].rstrip(), pieces[-1][1]
+    return tuple(pieces)
+
+
+def header(
+    live: Live, source: Source, width: int, *, pace: bool = True, wall: float = 0.0, zone: tzinfo | None = None
+) -> list[Line]:
+    """Return what is to be known of the line and where all this comes from; `pace`: also what changes all the time.
+
+    `wall` (epoch s) is now: what began on another day is told with its date.
+    """
+    line = live.line
+    words = [f"{escape(live.name)}: {_said(line, 'port')}"]
+    if "baudrate" in line:
+        character = f"{_said(line, 'databits')}{_said(line, 'parity')[:1].upper()}{_said(line, 'stopbits')}"
+        words.append(f"{_said(line, 'baudrate')} baud {character}")
+    if line.get("activity", "polling") != "polling":
+        words.append(_said(line, "activity"))
+    load, polls = (line.get("load_pct"), line.get("polls_per_s")) if pace else (None, None)
+    if load is not None:
+        words.append(f"load {_said(line, 'load_pct')} %")
+    if polls is not None:
+        words.append(f"{_said(line, 'polls_per_s')} polls/s")
+    lines: list[Line] = [((", ".join(words), "bold"),), ((source.words, "" if source.alive else "bold yellow"),)]
+    if line.get("open") is False and live.line_error is None:
+        lines.append((("the port is not open", "bold red"),))
+    if live.line_error is not None:
+        code = f"{live.line_error_code}: " if live.line_error_code != live.line_error else ""
+        trouble = escape(f"{code}{live.line_error}") + _since(live.line_error_since, wall, zone)
+        lines.append(((trouble, "bold red"),))
+    return [piece for whole in lines for piece in _wrapped(whole, width)]
+
+
+def _said(line: Mapping[str, object], key: str) -> str:
+    return escape(str(line.get(key, "?"))[:LONGEST_WORD])
+
+
+def _wrapped(line: Line, width: int) -> Iterable[Line]:
+    """Yield a line of one piece as several that fit."""
+    ((text, style),) = line
+    current = ""
+    for word in text.split(" "):
+        if current and len(current) + 1 + len(word) > width:
+            yield ((current[:width], style),)
+            current = "  " + word
+        else:
+            current = f"{current} {word}" if current else word
+    yield ((current[:width], style),)
+
+
+def screen(
+    live: Live, source: Source, size: tuple[int, int], *, now: float, wall: float, zone: tzinfo | None = None
+) -> list[Line]:
+    """Return everything for a terminal of `size` columns and lines; where lines are short, the worst rows first."""
+    width, height = size
+    shown = rows(live, source, now=now, wall=wall, zone=zone)
+    above = [*header(live, source, width, wall=wall, zone=zone), ()]
+    legend = f"> moved just now   + came   - went   times: {zone_name(wall * 1000, zone)}   Ctrl-C ends"
+    room = max(1, height - len(above) - 3)
+    left = len(shown) - room
+    if left > 0:
+        kept = sorted(sorted(range(len(shown)), key=lambda place: _rank(shown[place]))[: room - 1])
+        hidden = [row for place, row in enumerate(shown) if place not in kept]
+        well = sum(row.good and not row.stale for row in hidden)
+        legend = f"{len(hidden)} more ({well} good): a taller window shows them   {legend}"
+        shown = [shown[place] for place in kept]
+    return [*above, *table(shown, width), (), _cut(((legend, "dim"),), width)]
+
+
+def _rank(row: Row) -> int:
+    """Return how much a row wants to be seen: what moves, what fails, the rest."""
+    if row.just:
+        return 0
+    return 2 if row.good and not row.stale else 1

@@ -1,0 +1,98 @@
+"""A response in words: what a request did, for people. Pure; whatever it holds came over the network and is escaped."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from datetime import tzinfo
+from typing import Any
+
+from lfs10d.cli.local_time import stamp
+from lfs10d.system.logs import escape
+
+INDENT = "  "
+SAMPLE = frozenset({"device", "seq", "quality", "error"})
+"""What tells a sample."""
+BESIDES = SAMPLE | {"v", "line", "boot", "ts", "time", "clock", "unit", "units", "rtt_ms", "historical"}
+"""What a sample has besides its values."""
+DEEPEST = 20
+"""Levels that are laid out; what lies deeper is shown as JSON."""
+
+
+def verdict(response: Mapping[str, Any]) -> str:
+    """Return how a request ended, in one line."""
+    name, status = _plain(response.get("request")), _plain(response.get("status"))
+    error = response.get("error")
+    if not isinstance(error, dict):
+        took = response.get("took_ms")
+        return f"{name}: {status}" + (f", {took:.0f} ms" if isinstance(took, int | float) else "")
+    return f"{name}: {status}: {_plain(error.get('code'))}: {_plain(error.get('message'))}"
+
+
+def told(response: Mapping[str, Any], zone: tzinfo | None = None) -> Iterator[str]:
+    """Yield what it brought, line by line; the time of a sample is that of `zone` (None: this machine's)."""
+    data = response.get("data")
+    if isinstance(data, dict) and data.keys() >= SAMPLE:
+        yield _sample(data, zone)
+    elif data is not None:
+        yield from _laid_out(data, 0)
+
+
+def _sample(sample: Mapping[str, Any], zone: tzinfo | None) -> str:
+    units = sample.get("units")
+    values = []
+    for name, value in sample.items():
+        if name in BESIDES:
+            continue
+        unit = units.get(name) if isinstance(units, dict) else sample.get("unit")
+        values.append(f"{_plain(name)} {'no value' if value is None else f'{_plain(value)} {_plain(unit)}'}")
+    quality = "good" if sample["error"] is None else f"{_plain(sample['quality'])} ({_plain(sample['error'])})"
+    rtt = sample.get("rtt_ms")
+    answered = "" if rtt is None else f", answered in {_plain(rtt)} ms"
+    ts = sample.get("ts")
+    when = stamp(ts, zone) if isinstance(ts, int | float) else _plain(sample.get("time"))
+    return f"{_plain(sample['device'])}: {', '.join(values)}, {quality}{answered}, at {when}"
+
+
+def _laid_out(data: object, depth: int) -> Iterator[str]:
+    """Yield keys and values, one a line, what belongs together indented."""
+    indent = INDENT * depth
+    if depth >= DEEPEST or not isinstance(data, dict | list):
+        yield f"{indent}{_plain(data)}"
+    elif isinstance(data, dict):
+        for key, value in data.items():
+            if _is_leaf(value):
+                yield f"{indent}{escape(key)}: {_plain(value)}"
+            else:
+                yield f"{indent}{escape(key)}:"
+                yield from _laid_out(value, depth + 1)
+    else:
+        for item in data:
+            if _is_leaf(item):
+                yield f"{indent}- {_plain(item)}"
+            else:
+                yield f"{indent}-"
+                yield from _laid_out(item, depth + 1)
+
+
+def _is_leaf(value: object) -> bool:
+    """Whether a value goes on one line: a plain one, nothing, or a list of plain ones."""
+    if isinstance(value, list):
+        return all(not isinstance(item, dict | list) for item in value)
+    return not isinstance(value, dict) or not value
+
+
+def _plain(value: object) -> str:
+    match value:
+        case str():
+            return escape(value)
+        case None:
+            return "null"
+        case bool():
+            return "true" if value else "false"
+        case list():
+            return f"[{', '.join(_plain(item) for item in value)}]"
+        case dict():
+            return escape(json.dumps(value, ensure_ascii=False))
+        case _:
+            return str(value)

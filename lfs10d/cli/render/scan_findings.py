@@ -1,0 +1,170 @@
+"""What a scan found, in words: a table for people, YAML to paste, JSON for programs."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from lfs10d.cli.options import LineOptions
+from lfs10d.line.jobs.identification import Finding
+from lfs10d.modbus.frames import EXCEPTION_NAMES, Framing
+from lfs10d.schema.quantities import duration_text
+
+HEAD = ("id", "baud", "answers in", "what it is", "remark")
+RIGHT = (0, 1, 2)
+
+DEFAULT_PROFILE = "lfs10"
+DEFAULT_BAUDRATE = 9600
+FACTORY_ID = 1
+ILLEGAL_FUNCTION = 1
+"""The exception of a device that does not know the function (Modbus Application Protocol V1.1b3, section 7)."""
+BY_ID = Path("/dev/serial/by-id")
+
+
+def row(finding: Finding) -> tuple[str, ...]:
+    """Return a finding as a row of the table."""
+    answers_in = f"{finding.rtt * 1e3:.0f} ms" if finding.rtt is not None else "-"
+    return str(finding.slave), str(finding.baudrate), answers_in, what(finding), "; ".join(remarks(finding))
+
+
+def what(finding: Finding) -> str:
+    """Return what it is, with what it measures just now."""
+    profile = finding.profile
+    if profile is not None:
+        return profile.title if finding.duplicate else f"{profile.title}, {value_text(finding)}"
+    if not finding.answers:
+        return "something that gives no right answer"
+    if finding.exception is not None:
+        name = EXCEPTION_NAMES.get(finding.exception, "of its own")
+        how = "refuses" if finding.exception == ILLEGAL_FUNCTION else "answers"
+        return f"unknown device, {how} function 03 (exception {finding.exception:02X} {name})"
+    return "unknown device, answers function 03"
+
+
+def value_text(finding: Finding) -> str:
+    """Return its first value with its unit."""
+    profile = finding.profile
+    if profile is None or profile.value_names[0] not in finding.values:
+        return "no believable value"
+    first = profile.values[0]
+    unit = "" if first.unit == "1" else f" {first.unit}"
+    return f"{finding.values[first.name]}{unit}"
+
+
+def remarks(finding: Finding) -> Iterator[str]:
+    """Yield what a newcomer should know of it."""
+    if finding.duplicate:
+        yield f"DUPLICATE? {finding.spoilt} of {finding.tries} answers garbled: two sensors with this id?"
+    elif finding.spoilt:
+        yield f"{finding.spoilt} of {finding.tries} answers garbled"
+    other = finding.id_register if finding.id_register != finding.slave else None
+    if finding.suspect and other is not None:
+        yield f"SUSPECT: probably sensor {other}, which answers {finding.slave} too"
+    elif finding.suspect:
+        yield "SUSPECT: others answer too, so it may be no sensor of its own"
+    elif other is not None:
+        yield f"its id register holds {other}: is the DIP switch set?"
+    if finding.slave == FACTORY_ID and finding.profile is not None:
+        yield "the factory id"
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """How the line was scanned: with which check, and in which files the user's own profiles lie, by their names."""
+
+    checksum: str = "crc"
+    files: Mapping[str, str] = field(default_factory=dict)
+
+
+AS_USUAL = Asked()
+
+
+def snippet(
+    findings: Sequence[Finding], options: LineOptions, by_id: Path = BY_ID, asked: Asked = AS_USUAL
+) -> Iterator[str]:
+    """Yield a configuration file that polls what was found; what cannot be polled as it is stands in comments."""
+    baudrate = usual_rate(findings)
+    yield "line:"
+    yield f"  port: {lasting_name(options.port, by_id)}"
+    if baudrate != DEFAULT_BAUDRATE:
+        yield f"  baudrate: {baudrate}"
+    for key, value, usual in (
+        ("parity", options.parity, "none"),
+        ("databits", options.databits, 8),
+        ("stopbits", options.stopbits, 1),
+        ("framing", options.framing.value, Framing.RTU.value),
+    ):
+        if value != usual:
+            yield f"  {key}: {value}"
+    usable = [finding for finding in findings if _obstacle(finding, baudrate) is None]
+    yield "slaves:" if usable else "slaves: []"
+    for finding in findings:
+        obstacle = _obstacle(finding, baudrate)
+        entry = _entry(finding, options, asked)
+        yield f"  - {entry}" if obstacle is None else f"  # - {entry}    {obstacle}"
+    yield "mqtt: {host: localhost}"
+
+
+def usual_rate(findings: Sequence[Finding]) -> int:
+    """Return the rate at which most were found."""
+    rates = [finding.baudrate for finding in findings if finding.answers and not finding.suspect]
+    return max(rates, key=lambda rate: (rates.count(rate), -rate), default=DEFAULT_BAUDRATE)
+
+
+def lasting_name(port: str, by_id: Path = BY_ID) -> str:
+    """Return the name of an adapter that stays its own when others are plugged in; the absolute one where none is."""
+    try:
+        links = sorted(by_id.iterdir())
+    except OSError:
+        links = []
+    lasting = (str(link) for link in links if os.path.realpath(link) == os.path.realpath(port))
+    return next(lasting, os.path.abspath(port))  # noqa: PTH100  # resolve() would follow links that may be meant
+
+
+def _entry(finding: Finding, options: LineOptions, asked: Asked) -> str:
+    fields = [f"id: {finding.slave}"]
+    profile = finding.profile
+    if profile is not None and profile.name != DEFAULT_PROFILE:
+        file = asked.files.get(profile.name)
+        fields.append(f"profile: {profile.name if file is None else json.dumps(file)}")  # JSON's text is YAML's too
+    if profile is not None and options.framing is Framing.RTU and asked.checksum != profile.checksum:
+        fields.append(f"checksum: {asked.checksum}")
+    if options.timeout is not None:
+        fields.append(f"response_timeout: {duration_text(options.timeout)}")
+    return str(finding.slave) if len(fields) == 1 else f"{{{', '.join(fields)}}}"
+
+
+def _obstacle(finding: Finding, baudrate: int) -> str | None:
+    """Return why it cannot be polled as it is."""
+    if finding.suspect:
+        return "suspect"
+    if finding.duplicate:
+        return "give the two sensors different ids first"
+    if finding.profile is None:
+        return "needs a profile of its own"
+    if finding.baudrate != baudrate:
+        return f"answers at {finding.baudrate} baud; a line has one rate"
+    return None
+
+
+def plain(finding: Finding) -> dict[str, Any]:
+    """Return a finding for JSON."""
+    profile = finding.profile
+    return {
+        "id": finding.slave,
+        "baudrate": finding.baudrate,
+        "answers": finding.answers,
+        "rtt_ms": None if finding.rtt is None else round(finding.rtt * 1e3, 1),
+        "profile": None if profile is None else profile.name,
+        "title": None if profile is None else profile.title,
+        "values": dict(finding.values),
+        "units": {} if profile is None else {name: profile.units[name] for name in finding.values},
+        "id_register": finding.id_register,
+        "exception_code": finding.exception if profile is None else None,
+        "suspect": finding.suspect,
+        "duplicate": finding.duplicate,
+    }

@@ -1,0 +1,125 @@
+"""The way down: a command, its result, and the errors a command can end with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, TypeAlias
+
+from lfs10d.telemetry.publication import VERSION
+
+Identifier: TypeAlias = str | int
+
+
+RequestClass: TypeAlias = Literal["always", "polling", "sensors", "registers"]
+
+
+Status: TypeAlias = Literal["ok", "rejected", "failed"]
+
+
+ErrorCode: TypeAlias = Literal[
+    "not_recognised",
+    "invalid_json",
+    "invalid_param",
+    "unknown_request",
+    "unknown_device",
+    "not_allowed",
+    "retained",
+    "duplicate_conflict",
+    "busy",
+    "address_in_use",
+    "duplicate_id",
+    "dip_switch",
+    "power_cycle_needed",
+    "refused",
+    "not_verified",
+    "rolled_back",
+    "line_error",
+    "storage_full",
+    "timeout",
+    "too_large",
+    "rate_limited",
+    "cancelled",
+    "internal",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """How a request ended.
+
+    `rejected`: no write was sent and nothing changed. `failed`: a write may have been sent, or the reading asked
+    for failed.
+    """
+
+    status: Status
+    data: object = None
+    code: ErrorCode | None = None
+    message: str = ""
+    facts: Mapping[str, object] = field(default_factory=dict)
+    """Further keys of the error object, such as `param` and `exception_code`."""
+
+    def error(self) -> dict[str, object] | None:
+        """Return the error object; None where there is none."""
+        if self.code is None:
+            return None
+        return {"code": self.code, "message": self.message, **self.facts}
+
+
+def ok(data: object = None) -> Answer:
+    """Return the answer to a request that was carried out."""
+    return Answer("ok", data)
+
+
+def rejected(code: ErrorCode, message: str, *, param: str | None = None, **facts: object) -> Answer:
+    """Return the answer to a request that changed nothing."""
+    return Answer("rejected", code=code, message=message, facts={"param": param, **facts})
+
+
+def failed(code: ErrorCode, message: str, *, data: object = None, **facts: object) -> Answer:
+    """Return the answer to a request that may have sent a write, or asked for a reading that failed."""
+    return Answer("failed", data, code, message, {"param": None, **facts})
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """What could be read of a request: its ids, what it asks in its own words, and the same as one text.
+
+    `topic` (under B) and `correlation` are where its answer goes, once it is being performed.
+
+    Equal fingerprints are equal parameters as JSON sees them: in any order, but 1 is neither true nor 1.0.
+    """
+
+    id: Identifier | None = None
+    transaction: Identifier | None = None
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    fingerprint: str = ""
+    topic: str | None = None
+    correlation: bytes | None = None
+
+    @property
+    def key(self) -> Identifier | None:
+        """What tells a repeat; None: it cannot be told."""
+        return self.transaction if self.id is None else self.id
+
+    def response(self, name: str, answer: Answer, took_ms: float) -> dict[str, object]:
+        """Return the response to it under the request's `name`."""
+        response: dict[str, object] = {"v": VERSION, "id": self.id}
+        if self.transaction is not None:
+            response["transaction"] = self.transaction
+        return {
+            **response,
+            "request": name,
+            "status": answer.status,
+            "data": answer.data,
+            "error": answer.error(),
+            "took_ms": round(took_ms, 1),
+        }
+
+
+class RefusedError(Exception):
+    """A request is refused where it is being carried out; `answer` says why."""
+
+    def __init__(self, answer: Answer) -> None:
+        super().__init__(answer.message)
+        self.answer = answer

@@ -1,0 +1,1 @@
+"""Requests from the broker: admitted, carried out, answered once."""

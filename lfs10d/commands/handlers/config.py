@@ -1,0 +1,111 @@
+"""`config/get`, `config/reload` and `config/reset`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated
+
+from lfs10d.command import Answer, Call, RefusedError, ok, rejected
+from lfs10d.commands.admission import Form
+from lfs10d.commands.context import Powers, Request
+from lfs10d.commands.handlers.config_edit import altered, amend, known_device, refuse
+from lfs10d.commands.message import NoParameters, Parameters
+from lfs10d.config import changes
+from lfs10d.config.changes import Changes
+from lfs10d.config.effective import Effective, effective
+from lfs10d.errors import ConfigError
+from lfs10d.schema.fields import Name, Text, quoted
+
+LONGEST_KEY = 100
+_KEY_OF_A_DEVICE = 3
+"""Parts of `slaves.mast-top.interval`."""
+
+
+class WhichChange(Parameters):
+    """A device, or a key: `slaves.mast-top.interval`, or `interval` beside a device."""
+
+    device: Annotated[str, Name()] = ""
+    key: Annotated[str, Text(LONGEST_KEY)] = ""
+
+    @property
+    def place(self) -> tuple[str, str | None]:
+        """The device, and the key of it, None for all of them; raises RefusedError where neither can be meant."""
+        if not self.key:
+            if not self.device:
+                raise refuse("invalid_param", "device: is missing; give device or key", param="device")
+            return self.device, None
+        if self.key == "line.baudrate":
+            raise refuse("invalid_param", "key: a baud rate is a fact; line/baudrate changes it", param="key")
+        parts = self.key.split(".")
+        if self.device and len(parts) == 1:
+            return self.device, parts[0]
+        if parts[0] == "slaves" and len(parts) in {2, _KEY_OF_A_DEVICE} and self.device in {"", parts[1]}:
+            return parts[1], parts[2] if len(parts) == _KEY_OF_A_DEVICE else None
+        raise refuse("invalid_param", f"key: no request changed {quoted(self.key)}", param="key")
+
+
+async def get(_: NoParameters, powers: Powers, __: Call) -> Answer:
+    """Tell the effective configuration."""
+    return ok(powers.configuration())
+
+
+async def reload(_: NoParameters, powers: Powers, __: Call) -> Answer:
+    """Read the files again; a broken one changes nothing."""
+    try:
+        return ok(await powers.reload())
+    except ConfigError as error:
+        return rejected("invalid_param", str(error.problems[0]))
+
+
+async def reset(parameters: WhichChange, powers: Powers, call: Call) -> Answer:
+    """Take back what requests changed."""
+    try:
+        device, key = parameters.place
+        before, now = await amend(lambda now: _without(device, key, now), powers)
+    except RefusedError as error:
+        return error.answer
+    left = set(changes.keys(now.changes))
+    data = {
+        "dropped": [name for name in changes.keys(before.changes) if name not in left],
+        "changed": altered(before, now),
+    }
+    powers.applied("config/reset", call, device=device, **data)
+    return ok(data)
+
+
+def _without(device: str, key: str | None, now: Effective) -> Changes:
+    """Return the changes without one; raises RefusedError if it is none, or cannot be taken back."""
+    param = "device" if key is None else "key"
+    change = now.changes.of(device)
+    if not change:
+        known_device(device, now)
+        raise refuse("invalid_param", f"{param}: no request changed anything of {device}", param=param)
+    if key is not None and key not in change.options:
+        raise refuse("invalid_param", f"key: {_why_no_change(device, key, change)}", param="key")
+    left = now.changes.resetting(device, None if key is None else frozenset({key}))
+    if left == now.changes:
+        raise refuse("invalid_param", f"device: {_fact(device)}", param="device")
+    yielding = effective(now.file, left).conflicts.items() - now.conflicts.items()
+    if yielding:
+        name, why = min(yielding)
+        raise refuse("address_in_use", f"{name} cannot be polled then: {why}")
+    return left
+
+
+def _why_no_change(device: str, key: str, change: changes.DeviceChange) -> str:
+    if key == "id" and change.verified is not None:
+        return _fact(device)
+    if change.added is not None:
+        return f"{device} was added by request as a whole; device/options changes it, device/remove removes it"
+    return f"no request changed {quoted(key)} of {device}"
+
+
+def _fact(device: str) -> str:
+    return f"the slave id of {device} was verified on the line; device/readdress changes it"
+
+
+REQUESTS: Mapping[str, Request] = {
+    "config/get": Request(Form("always"), get),
+    "config/reload": Request(Form("polling"), reload),
+    "config/reset": Request(Form("polling", WhichChange), reset),
+}

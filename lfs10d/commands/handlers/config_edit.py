@@ -1,0 +1,56 @@
+"""What requests that change the configuration have in common: refused or kept, and told to everybody."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from lfs10d.command import Answer, ErrorCode, RefusedError, rejected
+from lfs10d.commands.context import Powers
+from lfs10d.config.diff import difference
+from lfs10d.config.effective import Edit, Effective
+from lfs10d.config.models import SlaveConfig
+from lfs10d.errors import StateError
+
+
+async def amend(edit: Edit, powers: Powers) -> tuple[Effective, Effective]:
+    """Change what holds; raises RefusedError, also where the change cannot be kept."""
+    try:
+        return await powers.change(edit)
+    except StateError as error:
+        raise RefusedError(rejected("storage_full", f"{error}; nothing was changed")) from None
+
+
+def refuse(code: ErrorCode, message: str, *, param: str | None = None, **facts: object) -> RefusedError:
+    """Return the error that refuses a request before anything was changed."""
+    return RefusedError(rejected(code, message, param=param, **facts))
+
+
+def unknown_device(device: str, known: tuple[str, ...]) -> Answer:
+    """Return the rejection of a name that no device has."""
+    names = ", ".join(known) or "none"
+    return rejected("unknown_device", f"there is no device {device}; configured are: {names}", param="device")
+
+
+def known_device(device: str, now: Effective) -> SlaveConfig:
+    """Return a configured device; raises RefusedError if there is none of this name."""
+    slave = now.slave(device)
+    if slave is None:
+        raise RefusedError(unknown_device(device, tuple(slave.name for slave in now.config.slaves)))
+    return slave
+
+
+def plainly(slave: SlaveConfig, keys: tuple[str, ...]) -> dict[str, Any]:
+    """Return what holds of a device as JSON has it: durations in s, a learned time-out is auto."""
+    values = {key: getattr(slave, key) for key in keys}
+    if "response_timeout" in values and values["response_timeout"] is None:
+        values["response_timeout"] = "auto"
+    return values
+
+
+def altered(before: Effective, now: Effective) -> list[dict[str, Any]]:
+    """Return what another configuration changes: key, from, to; devices that come or go as a whole."""
+    found = difference(before.config, now.config)
+    changed = [{"key": change.key, "from": change.old, "to": change.new} for change in found.changed]
+    for names, old, new in ((found.added, None, "polled"), (found.removed, "polled", None)):
+        changed += [{"key": f"slaves.{name}", "from": old, "to": new} for name in names]
+    return changed

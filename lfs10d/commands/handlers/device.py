@@ -1,0 +1,219 @@
+"""`device/add`, `device/remove`, `device/options` and `device/read`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+from lfs10d.command import Answer, Call, ErrorCode, RefusedError, failed, ok
+from lfs10d.commands.admission import Form
+from lfs10d.commands.context import Powers, Request
+from lfs10d.commands.handlers.config_edit import amend, known_device, plainly, refuse, unknown_device
+from lfs10d.commands.message import Parameters
+from lfs10d.config.changes import OPTIONS, Changes, Place
+from lfs10d.config.defaults import inherited
+from lfs10d.config.effective import Effective, effective
+from lfs10d.config.models import Interval, Label, ResponseTimeout, SlaveConfig, SlaveId, default_device_name
+from lfs10d.config.validation import contradictions
+from lfs10d.errors import ConfigError
+from lfs10d.profiles.library import builtin_names, load_profile
+from lfs10d.profiles.profile import Profile
+from lfs10d.reading import FaultCode
+from lfs10d.schema.fields import FilePath, Flag, Name, quoted
+from lfs10d.system.threads import aside
+
+SHOWN = ("label", "profile", "interval", "enabled", "response_timeout")
+"""What the answer tells of a device that was added."""
+STATED = ("label", "profile", "interval")
+"""What a request may state of a device it adds; the rest is as for any other."""
+
+
+class OneDevice(Parameters):
+    """Which device."""
+
+    device: Annotated[str, Name()]
+
+
+class NewDevice(Parameters):
+    """A device to be polled."""
+
+    slave: SlaveId
+    name: Annotated[str, Name()] = ""
+    label: Label = None
+    profile: Annotated[str, FilePath()] = "lfs10"
+    interval: Interval = 1.0
+    probe: Annotated[bool, Flag()] = True
+
+    @property
+    def device(self) -> str:
+        """Its name, or the default one."""
+        return self.name or default_device_name(self.slave)
+
+    @property
+    def entry(self) -> dict[str, Any]:
+        """What is said of it."""
+        stated = {key: getattr(self, key) for key in STATED if key in self.model_fields_set}
+        return {"id": self.slave, **stated}
+
+
+class Options(Parameters):
+    """What is to be changed of a device."""
+
+    device: Annotated[str, Name()]
+    interval: Interval = 1.0
+    enabled: Annotated[bool, Flag()] = True
+    label: Label = None
+    response_timeout: ResponseTimeout = None
+
+    @property
+    def wanted(self) -> dict[str, Any]:
+        """The options that were given."""
+        return {key: getattr(self, key) for key in OPTIONS if key in self.model_fields_set}
+
+
+async def add(parameters: NewDevice, powers: Powers, call: Call) -> Answer:
+    """Poll one more slave; with `probe` only if it answers."""
+    try:
+        profile = await profile_of(parameters.profile, powers.effective())
+        _check_new(parameters, profile, powers.effective(), powers.reserved())
+        if parameters.probe:
+            await _knock(parameters.slave, profile, powers)
+
+        def edit(now: Effective) -> Changes:
+            _check_new(parameters, profile, now, powers.reserved())
+            place = Place(parameters.slave) if parameters.probe else None
+            return now.changes.adding(parameters.device, parameters.entry, place)
+
+        _, now = await amend(edit, powers)
+        slave = known_device(parameters.device, now)
+    except RefusedError as error:
+        return error.answer
+    data = {"slave": slave.id, **plainly(slave, SHOWN)}
+    powers.applied("device/add", call, device=slave.name, **{"from": None, "to": data})
+    return ok({"device": slave.name, **data})
+
+
+async def profile_of(word: str, now: Effective) -> Profile:
+    """Return a profile by its name or file. A file is one that is used already, or lies beside the configuration.
+
+    Raises RefusedError for anything else.
+    """
+    known = now.loaded.profiles.get(word)
+    if known is not None:
+        return known
+    path = Path(word)
+    beside = not path.is_absolute() and ".." not in path.parts and path.suffix in {".yaml", ".yml"}
+    if word in builtin_names() or beside:
+        try:
+            return await aside(partial(load_profile, word, relative_to=now.file.path.parent.absolute()), "profile")
+        except ConfigError:
+            pass  # what is in a file is not told to whoever asks
+    names = ", ".join(builtin_names())
+    message = f"profile: {quoted(word)} is no profile; write {names}, or a profile's YAML file beside the configuration"
+    raise refuse("invalid_param", message, param="profile")
+
+
+def _check_new(wanted: NewDevice, profile: Profile, now: Effective, reserved: Mapping[int, str]) -> None:
+    """Raise RefusedError if there cannot be such a device."""
+    config = now.config
+    slave = inherited(SlaveConfig.model_construct(name=wanted.device, **wanted.entry), config.poll)
+    alone = config.model_copy(update={"slaves": (slave,)})
+    for found in contradictions(alone, {wanted.profile: profile}):
+        param = {"id": "slave"}.get(str(found.path[-1]), str(found.path[-1]))
+        raise refuse("invalid_param", f"{param}: {found.message}", param=param)
+    for other in config.slaves:
+        if any(wanted.slave == place.id for place in (Place(other.id), *now.places[other.name])):
+            raise refuse("address_in_use", f"slave id {wanted.slave} is that of {other.name}", param="slave")
+    if wanted.slave in reserved:
+        raise refuse("address_in_use", f"slave id {wanted.slave} {reserved[wanted.slave]}", param="slave")
+    if now.slave(wanted.device) is not None or now.changes.of(wanted.device).added is not None:
+        default = "" if wanted.name else "the default "
+        message = f"name: {default}{wanted.device} is taken; give it another name"
+        raise refuse("invalid_param", message, param="name")
+
+
+async def _knock(slave: int, profile: Profile, powers: Powers) -> None:
+    """Raise RefusedError unless there is an answer."""
+    knock = await powers.knock(slave, profile)
+    if knock.answered:
+        return
+    if knock.fault is None:
+        raise refuse("line_error", f"slave {slave} could not be asked: the port is lost")
+    heard = f" (heard {knock.fault.heard.hex(' ').upper()})" if knock.fault.heard else ""
+    message = f"slave {slave} does not answer: {knock.fault.message}{heard}; with probe false it is added all the same"
+    raise refuse("timeout", message)
+
+
+async def remove(parameters: OneDevice, powers: Powers, call: Call) -> Answer:
+    """Poll a device no more."""
+    device = parameters.device
+
+    def edit(now: Effective) -> Changes:
+        if now.changes.of(device).added is None:  # else it may be one that cannot be polled as things are
+            known_device(device, now)
+        return now.changes.removing(device, now.said)
+
+    try:
+        before, _ = await amend(edit, powers)
+    except RefusedError as error:
+        return error.answer
+    gone = before.slave(device)
+    data = None if gone is None else {"slave": gone.id, **plainly(gone, SHOWN)}
+    powers.applied("device/remove", call, device=device, **{"from": data, "to": None})
+    return ok({"device": device, "slave": None if gone is None else gone.id})
+
+
+async def options(parameters: Options, powers: Powers, call: Call) -> Answer:
+    """Change how a device is polled and called."""
+    device, wanted = parameters.device, parameters.wanted
+
+    def edit(now: Effective) -> Changes:
+        known_device(device, now)
+        changes = now.changes.setting(device, wanted, now.said)
+        why = effective(now.file, changes).suspended.get(device)
+        if why is not None:
+            param = why.partition(":")[0]
+            raise refuse("invalid_param", why, param=param if param in wanted else None)
+        return changes
+
+    try:
+        if not wanted:
+            message = f"nothing to change: give {', '.join(OPTIONS[:-1])} or {OPTIONS[-1]}"
+            raise refuse("invalid_param", message)
+        before, now = await amend(edit, powers)
+        keys = tuple(wanted)
+        old, new = plainly(known_device(device, before), keys), plainly(known_device(device, now), keys)
+    except RefusedError as error:
+        return error.answer
+    if old != new:
+        powers.applied("device/options", call, device=device, **{"from": old, "to": new})
+    return ok({"from": old, "to": new})
+
+
+async def read(parameters: OneDevice, powers: Powers, _: Call) -> Answer:
+    """Poll a device now, in turn with everybody else."""
+    device = parameters.device
+    if device not in powers.devices():
+        return unknown_device(device, powers.devices())
+    conflict = powers.effective().conflicts.get(device)
+    if conflict is not None:
+        return failed("line_error", f"{device} cannot be asked: {conflict}")
+    inquiry = await powers.read(device)
+    if inquiry is None:
+        return failed("line_error", f"{device} was removed or changed before it could be asked")
+    fault = inquiry.fault
+    if fault is None:
+        return ok(inquiry.sample)
+    facts = {} if fault.exception_code is None else {"exception_code": fault.exception_code}
+    code: ErrorCode = "timeout" if fault.code is FaultCode.TIMEOUT else "line_error"
+    return failed(code, f"{device}: {fault.message}", data=inquiry.sample, **facts)
+
+
+REQUESTS: Mapping[str, Request] = {
+    "device/add": Request(Form("polling", NewDevice), add),
+    "device/remove": Request(Form("polling", OneDevice), remove),
+    "device/options": Request(Form("polling", Options), options),
+    "device/read": Request(Form("polling", OneDevice), read),
+}

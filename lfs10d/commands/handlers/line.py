@@ -1,0 +1,52 @@
+"""`line/trace`, `line/pause` and `line/cancel`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated
+
+from pydantic import Field
+
+from lfs10d.command import Answer, Call, RefusedError, ok
+from lfs10d.commands.admission import Form
+from lfs10d.commands.context import Powers, Request
+from lfs10d.commands.message import NoParameters, Parameters
+from lfs10d.schema.fields import Duration
+
+LONGEST = 600.0
+"""s for which a trace or a pause may go on."""
+USUAL = 30.0
+"""s for which it goes on where nothing is said."""
+
+
+class HowLong(Parameters):
+    """For how long."""
+
+    duration: Annotated[float, Duration(0.1, LONGEST)] = Field(default=USUAL, alias="for")
+
+
+async def trace(parameters: HowLong, powers: Powers, _: Call) -> Answer:
+    """Tell every frame on `trace` for a while."""
+    powers.trace(parameters.duration)
+    return ok({"for": parameters.duration})
+
+
+async def pause(parameters: HowLong, powers: Powers, _: Call) -> Answer:
+    """Free the port for another program for a while."""
+    try:
+        await powers.pause(parameters.duration)
+    except RefusedError as error:
+        return error.answer
+    return ok({"for": parameters.duration})
+
+
+async def cancel(_: NoParameters, powers: Powers, __: Call) -> Answer:
+    """End a scan, a trace, a pause."""
+    return ok({"cancelled": list(powers.cancel())})
+
+
+REQUESTS: Mapping[str, Request] = {
+    "line/trace": Request(Form("sensors", HowLong), trace),
+    "line/pause": Request(Form("sensors", HowLong), pause),
+    "line/cancel": Request(Form("sensors"), cancel),
+}

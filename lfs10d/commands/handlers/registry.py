@@ -1,0 +1,18 @@
+"""Every request by its name: `config/reload` is `B/request/config/reload`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from lfs10d.commands.context import Request
+from lfs10d.commands.handlers import config, device, general, line, reconfigure, register, scan
+
+REQUESTS: Mapping[str, Request] = {
+    **general.REQUESTS,
+    **config.REQUESTS,
+    **device.REQUESTS,
+    **line.REQUESTS,
+    **register.REQUESTS,
+    **scan.REQUESTS,
+    **reconfigure.REQUESTS,
+}

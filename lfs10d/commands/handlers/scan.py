@@ -1,0 +1,137 @@
+"""`line/scan`: who is on the line, found while polling goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from lfs10d.command import Answer, Call, RefusedError, failed, ok
+from lfs10d.commands.admission import Form
+from lfs10d.commands.context import Powers, Request
+from lfs10d.commands.handlers import device
+from lfs10d.commands.message import Parameters
+from lfs10d.line.jobs.identification import Finding
+from lfs10d.line.jobs.scan import Scan
+from lfs10d.line.jobs.scan_plan import LAST_ID, ids_of
+from lfs10d.schema.fields import Choice, Flag, Kind, Whole
+
+BAUDRATES = Choice((1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200))
+
+
+@dataclass(frozen=True)
+class SlaveIds(Kind):
+    """Slave ids, as text of ids and ranges or as a list."""
+
+    @property
+    def words(self) -> str:
+        """Both ways to write them."""
+        return f'ids and ranges from 1 to {LAST_ID} such as "1-20,30", or a list such as [1, 2, 3]'
+
+    def accept(self, value: object) -> tuple[int, ...]:
+        """Take either way; return the ids in order, each once."""
+        if isinstance(value, str):
+            try:
+                return ids_of(value)
+            except ValueError:
+                raise self.refusal(value) from None
+        one = Whole(1, LAST_ID)
+        if not isinstance(value, list) or not value:
+            raise self.refusal(value)
+        return tuple(sorted({one.accept(each) for each in value}))
+
+
+@dataclass(frozen=True)
+class Rates(Kind):
+    """Rates of a line, as a list."""
+
+    @property
+    def words(self) -> str:
+        """How to write them."""
+        return f"a list such as [9600, 19200] of the rates {BAUDRATES.words}; or null"
+
+    def accept(self, value: object) -> tuple[int, ...] | None:
+        """Take a list; return its rates in their order, each once."""
+        if value is None:
+            return None
+        if not isinstance(value, list) or not value:
+            raise self.refusal(value)
+        return tuple(dict.fromkeys(int(BAUDRATES.accept(each) or 0) for each in value))
+
+
+class WhomToFind(Parameters):
+    """Where to look, with how much of the line's time in percent, and whether to add who is found."""
+
+    ids: Annotated[tuple[int, ...], SlaveIds()] = Field(default=f"1-{LAST_ID}", validate_default=True)
+    baudrates: Annotated[tuple[int, ...] | None, Rates()] = Field(
+        default=None, description="Without: the line's own, and both of an LFS10."
+    )
+    share: Annotated[int, Whole(1, 100)] = Field(
+        default=30, description="Percent of the line's time that it takes at most; polling keeps 5 in any case."
+    )
+    add: Annotated[bool, Flag()] = Field(
+        default=False,
+        description="Poll, as by `device/add`, who is new, recognised, at the rate of the line, and beyond doubt.",
+    )
+
+
+async def scan(parameters: WhomToFind, powers: Powers, call: Call) -> Answer:
+    """Find out who is on the line."""
+    try:
+        done = await powers.scan(parameters.ids, parameters.baudrates or (), parameters.share / 100)
+    except RefusedError as error:
+        return error.answer
+    data: dict[str, Any] = {"found": [_told(finding, powers) for finding in done.found]}
+    asked = f"after {done.progress.asked} of {done.progress.total} ids"
+    if done.lost:
+        return failed("line_error", f"the port was lost {asked}", data=data)
+    if not done.complete:
+        return failed("cancelled", f"the scan was ended {asked}", data=data)
+    if parameters.add:
+        data |= await _add(done, powers, call)
+    return ok(data)
+
+
+def _known(finding: Finding, powers: Powers) -> str | None:
+    """Return the name of the device that is configured where this was found."""
+    config = powers.effective().config
+    if finding.baudrate != config.line.baudrate:
+        return None
+    return next((slave.name for slave in config.slaves if slave.id == finding.slave), None)
+
+
+def _told(finding: Finding, powers: Powers) -> dict[str, Any]:
+    name = _known(finding, powers)
+    return {
+        "id": finding.slave,
+        "baudrate": finding.baudrate,
+        "known": name is not None,
+        "suspect": finding.suspect,
+        "duplicate": finding.duplicate,
+        "device": name,
+        "profile": None if finding.profile is None else finding.profile.name,
+        "rtt_ms": None if finding.rtt is None else round(finding.rtt * 1e3, 1),
+    }
+
+
+async def _add(done: Scan, powers: Powers, call: Call) -> dict[str, list[dict[str, Any]]]:
+    """Have polled who is new and beyond doubt, each as `device/add` does; return who was added and who was not."""
+    added: list[dict[str, Any]] = []
+    refused: list[dict[str, Any]] = []
+    for finding in done.found:
+        now = powers.effective()
+        profile = finding.profile
+        doubtful = finding.suspect or finding.duplicate or finding.baudrate != now.config.line.baudrate
+        if profile is None or doubtful or _known(finding, powers) is not None:
+            continue
+        own = now.loaded.profiles
+        word = next((word for word, known in own.items() if known.name == profile.name), profile.name)
+        answer = await device.add(device.NewDevice(slave=finding.slave, profile=word), powers, call)
+        entry = {"id": finding.slave, "error": answer.error()} if answer.code else answer.data
+        (refused if answer.code else added).append(entry)  # type: ignore[arg-type]  # device/add answers with an object
+    return {"added": added, "not_added": refused}
+
+
+REQUESTS: Mapping[str, Request] = {"line/scan": Request(Form("sensors", WhomToFind), scan)}

@@ -1,0 +1,64 @@
+"""Polls that requests wait for: a number goes to the line thread and comes back with the reading."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass
+from itertools import count
+
+from lfs10d.reading import Fault, Reading
+from lfs10d.telemetry.publication import Kind, Payload, Publication
+
+
+@dataclass(frozen=True, slots=True)
+class Inquiry:
+    """What came of one: the sample as it was published, and why there is no value."""
+
+    sample: Payload
+    fault: Fault | None
+
+
+class Inquiries:
+    """Those under way. Used in the thread of the asyncio loop; `submit(device, number)` begins one on the line."""
+
+    def __init__(self, submit: Callable[[str, int], None]) -> None:
+        self._submit = submit
+        self._numbers = count(1)
+        self._waiting: dict[int, tuple[str, asyncio.Future[Inquiry | None]]] = {}
+
+    async def read(self, device: str) -> Inquiry | None:
+        """Have a device polled and wait for its sample; None if `abandon` came first."""
+        number = next(self._numbers)
+        future: asyncio.Future[Inquiry | None] = asyncio.get_running_loop().create_future()
+        self._waiting[number] = device, future
+        try:
+            self._submit(device, number)
+            return await future
+        finally:
+            del self._waiting[number]
+
+    def heard(self, reading: Reading, published: Iterable[Publication]) -> None:
+        """Tell those who wait for this reading; `published` is what the station made of it."""
+        if not reading.requests:
+            return
+        sample = next((each.payload for each in published if each.kind is Kind.SAMPLE), None)
+        for number in reading.requests:
+            self._tell(number, Inquiry(sample, reading.fault))
+
+    def abandon(self, devices: Collection[str]) -> None:
+        """Tell those who wait for one of these devices that no reading will come."""
+        for number, (device, _) in self._waiting.items():
+            if device in devices:
+                self._tell(number, None)
+
+    def _tell(self, number: int, inquiry: Inquiry | None) -> None:
+        if number in self._waiting:
+            _, future = self._waiting[number]
+            if not future.done():
+                future.set_result(inquiry)
+
+
+def altered(before: Mapping[str, object], after: Mapping[str, object]) -> frozenset[str]:
+    """Return the names that are gone or stand for something else than before."""
+    return frozenset(name for name, what in before.items() if after.get(name) != what)

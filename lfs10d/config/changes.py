@@ -1,0 +1,168 @@
+"""What requests changed of the configuration, each with what the file said then; and what a request does to it. Pure.
+
+How the changes and the file as it is now go together is told in `lfs10d.config.merge`. What is said of a device is a
+mapping of keys of `SlaveConfig`, without its name, to values as the program uses them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeAlias
+
+OPTIONS = ("interval", "enabled", "label", "response_timeout")
+"""What a request may change of a device, in the order of the file."""
+
+Saying: TypeAlias = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What the file says: each slave by its name, in order; `usual` are the values of keys it says nothing of."""
+
+    slaves: Mapping[str, Saying]
+    baudrate: int = 9600
+    usual: Saying = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Rate:
+    """The line's rate: `now` was verified, `file` is what the file said then."""
+
+    file: int
+    now: int
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a device answers: its slave id, and the rate, or the line's where that is None."""
+
+    id: int
+    baudrate: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Verified:
+    """Where a device was verified last; `file` is the id in the file then, None where the file had no such device."""
+
+    place: Place
+    file: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceChange:
+    """What was changed of one name.
+
+    `removed` is what the file said of a device that is polled no more, `added` what holds of one that a request
+    added (after the removal, if both are there), and `added_at` where that one answered. `options` hold of a device
+    of the file, which said `instead_of` of these keys; a key missing there was not in the file. `verified` is of the
+    device of the file, removed or not.
+    """
+
+    removed: Saying | None = None
+    added: Saying | None = None
+    added_at: Place | None = None
+    options: Saying = field(default_factory=dict)
+    instead_of: Saying = field(default_factory=dict)
+    verified: Verified | None = None
+
+    def __bool__(self) -> bool:
+        return bool(self.count)
+
+    @property
+    def count(self) -> int:
+        """How many changes these are."""
+        wholes = (self.removed, self.added, self.verified)
+        return sum(whole is not None for whole in wholes) + len(self.options)
+
+    @property
+    def proven(self) -> Place | None:
+        """Where the device that holds was verified last, None if it never was."""
+        if self.added is not None:
+            return self.added_at
+        return None if self.verified is None else self.verified.place
+
+
+@dataclass(frozen=True, slots=True)
+class Changes:
+    """All that requests changed; `baudrate` is the line's."""
+
+    devices: Mapping[str, DeviceChange] = field(default_factory=dict)
+    baudrate: Rate | None = None
+
+    @property
+    def count(self) -> int:
+        """How many changes there are."""
+        return sum(change.count for change in self.devices.values()) + (self.baudrate is not None)
+
+    def of(self, name: str) -> DeviceChange:
+        """Return what was changed of a device, which may be nothing."""
+        return self.devices.get(name, DeviceChange())
+
+    def with_device(self, name: str, change: DeviceChange) -> Changes:
+        """Return the changes with another one of this device; one that changes nothing is left out."""
+        devices = {**self.devices, name: change}
+        return replace(self, devices={key: value for key, value in devices.items() if value})
+
+    # -- what requests do
+
+    def adding(self, name: str, entry: Saying, verified: Place | None = None) -> Changes:
+        """Return the changes with one more device; nobody has this name now."""
+        return self.with_device(name, replace(self.of(name), added=entry, added_at=verified))
+
+    def removing(self, name: str, said: Said) -> Changes:
+        """Return the changes without this device, be it the file's or one that was added."""
+        return self.with_device(name, DeviceChange(removed=said.slaves.get(name), verified=self.of(name).verified))
+
+    def moving(self, name: str, place: Place, said: Said) -> Changes:
+        """Return the changes with another place for a device that is there now: there it was verified."""
+        change = self.of(name)
+        if change.added is not None:
+            moved = replace(change, added={**change.added, "id": place.id}, added_at=place)
+            return self.with_device(name, moved)
+        filed = said.slaves[name]["id"]
+        verified = None if place == Place(filed) else Verified(place, file=filed)
+        return self.with_device(name, replace(change, verified=verified))
+
+    def setting(self, name: str, options: Saying, said: Said) -> Changes:
+        """Return the changes with other options of a device that is there now.
+
+        An option that is set to what the file gives anyway is no change any more.
+        """
+        change = self.of(name)
+        if change.added is not None:
+            return self.with_device(name, replace(change, added={**change.added, **options}))
+        entry = said.slaves[name]
+        wanted = {**change.options, **options}
+        wanted = {key: value for key, value in wanted.items() if value != value_of(entry, key, said)}
+        base = {key: entry[key] for key in wanted if key in entry}
+        return self.with_device(name, replace(change, options=wanted, instead_of=base))
+
+    def resetting(self, name: str, keys: frozenset[str] | None = None) -> Changes:
+        """Return the changes without those of a device's options, or of these `keys` only; facts stay.
+
+        Without `keys` a device that was added goes and one that was removed comes back.
+        """
+        change = self.of(name)
+        if keys is None:
+            return self.with_device(name, DeviceChange(verified=change.verified))
+        options = {key: value for key, value in change.options.items() if key not in keys}
+        base = {key: value for key, value in change.instead_of.items() if key not in keys}
+        return self.with_device(name, replace(change, options=options, instead_of=base))
+
+
+def keys(changes: Changes) -> Iterator[str]:
+    """Yield what was changed, by key as in `lfs10d.config.diff`."""
+    if changes.baudrate is not None:
+        yield "line.baudrate"
+    for name, change in changes.devices.items():
+        if change.removed is not None or change.added is not None:
+            yield f"slaves.{name}"
+        yield from (f"slaves.{name}.{key}" for key in change.options)
+        if change.verified is not None:
+            yield f"slaves.{name}.id"
+
+
+def value_of(entry: Saying, key: str, said: Said) -> Any:  # noqa: ANN401  # any value of the configuration
+    """Return what the file gives for a key of a slave, said there or not."""
+    return entry.get(key, said.usual.get(key))

@@ -1,0 +1,242 @@
+"""`changes.yaml` in the state directory: YAML that a person can read, the whole of it replaced at each change.
+
+A file that cannot be understood (damaged, foreign, of a newer lfs10d) is put aside and reported, and nothing is
+changed by it. One that cannot be read at all stays where it is, and nothing is written in its place.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, ValidationError
+from pydantic_core import PydanticCustomError
+
+from lfs10d.config.changes import OPTIONS, Changes, DeviceChange, Place, Rate, Saying, Verified
+from lfs10d.config.credentials import reason
+from lfs10d.config.models import LineConfig, Section, SlaveConfig
+from lfs10d.errors import ConfigError, StateError
+from lfs10d.schema.document import LARGEST_FILE, decode, parse
+from lfs10d.schema.fields import Choice, Name, Whole
+from lfs10d.schema.quantities import duration_text
+from lfs10d.schema.yaml12 import render
+from lfs10d.system.disk import Disk
+
+FILE_NAME = "changes.yaml"
+VERSION = 1
+"""Of the form below."""
+ASIDE = "changes.yaml.unreadable"
+"""Where a file that cannot be understood is put; the last one is kept."""
+MODE = 0o640
+"""Whoever may read the state directory may read what was changed."""
+
+HEADING = """\
+# What requests changed of the configuration file, and what the file said then. Written by lfs10d.
+# A change holds until somebody edits the same key of the file. `lfs10d config --merged` prints both as one file,
+# the request config/reset takes a change back.
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What was in the file; `missing` if there is none, `trouble` in words if it cannot be used."""
+
+    changes: Changes
+    missing: bool = False
+    trouble: str | None = None
+
+
+class ChangeFile:
+    """The file in one state directory."""
+
+    def __init__(self, directory: Path, disk: Disk) -> None:
+        self.path = directory / FILE_NAME
+        self._disk = disk
+        self._unread: str | None = None
+
+    def read(self) -> Found:
+        """Read it; it stays as it is. Raises StateError if it is there and cannot be read."""
+        content = self._content()
+        if content is None:
+            return Found(Changes(), missing=True)
+        try:
+            return Found(understood(content, str(self.path)))
+        except ConfigError as error:
+            return Found(Changes(), trouble=str(error.problems[0]))
+
+    def _content(self) -> bytes | None:
+        try:
+            return self._disk.read(self.path)
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            raise StateError(f"{self.path} cannot be read: {reason(error)}") from None
+
+    def take(self) -> Found:
+        """Read it for good: one that cannot be understood is put aside. Never fails."""
+        try:
+            found = self.read()
+        except StateError as error:
+            self._unread = str(error)
+            return Found(Changes(), trouble=f"{error}; what requests changed is not known")
+        if found.trouble is None:
+            return found
+        aside = self.path.with_name(ASIDE)
+        with contextlib.suppress(OSError):
+            self._disk.put_aside(self.path, aside)
+            return Found(Changes(), trouble=f"{found.trouble}; the file is now {aside}, and nothing is changed by it")
+        self._unread = found.trouble
+        return found
+
+    def save(self, changes: Changes) -> None:
+        """Put these changes on the disk; raises StateError, and then the file holds what it held."""
+        if self._unread is not None:
+            raise StateError(self._unread)
+        content = written(changes)
+        if len(content) > LARGEST_FILE:
+            raise StateError(f"{self.path} would be too large; put changes into the file (lfs10d config --merged)")
+        before = self._content()
+        try:
+            self._disk.replace(self.path, content, mode=MODE)
+        except OSError as error:
+            self._restore(before, content)
+            raise StateError(f"{self.path} cannot be written: {reason(error)}") from None
+
+    def _restore(self, before: bytes | None, content: bytes) -> None:
+        """Take back what was written but, for all we know, not synced."""
+        with contextlib.suppress(OSError, StateError):
+            if self._content() == content != before:
+                if before is None:
+                    self._disk.remove(self.path)
+                else:
+                    self._disk.replace(self.path, before, mode=MODE)
+
+
+# -- the form
+
+_Id = Annotated[int, Whole(1, 255)]
+_Baudrate = Annotated[
+    int, next(kind for kind in LineConfig.model_fields["baudrate"].metadata if isinstance(kind, Choice))
+]
+
+
+def _saying(value: object, *, keys: tuple[str, ...], whole: bool) -> Saying:
+    """Take what is said of a device in the words of the configuration."""
+    if not isinstance(value, dict) or not set(value) <= set(keys) or ("id" in value) is not whole:
+        message = f"must be a mapping of {', '.join(keys)}" + (" with an id" if whole else "")
+        raise PydanticCustomError("plain", "{message}", {"message": message})
+    slave = SlaveConfig.model_validate({"id": 1, **value})
+    return {key: getattr(slave, key) for key in value}
+
+
+_ENTRY = tuple(key for key in SlaveConfig.model_fields if key != "name")
+_Entry = Annotated[dict[str, Any], BeforeValidator(lambda value: _saying(value, keys=_ENTRY, whole=True))]
+_Options = Annotated[dict[str, Any], BeforeValidator(lambda value: _saying(value, keys=OPTIONS, whole=False))]
+
+
+class _Place(Section):
+    id: _Id
+    baudrate: _Baudrate | None = None
+
+    def place(self) -> Place:
+        return Place(self.id, self.baudrate)
+
+
+class _Verified(_Place):
+    file: _Id | None = None
+
+
+class _Device(Section):
+    removed: _Entry | None = None
+    added: _Entry | None = None
+    added_at: _Place | None = None
+    options: _Options = Field(default_factory=dict)
+    instead_of: _Options = Field(default_factory=dict)
+    verified: _Verified | None = None
+
+    def change(self) -> DeviceChange:
+        return DeviceChange(
+            removed=self.removed,
+            added=self.added,
+            added_at=None if self.added_at is None else self.added_at.place(),
+            options=self.options,
+            instead_of=self.instead_of,
+            verified=None if self.verified is None else Verified(self.verified.place(), self.verified.file),
+        )
+
+
+class _Rate(Section):
+    file: _Baudrate
+    now: _Baudrate
+
+
+class _Line(Section):
+    baudrate: _Rate | None = None
+
+
+class _Content(Section):
+    version: Annotated[int, Whole(VERSION, VERSION)]
+    line: _Line = _Line()
+    devices: dict[Annotated[str, Name()], _Device] = Field(default_factory=dict)
+
+
+def understood(content: bytes, file: str) -> Changes:
+    """Return the changes in a file's content; raises ConfigError if any of it is not ours."""
+    document = parse(decode(content, file), file)
+    if document.problems:
+        raise ConfigError(document.problems)
+    version = document.data.get("version") if isinstance(document.data, dict) else None
+    if isinstance(version, int) and version > VERSION:
+        raise ConfigError((document.problem(("version",), f"is {version}: a newer lfs10d wrote this file"),))
+    try:
+        known = _Content.model_validate(document.data)
+    except ValidationError as error:
+        raise ConfigError(document.problems_of(error)) from None
+    rate = known.line.baudrate
+    return Changes(
+        devices={name: device.change() for name, device in known.devices.items()},
+        baudrate=None if rate is None else Rate(rate.file, rate.now),
+    )
+
+
+def written(changes: Changes) -> bytes:
+    """Return the file's content for these changes."""
+    data: dict[str, Any] = {"version": VERSION}
+    if changes.baudrate is not None:
+        data["line"] = {"baudrate": {"file": changes.baudrate.file, "now": changes.baudrate.now}}
+    data["devices"] = {name: _device(change) for name, change in changes.devices.items()}
+    return (HEADING + render(data)).encode()
+
+
+def _device(change: DeviceChange) -> dict[str, Any]:
+    data: dict[str, Any] = {}
+    for key in ("removed", "added", "options", "instead_of"):
+        saying = getattr(change, key)
+        if saying:
+            data[key] = in_words(saying)
+    if change.added_at is not None:
+        data["added_at"] = _place(change.added_at)
+    if change.verified is not None:
+        data["verified"] = _place(change.verified.place)
+        if change.verified.file is not None:
+            data["verified"]["file"] = change.verified.file
+    return data
+
+
+def _place(place: Place) -> dict[str, int]:
+    return {"id": place.id} if place.baudrate is None else {"id": place.id, "baudrate": place.baudrate}
+
+
+def in_words(saying: Saying) -> dict[str, Any]:
+    """Return what is said of a device as one writes it into the file: durations with their unit, auto for None."""
+    return {key: _word(key, value) for key, value in saying.items()}
+
+
+def _word(key: str, value: object) -> object:
+    if key == "response_timeout" and value is None:
+        return "auto"
+    if isinstance(value, float):
+        return duration_text(value) if value else 0
+    return value

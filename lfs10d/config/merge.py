@@ -1,0 +1,177 @@
+"""The three-way merge of the file as it is, as it was when a request changed something, and that change. Pure.
+
+Rules
+-----
+1. A change holds as long as the file still says what it said when the change was made (`instead_of`, `removed`,
+   `file`). Nothing said is a saying too: who writes a default out after a request changed it wants it back. Keys are
+   compared one by one, as values; devices go by their names.
+2. Once a person edits such a key the file wins and the change is dropped; silently where both now say the same.
+3. A slave id or a baud rate is a fact, not a wish: where the file was edited to another one than was last verified,
+   neither has won before the line was asked. The file's place is then tried first, and the change is kept.
+4. A device that a request added, and that the file now has too, is one of the file; its options stay changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from lfs10d.config.changes import OPTIONS, Changes, DeviceChange, Place, Rate, Said, Saying, Verified, value_of
+
+_NOTHING: Saying = {}
+_UNSAID = object()
+
+
+@dataclass(frozen=True, slots=True)
+class Dropped:
+    """A change that holds no more because a person edited the file: the value `lost`, and why.
+
+    `key` is as in `lfs10d.config.diff`: `slaves.mast-top.interval`, or `slaves.mast-top` for all of it. The file of
+    changes that could not be understood is one without a device.
+    """
+
+    key: str
+    device: str | None
+    lost: Any
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class Merged:
+    """What holds: `devices` by name, in order, with what is said of each; `changed` are the keys that changes say.
+
+    `changes` are those left, `dropped` those a person should know of. `contested` are the places where the file and
+    what was verified differ: the file's first. `baudrate` is the line's.
+    """
+
+    devices: Mapping[str, Saying]
+    changed: Mapping[str, frozenset[str]]
+    baudrate: int
+    changes: Changes
+    dropped: tuple[Dropped, ...]
+    contested: Mapping[str, tuple[Place, ...]]
+
+
+def merge(said: Said, changes: Changes) -> Merged:
+    """Return what the file and the changes give together, by the rules above."""
+    names = [*said.slaves, *(name for name in changes.devices if name not in said.slaves)]
+    devices: dict[str, Saying] = {}
+    changed: dict[str, frozenset[str]] = {}
+    left: dict[str, DeviceChange] = {}
+    dropped: list[Dropped] = []
+    contested: dict[str, tuple[Place, ...]] = {}
+    rate, baudrate, rates = _merge_rate(said, changes.baudrate)
+    for name in names:
+        change, lost = _settle(name, said, changes.of(name))
+        dropped += lost
+        if change:
+            left[name] = change
+        entry, keys = _entry(said.slaves.get(name), change)
+        if entry is None:
+            continue
+        devices[name], changed[name] = entry, keys
+        places = _places(entry["id"], change, rates)
+        if len(places) > 1:
+            contested[name] = places
+    return Merged(devices, changed, baudrate, Changes(left, rate), tuple(dropped), contested)
+
+
+def _merge_rate(said: Said, rate: Rate | None) -> tuple[Rate | None, int, tuple[int, ...]]:
+    """Return what is left of the change, the rate to begin with, and all that come into question."""
+    if rate is None or said.baudrate == rate.now:
+        return None, said.baudrate, (said.baudrate,)
+    if said.baudrate == rate.file:
+        return rate, rate.now, (rate.now,)
+    return rate, said.baudrate, (said.baudrate, rate.now)
+
+
+def _places(slave: int, change: DeviceChange, rates: tuple[int, ...]) -> tuple[Place, ...]:
+    """Return where a device may be: where it is said to be first, then where it was verified."""
+    proven = change.proven
+    if proven is None:
+        return tuple(Place(slave, rate) for rate in rates)
+    last = Place(proven.id, proven.baudrate or rates[-1])
+    if slave == last.id and len(rates) == 1:
+        return (last,)
+    first = Place(slave, rates[0])
+    return (first,) if first == last else (first, last)
+
+
+def _entry(entry: Saying | None, change: DeviceChange) -> tuple[Saying | None, frozenset[str]]:
+    """Return what holds of a device, None for no device, and which keys of it changes say."""
+    if change.added is not None:
+        return change.added, frozenset(change.added)
+    if change.removed is not None or entry is None:
+        return None, frozenset()
+    facts = {}
+    if change.verified is not None and change.verified.file == entry["id"]:
+        facts["id"] = change.verified.place.id
+    return {**entry, **change.options, **facts}, frozenset({*change.options, *facts})
+
+
+# -- one device, three ways
+
+
+def _settle(name: str, said: Said, change: DeviceChange) -> tuple[DeviceChange, list[Dropped]]:
+    """Return what is left of the changes of one device, and what of it a person should know is lost."""
+    entry = said.slaves.get(name)
+    if change.removed is not None:
+        if entry == change.removed:
+            return change, []
+        if entry is not None:
+            return _unremoved(name, entry, said, change)
+        change = replace(change, removed=None, verified=None)
+    if change.added is not None:
+        return (change, []) if entry is None else _adopted(name, entry, said, change)
+    if entry is None:
+        what = {**change.options, **({} if change.verified is None else {"id": change.verified.place.id})}
+        gone = "the file has this device no more"
+        return DeviceChange(), [_dropped(name, key, value, gone) for key, value in what.items()]
+    return _kept(name, entry, said, change)
+
+
+def _unremoved(name: str, entry: Saying, said: Said, change: DeviceChange) -> tuple[DeviceChange, list[Dropped]]:
+    """Give a device that was removed by request back to the file, where a person edited it."""
+    kept, lost = _kept(name, entry, said, DeviceChange(verified=change.verified))
+    if entry != change.added:
+        what = {"removed": True} if change.added is None else dict(change.added)
+        lost.append(Dropped(f"slaves.{name}", name, what, "the file's entry of this device was edited"))
+    return kept, lost
+
+
+def _adopted(name: str, entry: Saying, said: Said, change: DeviceChange) -> tuple[DeviceChange, list[Dropped]]:
+    """Take a device that was added by request for one of the file, where a person put it (rule 4)."""
+    added = change.added or _NOTHING
+    options = {key: added[key] for key in OPTIONS if key in added}
+    proof = None if change.added_at is None else Verified(change.added_at)
+    kept, lost = _kept(name, entry, said, DeviceChange(options=options, verified=proof))
+    for key in ("id", "profile", "checksum"):
+        if key in added and added[key] != value_of(entry, key, said) and not (key == "id" and proof):
+            lost.append(_dropped(name, key, added[key], _says(entry, key)))
+    return kept, lost
+
+
+def _kept(name: str, entry: Saying, said: Said, change: DeviceChange) -> tuple[DeviceChange, list[Dropped]]:
+    """Compare what was changed of a device of the file, key by key."""
+    options: dict[str, Any] = {}
+    lost: list[Dropped] = []
+    for key, value in change.options.items():
+        if entry.get(key, _UNSAID) == change.instead_of.get(key, _UNSAID):
+            options[key] = value
+        elif value_of(entry, key, said) != value:
+            lost.append(_dropped(name, key, value, _says(entry, key)))
+    verified = change.verified
+    if verified is not None and entry["id"] == verified.place.id and verified.file != entry["id"]:
+        # The file names the id that was verified; the rate it was verified at is the line's, or still a fact.
+        verified = None if verified.place.baudrate in (None, said.baudrate) else replace(verified, file=entry["id"])
+    base = {key: change.instead_of[key] for key in options if key in change.instead_of}
+    return replace(change, options=options, instead_of=base, verified=verified), lost
+
+
+def _says(entry: Saying, key: str) -> str:
+    return "the file says something else now" if key in entry else "the file's own was taken out"
+
+
+def _dropped(name: str, key: str, lost: object, message: str) -> Dropped:
+    return Dropped(f"slaves.{name}.{key}", name, lost, message)

@@ -1,0 +1,327 @@
+"""The configuration as frozen, strict models: every key with its default, its range and its meaning.
+
+The names are the keys of the file. Durations are float seconds, sizes bytes. `Config` as read from a file still has
+gaps (a slave without a name, a broker without a client id); `lfs10d.config.defaults` fills them. Nothing here reads a file.
+`docs/configuration.md` is generated from these models.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic_core import PydanticCustomError
+
+from lfs10d.schema.fields import (
+    PLAIN_ERROR,
+    BaseTopic,
+    Choice,
+    Duration,
+    FilePath,
+    Flag,
+    Hosts,
+    Name,
+    Size,
+    Text,
+    Whole,
+    node_text,
+    shown,
+    split_node,
+)
+
+MINUTE, HOUR, DAY = 60.0, 3600.0, 86400.0
+PLAIN_PORT, TLS_PORT = 1883, 8883
+"""Registered with IANA for MQTT and for MQTT over TLS."""
+
+LONGEST_CLIENT_ID = 200
+"""Characters; a broker need not take more than 23 (MQTT 5.0, section 3.1.3.1), all known ones do."""
+
+DEFAULT_STEM = "lfs10d"
+"""The file name without suffix whose line is `line0` by default."""
+
+DEFAULT_LINE = "line0"
+
+SlaveId: TypeAlias = Annotated[int, Whole(1, 255)]
+Label: TypeAlias = Annotated[str | None, Text(200, null=True)]
+Interval: TypeAlias = Annotated[float, Duration(0.02, DAY, zero="as fast as the line allows")]
+ResponseTimeout: TypeAlias = Annotated[float | None, Duration(0.01, 10, auto="learned")]
+
+CommandClass: TypeAlias = Literal["polling", "sensors", "registers"]
+
+
+class Section(BaseModel):
+    """Strict and frozen: no guessing of types, no unknown keys, no NaN, no change after loading."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+def _items(value: object) -> object:
+    """Let a YAML list become a tuple; anything else is told in plain words."""
+    if not isinstance(value, list | tuple):
+        message = f"must be a list, [] for none, not {shown(value)}"
+        raise PydanticCustomError(PLAIN_ERROR, "{message}", {"message": message})
+    return tuple(value)
+
+
+class Rs485Config(Section):
+    """How the driver switches the transceiver (kernel document serial-rs485)."""
+
+    rts_on_send: Annotated[bool, Flag()] = Field(default=True, description="Level of RTS while sending.")
+    rts_after_send: Annotated[bool, Flag()] = Field(default=False, description="Level of RTS after sending.")
+    delay_before_send: Annotated[float, Duration(0, 1)] = Field(0.0, description="Time between RTS and the first bit.")
+    delay_after_send: Annotated[float, Duration(0, 1)] = Field(0.0, description="Time between the last bit and RTS.")
+
+
+class LineConfig(Section):
+    """The RS485 line and the port it hangs on."""
+
+    name: Annotated[str, Name()] = Field(
+        "",
+        description="Second part of every topic, stable for life. "
+        "Default: line0 for lfs10d.yaml, else the file's name without .yaml.",
+    )
+    port: Annotated[str, FilePath()] = Field(
+        description="Path of the serial port; best one below /dev/serial/by-id, which stays the same when replugged."
+    )
+    baudrate: Annotated[int, Choice((1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200))] = Field(
+        9600, description="Bits per second. An LFS10 can do 9600 and 19200."
+    )
+    parity: Annotated[Literal["none", "even", "odd"], Choice(("none", "even", "odd"))] = Field(
+        "none", description="Parity bit of each character."
+    )
+    databits: Annotated[int, Choice((8, 7))] = Field(8, description="Data bits of each character; 7 with ascii only.")
+    stopbits: Annotated[int, Choice((1, 2))] = Field(1, description="Stop bits of each character.")
+    framing: Annotated[Literal["rtu", "ascii"], Choice(("rtu", "ascii"))] = Field(
+        "rtu", description="Modbus framing, one for the whole line. LFS10 and EH600 speak rtu only."
+    )
+    extra_gap: Annotated[float, Duration(0, 1)] = Field(
+        0.0, description="Added to the 3.5 characters of silence before each request."
+    )
+    turnaround_delay: Annotated[float, Duration(0, 10)] = Field(
+        0.1, description="Silence after a broadcast, which nobody answers."
+    )
+    echo: Annotated[Literal["auto", "on", "off"], Choice(("auto", "on", "off"))] = Field(
+        "auto", description="Does the adapter return our own bytes? auto finds out."
+    )
+    low_latency: Annotated[bool, Flag()] = Field(
+        default=True, description="Ask the driver for its low-latency mode where it has one."
+    )
+    realtime: Annotated[bool, Flag()] = Field(
+        default=False, description="SCHED_FIFO for the thread that owns the line, where the system permits it."
+    )
+    rs485: Rs485Config | None = Field(
+        None, description="Let the driver switch the transceiver by RTS; null leaves the driver as it is."
+    )
+
+
+class PollConfig(Section):
+    """How slaves are polled, unless a slave says otherwise."""
+
+    interval: Interval = Field(
+        1.0,
+        description="Time between two polls of one slave; 0 is as fast as the line allows, "
+        "in turn with what the others leave.",
+    )
+    response_timeout: Annotated[float | None, Duration(0.01, 10, auto="learned per slave")] = Field(
+        None,
+        description="From the last bit of the request to the first byte of the answer; "
+        "auto is learned per slave within 50ms..1s.",
+    )
+    retries: Annotated[int, Whole(0, 10)] = Field(
+        1,
+        description="Further exchanges within one poll that failed; "
+        "never for a write, an offline or a never-heard slave.",
+    )
+    offline_after: Annotated[int, Whole(1, 1000)] = Field(
+        3, description="Consecutive failed polls after which a device is offline."
+    )
+    probe_interval_max: Annotated[float, Duration(1, DAY)] = Field(
+        15.0,
+        description="An offline slave is probed after 1s, 2s, 4s ... up to this; all probes together take at most "
+        "5 % of the line while others answer.",
+    )
+
+
+class SlaveConfig(Section):
+    """One device on the line."""
+
+    id: SlaveId = Field(description="Slave id, 1 to 255; a profile may narrow it.")
+    name: Annotated[str, Name()] = Field(
+        "", description="Part of its topics, stable for life. Default: slave-<id as in the file>."
+    )
+    label: Label = Field(None, description="For people: free text, never in a topic.")
+    profile: Annotated[str, FilePath()] = Field(
+        "lfs10",
+        description="lfs10, ld-e, fuling-dzb, eh600, or the path of a profile YAML, relative to this file.",
+    )
+    interval: Interval = Field(1.0, description="Time between two polls. Default: poll.interval.")
+    enabled: Annotated[bool, Flag()] = Field(default=True, description="Whether it is polled.")
+    response_timeout: ResponseTimeout = Field(
+        None, description="Time to its answer's first byte. Default: poll.response_timeout."
+    )
+    checksum: Annotated[Literal["crc", "sum"] | None, Choice(("crc", "sum"), null=True)] = Field(
+        None, description="Check of its rtu frames; null is the profile's."
+    )
+    request_gap: Annotated[float, Duration(0, 60)] = Field(
+        0.0,
+        description="Rest before each request to it, counted from the end of the exchange with it before; "
+        "the greater of this and the profile's.",
+    )
+
+
+def _slave(value: object) -> object:
+    """Let a bare id stand for a mapping with nothing else."""
+    if isinstance(value, int) and not isinstance(value, bool):
+        return {"id": value}
+    if not isinstance(value, dict):
+        message = f"must be a slave id, a whole number from 1 to 255, or a mapping with an id, not {shown(value)}"
+        raise PydanticCustomError(PLAIN_ERROR, "{message}", {"message": message})
+    return value
+
+
+class TlsConfig(Section):
+    """TLS to the broker; paths are relative to the file."""
+
+    ca: Annotated[str | None, FilePath(null=True)] = Field(
+        None, description="File of the authorities to trust; null is the system's."
+    )
+    cert: Annotated[str | None, FilePath(null=True)] = Field(None, description="File of our own certificate.")
+    key: Annotated[str | None, FilePath(null=True)] = Field(
+        None, description="File of our own key, unless it is in cert."
+    )
+
+
+class MqttConfig(Section):
+    """The broker and who we are there."""
+
+    host: Annotated[str | tuple[str, ...], Hosts()] = Field(
+        "localhost",
+        description="Host name or address of the broker; or a list of its nodes, tried in turn until one accepts us, "
+        "then kept until it is gone.",
+    )
+    port: Annotated[int, Whole(1, 65535)] = Field(
+        PLAIN_PORT,
+        description="Port of the broker, of each node that has none of its own. "
+        f"Default: {PLAIN_PORT}, {TLS_PORT} with tls.",
+    )
+    version: Annotated[Literal["5", "3.1.1"], Choice((5, "3.1.1"), meaning={5: "5", "5": "5"})] = Field(
+        "5",
+        description="MQTT version. A broker that refuses 5 is spoken to in 3.1.1, with one warning.",
+    )
+    base_topic: Annotated[str, BaseTopic()] = Field(
+        "lfs10d", description="First part of every topic; may have several levels; %H is the host name."
+    )
+    client_id: Annotated[str | None, Text(LONGEST_CLIENT_ID, null=True)] = Field(
+        None, description="Must differ between clients; %H is the host name. Default: lfs10d-<host name>-<line name>."
+    )
+    telemetry: Annotated[bool, Flag()] = Field(
+        default=True,
+        description="false: no `telemetry` and no `history`, only states, errors, statistics, events and responses; "
+        "for a slow or dear uplink.",
+    )
+    state_every: Annotated[float, Duration(1, HOUR)] = Field(
+        1.0,
+        description="`state` of a device at most so often; a change of quality or error at once.",
+    )
+    username: Annotated[str | None, Text(200, null=True)] = Field(None, description="Login name; null for none.")
+    password_file: Annotated[str | None, FilePath(null=True)] = Field(
+        None,
+        description="File with the password in its first line, relative to this file; "
+        "null is the systemd credential mqtt-password, if there is one.",
+    )
+    tls: TlsConfig | None = Field(None, description="null for none; {} uses the system's authorities.")
+    keepalive: Annotated[float, Duration(1, 65535)] = Field(
+        20.0, description="Longest silence before the connection is tried; whole seconds, rounded up."
+    )
+
+    @property
+    def nodes(self) -> tuple[tuple[str, int], ...]:
+        """The broker's nodes in turn, host and port; one where `host` is no list."""
+        if isinstance(self.host, str):
+            return ((self.host, self.port),)
+        return tuple((host, self.port if port is None else port) for host, port in map(split_node, self.host))
+
+    @property
+    def broker(self) -> str:
+        """The broker in words: `localhost:1883`, its nodes joined by commas."""
+        return ", ".join(node_text(host, port) for host, port in self.nodes)
+
+
+class StoreConfig(Section):
+    """The backlog on disk while the broker is away."""
+
+    max_size: Annotated[int, Size(0, 10**13)] = Field(
+        512 * 10**6, description="Largest size on disk; below 1MB memory alone."
+    )
+    max_age: Annotated[float, Duration(1, 3650 * DAY)] = Field(7 * DAY, description="Older samples are dropped.")
+
+
+class LogConfig(Section):
+    """What is logged."""
+
+    level: Annotated[Literal["debug", "info", "warning", "error"], Choice(("debug", "info", "warning", "error"))] = (
+        Field("info", description="Least severity that is logged; debug shows every frame.")
+    )
+    format: Annotated[Literal["auto", "journal", "text"], Choice(("auto", "journal", "text"))] = Field(
+        "auto", description="auto is journal priorities under systemd, coloured text on a terminal."
+    )
+
+
+class HomeassistantConfig(Section):
+    """Home Assistant discovery. Without effect yet."""
+
+    discovery: Annotated[bool, Flag()] = Field(default=False, description="Announce devices to Home Assistant.")
+    prefix: Annotated[str, BaseTopic()] = Field("homeassistant", description="Its discovery prefix.")
+
+
+class WindConfig(Section):
+    """Wind statistics. Without effect yet."""
+
+    every: Annotated[float, Duration(1, HOUR)] = Field(10.0, description="Time between two statistics.")
+
+
+LATER_SECTIONS = ("homeassistant", "wind")
+"""Accepted and checked, but without effect yet."""
+
+CommandChoice: TypeAlias = Annotated[CommandClass, Choice(("polling", "sensors", "registers"))]
+
+
+class Config(Section):
+    """The whole file."""
+
+    line: LineConfig = Field(description="The RS485 line; at least `port`.")
+    poll: PollConfig = Field(PollConfig(), description="How slaves are polled.")
+    slaves: Annotated[tuple[Annotated[SlaveConfig, BeforeValidator(_slave)], ...], BeforeValidator(_items)] = Field(
+        (), description="A list of slave ids, of mappings, or both; may be empty."
+    )
+    mqtt: MqttConfig = Field(MqttConfig(), description="The broker.")
+    commands: Annotated[tuple[CommandChoice, ...], BeforeValidator(_items)] = Field(
+        ("polling", "sensors"),
+        description="Classes of requests obeyed: polling (what is polled and how), sensors (what changes or searches "
+        "the line), registers (raw access); [] for none.",
+    )
+    homeassistant: HomeassistantConfig = Field(HomeassistantConfig(), description="Home Assistant (later).")
+    wind: WindConfig = Field(WindConfig(), description="Wind statistics (later).")
+    store: StoreConfig = Field(StoreConfig(), description="The backlog on disk while the broker is away.")
+    log: LogConfig = Field(LogConfig(), description="What is logged.")
+
+
+def default_line_name(stem: str) -> str:
+    """Return the line's name for a file of this name without suffix: always a name.
+
+    What cannot be in a name becomes `-`.
+    """
+    if stem == DEFAULT_STEM:
+        return DEFAULT_LINE
+    return re.sub(r"[^a-z0-9_-]+", "-", stem.lower()).strip("-")[:32] or DEFAULT_LINE
+
+
+def default_device_name(slave: int) -> str:
+    """Return the name of a device that has none in the file."""
+    return f"slave-{slave}"
+
+
+def device_name(slave: SlaveConfig) -> str:
+    """Return the name as given, or the default."""
+    return slave.name or default_device_name(slave.id)

@@ -1,0 +1,107 @@
+"""What a reload has to do: the running configuration against the files as they are now. Pure but for the reading."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from lfs10d.config.diff import difference
+from lfs10d.config.loader import Loaded, load
+from lfs10d.config.models import MqttConfig
+from lfs10d.system.regular_file import read_regular
+
+
+@dataclass(frozen=True, slots=True)
+class Files:
+    """A valid configuration, and by key a digest of each file of the login beside it."""
+
+    loaded: Loaded
+    login: Mapping[str, bytes]
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What changes. `loaded` runs from now on: what needs a restart is in it as it was."""
+
+    loaded: Loaded
+    applied: tuple[str, ...]
+    restart_required: tuple[str, ...]
+    line: bool
+    """The port is set, or the line spoken on, in another way."""
+    realtime: bool
+    polling: bool
+    """Devices came, went or changed, or how they are polled."""
+    broker: bool
+    """The connection is to be made anew."""
+    publishing: bool
+    """What is published, or how often, is another."""
+    log: bool
+
+
+def read(path: Path) -> Files:
+    """Read everything anew; raises ConfigError with all that is wrong."""
+    loaded = load(path)
+    return Files(loaded, imprint(loaded))
+
+
+def imprint(loaded: Loaded) -> dict[str, bytes]:
+    """Return a digest of the password and of the certificates, by key; unreadable ones are left out."""
+    mqtt = loaded.config.mqtt
+    digests: dict[str, bytes] = {}
+    password = mqtt.password_file or loaded.credential
+    if password is not None:
+        digests["mqtt.password_file"] = _digest(Path(password))
+    if mqtt.tls is not None:
+        files = (file for file in (mqtt.tls.ca, mqtt.tls.cert, mqtt.tls.key) if file is not None)
+        digests["mqtt.tls"] = b"".join(_digest(Path(file)) for file in files)
+    return digests
+
+
+def _digest(file: Path) -> bytes:
+    try:
+        return hashlib.sha256(read_regular(file)).digest()
+    except OSError:
+        return b""
+
+
+def plan(running: Files, found: Files) -> Plan:
+    """Return what leads from one to the other."""
+    before, after = running.loaded, found.loaded
+    changes = difference(before.config, after.config)
+    target = changes.target
+    keys = dict.fromkeys(changes.applied)
+    stay = {slave.name for slave in before.config.slaves} - set(changes.removed)
+    profiles = [
+        f"slaves.{slave.name}.profile"
+        for slave in target.slaves
+        if slave.name in stay and before.profiles.get(slave.profile) != after.profiles[slave.profile]
+    ]
+    login = [key for key in {*running.login, *found.login} if running.login.get(key) != found.login.get(key)]
+    keys.update(dict.fromkeys([*profiles, *sorted(login)]))
+    silent = {"realtime": before.config.line.realtime}
+    line = before.config.line != target.line.model_copy(update=silent)
+    return Plan(
+        loaded=replace(after, config=target),
+        applied=tuple(keys),
+        restart_required=changes.restart_required,
+        line=line,
+        realtime=before.config.line.realtime is not target.line.realtime,
+        polling=bool(line or profiles or changes.sections & {"slaves", "poll"}),
+        broker=bool(login) or _connection(before.config.mqtt) != _connection(target.mqtt),
+        publishing=_publishing(before.config.mqtt) != _publishing(target.mqtt),
+        log=before.config.log != target.log,
+    )
+
+
+PUBLISHING = {"telemetry", "state_every"}
+"""Keys of `mqtt` that the connection does not depend on."""
+
+
+def _connection(mqtt: MqttConfig) -> dict[str, object]:
+    return mqtt.model_dump(exclude=PUBLISHING)
+
+
+def _publishing(mqtt: MqttConfig) -> dict[str, object]:
+    return mqtt.model_dump(include=PUBLISHING)

@@ -1,0 +1,54 @@
+"""`status.json`: what `watch` shows when the broker is away. Written once a second, never half."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+from lfs10d.system.regular_file import write_new
+
+WORLD_READABLE = 0o644
+
+
+class StatusFile:
+    """The file at `path`; its folder is made if it can be. A place that cannot be written is no error."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._draft = path.with_suffix(".tmp")
+
+    def show(self, status: Mapping[str, object]) -> bool:
+        """Replace the content; returns whether it could be written. Nothing is synced: it is of the moment."""
+        text = _json(status)
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            write_new(self._draft, text.encode(), mode=WORLD_READABLE)
+            self._draft.replace(self.path)
+        except OSError:
+            return False
+        return True
+
+    def remove(self) -> None:
+        """Take the file away: nobody stands behind it any more."""
+        for path in (self.path, self._draft):
+            with contextlib.suppress(OSError):
+                path.unlink(missing_ok=True)
+
+
+def _json(status: Mapping[str, object]) -> str:
+    """Return the status as JSON, each device by itself: the encoder holds the interpreter, and the line must wake."""
+    members = (
+        f"{_encoded(key)}:{f'[{_joined(value)}]' if isinstance(value, list) else _encoded(value)}"
+        for key, value in status.items()
+    )
+    return f"{{{','.join(members)}}}"
+
+
+def _joined(items: list[object]) -> str:
+    return ",".join(_encoded(item) for item in items)
+
+
+def _encoded(value: object) -> str:
+    return json.dumps(value, allow_nan=False, separators=(",", ":"))

@@ -1,0 +1,1 @@
+"""The line thread: who is polled next, one exchange after the other."""

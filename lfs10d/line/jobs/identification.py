@@ -1,0 +1,207 @@
+"""Who is it? A few reads of one slave id at which something was heard: is it one device, which one, how fast. Pure.
+
+Rules
+-----
+1. Profiles are tried in order; each by the register of its slave id, where it has one, and its first read. What was
+   answered once is not asked again. Nothing is ever written.
+2. A profile fits that reads believable values. One with a register of its slave id fits only if all agree: that
+   register holds a possible id, the values are believable, and the register of the rate, where it has one, holds one
+   of its codes. Values that collide do not disagree, where the id is the right one: then two such devices share it.
+3. An answer is any right frame of the slave, an exception too. Silence is asked again, `SILENCES` times in all.
+4. Where bytes came that make no right frame, or a second frame behind the right one, the read is repeated, `TRIES`
+   times in all. Spoilt `SPOILT` times, two devices probably share the id (`ALL_SPOILT` where no right answer came).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TypeAlias
+
+from lfs10d.modbus.exchange import Outcome
+from lfs10d.modbus.frames import READ_HOLDING_REGISTERS, Codec, ReadRegisters
+from lfs10d.profiles.blocks import Block
+from lfs10d.profiles.profile import Profile
+from lfs10d.reading import Fault, FaultCode, Number
+
+TRIES = 5
+"""How often a read is asked once something spoilt it."""
+SPOILT = 3
+"""Spoilt so many times out of `TRIES`, an id that answers has probably two devices."""
+ALL_SPOILT = 4
+"""As many are needed where no right answer came: there noise alone must not make a device."""
+SILENCES = 3
+"""Silent so many times, a slave is given up."""
+
+_EXCEPTION_BODY = 3
+"""Slave, function, code: the body of the shortest answer (Modbus Application Protocol V1.1b3, section 7)."""
+
+Conversation: TypeAlias = "Generator[ReadRegisters, Outcome, Finding | None]"
+"""Yields what to read, is sent the outcome, returns what was found; None: nobody is there."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What is at one slave id at one rate.
+
+    `answers`: a right frame came; without it only bytes that make none. `rtt` in s is the middle one of the
+    answers'. `profile` is the one that fits, with the `values` it read. `id_register` is what the slave says its id
+    is, `exception` the code of its last refusal. `spoilt` of `tries` repeated reads were spoilt; `duplicate`: two
+    devices probably share the id. `suspect`: it may be no device of its own; see `lfs10d.line.jobs.scan`.
+    """
+
+    slave: int
+    baudrate: int
+    answers: bool = False
+    rtt: float | None = None
+    profile: Profile | None = None
+    values: Mapping[str, Number] = field(default_factory=dict)
+    id_register: int | None = None
+    exception: int | None = None
+    spoilt: int = 0
+    tries: int = 0
+    duplicate: bool = False
+    suspect: bool = False
+
+
+def speaks(outcome: Outcome, codec: Codec) -> bool:
+    """Whether the slave asked is there: a right frame of it came, be it an exception or another one than asked for."""
+    fault = outcome.fault
+    if fault is None or fault.code is FaultCode.EXCEPTION:
+        return True
+    return outcome.request.slave in _speakers(outcome, codec)
+
+
+def strangers(outcome: Outcome, codec: Codec) -> frozenset[int]:
+    """Return the other slaves of which a right frame came."""
+    return frozenset() if outcome.fault is None else _speakers(outcome, codec) - {outcome.request.slave}
+
+
+def _speakers(outcome: Outcome, codec: Codec) -> frozenset[int]:
+    frames = codec.frames(codec.fold(outcome.heard), outcome.request.slave, codec.answer_size(outcome.request))
+    return frozenset(body[0] for _, _, body in frames if codec.wrap(body) != outcome.sent)
+
+
+def spoilt(outcome: Outcome, codec: Codec) -> bool:
+    """Whether bytes came that make no right frame, or enough for one more frame than the right one."""
+    fault = outcome.fault
+    if fault is None or fault.code is FaultCode.EXCEPTION:
+        return outcome.unsolicited >= shortest_answer(codec)
+    return fault.code in (FaultCode.CRC, FaultCode.MALFORMED) and not speaks(outcome, codec)
+
+
+def shortest_answer(codec: Codec) -> int:
+    """Return the characters of the shortest answer there is, an exception."""
+    return codec.size(_EXCEPTION_BODY)
+
+
+def rate_fits(profile: Profile, code: int | None, baudrate: int) -> bool:
+    """Whether the register of the rate holds what a device of this profile can hold; always where it has none.
+
+    A device may speak at a rate that the profile has no code for (the factory's may be such): then any content fits.
+    """
+    if profile.baudrate is None:
+        return True
+    return code is not None and (baudrate not in profile.baudrate.codes or code in profile.baudrate.codes.values())
+
+
+def first_read(profile: Profile, slave: int) -> ReadRegisters:
+    """Return what a device of this profile is asked first: its id, or else its first values."""
+    if profile.slave_id is not None:
+        return ReadRegisters(slave, profile.slave_id.register, 1, READ_HOLDING_REGISTERS)
+    return _read_of(profile.reads()[0], slave)
+
+
+def _read_of(block: Block, slave: int) -> ReadRegisters:
+    return ReadRegisters(slave, block.address, block.count, block.function)
+
+
+class Interview:
+    """One slave id at one rate; `first` is an outcome that is known already. `converse` does it."""
+
+    def __init__(self, finding: Finding, profiles: Sequence[Profile], codec: Codec, first: Outcome | None) -> None:
+        self._finding = finding
+        self._slave = finding.slave
+        self._profiles = [profile for profile in profiles if profile.ids[0] <= finding.slave <= profile.ids[1]]
+        self._codec = codec
+        self._told: dict[object, Outcome | None] = {}
+        self._rtts: list[float] = []
+        if first is not None and self._listen(first):
+            self._told[first.request] = first
+
+    def converse(self) -> Conversation:
+        """Ask until it is clear who is there."""
+        for profile in self._profiles:
+            if (yield from self._fits(profile)):
+                self._note(profile=profile)
+                break
+        if not self._profiles:
+            yield from self._hear(ReadRegisters(self._slave, 0, 1))
+        rtts = sorted(self._rtts)
+        self._note(rtt=rtts[len(rtts) // 2] if rtts else None)
+        finding = self._finding
+        return finding if finding.answers or finding.duplicate else None
+
+    def _note(self, **changes: object) -> None:
+        self._finding = replace(self._finding, **changes)  # type: ignore[arg-type]  # replace checks the names
+
+    def _fits(self, profile: Profile) -> Generator[ReadRegisters, Outcome, bool]:
+        sure, number = False, None
+        if profile.slave_id is not None:
+            said = yield from self._hear(first_read(profile, self._slave))
+            if said is None or said.answer is None:
+                return False
+            (number,) = said.answer
+            if not profile.ids[0] <= number <= profile.ids[1]:
+                return False
+            sure = number == self._slave
+        block = profile.reads()[0]
+        outcome = yield from self._hear(_read_of(block, self._slave))
+        values: Mapping[str, Number] | Fault = {}
+        if outcome is not None and outcome.answer is not None:
+            values = profile.decode(block, outcome.answer)
+        elif outcome is not None or not (sure and self._finding.duplicate):
+            return False
+        if isinstance(values, Fault) or not (yield from self._rate_agrees(profile)):
+            return False
+        self._note(values=values, id_register=number)
+        return True
+
+    def _rate_agrees(self, profile: Profile) -> Generator[ReadRegisters, Outcome, bool]:
+        if profile.slave_id is None or profile.baudrate is None:
+            return True
+        said = yield from self._hear(ReadRegisters(self._slave, profile.baudrate.register, 1, READ_HOLDING_REGISTERS))
+        code = None if said is None or said.answer is None else said.answer[0]
+        return rate_fits(profile, code, self._finding.baudrate)
+
+    def _hear(self, request: ReadRegisters) -> Generator[ReadRegisters, Outcome, Outcome | None]:
+        """Ask one read, again where rules 3 and 4 say so; return the outcome that is to be believed."""
+        if request in self._told:
+            return self._told[request]
+        believed: Outcome | None = None
+        broken = silences = tries = 0
+        while tries < TRIES and silences < SILENCES and (believed is None or broken):
+            outcome = yield request
+            tries += 1
+            broken += spoilt(outcome, self._codec)
+            if self._listen(outcome):
+                believed = believed or outcome
+            elif not spoilt(outcome, self._codec):
+                silences += 1
+        if broken > self._finding.spoilt:
+            duplicate = self._finding.duplicate or broken >= (SPOILT if self._finding.answers else ALL_SPOILT)
+            self._note(spoilt=broken, tries=tries, duplicate=duplicate)
+        self._told[request] = believed
+        return believed
+
+    def _listen(self, outcome: Outcome) -> bool:
+        """Note what one outcome shows; whether it answers what was asked, beyond doubt."""
+        if not speaks(outcome, self._codec):
+            return False
+        self._note(answers=True)
+        fault = outcome.fault
+        if fault is not None and fault.exception_code is not None:
+            self._note(exception=fault.exception_code)
+        if outcome.rtt is not None:
+            self._rtts.append(outcome.rtt)
+        return fault is not None or not outcome.ambiguous

@@ -1,0 +1,117 @@
+"""What a job is: something done on the line, one exchange after the other.
+
+A job never touches the line. The schedule calls `ask` when the line could be the job's, and `heard` with the
+outcome of what it asked; between the two and after them others may have had the line. Time is an argument.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, TypeAlias
+
+from lfs10d.modbus.exchange import Outcome
+from lfs10d.modbus.frames import Codec, Request
+from lfs10d.reading import Errand
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """Put this request on the line now.
+
+    `timeout` (s) runs from the request's last bit to the answer's first byte; `patience` is the slave's learned
+    p99 of it, None where it is not known. `baudrate` None means the line's own rate. `at_once`: nobody else is asked
+    between the job's exchange before and this one, so that what comes late is received here. `request_gap` (s) is the
+    rest that the slave needs by what the job knows of it; the schedule keeps what it knows itself in any case.
+    """
+
+    request: Request
+    codec: Codec
+    timeout: float
+    patience: float | None = None
+    baudrate: int | None = None
+    at_once: bool = False
+    request_gap: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Hold:
+    """Nothing to ask before `until` (None: before the schedule is told to `wake` the job)."""
+
+    until: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """The job is over."""
+
+
+@dataclass(frozen=True, slots=True)
+class Later:
+    """More to ask, but not before what was due by `key`."""
+
+    key: float
+
+
+@dataclass(frozen=True, slots=True)
+class Again:
+    """More to ask at once, whatever the share says: the slice at another rate goes on.
+
+    A job says so for a quarter of a second at most; the rate is changed per slice, never per exchange.
+    """
+
+
+Next: TypeAlias = Later | Again | Done
+
+
+class Account(Protocol):
+    """What holds a job to its part of the line's time; see `lfs10d.line.quota.Share`."""
+
+    def allows(self, now: float) -> bool:
+        """Whether the line may be used now."""
+        ...
+
+    def ready_at(self, now: float) -> float:
+        """When the line may be used next; not before `now`."""
+        ...
+
+    def spend(self, taken: float, now: float) -> None:
+        """Note that `taken` s of the line were used."""
+        ...
+
+
+class Job(Protocol):
+    """One thing done on the line.
+
+    `share` is the greatest part of the line's time it may take, 0 < share <= 1; with 1 it goes before everybody.
+    `excludes` are slave ids that nobody else may ask while it runs.
+    """
+
+    @property
+    def errand(self) -> Errand:
+        """What its exchanges are for."""
+        ...
+
+    @property
+    def share(self) -> float:
+        """The greatest share of the line."""
+        ...
+
+    @property
+    def excludes(self) -> frozenset[int]:
+        """Slave ids that are its own while it runs."""
+        ...
+
+    def ask(self, now: float) -> Ask | Hold | Done:
+        """Decide what to put on the line now.
+
+        What was decided is not sent yet where the slave must rest first: then the job is asked again after that.
+        """
+        ...
+
+    def heard(self, outcome: Outcome, now: float) -> Next:
+        """Take the outcome of what was asked."""
+        ...
+
+    def cut_off(self, now: float) -> None:
+        """Learn that the job is over before its time: the port is lost, or its device is no longer configured."""
+        ...

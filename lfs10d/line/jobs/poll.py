@@ -1,0 +1,187 @@
+"""A poll: read a device's values once, with retries as later exchanges; a probe: the same of an offline device.
+
+Rules
+-----
+1. While a late answer could pass for a value's, the slave is asked its profile's barrier first, by retries too; see
+   `lfs10d.modbus.pending`. Probes begin with the barrier always. Where the profile has none the slave is left
+   alone until nothing can be pending.
+2. A fault of the line is tried again, `retries` times, as a later exchange. A right frame is not: an exception or
+   a value out of range would only be said twice.
+3. One poll, one outcome, whatever it took.
+4. A device that sleeps (`lfs10d.line.request_gap`) may lose the first request after a pause: it is asked again at once,
+   and where that has helped before the silence is no failed attempt. It is woken by its barrier, where it has one,
+   so that the value can be asked right after it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from functools import lru_cache
+
+from lfs10d.line.device import Device
+from lfs10d.line.jobs.job import Ask, Done, Hold, Later, Next
+from lfs10d.modbus.exchange import FAULT_HEARD, Outcome
+from lfs10d.modbus.frames import ReadRegisters
+from lfs10d.modbus.pending import Unanswered
+from lfs10d.profiles.blocks import Block
+from lfs10d.reading import ALIVE_CODES, Errand, Fault, FaultCode, Number, Reading
+
+WAKES = 3
+"""So often within one poll a silence after a pause is taken for sleep."""
+_NOTHING: frozenset[int] = frozenset()
+
+
+def told_busy(fault: Fault, exceptions: tuple[int, ...]) -> Fault:
+    """Return the fault, marked as busy where its exception is one of those that mean so."""
+    return replace(fault, busy=True) if fault.exception_code in exceptions else fault
+
+
+@lru_cache(maxsize=1024)
+def _read(slave: int, address: int, count: int, function: int) -> ReadRegisters:
+    """Return a request, the same object for the same read: it is asked again and again, and looked up by it."""
+    return ReadRegisters(slave, address, count, function)
+
+
+class Poll:
+    """One poll of `device`; `due` orders it among the others. `request` is the number of the request that wants it.
+
+    When it is over `values` or `fault` is set, `at` says when, `rtt` how long the last exchange took.
+    """
+
+    share = 1.0
+    excludes = _NOTHING
+
+    def __init__(
+        self, device: Device, unanswered: Unanswered, *, due: float, errand: Errand, request: int | None = None
+    ) -> None:
+        self.device = device
+        self.errand = errand
+        self.request = request
+        self.due = due
+        self.values: dict[str, Number] = {}
+        self.fault: Fault | None = None
+        self.rtt: float | None = None
+        self.at = due
+        self.failed_attempts: list[FaultCode] = []
+        self._unanswered = unanswered
+        self._blocks = device.spec.profile.reads()
+        self._block = 0
+        self._retries = device.retries if errand is not Errand.PROBE else 0
+        self._barrier_due = errand is Errand.PROBE
+        self._barrier_asked = False
+        self._begun = False
+        self._waking = False
+        self._wakes = 0
+
+    @property
+    def begun(self) -> bool:
+        """Something was put on the line for it."""
+        return self._begun
+
+    @property
+    def good(self) -> Mapping[str, Number] | None:
+        """The values; None where the poll failed."""
+        return self.values if self.fault is None else None
+
+    def ask(self, now: float) -> Ask | Hold:
+        """Decide what to put on the line now."""
+        device = self.device
+        spec = device.spec
+        self._waking = self._wakes < WAKES and device.gap.may_sleep(now)
+        block = self._blocks[self._block]
+        request = _read(device.slave, block.address, block.count, block.function)
+        barrier = spec.profile.barrier
+        if barrier is None and self._unanswered.confusable(request, spec.codec):
+            self._unanswered.leave_alone(device.slave, device.timeout)
+        until = self._unanswered.left_alone_until(device.slave, now)
+        if until is not None:
+            return Hold(until)
+        self._barrier_asked = False
+        first = self._barrier_due or (self._waking and device.gap.sleeps)
+        if barrier is not None and (first or self._unanswered.confusable(request, spec.codec)):
+            request = _read(device.slave, barrier.register, barrier.count, barrier.function)
+            self._barrier_asked = True
+        elif (until := self._unanswered.lingering_until(request, spec.codec, now)) is not None:
+            return Hold(until)
+        timeout = device.probe_timeout if self.errand is Errand.PROBE else device.timeout
+        return Ask(request, spec.codec, timeout, device.patience)
+
+    def heard(self, outcome: Outcome, now: float) -> Next:
+        """Take the outcome of what was asked."""
+        device = self.device
+        self.at = outcome.ended
+        self._begun = True
+        fault = outcome.fault
+        waking, self._waking = self._waking, False
+        if waking and fault is not None and fault.code is FaultCode.TIMEOUT:
+            self._wakes += 1
+            if not device.gap.sleeps:
+                self.failed_attempts.append(fault.code)
+            self._barrier_due = False
+            return Later(self.due)
+        if fault is None or fault.code is not FaultCode.LATE:  # else the attempt itself is counted as late
+            self.failed_attempts += [
+                FaultCode.LATE for late in outcome.late if late.ours and late.request.slave == device.slave
+            ]
+        if self._barrier_asked:
+            alive = fault is None or (
+                fault.code is FaultCode.EXCEPTION and not outcome.ambiguous and not outcome.may_follow
+            )
+            if alive:
+                self._barrier_due = False
+                return Later(self.due)
+        elif fault is None and outcome.answer is not None:
+            fault = self._take(self._blocks[self._block], outcome.answer, outcome.heard)
+            if fault is None:
+                self.rtt = outcome.rtt
+                return Later(self.due) if self._block < len(self._blocks) else Done()
+        if fault is not None and fault.code not in ALIVE_CODES and self._retries > 0:
+            self._retries -= 1
+            self.failed_attempts.append(fault.code)
+            self.due = now
+            return Later(now)
+        self.fault = None if fault is None else told_busy(fault, device.spec.profile.busy_exceptions)
+        self.values = {}
+        return Done()
+
+    def _take(self, block: Block, registers: tuple[int, ...], heard: bytes) -> Fault | None:
+        decoded = self.device.spec.profile.decode(block, registers)
+        if isinstance(decoded, Fault):
+            return replace(decoded, heard=heard[-FAULT_HEARD:])
+        self.values.update(decoded)
+        self._block += 1
+        return None
+
+    def cut_off(self, now: float) -> None:
+        """Learn that the port is lost."""
+        self.at = now
+
+
+def tell(poll: Poll) -> Reading:
+    """Return the reading of a poll that is over; its device knows of it already."""
+    return _reading(poll.device, poll.at, poll.fault, poll, [poll])
+
+
+def tell_lost(device: Device, fault: Fault, now: float, polls: Iterable[Poll]) -> Reading:
+    """Return the reading of a device whose port is lost, in answer to the requested among `polls` of it too."""
+    return _reading(device, now, fault, None, (poll for poll in polls if poll.device is device))
+
+
+def _reading(device: Device, at: float, fault: Fault | None, poll: Poll | None, polls: Iterable[Poll]) -> Reading:
+    overruns, device.overruns = device.overruns, 0
+    return Reading(
+        device=device.name,
+        at=at,
+        values=poll.good if poll else None,
+        fault=fault,
+        rtt=poll.rtt if poll else None,
+        online=device.online,
+        response_timeout=device.timeout,
+        probe=poll is not None and poll.errand is Errand.PROBE,
+        failed_attempts=tuple(poll.failed_attempts) if poll else (),
+        overruns=overruns,
+        requests=tuple(each.request for each in polls if each.request is not None),
+        request_gap=device.gap.seconds,
+        gap_learned=device.gap.learned > device.gap.configured,
+    )

@@ -1,0 +1,169 @@
+"""A course: a job whose questions follow from the answers, told as one generator. Pure.
+
+Its generator yields `Ask` and is sent the outcome; yields `Hold(until)` to rest; yields `Aside(...)` to have something
+done off the line (an intent put on the disk) and is sent what `go_on` brings, while others have the line. What it
+returns goes aside too: the job is over only when that has been taken care of, so that its slave ids stay its own
+until the configuration says who has them. Where the port is lost `LineLostError` is thrown into it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from math import inf
+from typing import Any, TypeAlias
+
+from lfs10d.line.jobs.job import Again, Ask, Done, Hold, Later, Next
+from lfs10d.modbus.exchange import Outcome
+from lfs10d.reading import Errand
+
+SLICE = 0.25
+"""The longest stay at another rate than the line's, in s; one question may take longer."""
+
+
+class LineLostError(Exception):
+    """The port is lost in the middle of a course."""
+
+
+@dataclass(frozen=True, slots=True)
+class Aside:
+    """Something to be done off the line; the course goes on when it is."""
+
+    what: object
+
+
+@dataclass(frozen=True, slots=True)
+class Over:
+    """The course is at its end: `result` is what it returned, None where the port was lost before it could say."""
+
+    result: Any
+
+
+Step: TypeAlias = "Ask | Hold | Aside"
+Steps: TypeAlias = "Generator[Step, Any, Any]"
+
+
+class Now:
+    """The time at which a course goes on."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+
+class Course:
+    """The job. `aside(course, what)` is told what to do off the line, and in the end `Over` with what was returned.
+
+    It is called once for each, in the line's thread, and is answered with `go_on` and a wake. `line_rate` is the
+    line's own rate.
+    """
+
+    def __init__(
+        self,
+        steps: Steps,
+        clock: Now,
+        aside: Callable[[Course, object], None],
+        *,
+        line_rate: int,
+        excludes: frozenset[int] = frozenset(),
+        share: float = 0.3,
+        errand: Errand = Errand.CHANGE,
+    ) -> None:
+        self.excludes = excludes
+        self.share = share
+        self.errand = errand
+        self._steps = steps
+        self._clock = clock
+        self._aside = aside
+        self._line_rate = line_rate
+        self._following: Step | None = None
+        self._begun = self._told = self._over = False
+        self._answer: tuple[Any] | None = None
+        self._result: Any = None
+        self._slice_until = -inf
+
+    def halt(self) -> None:
+        """Send no new frame from now on, and tell nothing; from any thread."""
+        self._over = True
+
+    def go_on(self, answer: object = None) -> None:
+        """Tell what came of the thing done aside; the schedule must be told to wake the job then."""
+        self._answer = (answer,)
+
+    # -- as a job
+
+    def ask(self, now: float) -> Ask | Hold | Done:
+        """Decide what to put on the line now."""
+        self._clock.now = now
+        if not self._begun:
+            self._begun = True
+            self._advance(None)
+        while not self._over:
+            step = self._following
+            if isinstance(step, Ask):
+                if now >= self._slice_until:
+                    self._slice_until = now + SLICE
+                return step
+            if isinstance(step, Hold):
+                if step.until is None or step.until > now:
+                    return step
+                self._advance(None)
+            elif self._answer is None:
+                self._tell_aside()
+                if self._answer is None:
+                    return Hold()
+            else:
+                (answer,), self._answer = self._answer, None
+                self._told = False
+                if step is None:
+                    self._over = True
+                else:
+                    self._advance(answer)
+        return Done()
+
+    def _tell_aside(self) -> None:
+        if not self._told:
+            self._told = True
+            step = self._following
+            if isinstance(step, Aside):
+                self._aside(self, step.what)
+            else:
+                self._aside(self, Over(self._result))
+
+    def _advance(self, value: object) -> None:
+        try:
+            self._following = self._steps.send(value)
+        except StopIteration as end:
+            self._following, self._result = None, end.value
+
+    def heard(self, outcome: Outcome, now: float) -> Next:
+        """Take the outcome of what was asked."""
+        self._clock.now = now
+        asked = self._following
+        if self._over or not isinstance(asked, Ask):
+            return Done()
+        self._advance(outcome)
+        following = self._following
+        if isinstance(following, Ask):
+            if following.at_once:
+                return Again()
+            stays = following.baudrate == asked.baudrate not in (None, self._line_rate)
+            if stays and now + following.timeout <= self._slice_until:
+                return Again()
+        self._slice_until = -inf
+        return Later(now)
+
+    def cut_off(self, now: float) -> None:
+        """Learn that the port is lost: the course says what that makes of it."""
+        self._clock.now = now
+        if self._over or (self._begun and self._following is None):
+            return
+        self._over = True
+        if not self._begun:
+            self._begun = True
+            self._advance(None)
+        try:
+            self._steps.throw(LineLostError())
+        except StopIteration as end:
+            self._aside(self, Over(end.value))
+        except LineLostError:
+            self._aside(self, Over(None))

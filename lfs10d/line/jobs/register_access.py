@@ -1,0 +1,249 @@
+"""Raw access to one slave's registers: read some, or write one and read it back. Pure.
+
+Rules
+-----
+1. While a late answer could pass for the one that is waited for, the slave is asked another shape first, or left
+   alone until nothing can be pending; see `lfs10d.modbus.pending`.
+2. A read is tried as often as there are time-outs, each longer than the one before; a busy slave is asked later.
+3. A write goes out only after the slave answered a read of the same register, be it with an exception, and when it is
+   known whether the adapter echoes: reads tell. Else nothing was written.
+4. A write is sent once. Whatever came of it, but for an exception, the register is read back until the slave
+   answers: an echo proves nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TypeAlias
+
+from lfs10d.line.device import FIRST_TIMEOUTS
+from lfs10d.line.jobs.job import Ask, Done, Hold, Later, Next
+from lfs10d.line.jobs.poll import told_busy
+from lfs10d.modbus.exchange import Outcome
+from lfs10d.modbus.frames import Codec, ReadRegisters, Request, WriteRegister
+from lfs10d.modbus.pending import Unanswered
+from lfs10d.profiles.profile import BUSY_EXCEPTIONS, Profile
+from lfs10d.reading import Errand, Fault, FaultCode
+
+BUSY_PAUSE = 0.3
+"""A busy slave is left alone for so long, in s; so is one whose register does not hold yet what was written."""
+ECHO_READS = 8
+"""So many reads are made at most to learn whether the adapter echoes; three that agree are enough."""
+VERIFY_WITHIN = 5.0
+"""For so long after a write a silent slave is asked what its register holds, in s."""
+DIFFERING = 3
+"""Read back so often with another content than was written, the write did not take."""
+
+Steps: TypeAlias = "Generator[Request, Outcome, End]"
+
+
+class End(StrEnum):
+    """How it ended."""
+
+    DONE = "done"
+    """The registers were read; what was written was read back."""
+    REFUSED = "refused"
+    """An exception: `fault` has its code."""
+    BUSY = "busy"
+    """An exception that means so by the profile."""
+    NOT_VERIFIED = "not_verified"
+    """The slave answers, but its register does not hold what was written, or cannot be read."""
+    UNANSWERED = "unanswered"
+    """Silence, or bytes that are no answer: `fault` says which."""
+    ECHO_UNKNOWN = "echo_unknown"
+    """It could not be learned whether the adapter echoes, so nothing was written."""
+    CUT_OFF = "cut_off"
+    """The port was lost."""
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """Whom to ask, and how; `profile` is None for a slave that is not configured, `response_timeout` (s) if learned."""
+
+    slave: int
+    codec: Codec
+    profile: Profile | None = None
+    response_timeout: float | None = None
+
+    @property
+    def busy_exceptions(self) -> tuple[int, ...]:
+        """Which exceptions mean: ask again later."""
+        return BUSY_EXCEPTIONS if self.profile is None else self.profile.busy_exceptions
+
+    @property
+    def timeouts(self) -> tuple[float, ...]:
+        """How long the tries wait, in s."""
+        fixed = self.response_timeout
+        return FIRST_TIMEOUTS if fixed is None else (fixed,) * len(FIRST_TIMEOUTS)
+
+
+class Access:
+    """Reads registers or writes one; `what` is the request. `over` is called once, in the line's thread, at its end.
+
+    `end` says how it ended, `registers` what was read last, `fault` what went wrong, `sent` whether a write may have
+    left. `before` is what the register held before a write, where it can be read.
+    """
+
+    errand = Errand.REQUEST
+    share = 1.0
+
+    def __init__(
+        self,
+        target: Target,
+        what: Request,
+        *,
+        unanswered: Unanswered,
+        echo_known: Callable[[], bool],
+        over: Callable[[Access], None],
+    ) -> None:
+        self.excludes = frozenset({target.slave})
+        self.end: End | None = None
+        self.registers: tuple[int, ...] | None = None
+        self.before: int | None = None
+        self.fault: Fault | None = None
+        self.sent = False
+        self._target = target
+        self._unanswered = unanswered
+        self._echo_known = echo_known
+        self._over = over
+        self._now = 0.0
+        self._timeout = target.timeouts[0]
+        self._rest_until = 0.0
+        self._shaping = False
+        self._steps = self._read(what) if isinstance(what, ReadRegisters) else self._write(what)
+        self._following: Request = next(self._steps)
+
+    # -- as a job
+
+    def ask(self, now: float) -> Ask | Hold:
+        """Decide what to put on the line now."""
+        self._shaping = False
+        slave, codec, request = self._target.slave, self._target.codec, self._following
+        if now < self._rest_until:
+            return Hold(self._rest_until)
+        until = self._unanswered.left_alone_until(slave, now)
+        reads = isinstance(request, ReadRegisters)
+        if until is None and reads and self._unanswered.confusable(request, codec):
+            other = self._other_shape()
+            if other is not None:
+                self._shaping = True
+                return Ask(other, codec, self._timeout)
+            self._unanswered.leave_alone(slave, self._timeout)
+            until = self._unanswered.left_alone_until(slave, now)
+        if until is None:
+            until = self._unanswered.lingering_until(request, codec, now)
+        if until is not None:
+            return Hold(until)
+        self.sent = self.sent or not reads
+        return Ask(request, codec, self._timeout)
+
+    def heard(self, outcome: Outcome, now: float) -> Next:
+        """Take the outcome of what was asked."""
+        self._now = now
+        if self._shaping and (outcome.fault is None or _refused(outcome)):
+            return Later(now)
+        try:
+            self._following = self._steps.send(outcome)
+        except StopIteration as over:
+            self._finish(over.value)
+            return Done()
+        return Later(now)
+
+    def cut_off(self, now: float) -> None:
+        """Learn that the port is lost."""
+        del now
+        self.fault = None
+        self._finish(End.CUT_OFF)
+
+    def _finish(self, end: End) -> None:
+        self._steps.close()
+        self.end = end
+        self._over(self)
+
+    def _other_shape(self) -> ReadRegisters | None:
+        """Return a read whose answer cannot be taken for another's that may still come, if the profile has one."""
+        profile, slave = self._target.profile, self._target.slave
+        if profile is None:
+            return None
+        places = [(block.address, block.count, block.function) for block in profile.reads()]
+        if profile.barrier is not None:
+            places.insert(0, (profile.barrier.register, profile.barrier.count, profile.barrier.function))
+        reads = (ReadRegisters(slave, *place) for place in places)
+        return next((read for read in reads if not self._unanswered.confusable(read, self._target.codec)), None)
+
+    # -- what is asked, one after the other
+
+    def _read(self, what: ReadRegisters) -> Steps:
+        outcome = yield from self._ask_patiently(what)
+        return End.DONE if outcome.fault is None else self._failed(outcome)
+
+    def _write(self, what: WriteRegister) -> Steps:
+        look = ReadRegisters(what.slave, what.address, 1)
+        outcome = yield from self._ask_patiently(look)
+        if outcome.fault is None and outcome.answer is not None:
+            (self.before,) = outcome.answer
+        elif not self._refuses(outcome):
+            return self._failed(outcome)
+        for _ in range(ECHO_READS):
+            if self._echo_known():
+                break
+            outcome = yield from self._ask_patiently(look)
+            if outcome.fault is not None and not self._refuses(outcome):
+                return self._failed(outcome)
+        else:
+            return End.ECHO_UNKNOWN
+        outcome = yield from self._ask_once(what, self._target.timeouts[-1])
+        if _refused(outcome):
+            return self._failed(outcome)
+        return (yield from self._read_back(look, what.value))
+
+    def _read_back(self, look: ReadRegisters, value: int) -> Steps:
+        deadline = self._now + VERIFY_WITHIN
+        differing = 0
+        while True:
+            outcome = yield from self._ask_patiently(look)
+            if outcome.answer == (value,):
+                return End.DONE
+            differing += outcome.answer is not None
+            if differing >= DIFFERING or self._refuses(outcome):
+                return End.NOT_VERIFIED
+            if self._now >= deadline:
+                return self._failed(outcome)
+            self._rest_until = self._now + BUSY_PAUSE
+
+    def _ask_patiently(self, what: ReadRegisters) -> Generator[Request, Outcome, Outcome]:
+        """Ask until there is an answer, an exception that is no word for busy, or no more patience."""
+        *tries, last = self._target.timeouts
+        for timeout in tries:
+            outcome = yield from self._ask_once(what, timeout)
+            if outcome.fault is None or self._refuses(outcome):
+                return outcome
+        return (yield from self._ask_once(what, last))
+
+    def _ask_once(self, what: Request, timeout: float) -> Generator[Request, Outcome, Outcome]:
+        self._timeout = timeout
+        outcome = yield what
+        fault = outcome.fault
+        self.fault = None if fault is None else told_busy(fault, self._target.busy_exceptions)
+        if isinstance(what, ReadRegisters):
+            self.registers = outcome.answer
+        if _refused(outcome) and not self._refuses(outcome):
+            self._rest_until = self._now + BUSY_PAUSE
+        return outcome
+
+    def _refuses(self, outcome: Outcome) -> bool:
+        """Whether it is an exception that no patience will change."""
+        return _refused(outcome) and self.fault is not None and not self.fault.busy
+
+    def _failed(self, outcome: Outcome) -> End:
+        if not _refused(outcome):
+            return End.UNANSWERED
+        return End.REFUSED if self._refuses(outcome) else End.BUSY
+
+
+def _refused(outcome: Outcome) -> bool:
+    """Whether the slave answered what was asked, and nothing older, with an exception."""
+    fault = outcome.fault
+    return fault is not None and fault.code is FaultCode.EXCEPTION and not outcome.ambiguous

@@ -1,0 +1,247 @@
+"""A scan: who is on the line? Every slave id at every rate is asked once, whoever is heard is interviewed. Pure.
+
+Rules
+-----
+1. It only reads. Each id is asked one read, with a short time-out: an answer that comes later than that is still
+   known for what it is (`Outcome.late`), and the last id of a round is waited for until none can come any more.
+2. Any right frame of a slave is an answer, an exception too; then it is interviewed (`lfs10d.line.jobs.identification`).
+3. Ids at which other bytes were heard are asked again at the end of the round, patiently, and so are the ids asked
+   shortly before them while such noise is rare: a late answer may have run into our next request. Where most ids
+   are noisy it is the line, and nobody is asked again.
+4. Ids 248 to 255 are asked last, when everybody else has been heard at every rate: 255 may be a wildcard. One that
+   answers when any other id answers too is `suspect`.
+5. Another rate than the line's is spoken in slices of up to `SLICE`, never for one exchange; at the line's own rate
+   others may speak after each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, replace
+from math import inf
+
+from lfs10d.line.jobs.identification import Finding, Interview, shortest_answer, speaks, spoilt, strangers
+from lfs10d.line.jobs.job import Again, Ask, Done, Later, Next
+from lfs10d.line.jobs.scan_plan import LAST_TIMEOUT, RESERVED_FROM, Search
+from lfs10d.modbus.exchange import Outcome
+from lfs10d.reading import Errand, Fault, FaultCode
+
+PATIENT_TIMEOUT = 0.4
+"""How long an id is waited for in an interview or asked once more, in s."""
+SLICE = 0.25
+"""The longest stay at another rate than the line's, in s."""
+BEFORE_NOISE = 5
+"""So many ids before one with noise are asked again..."""
+RARE = 3
+"""... where no more ids than this had noise."""
+COMMON = 0.25
+"""Noise at more than this share of the ids (and more than `RARE`) is the line's."""
+SETTLING = 1.0
+"""After so many s of scanning the pace so far counts as much as the pace expected."""
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a scan is: `asked` of `total` ids, `remaining` s to go, at `slave` and `baudrate` now."""
+
+    asked: int
+    total: int
+    remaining: float
+    slave: int
+    baudrate: int
+
+    @property
+    def percent(self) -> float:
+        """How much of it is done, 0 to 100."""
+        return 100.0 * self.asked / self.total
+
+
+@dataclass(slots=True)
+class Noise:
+    """What was heard that is no answer, in the first round of questions.
+
+    `ids` had bytes that make no right frame, or another's frame; `last` is the last such fault. `echoed`: the
+    adapter returns our own bytes. `refused` ids were never asked, for the line did not fall silent.
+    """
+
+    ids: int = 0
+    refused: int = 0
+    echoed: bool = False
+    last: Fault | None = None
+
+
+def _nobody(_: Scan) -> None:
+    """Tell nobody."""
+
+
+class Scan:
+    """One scan. `over` when it is; `complete` if it came to its end, `lost` if the port was lost before.
+
+    `ended` is called once, with this job, when it is over.
+    """
+
+    errand = Errand.SCAN
+    excludes: frozenset[int] = frozenset()
+
+    def __init__(self, search: Search, ended: Callable[[Scan], None] = _nobody) -> None:
+        self.search = search
+        self.share = search.share
+        self.over = self.complete = self.lost = False
+        self._ended = ended
+        self.noise = Noise()
+        self._found: dict[tuple[int, int], Finding] = {}
+        self._slow: set[int] = set()
+        self._asked_at: dict[int, set[int]] = {timing.baudrate: set() for timing in search.timings}
+        self._asked = 0
+        self._total = sum(len(ids) for _, ids in search.rounds)
+        self._place = (search.rounds[0][1][0], search.rounds[0][0].baudrate)
+        self._began: float | None = None
+        self._now = 0.0
+        self._slice_until = -inf
+        self._course = self._whole_course()
+        self._following: Ask | None = next(self._course, None)
+
+    @property
+    def found(self) -> tuple[Finding, ...]:
+        """Who was found so far, by rate and id."""
+        answering = {finding.slave for finding in tuple(self._found.values()) if finding.answers}
+        findings = (
+            replace(finding, suspect=finding.slave >= RESERVED_FROM and bool(answering - {finding.slave}))
+            for finding in tuple(self._found.values())
+        )
+        return tuple(sorted(findings, key=lambda finding: (finding.baudrate, finding.slave)))
+
+    @property
+    def progress(self) -> Progress:
+        """How far it is, by the pace so far."""
+        expected = self.search.expected
+        done = expected * self._asked / self._total
+        elapsed = 0.0 if self._began is None else self._now - self._began
+        pace = (SETTLING + elapsed) / (SETTLING + done)
+        return Progress(self._asked, self._total, (expected - done) * pace, *self._place)
+
+    def cancel(self) -> None:
+        """End it after the exchange under way; what was found stays."""
+        self._following = None
+
+    # -- as a job
+
+    def ask(self, now: float) -> Ask | Done:
+        """Decide what to put on the line now."""
+        if self._began is None:
+            self._now = self._began = now  # in this order: `progress` may be read meanwhile
+        if self._following is None:
+            return self._end()
+        if now >= self._slice_until:
+            self._slice_until = now + SLICE
+        return self._following
+
+    def heard(self, outcome: Outcome, now: float) -> Next:
+        """Take the outcome of what was asked."""
+        asked, self._now = self._following, now
+        if asked is not None:
+            try:
+                self._following = self._course.send(outcome)
+            except StopIteration:
+                self._following, self.complete = None, True
+        following = self._following
+        if following is None or asked is None:
+            return self._end()
+        stays = following.baudrate == asked.baudrate != self.search.line_rate
+        ends = now + following.timeout + self._cost_at(following.baudrate)
+        if stays and self.search.line_rate is not None and ends <= self._slice_until:
+            return Again()
+        self._slice_until = -inf
+        return Later(now)
+
+    def cut_off(self, now: float) -> None:
+        """Learn that the port is lost."""
+        self._now, self._following, self.lost = now, None, True
+        self._end()
+
+    def _end(self) -> Done:
+        self.over = True
+        self._ended(self)
+        return Done()
+
+    def _cost_at(self, baudrate: int | None) -> float:
+        return next(self.search.cost(timing) for timing in self.search.timings if timing.baudrate == baudrate)
+
+    # -- the course of questions
+
+    def _whole_course(self) -> Generator[Ask, Outcome, None]:
+        for timing, ids in self.search.rounds:
+            yield from self._round(ids, timing.baudrate)
+
+    def _round(self, ids: tuple[int, ...], baudrate: int) -> Generator[Ask, Outcome, None]:
+        noisy: list[int] = []
+        for place, slave in enumerate(ids):
+            self._place = slave, baudrate
+            timeout = self.search.timeout if place < len(ids) - 1 else max(LAST_TIMEOUT, self.search.timeout)
+            outcome = yield from self._question(slave, baudrate, timeout)
+            self._asked += 1
+            if self._disturbed(outcome):
+                noisy.append(place)
+            yield from self._late_ones(baudrate)
+        for place in self._worth_another(noisy, len(ids)):
+            if (ids[place], baudrate) not in self._found:
+                yield from self._question(ids[place], baudrate, PATIENT_TIMEOUT, again=True)
+        yield from self._late_ones(baudrate)
+
+    def _worth_another(self, noisy: list[int], asked: int) -> list[int]:
+        if len(noisy) > max(RARE, COMMON * asked):
+            return []
+        before = BEFORE_NOISE if len(noisy) <= RARE else 0
+        return sorted({place for noise in noisy for place in range(max(0, noise - before), noise + 1)})
+
+    def _question(
+        self, slave: int, baudrate: int, timeout: float, *, again: bool = False
+    ) -> Generator[Ask, Outcome, Outcome]:
+        """Ask one id; whoever is heard is interviewed at once, of bytes that are no frame only the second time."""
+        codec = self.search.codec
+        self._asked_at[baudrate].add(slave)
+        outcome = yield Ask(self.search.opening(slave), codec, timeout, None, baudrate)
+        self._note_late(outcome, baudrate)
+        if speaks(outcome, codec) or (again and spoilt(outcome, codec)):
+            yield from self._interview(slave, baudrate, PATIENT_TIMEOUT, outcome)
+        return outcome
+
+    def _late_ones(self, baudrate: int) -> Generator[Ask, Outcome, None]:
+        """Interview those who answered later than they were waited for."""
+        while self._slow:
+            slave = self._slow.pop()
+            if (slave, baudrate) not in self._found:
+                yield from self._interview(slave, baudrate, LAST_TIMEOUT, None)
+
+    def _interview(
+        self, slave: int, baudrate: int, timeout: float, first: Outcome | None
+    ) -> Generator[Ask, Outcome, None]:
+        search = self.search
+        conversation = Interview(Finding(slave, baudrate), search.profiles, search.codec, first).converse()
+        try:
+            request = next(conversation)
+            while True:
+                outcome = yield Ask(request, search.codec, timeout, timeout / 4, baudrate)
+                self._note_late(outcome, baudrate)
+                request = conversation.send(outcome)
+        except StopIteration as end:
+            if end.value is not None:
+                self._found[slave, baudrate] = end.value
+
+    def _note_late(self, outcome: Outcome, baudrate: int) -> None:
+        """Note whose answer came though another is asked now: an id asked before at this rate, slower than expected."""
+        late = {late.request.slave for late in outcome.late}
+        self._slow.update(self._asked_at[baudrate] & (late | strangers(outcome, self.search.codec)))
+
+    def _disturbed(self, outcome: Outcome) -> bool:
+        """Note what else was heard; whether it makes it worth asking this id again."""
+        noise, fault = self.noise, outcome.fault
+        noise.echoed = noise.echoed or outcome.echoed is True
+        if fault is None or self._slow or speaks(outcome, self.search.codec):
+            return False
+        if fault.code in (FaultCode.TIMEOUT, FaultCode.LATE):  # what came before the request counts here only
+            return outcome.unsolicited >= shortest_answer(self.search.codec)
+        noise.ids += 1
+        noise.refused += outcome.began is None
+        noise.last = fault
+        return outcome.began is not None

@@ -1,0 +1,76 @@
+"""What to look for on a line: ids, rates, profiles, and how long that takes. Plain values, known before a scan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from lfs10d.line.jobs.identification import first_read
+from lfs10d.modbus.frames import Codec, ReadRegisters
+from lfs10d.modbus.timing import LineTiming
+from lfs10d.profiles.profile import Profile
+
+FIRST_TIMEOUT = 0.1
+"""How long each id is waited for, in s: twenty times the usual turnaround, USB adapter included."""
+LAST_TIMEOUT = 1.0
+"""How long the last id of a round is waited for, in s: the longest learned time-out of a poll."""
+RESERVED_FROM = 248
+"""The first id that Modbus reserves (Modbus over Serial Line V1.02, section 2.2); 255 may be a wildcard."""
+
+LAST_ID = 255
+"""LFS10-RS485 Protocol, slave id 0x01..0xFF: wider than the 247 of Modbus."""
+
+
+def ids_of(text: str) -> tuple[int, ...]:
+    """Return the ids of text such as `1-8,12`, in order; raises ValueError that says what is wrong."""
+    ids: set[int] = set()
+    for part in text.split(","):
+        first, dash, last = (piece.strip() for piece in part.partition("-"))
+        ends = (first, last) if dash else (first,)
+        if not all(end.isascii() and end.isdecimal() and len(end) <= len(str(LAST_ID)) for end in ends):
+            raise ValueError(f"{part.strip()!r} is neither an id such as 3 nor a range such as 1-8")
+        low, high = int(first), int(ends[-1])
+        if not 1 <= low <= high <= LAST_ID:
+            raise ValueError(f"{part.strip()!r}: ids go from 1 to {LAST_ID}, the smaller first")
+        ids.update(range(low, high + 1))
+    return tuple(sorted(ids))
+
+
+@dataclass(frozen=True, slots=True)
+class Search:
+    """What to look for: `ids` at each rate of `timings`, in this order; `profiles` are tried in their order.
+
+    `line_rate` is the rate that others speak on the line, None where nobody does. `share` is the greatest part of
+    the line's time. Times in s.
+    """
+
+    ids: tuple[int, ...]
+    timings: tuple[LineTiming, ...]
+    codec: Codec
+    profiles: tuple[Profile, ...]
+    line_rate: int | None = None
+    share: float = 1.0
+    timeout: float = FIRST_TIMEOUT
+
+    @property
+    def rounds(self) -> tuple[tuple[LineTiming, tuple[int, ...]], ...]:
+        """Rates and ids in the order they are asked."""
+        usual = tuple(slave for slave in self.ids if slave < RESERVED_FROM)
+        reserved = tuple(slave for slave in self.ids if slave >= RESERVED_FROM)
+        return tuple((timing, ids) for ids in (usual, reserved) if ids for timing in self.timings)
+
+    @property
+    def expected(self) -> float:
+        """How long it takes if nobody answers, in s."""
+        waiting = sum(
+            len(ids) * (self.cost(timing) + self.timeout) + max(0.0, LAST_TIMEOUT - self.timeout)
+            for timing, ids in self.rounds
+        )
+        return waiting / self.share
+
+    def cost(self, timing: LineTiming) -> float:
+        """Return how long one request takes on the wire, in s; the silence before it lies in the time-out before it."""
+        return timing.transmission(len(self.codec.encode(self.opening(self.ids[0]))))
+
+    def opening(self, slave: int) -> ReadRegisters:
+        """Return the read that each id is asked first."""
+        return first_read(self.profiles[0], slave)

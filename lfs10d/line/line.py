@@ -1,0 +1,173 @@
+"""The line as the daemon holds it: port, bus, schedule and poller, and the thread that owns them.
+
+What the thread hears is taken over to the asyncio loop by one `call_soon_threadsafe` per exchange.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+
+from lfs10d.config.models import Config
+from lfs10d.line.budget import timing_of
+from lfs10d.line.jobs.job import Job
+from lfs10d.line.jobs.procedure import Course
+from lfs10d.line.poller import Poller
+from lfs10d.line.scheduler import Schedule
+from lfs10d.line.settings import device_specs, line_rules, poll_rules, port_settings
+from lfs10d.line.thread import WAKING, WAKING_REALTIME, LineThread
+from lfs10d.modbus.bus import Bus
+from lfs10d.modbus.exchange import Echo
+from lfs10d.modbus.pending import Unanswered
+from lfs10d.modbus.port import SerialPort
+from lfs10d.modbus.realtime import sharpen_timers, take_precedence, yield_precedence
+from lfs10d.profiles.profile import Profile
+from lfs10d.reading import Event
+
+log = logging.getLogger(__name__)
+
+
+class Line:
+    """Built in the thread of the asyncio loop; `heard(events)` and `failed(error)` are called there.
+
+    `failed` is told what ended the line's thread by mistake.
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        profiles: Mapping[str, Profile],
+        *,
+        heard: Callable[[list[Event]], None],
+        failed: Callable[[BaseException], None],
+    ) -> None:
+        line = config.line
+        self.port = SerialPort(port_settings(line))
+        bus = Bus(self.port, line_rules(line), time.monotonic)
+        schedule = Schedule(timing_of(line), time.monotonic())
+        schedule.replace(
+            device_specs(config, profiles), poll_rules(config.poll), time.monotonic()
+        )  # fmt: skip
+        self.poller = Poller(bus, schedule, self._take_over, time.monotonic)
+        self._realtime = line.realtime
+        self._heard = heard
+        self._failed = failed
+        self._loop = asyncio.get_running_loop()
+        self._inbox: deque[list[Event]] = deque()
+        self._thread = LineThread(self.poller, prepare=self._prepare, failed=self._tell_failed)
+
+    def start(self) -> None:
+        """Open the port and poll."""
+        self._thread.start()
+
+    async def stop(self, within: float) -> None:
+        """Give the port back and end; after `within` s the thread is left to itself."""
+        self._thread.stop()
+        await asyncio.to_thread(self._thread.join, within)
+
+    def wake(self) -> None:
+        """Have what was given to the poller looked at now."""
+        self._thread.wake()
+
+    @property
+    def declared(self) -> float:
+        """The monotonic time by which the thread promised its next turn."""
+        return self._thread.declared
+
+    def read(self, device: str, request: int) -> None:
+        """Have a device polled now for a request, whose number comes back with the reading."""
+        self.poller.read(device, request)
+        self.wake()
+
+    def submit(self, job: Job) -> None:
+        """Have a job done; what it calls, it calls in the line's thread."""
+        self.poller.submit(job)
+        self.wake()
+
+    def go_on(self, course: Course, answer: object) -> None:
+        """Tell a course what came of what it had done aside."""
+
+        def tell(now: float) -> None:
+            course.go_on(answer)
+            self.poller.schedule.wake(course, now)
+
+        self.poller.post(tell)
+        self.wake()
+
+    async def pause(self) -> None:
+        """Give the port back until `resume`; return when it is free."""
+        freed: asyncio.Future[None] = self._loop.create_future()
+
+        def settle() -> None:
+            if not freed.done():
+                freed.set_result(None)
+
+        def tell() -> None:
+            with contextlib.suppress(RuntimeError):  # the loop is closed: we are ending
+                self._loop.call_soon_threadsafe(settle)
+
+        self.poller.pause(tell)
+        self.wake()
+        await freed
+
+    def resume(self) -> None:
+        """Open the port again, if it is paused."""
+        self.poller.resume()
+        self.wake()
+
+    @property
+    def unanswered(self) -> Unanswered:
+        """Which requests may still be answered; for jobs, in the line's thread."""
+        return self.poller.schedule.unanswered
+
+    def echo_known(self) -> bool:
+        """Whether it is known how the adapter echoes: before that nothing is written."""
+        return self.poller.bus.echo is not Echo.UNKNOWN
+
+    def take(self, config: Config, profiles: Mapping[str, Profile], *, line: bool, realtime: bool) -> None:
+        """Poll by another configuration from now on; `line` and `realtime` tell whether those changed."""
+        if line:
+            self.poller.reconfigure(port_settings(config.line), line_rules(config.line))
+        if realtime:
+            wanted = self._realtime = config.line.realtime
+            self.poller.post(lambda _: self._precede(wanted=wanted))
+        self.poller.replace(device_specs(config, profiles), poll_rules(config.poll))
+        self.wake()
+
+    # -- in the line's thread
+
+    def _prepare(self) -> None:
+        """Make the thread wake up on time; runs before its first turn."""
+        if not sharpen_timers():
+            log.debug("the timer slack of the line's thread cannot be set: gaps are 50 us longer than need be")
+        if self._realtime:
+            self._precede(wanted=True)
+
+    def _precede(self, *, wanted: bool) -> None:
+        """Put the thread under SCHED_FIFO and have it awake earlier, or make it an ordinary one again."""
+        self._thread.waking = WAKING
+        if not wanted:
+            yield_precedence()
+        elif (refusal := take_precedence()) is not None:
+            log.warning("%s", refusal)
+        else:
+            self._thread.waking = WAKING_REALTIME
+
+    def _take_over(self, events: list[Event]) -> None:
+        self._inbox.append(events)
+        with contextlib.suppress(RuntimeError):  # the loop is closed: we are ending
+            self._loop.call_soon_threadsafe(self._empty)
+
+    def _tell_failed(self, error: BaseException) -> None:
+        with contextlib.suppress(RuntimeError):
+            self._loop.call_soon_threadsafe(self._failed, error)
+
+    # -- in the loop again
+
+    def _empty(self) -> None:
+        while self._inbox:
+            self._heard(self._inbox.popleft())

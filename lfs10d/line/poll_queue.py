@@ -1,0 +1,137 @@
+"""Which poll is next: fixed grids, the earliest due first; then devices with interval 0 in turn.
+
+Polls lie on a fixed grid per device: no drift. A point of the grid that is missed is skipped and counted. A retry
+goes behind what was due before the attempt failed. So overload degrades evenly, and no device is asked twice before
+one that was due. A device with interval 0 that waited 5 s goes as one that was due then. One that is silent at the
+start is polled again at once, but not before the first poll of each other device.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable
+from heapq import heappop, heappush
+from math import floor, inf
+
+from lfs10d.line.device import Device
+from lfs10d.line.jobs.poll import Poll
+from lfs10d.modbus.pending import Unanswered
+from lfs10d.reading import Errand
+
+FLAT_OUT_PATIENCE = 5.0
+"""A device with interval 0 goes as one that became due so many s after it was asked last."""
+EXCLUDED_PAUSE = 0.25
+"""A device whose slave id belongs to a job for the moment is looked at again after so many s."""
+SPREAD = 2.0
+"""Grids lie at most so many exchanges apart, so that every device is asked soon after the start."""
+
+
+def spread(devices: Iterable[Device], *, polled: int, wire_time: float, now: float) -> None:
+    """Lay the grids of `devices` side by side from `now` on, so that they do not want the line at one moment.
+
+    `polled` is how many devices share the line, `wire_time` (s) what one exchange takes.
+    """
+    phase = now
+    for device in devices:
+        device.due = phase
+        phase += min(device.spec.interval / polled, SPREAD * wire_time)
+
+
+class PollQueue:
+    """The devices waiting for their poll and the polls waiting for their next exchange."""
+
+    def __init__(self, unanswered: Unanswered) -> None:
+        self._unanswered = unanswered
+        self._due: list[tuple[float, int, Device | Poll]] = []
+        self._flat: deque[Device] = deque()
+        self._turn = 0
+
+    def clear(self) -> None:
+        """Forget everybody."""
+        for _, _, entry in self._due:
+            if isinstance(entry, Device):
+                entry.queued = False
+        for device in self._flat:
+            device.queued = False
+        self._due.clear()
+        self._flat.clear()
+
+    def polls(self) -> list[Poll]:
+        """Return the polls that wait for their next exchange."""
+        return [entry for _, _, entry in self._due if isinstance(entry, Poll)]
+
+    def enqueue(self, device: Device) -> None:
+        """Let `device` wait for its next point of the grid, if it is to be polled and does not wait yet."""
+        if device.queued or not device.spec.enabled or device.doubtful:
+            return
+        device.queued = True
+        if device.starting:
+            first = (each.due for _, _, each in self._due if isinstance(each, Device) and each.last_asked == -inf)
+            self._push(max(device.again_at, *first, -inf), device)
+        elif device.spec.interval == 0:
+            self._flat.append(device)
+        else:
+            self._push(device.due, device)
+
+    def resume(self, poll: Poll, key: float) -> None:
+        """Let `poll` wait for its next exchange as one that became due at `key`."""
+        self._push(key, poll)
+
+    def next_due(self) -> float:
+        """When somebody is due; inf where nobody waits. With interval 0 somebody is due always."""
+        if self._flat:
+            return -inf
+        return self._due[0][0] if self._due else inf
+
+    def choose(self, now: float, excluded: frozenset[int]) -> Poll | None:
+        """Take the poll whose turn it is; `excluded` slave ids are not asked now."""
+        for _ in range(len(self._due) + len(self._flat)):
+            entry = self._first(now)
+            if entry is None:
+                return None
+            device = entry.device if isinstance(entry, Poll) else entry
+            if device.slave in excluded:
+                self._push(now + EXCLUDED_PAUSE, entry)
+            elif isinstance(entry, Poll):
+                return entry
+            else:
+                device.queued = False
+                if not device.doubtful:
+                    return self._begin(device, now)
+        return None
+
+    def _first(self, now: float) -> Device | Poll | None:
+        due = self._due[0][0] if self._due else inf
+        flat = self._flat_due() if self._flat else inf
+        if due <= min(now, flat):
+            return heappop(self._due)[2]
+        return self._flat.popleft() if self._flat else None
+
+    def _flat_due(self) -> float:
+        device = self._flat[0]
+        return max(device.last_asked, device.due) + FLAT_OUT_PATIENCE
+
+    def _begin(self, device: Device, now: float) -> Poll:
+        interval = device.spec.interval
+        due = now
+        if device.starting:
+            back_on_grid(device, now)
+        elif interval > 0:
+            due = device.due
+            missed = floor((now - due) / interval)
+            device.overruns += missed
+            device.due = due + (missed + 1) * interval
+        device.polling = True
+        device.last_asked = now
+        return Poll(device, self._unanswered, due=due, errand=Errand.POLL)
+
+    def _push(self, key: float, entry: Device | Poll) -> None:
+        self._turn += 1
+        heappush(self._due, (key, self._turn, entry))
+
+
+def back_on_grid(device: Device, now: float) -> None:
+    """Go on at the next point of the grid after one that was offline has answered; what passed is no overrun."""
+    interval = device.spec.interval
+    if interval > 0 and device.due <= now:
+        device.due += (floor((now - device.due) / interval) + 1) * interval

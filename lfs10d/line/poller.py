@@ -1,0 +1,214 @@
+"""The body of the line thread: the schedule decides, the bus obeys, what was heard goes out as events.
+
+`Poller.turn` is called with a time and says when to come back: by `LineThread` with the real clock, by tests with a
+virtual one. Other threads only `post`.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable
+from dataclasses import astuple
+from math import inf
+from typing import TypeAlias
+
+from lfs10d.line.device import DeviceSpec, PollRules
+from lfs10d.line.jobs.job import Ask, Job
+from lfs10d.line.jobs.poll import Poll
+from lfs10d.line.scheduler import Rest, Schedule
+from lfs10d.modbus.bus import Bus, LineRules, Order, Wait
+from lfs10d.modbus.exchange import Outcome
+from lfs10d.modbus.port import PortSettings
+from lfs10d.reading import Errand, Event, Exchanged, Fault, FaultCode, PortChanged, UartCounted, UartCounters
+
+COUNTERS_EVERY = 10.0
+"""How often the driver's counters are read, in s."""
+
+FREED = Fault(FaultCode.PORT_LOST, "the port is freed for another program")
+"""What is told of the devices while the line is paused."""
+
+Sink: TypeAlias = "Callable[[list[Event]], None]"
+
+
+class Poller:
+    """One line. `sink` takes what was heard, at most once per exchange; `clock` is the bus's."""
+
+    def __init__(self, bus: Bus, schedule: Schedule, sink: Sink, clock: Callable[[], float]) -> None:
+        self.bus = bus
+        self.schedule = schedule
+        self._sink = sink
+        self._clock = clock
+        self._posted: deque[Callable[[float], None]] = deque()
+        self._events: list[Event] = []
+        self._errand = Errand.POLL
+        self._paused = False
+        self._count_at = clock()
+        self._first_counters: UartCounters | None = None
+        self._counted_before = self._counted = UartCounters(0, 0, 0, 0)
+
+    # -- from any thread (the thread must be woken afterwards)
+
+    def post(self, action: Callable[[float], None]) -> None:
+        """Have `action(now)` done between two exchanges."""
+        self._posted.append(action)
+
+    def submit(self, job: Job) -> None:
+        """Have `job` done on the line."""
+        self.post(lambda now: self._events.extend(self.schedule.submit(job, now)))
+
+    def wake(self, job: Job) -> None:
+        """End the rest of `job`."""
+        self.post(lambda now: self.schedule.wake(job, now))
+
+    def read(self, device: str, request: int) -> None:
+        """Have a device polled now for a request, whose number comes back with the reading; none for an unknown one."""
+        self.post(lambda now: self._read(device, request, now))
+
+    def _read(self, name: str, request: int, now: float) -> None:
+        device = self.schedule.devices.get(name)
+        if device is not None:
+            poll = Poll(device, self.schedule.unanswered, due=now, errand=Errand.REQUEST, request=request)
+            self._events += self.schedule.submit(poll, now)
+
+    def replace(self, specs: Iterable[DeviceSpec], rules: PollRules) -> None:
+        """Poll these devices from now on."""
+        devices = tuple(specs)
+        self.post(lambda now: self.schedule.replace(devices, rules, now))
+
+    def reconfigure(self, settings: PortSettings, rules: LineRules) -> None:
+        """Speak by other settings from now on; another path closes the port and opens that one."""
+        self.post(lambda now: self._reconfigure(settings, rules, now))
+
+    def _reconfigure(self, settings: PortSettings, rules: LineRules, now: float) -> None:
+        self.bus.reconfigure(settings, rules, now)
+        self.schedule.retime(self.bus.line_timing)
+
+    def pause(self, freed: Callable[[], None]) -> None:
+        """Give the port back after the exchange under way, until `resume`; `freed()` is called in the line thread."""
+        self.post(lambda now: self._pause(freed, now))
+
+    def _pause(self, freed: Callable[[], None], now: float) -> None:
+        if not self._paused:
+            self._paused = True
+            self.bus.close()
+            self._port_changed(PortChanged(now, FREED, freed=True))
+        freed()
+
+    def resume(self) -> None:
+        """Open the port again; whether that succeeds is told in any case. Nothing happens if it is not paused."""
+        self.post(self._resume)
+
+    def _resume(self, now: float) -> None:
+        if self._paused:
+            self._paused = False
+            self.bus.retry(now)
+
+    # -- in the line thread
+
+    def turn(self, now: float, *, readable: bool = True) -> Wait:
+        """Do what can be done now and say when to come back."""
+        while True:
+            if self.bus.idle:
+                while self._posted:
+                    self._posted.popleft()(now)
+            wait = self._advance(now, readable=readable)
+            if wait is not None:
+                break
+            readable = False
+            now = self._clock()
+        if self._events:
+            events, self._events = self._events, []
+            self._sink(events)
+        return wait
+
+    def _advance(self, now: float, *, readable: bool) -> Wait | None:
+        """Take one step; None where there may be more to do at once."""
+        if not self.bus.open:
+            return self._reopen(now)
+        resting = None
+        if self.bus.idle:
+            decision = self.schedule.next(now)
+            if isinstance(decision, Rest):
+                resting = decision
+            else:
+                self._ask(decision)
+        step = self.bus.step(now, readable=readable)
+        if self.bus.strays:
+            strays, self.bus.strays = self.bus.strays, []
+            self._events += self.schedule.overheard(strays)
+        if isinstance(step, PortChanged):
+            self._port_changed(step)
+            return None
+        if isinstance(step, Wait):
+            if resting is None:
+                return step
+            return Wait(resting.until, listen=True)
+        self._settled(step)
+        self._count(self._clock())
+        return None
+
+    def _reopen(self, now: float) -> Wait | None:
+        opened = Wait(inf, listen=False) if self._paused else self.bus.reopen(now)
+        if isinstance(opened, Wait):
+            return opened
+        self._port_changed(opened)
+        return None
+
+    def _ask(self, ask: Ask) -> None:
+        self._errand = self.schedule.errand
+        order = Order(
+            ask.request,
+            ask.codec,
+            ask.timeout,
+            ask.patience,
+            ask.baudrate,
+            self.schedule.unanswered.earlier(ask.request.slave),
+            self.schedule.unanswered.everybodys,
+        )
+        self.bus.ask(order)
+
+    def _settled(self, outcome: Outcome) -> None:
+        now = self._clock()
+        readings = self.schedule.settled(outcome, now)
+        stray, self.bus.unsolicited = self.bus.unsolicited, 0
+        self._events.append(
+            Exchanged(
+                at=outcome.ended,
+                asked=outcome.asked,
+                began=outcome.began,
+                gap=outcome.gap,
+                slave=outcome.request.slave,
+                errand=self._errand,
+                fault=None if outcome.fault is None else outcome.fault.code,
+                sent=outcome.sent,
+                heard=outcome.heard,
+                unsolicited=outcome.unsolicited + stray,
+                late=sum(late.ours for late in outcome.late),
+            )
+        )
+        self._events += readings
+        self._events += self.schedule.answered(outcome)
+        if outcome.strays:
+            self._events += self.schedule.overheard(outcome.strays, outcome)
+
+    def _port_changed(self, changed: PortChanged) -> None:
+        self._events.append(changed)
+        if changed.fault is None:
+            self._first_counters, self._counted_before = None, self._counted  # another adapter begins at 0
+            self._count_at = changed.at
+            self.schedule.port_opened(changed.at)
+        else:
+            self._events += self.schedule.port_lost(changed.fault, changed.at)
+
+    def _count(self, now: float) -> None:
+        """Read the driver's counters now and then."""
+        if now < self._count_at:
+            return
+        self._count_at = now + COUNTERS_EVERY
+        counters = self.bus.counters()
+        if counters is None:
+            return
+        first = self._first_counters = self._first_counters or counters
+        each = zip(astuple(self._counted_before), astuple(counters), astuple(first), strict=True)
+        self._counted = UartCounters(*(before + count - start for before, count, start in each))
+        self._events.append(UartCounted(now, self._counted))

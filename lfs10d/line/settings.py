@@ -1,0 +1,113 @@
+"""From the configuration to port, bus, scheduler and jobs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from lfs10d.config.loader import Loaded
+from lfs10d.config.models import Config, LineConfig, PollConfig, SlaveConfig
+from lfs10d.line.budget import request_gap, timing_of
+from lfs10d.line.device import DeviceSpec, PollRules
+from lfs10d.line.jobs.register_access import Target
+from lfs10d.line.jobs.scan_plan import Search
+from lfs10d.modbus.bus import LineRules
+from lfs10d.modbus.frames import Checksum, Codec, Framing
+from lfs10d.modbus.port_settings import PortSettings, Rs485
+from lfs10d.profiles.library import builtin_names, load_profile
+from lfs10d.profiles.profile import Profile
+
+GREATEST_SHARE = 0.95
+"""A scan takes at most this share of the line, whatever is asked for, so that polling goes on."""
+
+
+DEFAULT_PROFILE = builtin_names()[0]
+
+
+def port_settings(line: LineConfig) -> PortSettings:
+    """Return how the port is to be opened."""
+    return PortSettings(
+        path=line.port,
+        baudrate=line.baudrate,
+        parity=line.parity,
+        databits=line.databits,
+        stopbits=line.stopbits,
+        low_latency=line.low_latency,
+        rs485=None if line.rs485 is None else Rs485(**line.rs485.model_dump()),
+    )
+
+
+def line_rules(line: LineConfig) -> LineRules:
+    """Return how the line is spoken on."""
+    return LineRules(extra_gap=line.extra_gap, turnaround_delay=line.turnaround_delay, echo=line.echo)
+
+
+def poll_rules(poll: PollConfig) -> PollRules:
+    """Return what holds for the polls of every device."""
+    return PollRules(retries=poll.retries, offline_after=poll.offline_after, probe_interval_max=poll.probe_interval_max)
+
+
+def usual_codec(line: LineConfig) -> Codec:
+    """Return how the frames of a slave that is not configured are read."""
+    return Codec(Framing(line.framing))
+
+
+def profile_codec(line: LineConfig, profile: Profile) -> Codec:
+    """Return how the frames of a device of this profile are read that is not configured yet."""
+    return Codec(Framing(line.framing), Checksum(profile.checksum))
+
+
+def device_specs(config: Config, profiles: Mapping[str, Profile]) -> tuple[DeviceSpec, ...]:
+    """Return the devices for the schedule; `profiles` by the configuration's word for each."""
+    return tuple(_device_spec(slave, config.line, profiles[slave.profile]) for slave in config.slaves)
+
+
+def _device_spec(slave: SlaveConfig, line: LineConfig, profile: Profile) -> DeviceSpec:
+    return DeviceSpec(
+        name=slave.name,
+        slave=slave.id,
+        profile=profile,
+        codec=Codec(Framing(line.framing), Checksum(slave.checksum or profile.checksum)),
+        interval=max(slave.interval, profile.min_interval),  # 0 is as fast as the line allows, and the device
+        enabled=slave.enabled,
+        response_timeout=slave.response_timeout,
+        request_gap=request_gap(slave, profile),
+    )
+
+
+def search(loaded: Loaded, ids: tuple[int, ...], rates: tuple[int, ...], *, share: float) -> Search:
+    """Return what to look for on the line; without `rates` its own, and those an LFS10 can have.
+
+    Everybody is asked with the check that all configured devices share, or CRC. May read the built-in profiles.
+    """
+    line, builtin = loaded.config.line, builtin_names()
+    checksums = {spec.codec.checksum for spec in device_specs(loaded.config, loaded.profiles)}
+    codec = Codec(Framing(line.framing), checksums.pop() if len(checksums) == 1 else Checksum.CRC)
+    own = tuple(profile for word, profile in loaded.profiles.items() if word not in builtin)
+    known = (*own, *(load_profile(name, relative_to=Path()) for name in builtin))
+    ascii_line = line.framing == Framing.ASCII.value
+    profiles = tuple(
+        each for each in known
+        if line.framing in each.framings and (ascii_line or codec.checksum.value in each.checksums)
+    )  # fmt: skip
+    usual = next((each.baudrate.codes for each in profiles if each.name == DEFAULT_PROFILE and each.baudrate), ())
+    return Search(
+        ids,
+        tuple(
+            timing_of(line.model_copy(update={"baudrate": rate}))
+            for rate in rates or dict.fromkeys((line.baudrate, *usual))
+        ),
+        codec,
+        profiles,
+        line_rate=line.baudrate,
+        share=min(share, GREATEST_SHARE),
+    )
+
+
+def access_target(loaded: Loaded, slave: int, device: SlaveConfig | None) -> Target:
+    """Return how the registers of a configured device are accessed, or of a slave id where none is."""
+    config = loaded.config
+    if device is None:
+        return Target(slave, usual_codec(config.line), None, config.poll.response_timeout)
+    spec = _device_spec(device, config.line, loaded.profiles[device.profile])
+    return Target(slave, spec.codec, spec.profile, spec.response_timeout)

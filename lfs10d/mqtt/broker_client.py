@@ -1,0 +1,203 @@
+"""Keeps one connection to the broker for as long as it is wanted: the shell around `Reconnect`.
+
+It says nothing of what is sent: the daemon's uplink and the verbs of the command line are above it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import random
+from collections.abc import Callable
+
+from lfs10d.errors import BrokerError
+from lfs10d.mqtt.connection import Connection
+from lfs10d.mqtt.messages import Accepted, Events, Incoming, Will
+from lfs10d.mqtt.reasons import Ended, Ending
+from lfs10d.mqtt.reconnect import Reconnect
+from lfs10d.mqtt.settings import BrokerSettings, Version
+
+log = logging.getLogger(__name__)
+
+
+class Link:
+    """`events.accepted` and `events.ended` come in turn, once for each connection that stood.
+
+    `explained()` tells whether a message of ours may be why the broker ends the connection that stands. `connect`
+    begins a connection; in virtual time it is one to a broker in memory.
+    """
+
+    def __init__(
+        self,
+        settings: BrokerSettings,
+        events: Events,
+        *,
+        will: Will | None = None,
+        chance: Callable[[], float] = random.random,
+        explained: Callable[[], bool] = lambda: False,
+        connect: type[Connection] = Connection,
+    ) -> None:
+        self._settings = settings
+        self._nodes = settings.nodes
+        self._events = events
+        self._will = will
+        self._chance = chance
+        self._explained = explained
+        self._connect = connect
+        self._reconnect = Reconnect(settings.version, chance, len(self._nodes))
+        self._connection: Connection | None = None
+        self._accepted: Accepted | None = None
+        self._timer: asyncio.TimerHandle | None = None
+        self._wanted = False
+        self._told: dict[str, str] = {}
+        self._warned_version = False
+        self._waiters: list[asyncio.Future[Accepted]] = []
+        self._over: asyncio.Event = asyncio.Event()
+
+    @property
+    def settings(self) -> BrokerSettings:
+        """What is spoken to: where there are several nodes, the one that is connected or tried next."""
+        return self._nodes[self._reconnect.node]
+
+    @property
+    def standing(self) -> Connection | None:
+        """The connection while it stands."""
+        return self._connection if self._accepted is not None else None
+
+    @property
+    def version(self) -> Version | None:
+        """The version spoken while the connection stands."""
+        return None if self._accepted is None else self._accepted.version
+
+    @property
+    def duplicate(self) -> bool:
+        """Another client uses our id; False again once a connection has held for longer than we would have waited."""
+        self._reconnect.held(self._now())
+        return self._reconnect.duplicate
+
+    def start(self) -> None:
+        """Begin to connect, and again whenever the connection is lost."""
+        self._wanted = True
+        self._try()
+
+    async def opened(self, within: float) -> Accepted:
+        """Wait for the connection; raise BrokerError when no node accepts us or `within` seconds are over."""
+        if self._accepted is not None:
+            return self._accepted
+        waiter = asyncio.get_running_loop().create_future()
+        self._waiters.append(waiter)
+        try:
+            return await asyncio.wait_for(waiter, within)
+        except TimeoutError:
+            raise BrokerError(f"{self.settings.place}: no answer within {within:g} s") from None
+        finally:
+            self._waiters.remove(waiter)
+
+    async def leave(self, within: float) -> None:
+        """Disconnect in order if the broker answers `within` seconds, else at once; stay away."""
+        self._wanted = False
+        if self._timer is not None:
+            self._timer.cancel()
+        standing = self.standing
+        if standing is not None:
+            self._over.clear()
+            standing.leave()
+            try:
+                await asyncio.wait_for(self._over.wait(), within)
+            except TimeoutError:
+                self.drop("no end to the connection")
+        if self._connection is not None:
+            self._connection.abandon()
+            self._connection = None
+
+    def drop(self, why: str) -> None:
+        """End the connection that stands without a word, as lost."""
+        if self._connection is not None:
+            self._connection.abandon()
+            self.ended(Ended(Ending.LOST, f"{self.settings.place}: {why}"))
+
+    def missed(self) -> None:
+        """Note that the broker had published our will before we came back."""
+        self._reconnect.missed()
+
+    def renew(self, settings: BrokerSettings) -> None:
+        """Begin anew with other settings, after `leave`."""
+        self._settings = settings
+        self._nodes = settings.nodes
+        self._reconnect = Reconnect(settings.version, self._chance, len(self._nodes))
+        self._warned_version = False
+        self.start()
+
+    def _now(self) -> float:
+        return asyncio.get_running_loop().time()
+
+    def _try(self) -> None:
+        self._timer = None
+        self._reconnect.begun(self._now())
+        self._connection = self._connect(self.settings, self._reconnect.version, self, will=self._will)
+
+    # Events of the connection
+
+    def accepted(self, accepted: Accepted) -> None:
+        """Tell that it stands."""
+        self._accepted = accepted
+        self._reconnect.accepted(self._now())
+        place = self.settings.place
+        if accepted.version is not self._settings.version and not self._warned_version:
+            self._warned_version = True
+            log.warning("%s: refuses MQTT 5; connected by MQTT %s, which hides reason codes", place, accepted.version)
+        else:
+            log.info("%s: connected by MQTT %s", place, accepted.version)
+        self._told.clear()
+        self._answer_waiters(accepted)
+        self._events.accepted(accepted)
+
+    def ended(self, ended: Ended) -> None:
+        """Tell that it is over, and try again when `Reconnect` says."""
+        stood, self._accepted = self._accepted is not None, None
+        self._connection = None
+        self._over.set()
+        now, place = self._now(), self.settings.place
+        self._reconnect.ended(ended, now, explained=stood and ended.by_message and self._explained())
+        if self._wanted:
+            self._tell(ended, place, self._reconnect.due - now)
+            self._timer = asyncio.get_running_loop().call_at(self._reconnect.due, self._try)
+        if stood:
+            self._events.ended(ended)
+
+    def _tell(self, ended: Ended, place: str, delay: float) -> None:
+        if self._reconnect.version is not self._settings.version:
+            log.debug("%s; trying MQTT %s", ended.message, self._reconnect.version)
+            return
+        level = logging.DEBUG if ended.message == self._told.get(place) else logging.WARNING
+        self._told[place] = ended.message
+        if self._reconnect.duplicate:
+            log.log(level, "%s; is another client using our id %s? trying again in %.0f s",
+                    ended.message, self._settings.client_id, delay)  # fmt: skip
+        else:
+            others = f"{self.settings.place} is next" if self.settings.place != place else "trying again until it works"
+            log.log(level, "%s; %s", ended.message, others)
+        if len(self._told) < len(self._nodes):
+            return  # the others have not been tried
+        self._answer_waiters(BrokerError(ended.message))
+
+    def _answer_waiters(self, answer: Accepted | BrokerError) -> None:
+        for waiter in self._waiters:
+            if waiter.done():
+                continue
+            if isinstance(answer, BrokerError):
+                waiter.set_exception(answer)
+            else:
+                waiter.set_result(answer)
+
+    def acknowledged(self, mid: int, reason: int) -> None:
+        """Pass it on."""
+        self._events.acknowledged(mid, reason)
+
+    def subscribed(self, mid: int, reasons: tuple[int, ...]) -> None:
+        """Pass it on."""
+        self._events.subscribed(mid, reasons)
+
+    def arrived(self, message: Incoming) -> None:
+        """Pass it on."""
+        self._events.arrived(message)

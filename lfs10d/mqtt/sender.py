@@ -1,0 +1,325 @@
+"""Carries letters from the outbox to a connection, and the broker's answers back.
+
+Serialising is done here, once per message, in slices: the loop has others to serve.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from itertools import islice
+
+from lfs10d.mqtt.connection import Connection
+from lfs10d.mqtt.encoding import array, encode, packet_size
+from lfs10d.mqtt.messages import Accepted
+from lfs10d.mqtt.reasons import NO_MATCHING_SUBSCRIBERS, REFUSED_FROM, Ended, reason_in_words
+from lfs10d.mqtt.topics import Topics
+from lfs10d.outbox.backlog import ARRAY_BYTES
+from lfs10d.outbox.items import Array, Declaration, Letter, Live, Message, Retained
+from lfs10d.outbox.outbox import IN_FLIGHT_MOST, Outbox
+from lfs10d.outbox.refusals import Refusal, refusal_of
+from lfs10d.outbox.suspects import Culprit
+from lfs10d.telemetry import publication
+
+log = logging.getLogger(__name__)
+
+LETTERS_AT_ONCE = 4
+"""Letters handed to paho in one go of the loop, about 50 us each."""
+
+SAMPLES_AT_ONCE = 16
+"""Samples of a history array serialised in one go; a whole array would take a millisecond."""
+
+ACKNOWLEDGED_WITHIN = 60.0
+"""Seconds after which a broker that answers pings but acknowledges nothing is given up."""
+
+
+UNPROVED_MOST = 64
+"""Messages of QoS 0 that are remembered until a later message is acknowledged: then the broker has them too."""
+
+NOT_AUTHORIZED = 0x87
+"""Reason code of a publication that the broker's rules deny (MQTT 5.0, section 2.4)."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Sent:
+    """One message on its way, the `number`th of this connection: `size` bytes of payload, sent `at` (monotonic s)."""
+
+    letter: Letter
+    at: float
+    size: int
+    qos: int
+    number: int
+
+
+@dataclass(slots=True)
+class _Assembly:
+    """A history array that is being serialised; `size` is its bytes so far, `most` its greatest."""
+
+    letter: Array
+    most: int
+    parts: list[bytes] = field(default_factory=list)
+    size: int = 1
+
+
+class Dispatch:
+    """`epoch_ms()` is the wall clock; `stuck()` is called when the connection is of no use."""
+
+    def __init__(
+        self,
+        outbox: Outbox,
+        topics: Topics,
+        line: str,
+        *,
+        epoch_ms: Callable[[], int],
+        stuck: Callable[[], None],
+    ) -> None:
+        self._outbox = outbox
+        self._topics = topics
+        self._line = line
+        self._epoch_ms = epoch_ms
+        self._stuck = stuck
+        self._connection: Connection | None = None
+        self._accepted: Accepted | None = None
+        self._sent: dict[int, _Sent] = {}
+        self._number = 0
+        self._acknowledged = 0
+        self._unproved: deque[_Sent] = deque(maxlen=UNPROVED_MOST)
+        self._swallowed: dict[str, int] = {}
+        self._assembly: _Assembly | None = None
+        self._turn: asyncio.Handle | None = None
+        self._sending = False
+        self._alarm: asyncio.TimerHandle | None = None
+        self._encoded: tuple[publication.Payload, bytes] = (None, b"")
+
+    def connected(self, connection: Connection, accepted: Accepted) -> None:
+        """Begin to send over this connection; `wake` is to follow."""
+        self._connection = connection
+        self._accepted = accepted
+        self._outbox.connected(self._now(), window=min(IN_FLIGHT_MOST, accepted.receive_maximum))
+
+    def lost(self, ended: Ended) -> None:
+        """Put back what is not acknowledged, and stop."""
+        outbox, sent = self._outbox, self._swallowed or self.under_way
+        culprit = None
+        if ended.by_message or self._swallowed:
+            culprit = outbox.suspects.ended(sent, certain=ended.reason is not None)
+        self._connection = self._accepted = self._assembly = None
+        self._sent.clear()
+        self._unproved.clear()
+        self._swallowed = {}
+        self._number = self._acknowledged = 0
+        for handle in (self._turn, self._alarm):
+            if handle is not None:
+                handle.cancel()
+        self._turn = self._alarm = None
+        outbox.lost(self._now(), culprit, denied=ended.reason == NOT_AUTHORIZED)
+        if culprit is not None:
+            self._report(culprit, ended)
+
+    @property
+    def under_way(self) -> dict[str, int]:
+        """What the broker may have got last: topics under `B`, each with the bytes of its largest message."""
+        found: dict[str, int] = {}
+        for each in (*self._sent.values(), *self._unproved):
+            found[each.letter.topic] = max(each.size, found.get(each.letter.topic, 0))
+        return found
+
+    @property
+    def explains_end(self) -> bool:
+        """Something is under way that was so when the connection before ended: it may be why this one does."""
+        return self._outbox.suspects.explain(self.under_way)
+
+    def _report(self, culprit: Culprit, ended: Ended) -> None:
+        topic = self._topics.full(culprit.topic)
+        if self._outbox.passes_over(culprit.topic):
+            log.warning("%s; again with a message of %d bytes to %s under way: nothing is sent there for an hour",
+                        ended.message, culprit.size, topic)  # fmt: skip
+        else:
+            log.warning("%s; again with a message of %d bytes to %s under way: it is sent in smaller parts",
+                        ended.message, culprit.size, topic)  # fmt: skip
+
+    def wake(self) -> None:
+        """Send what there is to send: some at once, the rest soon."""
+        if self._connection is not None and self._turn is None and not self._sending:
+            self._send_some()
+
+    def acknowledged(self, mid: int, reason: int) -> None:
+        """Note the broker's answer to a message."""
+        sent = self._sent.pop(mid, None)
+        if sent is None:
+            return
+        if sent.qos:
+            self._prove(sent)
+        else:
+            self._unproved.append(sent)  # it was written, that is all
+        if reason < REFUSED_FROM:
+            self._outbox.settled(sent.letter, self._now(), heard=reason != NO_MATCHING_SUBSCRIBERS)
+        else:
+            self._refused(sent, reason)
+        congested = self._outbox.congested(self._now())
+        if congested is not None:
+            log.warning(
+                "the way to the broker carries about %.3g messages a second (round trip %.3g s, %d under way at most), "
+                "less than is published: states come less often, and samples that find no room follow as history; "
+                "see mqtt.telemetry, mqtt.state_every and poll.interval",
+                congested.rate,
+                congested.round_trip,
+                congested.window,
+            )
+        if self._outbox.waits:
+            self.wake()
+
+    def _prove(self, acknowledged: _Sent) -> None:
+        """Note that the broker took this message, and all before it, without ending the connection."""
+        suspects = self._outbox.suspects
+        self._acknowledged = max(self._acknowledged, acknowledged.number)
+        suspects.acknowledged(acknowledged.letter.topic, acknowledged.size)
+        while self._unproved and self._unproved[0].number < acknowledged.number:
+            proved = self._unproved.popleft()
+            suspects.acknowledged(proved.letter.topic, proved.size)
+
+    def _refused(self, sent: _Sent, reason: int) -> None:
+        letter, refusal = sent.letter, refusal_of(reason)
+        topic, words = self._topics.full(letter.topic), reason_in_words(reason)
+        if refusal is Refusal.UNFIT:
+            if self._outbox.unfit(letter):
+                log.warning(
+                    "the broker refuses a message of %d bytes to %s: %s; it is dropped", sent.size, topic, words
+                )
+        elif self._outbox.refused(letter, reason, self._now()):
+            again = "in a second, then less often" if refusal is Refusal.LATER else "after the next connect or a reload"
+            log.warning("the broker refuses %s: %s; it is tried again %s", topic, words, again)
+
+    def _now(self) -> float:
+        return asyncio.get_running_loop().time()
+
+    def _send_some(self) -> None:
+        self._turn = None
+        self._sending = True
+        if self._connection is not None:
+            self._connection.cork(on=True)
+        emptied = self._send_a_few()
+        if self._connection is not None:
+            self._connection.cork(on=False)
+        self._sending = False
+        if emptied:
+            self._set_alarm()
+        else:
+            self._turn = asyncio.get_running_loop().call_soon(self._send_some)
+
+    def _send_a_few(self) -> bool:
+        """Send up to `LETTERS_AT_ONCE`; return whether nothing more may go now."""
+        for _ in range(LETTERS_AT_ONCE):
+            letter = self._outbox.next(self._now(), past=self._assembly is None)
+            if letter is None:
+                return True
+            if isinstance(letter, Array):
+                self._assembly = _Assembly(letter, self._room(letter))
+                asyncio.get_running_loop().call_soon(self._assemble, letter)
+            else:
+                self._send_encoded(letter)
+        return False
+
+    def _send_encoded(self, letter: Retained | Message | Live | Declaration) -> None:
+        if isinstance(letter, Declaration):
+            loss = letter.loss
+            payload = publication.dropped(
+                loss.device, loss.boot, loss.from_seq, loss.to_seq, count=loss.count, ts=self._epoch_ms()
+            ).payload
+        else:
+            payload = letter.publication.payload
+        try:
+            encoded = self._encode(payload)
+        except (TypeError, ValueError) as error:
+            self._unfit(letter, f"cannot be written as JSON: {error}")
+        else:
+            self._send(letter, encoded)
+
+    def _encode(self, payload: publication.Payload) -> bytes:
+        """Return the bytes of a payload: a sample and the state that shows it are one object, and encoded once."""
+        if payload is not self._encoded[0]:
+            self._encoded = payload, encode(payload)
+        return self._encoded[1]
+
+    def _room(self, letter: Array) -> int:
+        """Return how many bytes the payload of an array may have."""
+        accepted = self._accepted
+        if accepted is None or accepted.maximum_packet_size is None:
+            return ARRAY_BYTES
+        around = packet_size(self._topics.full(letter.topic), b"", version=accepted.version)
+        # The remaining length may take three bytes more than that of an empty payload.
+        return min(ARRAY_BYTES, accepted.maximum_packet_size - around - 3)
+
+    def _assemble(self, letter: Array) -> None:
+        assembly = self._assembly
+        if assembly is None or assembly.letter is not letter:
+            return  # the connection is another one now, and the samples wait again
+        parts = assembly.parts
+        for kept in letter.samples[len(parts) : len(parts) + SAMPLES_AT_ONCE]:
+            part = encode(kept.sample.payload(self._line, historical=True))
+            assembly.size += len(part) + 1  # the comma, or the bracket behind it
+            if parts and assembly.size > assembly.most:
+                letter = self._outbox.shorten(letter, len(parts))
+                break
+            parts.append(part)
+        if len(parts) < len(letter.samples):
+            asyncio.get_running_loop().call_soon(self._assemble, letter)
+        else:
+            self._assembly = None
+            self._send(letter, array(parts))
+
+    def _send(self, letter: Letter, payload: bytes) -> None:
+        if self._connection is None or self._accepted is None:
+            return
+        topic = self._topics.full(letter.topic)
+        retain, qos, correlation = False, 1, None
+        if not isinstance(letter, Array | Declaration):
+            retain, qos = letter.publication.retain, letter.publication.qos
+        if isinstance(letter, Message):
+            correlation = letter.correlation
+        if self._outbox.suspects.goes_alone(letter.topic):
+            qos = 1  # its acknowledgement clears it
+        limit = self._accepted.maximum_packet_size
+        if limit is not None:
+            size = packet_size(topic, payload, version=self._accepted.version, qos=qos, correlation=correlation)
+            if size > limit:
+                self._unfit(letter, f"{size} bytes are more than the {limit} that the broker takes")
+                return
+        mid = self._connection.publish(topic, payload, qos=qos, retain=retain, correlation=correlation)
+        if mid is not None:  # else it is under way until `lost`, which follows
+            self._number += 1
+            self._sent[mid] = _Sent(letter, self._now(), len(payload), qos, self._number)
+
+    def _unfit(self, letter: Letter, why: str) -> None:
+        if self._outbox.unfit(letter):
+            log.warning("not sent to %s: %s", self._topics.full(letter.topic), why)
+        self.wake()
+
+    def _set_alarm(self) -> None:
+        """Come back when time alone brings something to send, or shows that the broker is stuck."""
+        times = [sent.at + ACKNOWLEDGED_WITHIN for sent in islice(self._sent.values(), 1)]
+        due = self._outbox.due()
+        if due is not None:
+            times.append(due)
+        if not times:
+            return
+        # One that comes too soon finds that out and is set anew: cheaper than to move it with every message.
+        if self._alarm is not None:
+            if self._alarm.when() <= min(times):
+                return
+            self._alarm.cancel()
+        self._alarm = asyncio.get_running_loop().call_at(min(times), self._alarmed)
+
+    def _alarmed(self) -> None:
+        self._alarm = None
+        oldest = next(iter(self._sent.values()), None)
+        if oldest is not None and self._now() - oldest.at >= ACKNOWLEDGED_WITHIN:
+            # A broker acknowledges in order: what it acknowledged something later than, it has swallowed.
+            swallowed = (sent for sent in self._sent.values() if sent.number < self._acknowledged)
+            self._swallowed = {sent.letter.topic: sent.size for sent in swallowed}
+            self._stuck()
+        else:
+            self.wake()

@@ -1,0 +1,142 @@
+"""The samples that wait for their turn on `history`. Pure.
+
+One shelf per device and boot, in order of seq. The next to be taken is the shelf that holds the oldest sample.
+A sample that the broker has acknowledged before may stand here once more (`repeated`): where there is no room,
+these go first, and their going is no loss.
+"""
+
+from __future__ import annotations
+
+from bisect import insort
+from collections.abc import Iterable
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, field, replace
+
+from lfs10d.outbox.losses import Key
+from lfs10d.system.clock import ClockState
+from lfs10d.system.clock_step import corrects
+from lfs10d.telemetry.publication import Sample
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """One sample that waits since `since` (monotonic s); `repeated`: the broker acknowledged it before.
+
+    `shift` is the wall clock less the monotonic one when it was measured, in ms; None: of an earlier boot.
+    `row` is its id in the store, None where it is in memory alone.
+    """
+
+    sample: Sample
+    since: float
+    repeated: bool = False
+    shift: int | None = None
+    row: int | None = None
+
+    @property
+    def key(self) -> Key:
+        """Device and boot: one history array holds samples of one key."""
+        return self.sample.device, self.sample.boot
+
+    def at(self, shift: int, clock: ClockState = "synced") -> Kept:
+        """Return it with the time that the clock tells now, whose word is `clock`.
+
+        Unchanged if its own was synchronised; and where nobody vouches for the clock now, unless it was stepped since.
+        """
+        if self.shift is None or not corrects(self.sample.clock, self.shift, shift, clock):
+            return self
+        right = replace(self.sample, ts=self.sample.ts + shift - self.shift, clock=clock)
+        return replace(self, sample=right, shift=shift)
+
+
+NONE: AbstractSet[str] = frozenset()
+
+
+def _seq(kept: Kept) -> int:
+    return kept.sample.seq
+
+
+@dataclass(slots=True)
+class History:
+    """What waits; `len()` counts the samples. No sample is put here while it stands here already."""
+
+    _shelves: dict[Key, list[Kept]] = field(default_factory=dict)
+    _count: int = 0
+    _repeated: int = 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __contains__(self, key: Key) -> bool:
+        """Tell whether a sample of this device and boot waits."""
+        return key in self._shelves
+
+    def add(self, kept: Kept) -> None:
+        """Put one sample in its place."""
+        shelf = self._shelves.setdefault(kept.key, [])
+        if shelf and _seq(shelf[-1]) > _seq(kept):
+            insort(shelf, kept, key=_seq)
+        else:
+            shelf.append(kept)
+        self._count += 1
+        self._repeated += kept.repeated
+
+    def extend(self, many: Iterable[Kept]) -> None:
+        """Put several in their places."""
+        for kept in many:
+            self.add(kept)
+
+    def put_back(self, taken: tuple[Kept, ...]) -> None:
+        """Put back samples of one key that were taken last: before all others of it, if that is their place."""
+        shelf = self._shelves.get(taken[0].key)
+        if shelf is None or _seq(taken[-1]) > _seq(shelf[0]):
+            self.extend(taken)
+            return
+        shelf[:0] = taken
+        self._count += len(taken)
+        self._repeated += sum(kept.repeated for kept in taken)
+
+    def waits(self, passed_over: AbstractSet[str] = NONE) -> bool:
+        """Tell whether a sample waits of a device that is not `passed_over`."""
+        return any(device not in passed_over for device, _ in self._shelves)
+
+    def take(self, most: int, passed_over: AbstractSet[str] = NONE) -> tuple[Kept, ...]:
+        """Take up to `most` samples of the key that holds the oldest, in order of seq; () where none waits.
+
+        Those of devices that are `passed_over` stay.
+        """
+        keys = [key for key in self._shelves if key[0] not in passed_over]
+        if not keys:
+            return ()
+        key = min(keys, key=lambda each: self._shelves[each][0].since)
+        shelf = self._shelves[key]
+        taken = tuple(shelf[:most])
+        del shelf[:most]
+        if not shelf:
+            del self._shelves[key]
+        self._count -= len(taken)
+        self._repeated -= sum(kept.repeated for kept in taken)
+        return taken
+
+    def evict(self) -> Kept | None:
+        """Make room: drop all that were acknowledged before (None), else take the oldest (None: none waits)."""
+        if not self._repeated:
+            return next(iter(self.take(1)), None)
+        shelves = {key: [kept for kept in shelf if not kept.repeated] for key, shelf in self._shelves.items()}
+        self._shelves = {key: shelf for key, shelf in shelves.items() if shelf}
+        self._count -= self._repeated
+        self._repeated = 0
+        return None
+
+    def correct(self, shift: int, clock: ClockState = "synced") -> None:
+        """Give all the time that the clock tells now, as `Kept.at` does."""
+        for shelf in self._shelves.values():
+            shelf[:] = [kept.at(shift, clock) for kept in shelf]
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._shelves.clear()
+        self._count = self._repeated = 0
+
+    def oldest(self) -> Kept | None:
+        """Return the one that waits longest, None where none waits."""
+        return min((shelf[0] for shelf in self._shelves.values()), key=lambda kept: kept.since, default=None)

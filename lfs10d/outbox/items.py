@@ -1,0 +1,89 @@
+"""The letters of the outbox: what one message on its way to the broker is made of. Pure values.
+
+Topics are under `B`. Two letters are never equal, whatever they say: each is one message.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from lfs10d.outbox.history import Kept
+from lfs10d.outbox.losses import Loss
+from lfs10d.telemetry.publication import EVENT, HISTORY, Publication, device_topic
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Retained:
+    """The newest version of a retained topic; payload None clears it."""
+
+    publication: Publication
+
+    @property
+    def topic(self) -> str:
+        """The topic under `B`."""
+        return self.publication.topic
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Message:
+    """A response, an event or a trace; `correlation` is the request's Correlation Data."""
+
+    publication: Publication
+    correlation: bytes | None = None
+
+    @property
+    def topic(self) -> str:
+        """The topic under `B`."""
+        return self.publication.topic
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Live:
+    """A sample while it is young."""
+
+    publication: Publication
+    kept: Kept
+
+    @property
+    def topic(self) -> str:
+        """The topic under `B`."""
+        return self.publication.topic
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Array:
+    """1..100 samples of one device and boot in order of seq, for `history`."""
+
+    samples: tuple[Kept, ...]
+
+    @property
+    def topic(self) -> str:
+        """The topic under `B`."""
+        return device_topic(self.samples[0].sample.device, HISTORY)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Declaration:
+    """Samples that will never come, for event `dropped`."""
+
+    loss: Loss
+
+    @property
+    def topic(self) -> str:
+        """The topic under `B`."""
+        return EVENT
+
+
+Letter: TypeAlias = Retained | Message | Live | Array | Declaration
+
+
+def samples_of(letter: Letter) -> tuple[Kept, ...]:
+    """Return the samples a letter carries."""
+    match letter:
+        case Live(kept=kept):
+            return (kept,)
+        case Array(samples=samples):
+            return samples
+        case _:
+            return ()

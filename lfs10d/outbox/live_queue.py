@@ -1,0 +1,65 @@
+"""The live samples that wait: the devices in turn, of each the oldest first. Pure.
+
+A device that is polled often delays no other: each waits for at most one sample of every other device.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+
+from lfs10d.outbox.items import Live
+
+
+class LiveQueue:
+    """What waits; `len()` counts the samples."""
+
+    def __init__(self) -> None:
+        self._waiting: dict[Live, None] = {}  # the oldest first
+        self._devices: dict[str, deque[Live]] = {}  # in the order of their turns; none is empty
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    def add(self, live: Live) -> None:
+        """Put a new sample behind those of its device."""
+        self._waiting[live] = None
+        self._devices.setdefault(live.kept.sample.device, deque()).append(live)
+
+    def put_back(self, live: Live) -> None:
+        """Put a sample that did not arrive before all others."""
+        self._waiting = {live: None, **self._waiting}
+        self._devices.setdefault(live.kept.sample.device, deque()).appendleft(live)
+
+    def take(self) -> Live | None:
+        """Take the sample whose turn it is, None where none waits."""
+        if not self._devices:
+            return None
+        device = next(iter(self._devices))
+        waiting = self._devices.pop(device)
+        live = waiting.popleft()
+        if waiting:
+            self._devices[device] = waiting
+        del self._waiting[live]
+        return live
+
+    def take_oldest(self) -> Live | None:
+        """Take the sample that waits longest, None where none waits."""
+        live = self.oldest()
+        if live is not None:
+            del self._waiting[live]
+            device = live.kept.sample.device
+            self._devices[device].remove(live)  # its first
+            if not self._devices[device]:
+                del self._devices[device]
+        return live
+
+    def oldest(self) -> Live | None:
+        """Return the sample that waits longest, None where none waits."""
+        return next(iter(self._waiting), None)
+
+    def change(self, changed: Callable[[Live], Live]) -> None:
+        """Replace each sample by what `changed` makes of it; the turns stay."""
+        replaced = {live: changed(live) for live in self._waiting}
+        self._waiting = dict.fromkeys(replaced.values())
+        self._devices = {device: deque(replaced[live] for live in waiting) for device, waiting in self._devices.items()}

@@ -1,0 +1,282 @@
+"""Carries samples between the outbox and the store, one operation at a time: the shell around `Past`'s decisions.
+
+The store works in a thread of its own; nothing here blocks. What the store cannot do is tried again every 5 s.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable
+
+from lfs10d.outbox.backlog import SPILL_EVERY, Past
+from lfs10d.outbox.outbox import Outbox
+from lfs10d.outbox.spool import PAGE_ROWS
+from lfs10d.outbox.store.database import Limits
+from lfs10d.outbox.store.sample_file import Entry
+from lfs10d.outbox.store.store import Store, StoreError
+from lfs10d.system.clock import ClockState
+from lfs10d.system.threads import OwnThread
+from lfs10d.telemetry import publication
+from lfs10d.telemetry.publication import Publication
+
+log = logging.getLogger(__name__)
+
+NOTICED = 0.02
+"""Seconds after a sample has become old at which it is looked for."""
+
+FULL_DISK = "samples that the broker does not take wait in memory, where 10 000 have room"
+
+
+class Stowage:
+    """`epoch_ms()` is the wall clock; `wake()` is called when there is more to send.
+
+    `troubled` is told why the store cannot keep anything, and None when it can again; `tell` takes events.
+    """
+
+    def __init__(
+        self,
+        outbox: Outbox,
+        store: Store,
+        *,
+        epoch_ms: Callable[[], int],
+        wake: Callable[[], None],
+        troubled: Callable[[str | None], None],
+        tell: Callable[[Publication], None],
+    ) -> None:
+        self._outbox = outbox
+        self._store = store
+        self._epoch_ms = epoch_ms
+        self._wake = wake
+        self._troubled = troubled
+        self._tell = tell
+        self._thread = OwnThread("store")
+        self._poked = asyncio.Event()
+        self._task: asyncio.Task[None] | None = None
+        self._ending = False
+        self._opened = False
+        self._open_at = float("-inf")
+        self._trouble: str | None = None
+        self._right: tuple[int, ClockState] | None = None
+        self._limits: Limits | None = None
+        self._changed_at: float | None = None
+        self._first_opening = True
+
+    @property
+    def _past(self) -> Past:
+        return self._outbox.past
+
+    def start(self) -> None:
+        """Open the store, and begin."""
+        self._task = asyncio.get_running_loop().create_task(self._run(), name="store")
+        self._task.add_done_callback(self._over)
+
+    def _over(self, task: asyncio.Task[None]) -> None:
+        if not task.cancelled() and (mistake := task.exception()) is not None:
+            log.error("nothing is kept on disk any more, by a mistake of ours", exc_info=mistake)
+            self._tell_trouble(f"nothing is kept on disk until a restart; {FULL_DISK}")
+
+    async def stop(self, within: float) -> None:
+        """Keep what waits on disk, in at most `within` seconds."""
+        self._ending = True
+        self.poke()
+        try:
+            async with asyncio.timeout(within):
+                if self._task is not None:
+                    await asyncio.wait([self._task])
+                await self._keep_everything()
+        except TimeoutError:
+            log.warning("the disk is too slow: %d samples that wait for the broker are not kept", self._in_memory)
+        finally:
+            self._thread.end()
+            if self._task is not None:
+                self._task.cancel()
+
+    def poke(self) -> None:
+        """Look again what is to be done: something has happened."""
+        self._poked.set()
+
+    def correct(self, shift: int, clock: ClockState = "synced") -> None:
+        """Give the samples of this boot the time that the clock tells now, as `Kept.at` does."""
+        self._right = (shift, clock)
+        self.poke()
+
+    def limit(self, limits: Limits) -> None:
+        """Take other limits."""
+        self._limits = limits
+        self.poke()
+
+    @property
+    def _in_memory(self) -> int:
+        return self._outbox.depth - self._past.stored.depth
+
+    def _now(self) -> float:
+        return asyncio.get_running_loop().time()
+
+    # What is to be done
+
+    async def _run(self) -> None:
+        while not self._ending:
+            self._poked.clear()
+            self._outbox.age(self._now())
+            due, act = self._next()
+            if due <= self._now():
+                await self._attempt(act)
+            else:
+                await self._rest(due)
+
+    async def _rest(self, until: float) -> None:
+        try:
+            async with asyncio.timeout_at(until if until < float("inf") else None):
+                await self._poked.wait()
+        except TimeoutError:
+            pass
+
+    def _next(self) -> tuple[float, Callable[[], Awaitable[None]]]:
+        """Return what is to be done next, and when; inf: nothing, unless something happens."""
+        never = float("inf")
+        if not self._opened:
+            return self._open_at, self._open
+        if self._limits is not None:
+            return float("-inf"), self._take_limits
+        if self._right is not None:
+            return float("-inf"), self._correct
+        spill, page, release = self._past.spill_due(), self._past.page_due(), self._past.stored.release_due()
+        choices: list[tuple[float, Callable[[], Awaitable[None]]]] = [
+            (never if page is None else page, self._take_page),
+            (never if release is None else release, self._release),
+        ]
+        if self._store.open_for_more:
+            choices.append((never if spill is None else spill, self._spill))
+            old = self._outbox.next_old() if self._past.away else None
+            choices.append((self._losses_due, self._release))
+            if spill is None and old is not None:
+                choices.append((max(old + NOTICED, self._now() + NOTICED), self._nothing))
+        return min(choices, key=lambda choice: choice[0])
+
+    @property
+    def _losses_changed(self) -> bool:
+        return tuple(self._past.undeclared()) != self._store.losses
+
+    @property
+    def _losses_due(self) -> float:
+        """When the losses that are not declared yet are to be kept: they have changed for 5 s; inf: they have not."""
+        if not self._losses_changed:
+            self._changed_at = None
+        elif self._changed_at is None:
+            self._changed_at = self._now() + SPILL_EVERY
+        return float("inf") if self._changed_at is None else self._changed_at
+
+    async def _nothing(self) -> None:
+        """Do nothing: to look again is all."""
+
+    async def _attempt(self, act: Callable[[], Awaitable[None]]) -> None:
+        try:
+            await act()
+        except StoreError as error:
+            self._opened = False
+            self._open_at = self._now() + SPILL_EVERY
+            self._tell_trouble(f"{error}; {FULL_DISK}")
+        self._past.stored.told(self._store.rows, self._store.oldest_ts)
+        while self._store.reports:
+            report = self._store.reports.popleft()
+            log.warning("the backlog %s %s; it is put aside as %s", self._store.path, report.reason, report.path.name)
+            self._tell(
+                publication.event("store_put_aside", self._epoch_ms(), file=report.path.name, reason=report.reason)
+            )
+
+    def _tell_trouble(self, trouble: str | None) -> None:
+        if trouble == self._trouble:
+            return
+        self._trouble = trouble
+        self._troubled(trouble)
+
+    def _works(self) -> None:
+        """Note that something could be written."""
+        if self._trouble is not None:
+            log.info("the backlog %s can be written again", self._store.path)
+        self._tell_trouble(None)
+
+    # How it is done
+
+    async def _open(self) -> None:
+        losses = await self._thread.call(self._store.open)
+        self._opened = True
+        stored = self._past.stored
+        stored.told(self._store.rows, self._store.oldest_ts)
+        if self._first_opening:
+            self._first_opening = False
+            for loss in losses:
+                self._past.losses.restore(loss)
+            if stored.rows:
+                log.info("%d samples of before wait for the broker in %s", stored.rows, self._store.path)
+        stored.more = stored.rows > 0
+        if self._past.spill_due() is None:
+            self._works()
+
+    async def _take_limits(self) -> None:
+        limits, self._limits = self._limits, None
+        assert limits is not None  # noqa: S101 - or it would not be due
+        await self._thread.call(self._store.limit, limits)
+
+    async def _correct(self) -> None:
+        right = self._right
+        assert right is not None  # noqa: S101 - or it would not be due
+        await self._thread.call(self._store.correct, *right)
+        if right == self._right:
+            self._right = None
+
+    async def _spill(self) -> None:
+        stored = self._past.stored
+        entries = [Entry(kept.sample, kept.shift or 0, kept.repeated) for kept in self._past.spill()]
+        try:
+            evicted = await self._thread.call(
+                self._store.append,
+                entries,
+                losses=self._past.undeclared(),
+                now=self._epoch_ms(),
+                mono=round(self._now() * 1000),
+                beyond=self._past.beyond,
+                delivered=stored.delivered,
+            )
+        except StoreError:
+            self._outbox.not_spilled(self._now())
+            raise
+        stored.told(self._store.rows, self._store.oldest_ts)
+        self._past.spilled(evicted, self._now())
+        self._works()
+        if evicted:
+            log.warning("the backlog on disk has reached store.max_size or store.max_age: the oldest samples go")
+        self._wake()
+
+    async def _take_page(self) -> None:
+        stored = self._past.stored
+        turn = stored.turn
+        rows = await self._thread.call(self._store.read, stored.after, PAGE_ROWS)
+        if turn == stored.turn:
+            stored.take_page(rows, PAGE_ROWS)
+            if self._right is not None:
+                stored.page.correct(*self._right)
+            self._wake()
+
+    async def _release(self) -> None:
+        rows = self._past.stored.releasing(self._now())
+        await self._thread.call(self._store.delete, rows, losses=self._past.undeclared())
+        self._past.stored.deleted(rows)
+        self._works()
+
+    # The end
+
+    async def _keep_everything(self) -> None:
+        """Keep what waits, let go what was acknowledged, close."""
+        self._outbox.age(float("inf"))
+        try:
+            if not self._opened:
+                await self._open()
+            while self._store.open_for_more and self._past.spill_at_last():
+                await self._spill()
+            while self._past.stored.letting_go or self._losses_changed:
+                await self._release()
+            await self._thread.call(self._store.close)
+        except StoreError as error:
+            log.warning("%s; %d samples that wait for the broker are not kept", error, self._in_memory)

@@ -1,0 +1,270 @@
+"""The samples in one SQLite file: kept, read, let go, evicted.
+
+All methods block, and belong to one thread. Each is one transaction: it has happened on the disk, or raises
+sqlite3.Error or DamagedError; then the file is to be closed, since nobody knows what of it has happened.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
+from pathlib import Path
+
+from lfs10d.outbox.losses import Loss, joined
+from lfs10d.outbox.store import database
+from lfs10d.outbox.store.catalogue import Catalogue
+from lfs10d.outbox.store.database import PAGE, Limits, number, transaction
+from lfs10d.outbox.store.row import Cell, DamagedError, check, pack_rtt, unpack_rtt, values_from, values_of
+from lfs10d.system.clock import ClockState
+from lfs10d.telemetry.publication import Sample
+
+EVICTED_AT_ONCE = 256
+"""Samples evicted in one go: two pages."""
+
+BYTES_PER_SAMPLE = 64
+"""More than a sample takes, to make room before it is written."""
+
+VACUUMED_AT_ONCE = 256
+"""Pages given back in one transaction."""
+
+RANGES_MOST = 8
+"""Ranges of losses kept apart per device and boot in one eviction."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A sample to be kept; `shift`: wall clock less monotonic clock when it was measured, in ms."""
+
+    sample: Sample
+    shift: int
+    repeated: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A sample that is kept. `shift` is None for one of an earlier boot."""
+
+    id: int
+    sample: Sample
+    shift: int | None
+    repeated: bool
+
+
+def unheard(evicted: tuple[Loss, ...]) -> None:
+    """Take what is about to be lost, and do nothing about it."""
+    del evicted
+
+
+class SampleFile:
+    """The file at `path`, made if there is none; `first` is the least id of what is appended.
+
+    Raises as the methods do, and ForeignError.
+    """
+
+    def __init__(self, path: Path, *, boot: str, limits: Limits, first: int = 1) -> None:
+        self._boot = boot
+        self._limits = limits
+        self._db = database.connect(path, boot=boot, limits=limits)
+        try:
+            self._catalogue = Catalogue(self._db, boot=boot)
+            self.losses = tuple(
+                Loss(*each) for each in self._db.execute("SELECT device, boot, from_seq, to_seq, count FROM loss")
+            )
+            """What the table of losses says."""
+            self.rows = number(self._db, "SELECT count(*) FROM sample")  # reads every page of them
+            """Samples in the file."""
+            self.next = max(first, 1 + number(self._db, "SELECT coalesce(max(id), 0) FROM sample"))
+            """The id of the next sample."""
+        except BaseException:
+            self._db.close()
+            raise
+
+    def limit(self, limits: Limits) -> None:
+        """Take other limits; they hold from the next `append` on."""
+        self._limits = limits
+        database.limit(self._db, limits)
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._db.close()
+
+    # In
+
+    def append(
+        self,
+        entries: Sequence[Entry],
+        *,
+        losses: Sequence[Loss],
+        now: int,
+        mono: int,
+        beyond: int = 0,
+        delivered: AbstractSet[int] = frozenset(),
+        about: Callable[[tuple[Loss, ...]], None] = unheard,
+    ) -> tuple[Loss, ...]:
+        """Keep samples, evict the oldest where there is no room or they are too old; return what is lost by that.
+
+        There is at least one entry. `losses` are those to be declared so far; with the new ones they are kept.
+        `now` is epoch ms, `mono` the monotonic clock in ms. Rows up to id `beyond` are under way to the broker and
+        stay; the going of rows `delivered` is no loss. `about` is told what is lost before that is so.
+        """
+        certain = entries[-1].sample.clock == "synced"
+        with transaction(self._db):
+            evicted = self._evict(len(entries), beyond, delivered, (now if certain else None, mono))
+            for entry in entries:
+                self._insert(entry)
+            self._keep_losses((*losses, *evicted))
+            about(evicted)
+        self.rows += len(entries)
+        return evicted
+
+    def _insert(self, entry: Entry) -> None:
+        sample = entry.sample
+        series_id, series, base = self._catalogue.place(sample, entry.shift, repeated=entry.repeated)
+        key, at, rtt = self.next, sample.ts - base, pack_rtt(sample.rtt_ms)
+        first, *others = values_of(sample) or (None,)
+        checked = check(series.text, sample.seq, at, rtt, first, *others)
+        self._db.execute(
+            "INSERT INTO sample VALUES (?, ?, ?, ?, ?, ?, ?)", (key, series_id, sample.seq, at, rtt, first, checked)
+        )
+        if others:
+            self._db.executemany(
+                "INSERT INTO further VALUES (?, ?, ?)", [(key, place, value) for place, value in enumerate(others, 1)]
+            )
+        self.next += 1
+
+    def take_back(self, first: int) -> bool:
+        """Delete the samples from id `first` on; return True if there were any."""
+        before = self.rows
+        with transaction(self._db):
+            self._delete(first, self.next)
+        return self.rows < before
+
+    # Out
+
+    def read(self, after: int, most: int) -> list[Row]:
+        """Return up to `most` samples of ids above `after`, the oldest first."""
+        found = self._db.execute(
+            "SELECT id, series, seq, at, rtt, value, checked FROM sample WHERE id > ? ORDER BY id LIMIT ?",
+            (after, most),
+        ).fetchall()
+        further: dict[int, list[Cell]] = {}
+        if found:
+            for key, value in self._db.execute(
+                "SELECT sample, value FROM further WHERE sample BETWEEN ? AND ? ORDER BY sample, place",
+                (found[0][0], found[-1][0]),
+            ):
+                further.setdefault(key, []).append(value)
+        return [self._row(columns, further.get(columns[0], [])) for columns in found]
+
+    def _row(self, columns: tuple[int, int, int, int, Cell, Cell, int], others: list[Cell]) -> Row:
+        key, series_id, seq, at, rtt, value, checked = columns
+        era, series = self._catalogue.find(series_id)
+        if check(series.text, seq, at, rtt, value, *others) != checked:
+            raise DamagedError("a sample is not what was written")
+        sample = Sample(
+            device=series.device,
+            boot=series.boot,
+            seq=seq,
+            ts=era.base + at,
+            clock=era.clock,
+            values=values_from(series, (value, *others)),
+            units=dict(series.units),
+            names=series.names,
+            quality=series.quality,
+            error=series.error,
+            rtt_ms=unpack_rtt(rtt),
+        )
+        return Row(key, sample, era.shift if era.boot == self._boot else None, series.repeated)
+
+    def oldest(self) -> int | None:
+        """Return the `ts` of the oldest sample, None where there is none."""
+        return next((row.sample.ts for row in self.read(0, 1)), None)
+
+    def delete(self, ids: Collection[int], *, losses: Sequence[Loss]) -> None:
+        """Let these go, and keep `losses` as those to be declared; give back what room is no longer needed."""
+        with transaction(self._db):
+            for first, last in runs(ids):
+                self._delete(first, last)
+            if not self.rows:
+                self._catalogue.clear()
+            self._keep_losses(losses)
+        free = number(self._db, "PRAGMA freelist_count")
+        if free > VACUUMED_AT_ONCE and free > number(self._db, "PRAGMA page_count") // 2:
+            # Where most of the file is free: so every page is moved once at most. One page at each step of the
+            # statement, which `execute` makes only one of.
+            self._db.executescript(f"PRAGMA incremental_vacuum({VACUUMED_AT_ONCE})")
+        elif free and not self.rows:
+            self._db.executescript("PRAGMA incremental_vacuum; PRAGMA wal_checkpoint(TRUNCATE)")
+
+    def _delete(self, first: int, last: int) -> None:
+        self.rows -= self._db.execute("DELETE FROM sample WHERE id BETWEEN ? AND ?", (first, last)).rowcount
+        self._db.execute("DELETE FROM further WHERE sample BETWEEN ? AND ?", (first, last))
+
+    # Evicting
+
+    def _evict(
+        self, coming: int, beyond: int, delivered: AbstractSet[int], now: tuple[int | None, int]
+    ) -> tuple[Loss, ...]:
+        lost: dict[tuple[str, str], list[Loss]] = {}
+        room = self._limits.pages - coming * BYTES_PER_SAMPLE // PAGE
+        while self.rows:
+            found = self._db.execute(
+                "SELECT id, series, seq, at FROM sample WHERE id > ? ORDER BY id LIMIT ?", (beyond, EVICTED_AT_ONCE)
+            ).fetchall()
+            if number(self._db, "PRAGMA page_count") - number(self._db, "PRAGMA freelist_count") <= room:
+                found = found[: self._too_old(found, *now)]
+            if not found:
+                break
+            for key, series_id, seq, _ in found:
+                _, series = self._catalogue.find(series_id)
+                if key not in delivered and not series.repeated:
+                    loss = Loss(series.device, series.boot, seq, seq, 1)
+                    lost[loss.key] = joined([*lost.get(loss.key, ()), loss], RANGES_MOST)
+            self._delete(found[0][0], found[-1][0])
+        return tuple(loss for losses in lost.values() for loss in losses)
+
+    def _too_old(self, found: Sequence[tuple[int, int, int, int]], now: int | None, mono: int) -> int:
+        """Return how many of the rows are too old: all up to the last one of which it is certain.
+
+        Within this boot the monotonic clock knows, whatever becomes of the wall clock. Of an earlier boot the wall
+        clock does, if it was synchronised then and is now (`now`, else None): where it was not, nobody knows.
+        """
+        count = 0
+        for place, (_, series_id, _, at) in enumerate(found, 1):
+            era, _ = self._catalogue.find(series_id)
+            if era.boot == self._boot:
+                age: int | None = mono - (era.base + at - era.shift)
+            else:
+                age = None if now is None or era.clock != "synced" else now - (era.base + at)
+            if age is not None and age > self._limits.age:
+                count = place
+        return count
+
+    # What else is kept
+
+    def correct(self, shift: int, clock: ClockState = "synced") -> None:
+        """Give this boot's samples the time that the clock tells now, as `Catalogue.correct` does."""
+        with transaction(self._db):
+            self._catalogue.correct(shift, clock)
+
+    def _keep_losses(self, losses: Sequence[Loss]) -> None:
+        if tuple(losses) != self.losses:
+            self._db.execute("DELETE FROM loss")
+            self._db.executemany(
+                "INSERT INTO loss VALUES (?, ?, ?, ?, ?)",
+                [(each.device, each.boot, each.from_seq, each.to_seq, each.count) for each in losses],
+            )
+            self.losses = tuple(losses)
+
+
+def runs(ids: Collection[int]) -> Iterator[tuple[int, int]]:
+    """Return the runs of neighbouring numbers, first and last of each."""
+    first = last = None
+    for each in sorted(ids):
+        if first is not None and last is not None and each > last + 1:
+            yield first, last
+            first = None
+        first, last = each if first is None else first, each
+    if first is not None and last is not None:
+        yield first, last

@@ -1,0 +1,299 @@
+"""The schema of a device profile: what a YAML file may say about a device, and what it means.
+
+A profile is a fact sheet: registers, limits, how id and rate are set, what may be written at all. Register
+addresses are those on the wire (0x0001 is sent as 00 01). There is no default where a guess would give a
+plausible wrong number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Annotated, Any, Literal, TypeAlias, get_args
+
+from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_validator
+
+from lfs10d.profiles.blocks import Block, batch
+from lfs10d.profiles.values import (
+    Fact,
+    Facts,
+    Place,
+    ReadFunction,
+    Register,
+    Registered,
+    Sentence,
+    Setting,
+    Value,
+    refuse,
+)
+from lfs10d.reading import Fault, Number
+from lfs10d.schema.fields import Duration, Name, Whole
+
+FramingName: TypeAlias = Literal["rtu", "ascii"]
+ChecksumName: TypeAlias = Literal["crc", "sum"]
+SlaveId: TypeAlias = Annotated[int, Whole(1, 255)]
+Rate: TypeAlias = Literal[1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200]
+
+MOST_WORDS = 125
+"""Registers of one read (Modbus Application Protocol V1.1b3, section 6.3)."""
+
+BUSY_EXCEPTIONS = (6,)
+"""Server device busy (Modbus Application Protocol V1.1b3, section 7; EH600: the maker's fuller manual)."""
+
+BYTE_COUNT = 1
+"""Byte before the registers of an answer; it counts as data (Fuling DZB manual, appendix B)."""
+
+
+class Barrier(Registered):
+    """A read whose answer has another shape than any poll's, so that a late answer cannot pass for it."""
+
+    function: ReadFunction = Field(3, description="3 reads holding registers, 4 input registers.")
+    count: Annotated[int, Whole(1, MOST_WORDS)] = Field(description="Registers that it asks for.")
+
+
+class IdRegister(Registered):
+    """Where the slave id is set; `locked_by` is what overrules it (`DIP switch`)."""
+
+    locked_by: Sentence | None = Field(None, description="What overrules it, such as a DIP switch.")
+
+
+class RateRegister(Registered):
+    """Where the baud rate is set."""
+
+    codes: dict[int, Register] = Field(description="The register's content for each rate: {9600: 1, 19200: 2}.")
+    locked_by: Sentence | None = Field(None, description="What overrules it, such as a DIP switch.")
+
+    @field_validator("codes", mode="before")
+    @classmethod
+    def _are_of_rates(cls, codes: object) -> object:
+        rates: tuple[int, ...] = get_args(Rate)
+        wanted = " ".join(map(str, rates))
+        keys = codes if isinstance(codes, dict) else {}
+        refuse([((key,), f"is no baud rate; write one of {wanted}") for key in keys if key not in rates])
+        return codes
+
+    @field_validator("codes", mode="after")
+    @classmethod
+    def _differ(cls, codes: dict[int, int]) -> dict[int, int]:
+        problems: list[tuple[Place, str]] = []
+        if not codes:
+            problems.append(((), "names no rate"))
+        rates: dict[int, int] = {}
+        for rate, code in codes.items():
+            first = rates.setdefault(code, rate)
+            if first != rate:
+                problems.append(((rate,), f"{code} is the code of {first} already"))
+        refuse(problems)
+        return codes
+
+
+class Factory(Fact):
+    """How a new device comes: its slave id and baud rate. `line/adopt` looks for it there."""
+
+    id: SlaveId = Field(description="Its slave id.")
+    baudrate: Rate = Field(description="Its baud rate; it need not be among the rates that can be set.")
+
+
+def _ids(ids: tuple[int, int]) -> tuple[int, int]:
+    if ids[0] > ids[1]:
+        refuse([((), "the first id is greater than the last")])
+    return ids
+
+
+def _unique(texts: tuple[str, ...]) -> tuple[str, ...]:
+    if len(texts) == 0 or len(set(texts)) < len(texts):
+        refuse([((), "must name at least one, each once")])
+    return texts
+
+
+def _repeated(facts: Iterable[Value | Setting]) -> list[tuple[Place, str]]:
+    seen: dict[str, int] = {}
+    problems: list[tuple[Place, str]] = []
+    for index, fact in enumerate(facts):
+        first = seen.setdefault(fact.name, index)
+        if first != index:
+            problems.append(((index, "name"), f"{fact.name!r} is the name of [{first}] already"))
+    return problems
+
+
+class Profile(Facts):
+    """A kind of device. The first of `values` is the primary one; the first of `checksums` is the usual one.
+
+    `ids` are the first and the last slave id it can have, both included. `ascii_max_data` bounds the data
+    bytes of an ASCII answer. `min_interval` is the shortest time between two polls in seconds, `request_gap` the
+    silence before each request to it, counted from the end of the exchange with it before.
+    `busy_exceptions` are asked again later. `provenance` tells where a plain key's fact comes from.
+    """
+
+    name: Annotated[str, Name()] = Field(description="What to call it, of a-z 0-9 _ -.")
+    title: Sentence = Field(description="What it is, for people.")
+    sources: Annotated[tuple[Sentence, ...], Field(strict=False)] = Field((), description="The maker's documents.")
+    ids: Annotated[tuple[SlaveId, SlaveId], Field(strict=False), AfterValidator(_ids)] = Field(
+        (1, 247), description="First and last slave id it can have."
+    )
+    broadcast: bool = Field(default=False, description="It obeys writes to slave 0; none is ever sent.")
+    framings: Annotated[tuple[FramingName, ...], Field(strict=False), AfterValidator(_unique)] = Field(
+        ("rtu",), description="rtu, ascii or both."
+    )
+    checksums: Annotated[tuple[ChecksumName, ...], Field(strict=False), AfterValidator(_unique)] = Field(
+        ("crc",), description="crc, sum or both; the first unless a slave's `checksum` says otherwise."
+    )
+    max_words: Annotated[int, Whole(1, MOST_WORDS)] = Field(
+        MOST_WORDS, description="Registers that one read may ask for."
+    )
+    ascii_max_data: Annotated[int, Whole(3, 252)] | None = Field(
+        None, description="Data bytes that one ascii answer may have."
+    )
+    min_interval: Annotated[float, Duration(0, 86400)] = Field(0.0, description="Shortest time between two polls.")
+    request_gap: Annotated[float, Duration(0, 60)] = Field(
+        0.0, description="Rest that it needs between the end of one exchange and its next request, whatever it is for."
+    )
+    busy_exceptions: Annotated[tuple[Annotated[int, Whole(1, 255)], ...], Field(strict=False)] = Field(
+        BUSY_EXCEPTIONS, description="Exception codes that mean: ask again later."
+    )
+    factory: Factory | None = Field(None, description="How a new one comes; `line/adopt` needs it.")
+    slave_id: IdRegister | None = Field(None, description="Where its slave id is set.")
+    baudrate: RateRegister | None = Field(None, description="Where its baud rate is set.")
+    values: Annotated[tuple[Value, ...], Field(strict=False)] = Field(
+        description="What it measures, the most important first."
+    )
+    settings: Annotated[tuple[Setting, ...], Field(strict=False)] = Field(
+        (), description="Registers that configure it."
+    )
+    barrier: Barrier | None = Field(None, description="A read of another length than any poll's.")
+    run_commands: Annotated[tuple[Register, ...], Field(strict=False)] = Field(
+        (), description="Registers that set something going; never written, whatever a request says."
+    )
+    provenance: dict[str, Sentence] = Field({}, description="Where a plain key's fact comes from, by key.")
+    notes: Annotated[tuple[Sentence, ...], Field(strict=False)] = Field((), description="What else to know.")
+
+    _blocks: tuple[Block, ...] = PrivateAttr(default=())
+
+    # A field's validator sees those fields above it that have no error. So the order of the fields matters,
+    # and every problem of a file is found at once, though another field is wrong.
+
+    @field_validator("factory", mode="after")
+    @classmethod
+    def _factory_id_is_an_id(cls, factory: Factory | None, info: ValidationInfo) -> Factory | None:
+        ids = info.data.get("ids")
+        if factory and ids and not ids[0] <= factory.id <= ids[1]:
+            refuse([(("id",), f"{factory.id} is none of the ids {ids[0]} to {ids[1]}")])
+        return factory
+
+    @field_validator("baudrate", mode="after")
+    @classmethod
+    def _rate_register_is_another(cls, rate: RateRegister | None, info: ValidationInfo) -> RateRegister | None:
+        slave_id = info.data.get("slave_id")
+        if rate and slave_id and rate.register == slave_id.register:
+            refuse([(("register",), "is the register of the slave id")])
+        return rate
+
+    @field_validator("values", mode="after")
+    @classmethod
+    def _values_can_be_read(cls, values: tuple[Value, ...], info: ValidationInfo) -> tuple[Value, ...]:
+        problems = _repeated(values)
+        if not values:
+            problems.append(((), "names no value"))
+        most = _words_per_read(info.data)
+        for index, value in enumerate(values):
+            if value.words > most:
+                wanted = f"needs {value.words} registers, one read of this device brings {most} at most"
+                problems.append(((index, "type"), f"{value.type} {wanted}"))
+        refuse(problems)
+        return values
+
+    @field_validator("settings", mode="after")
+    @classmethod
+    def _settings_are_apart(cls, settings: tuple[Setting, ...], info: ValidationInfo) -> tuple[Setting, ...]:
+        problems = _repeated(settings)
+        taken = {fact.register: key for key in ("slave_id", "baudrate") if (fact := info.data.get(key)) is not None}
+        for index, setting in enumerate(settings):
+            if setting.register in taken:
+                message = f"is set by {taken[setting.register]}; it is no setting of its own"
+                problems.append(((index, "register"), message))
+            taken.setdefault(setting.register, f"settings[{index}]")
+        refuse(problems)
+        return settings
+
+    @field_validator("barrier", mode="after")
+    @classmethod
+    def _barrier_has_its_own_shape(cls, barrier: Barrier | None, info: ValidationInfo) -> Barrier | None:
+        values = info.data.get("values")
+        if barrier and values:
+            most = _words_per_read(info.data)
+            if barrier.count > most:
+                refuse([(("count",), f"one read of this device brings {most} registers at most")])
+            shapes = {(block.function, block.count) for block in batch(values, most)}
+            if (barrier.function, barrier.count) in shapes:
+                refuse(
+                    [
+                        (
+                            ("count",),
+                            "a poll reads as many registers; a late answer could pass for the barrier's",
+                        )
+                    ]
+                )
+        return barrier
+
+    @field_validator("run_commands", mode="after")
+    @classmethod
+    def _run_commands_are_no_settings(cls, registers: tuple[int, ...], info: ValidationInfo) -> tuple[int, ...]:
+        settings = {setting.register: setting.name for setting in info.data.get("settings", ())}
+        taken = [(place, register) for place, register in enumerate(registers) if register in settings]
+        refuse([((place,), f"is the setting {settings[register]} already") for place, register in taken])
+        return registers
+
+    @field_validator("provenance", mode="after")
+    @classmethod
+    def _provenance_is_of_keys(cls, provenance: dict[str, str]) -> dict[str, str]:
+        refuse([((key,), "is no key of a profile") for key in provenance if key not in cls.model_fields])
+        return provenance
+
+    def model_post_init(self, _context: Any, /) -> None:  # noqa: ANN401 - pydantic's signature
+        """Batch the values once; reads and decoding are on the path of every poll."""
+        self._blocks = batch(self.values, self.most_words)
+
+    @property
+    def checksum(self) -> ChecksumName:
+        """The check of its RTU frames, unless a slave's `checksum` says otherwise."""
+        return self.checksums[0]
+
+    @property
+    def value_names(self) -> tuple[str, ...]:
+        """Names in the file's order, the primary value first."""
+        return tuple(value.name for value in self.values)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of each value by name."""
+        return {value.name: value.unit for value in self.values}
+
+    @property
+    def id_and_rate_registers(self) -> frozenset[int]:
+        """Registers that only a verified change of id or rate may write."""
+        return frozenset(fact.register for fact in (self.slave_id, self.baudrate) if fact is not None)
+
+    @property
+    def most_words(self) -> int:
+        """Registers that one read may ask for in every framing that the device speaks."""
+        return _words_per_read(self.__dict__)
+
+    def setting_at(self, register: int) -> Setting | None:
+        """Return the setting at a register; None where the profile knows none: never to be written."""
+        return next((setting for setting in self.settings if setting.register == register), None)
+
+    def reads(self) -> tuple[Block, ...]:
+        """Return the reads of one poll, neighbouring values together; the same objects every time."""
+        return self._blocks
+
+    def decode(self, block: Block, registers: tuple[int, ...]) -> dict[str, Number] | Fault:
+        """Return the values of `block` by name, or the first fault: `not_finite` or `out_of_range`."""
+        return block.decode(registers)
+
+
+def _words_per_read(data: dict[str, Any]) -> int:
+    """Return how many registers one read may bring in any framing; fields with an error do not bind."""
+    most: int = data.get("max_words", MOST_WORDS)
+    limit: int | None = data.get("ascii_max_data")
+    if limit is not None and "ascii" in data.get("framings", ()):
+        most = min(most, (limit - BYTE_COUNT) // 2)
+    return most

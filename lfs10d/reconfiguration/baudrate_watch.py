@@ -1,0 +1,73 @@
+"""Raises `wrong_rate` while no sensor answers at the line's rate but some do at another. Used in the asyncio loop."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Iterable
+
+from lfs10d.config.effective import Effective
+from lfs10d.line.device import Device
+from lfs10d.line.jobs.procedure import Now, Over
+from lfs10d.reading import Errand
+from lfs10d.reconfiguration.procedure_run import Talk
+from lfs10d.reconfiguration.procedures.find_baudrate import in_words, seek
+from lfs10d.system.tasks import BackgroundTasks
+
+log = logging.getLogger(__name__)
+
+
+class Losing:
+    """`tell(words)` raises the line's error, `tell(None)` clears it; `devices()` are those of the line's thread."""
+
+    def __init__(
+        self,
+        *,
+        running: Callable[[], Effective],
+        talk: Callable[[], Talk],
+        devices: Callable[[], Iterable[Device]],
+        tell: Callable[[str | None], None],
+    ) -> None:
+        self._running = running
+        self._talk = talk
+        self._devices = devices
+        self._tell = tell
+        self._tasks = BackgroundTasks()
+        self._told: str | None = None
+        self._task: tuple[int, Talk, asyncio.Task[None]] | None = None
+
+    def begin(self) -> None:
+        """Look out from now on, at the line's rate as it is; the port is open."""
+        rate = self._running().config.line.baudrate
+        if self._task is not None and self._task[0] == rate and not self._task[2].done():
+            return
+        self.stop()
+        talk = self._talk()
+        self._task = rate, talk, self._tasks.start("rate watch", self._look_out(rate, talk))
+        self._say(None)
+
+    def stop(self) -> None:
+        """Look out no more."""
+        if self._task is not None:
+            _, talk, task = self._task
+            talk.halt()
+            talk.go_on()
+            task.cancel()
+            self._task = None
+
+    async def _look_out(self, rate: int, talk: Talk) -> None:
+        clock = Now()
+        talk.begin(seek(self._devices, clock, rate), clock, line_rate=rate, share=1.0, errand=Errand.PROBE)
+        while not isinstance(found := await talk.wanted(), Over):
+            if isinstance(found, dict):
+                now = self._running()
+                polled = sum(slave.enabled for slave in now.config.slaves)
+                self._say(in_words(found, rate, polled, filed=now.said.baudrate) if found else None)
+            talk.go_on()
+
+    def _say(self, words: str | None) -> None:
+        if words != self._told:
+            self._told = words
+            self._tell(words)
+            if words is not None:
+                log.warning("%s", words)

@@ -1,0 +1,157 @@
+"""Devices whose place in the file is not where they were verified last: the line is asked, and what answers is used."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+from lfs10d.config.changes import Changes, Place, Rate
+from lfs10d.config.effective import Effective
+from lfs10d.line.jobs.procedure import Now, Over
+from lfs10d.reading import Errand
+from lfs10d.reconfiguration.journal import Spot
+from lfs10d.reconfiguration.procedure_run import Talk
+from lfs10d.reconfiguration.procedures.locate import locate
+from lfs10d.system.tasks import BackgroundTasks
+
+if TYPE_CHECKING:
+    from lfs10d.reconfiguration.reconfiguration import Physical
+
+log = logging.getLogger(__name__)
+
+
+class Locating:
+    """A part of `Physical`; `repoll()` has the devices polled that are no longer `withheld`."""
+
+    def __init__(self, physical: Physical, repoll: Callable[[], None]) -> None:
+        self._physical = physical
+        self._repoll = repoll
+        self._asked: dict[str, tuple[Place, ...]] = {}
+        """Devices that answered nowhere when they were asked, with where that was."""
+        self._tasks = BackgroundTasks()
+        self._searches: dict[str, tuple[tuple[Place, ...], Talk, asyncio.Task[None]]] = {}
+
+    def contested(self) -> dict[str, tuple[Place, ...]]:
+        """Return the devices that may be at one of several places; less the id that another one was verified at."""
+        now = self._physical.running()
+        contested: dict[str, tuple[Place, ...]] = {}
+        for slave in now.config.slaves:
+            places = now.places[slave.name]
+            if len(places) > 1 and slave.name in now.conflicts:
+                contested[slave.name] = tuple(place for place in places if place.id != slave.id)
+            elif len(places) > 1:
+                contested[slave.name] = places
+        return {name: places for name, places in contested.items() if places}
+
+    def withheld(self) -> frozenset[str]:
+        """Return the devices that must not be polled before the line was asked where they are."""
+        return frozenset(name for name, places in self.contested().items() if self._asked.get(name) != places)
+
+    def begin(self) -> None:
+        """Ask for every contested device that nobody asks for now, and whose turn it is."""
+        if self._physical.ending:
+            return
+        contested = self.contested()
+        turn = in_turn({name: places for name, places in contested.items() if self._asked.get(name) != places})
+        for name, (places, _, _) in tuple(self._searches.items()):
+            if contested.get(name) != places:
+                self._end(name)
+        for name, places in contested.items():
+            if name in self._searches or (name not in turn and self._asked.get(name) != places):
+                continue
+            now = self._physical.running()
+            slave = now.slave(name)
+            if (
+                slave is None or now.loaded.profiles[slave.profile].slave_id is None
+            ):  # it cannot be asked who it is: the file's place is kept
+                self._asked[name] = places
+                continue
+            talk = self._physical.talk()
+            task = self._tasks.start(f"locate {name}", self._locate(name, places, talk), partial(self._over, name))
+            self._searches[name] = places, talk, task
+
+    def stop(self) -> None:
+        """Ask no more."""
+        for name in tuple(self._searches):
+            self._end(name)
+
+    def _end(self, name: str) -> None:
+        _, talk, task = self._searches.pop(name)
+        talk.halt()
+        talk.go_on()
+        task.cancel()
+
+    def _over(self, name: str, task: asyncio.Task[None]) -> None:
+        if name in self._searches and self._searches[name][-1] is task:
+            del self._searches[name]
+
+    async def _locate(self, name: str, places: tuple[Place, ...], talk: Talk) -> None:
+        physical = self._physical
+        now = physical.running()
+        slave = now.slave(name)
+        if slave is None:
+            return
+        rate = now.config.line.baudrate
+        known, spots = (
+            [Spot(slave=place.id, baudrate=place.baudrate or rate) for place in each]
+            for each in (now.places[name], places)
+        )
+        clock = Now()
+        asking = physical.asking(slave, clock, line_rate=0)
+        errand = Errand.PROBE if self._asked.get(name) == places else Errand.CHANGE
+        steps = locate(spots, asking, longest_pause=now.config.poll.probe_interval_max)
+        talk.begin(steps, clock, line_rate=rate, errand=errand)
+        while not isinstance(what := await talk.wanted(), Over):
+            if self._asked.get(name) != places:
+                self._asked[name] = places
+                self._tell(name, known, None)
+                self._repoll()
+                self.begin()
+            talk.go_on()
+        talk.go_on()
+        if isinstance(what.result, Spot):
+            await self._found(name, known, what.result)
+
+    async def _found(self, name: str, known: list[Spot], spot: Spot) -> None:
+        def edit(now: Effective) -> Changes:
+            if now.slave(name) is None:
+                return now.changes
+            changes = now.changes.moving(name, Place(spot.slave), now.said)
+            filed = now.said.baudrate
+            if spot.baudrate != now.config.line.baudrate or changes.baudrate is not None:
+                changes = replace(changes, baudrate=None if spot.baudrate == filed else Rate(filed, spot.baudrate))
+            return changes
+
+        self._searches.pop(name, None)  # it is found: another configuration ends no search any more
+        await self._physical.learn(edit)
+        self._tell(name, known, spot)
+        self._repoll()
+        self.begin()
+
+    def _tell(self, name: str, known: list[Spot], used: Spot | None) -> None:
+        first, last = known[0], known[-1]
+        facts = {"device": name, "file": first.model_dump(), "last": last.model_dump()}
+        self._physical.tell("change_conflict", {**facts, "used": None if used is None else used.model_dump()})
+        where = "at neither; both are asked" if used is None else f"at slave id {used.slave}, {used.baudrate} baud"
+        log.warning(
+            "%s: the file says slave id %d at %d baud, it was last verified at %d at %d: it answers %s",
+            name, first.slave, first.baudrate, last.slave, last.baudrate, where,
+        )  # fmt: skip
+
+
+def in_turn(waiting: Mapping[str, tuple[Place, ...]]) -> frozenset[str]:
+    """Return the devices to ask for now: those at whose first place no other was last; all, where that is nobody.
+
+    Where another one was last, that one is asked for first: it may be the one that answers there.
+    """
+    last = {name: places[-1].id for name, places in waiting.items()}
+    free = (
+        name
+        for name, places in waiting.items()
+        if not any(slave == places[0].id for other, slave in last.items() if other != name)
+    )
+    return frozenset(free) or frozenset(waiting)

@@ -1,0 +1,1 @@
+"""Physical changes step by step, pure, run in the line thread."""

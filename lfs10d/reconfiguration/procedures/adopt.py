@@ -1,0 +1,171 @@
+"""Taking in a factory-new sensor: found at its factory id, brought to the line's rate, given a free id. Pure.
+
+Rules
+-----
+1. It is looked for at the line's rate first, then at its factory's and at each other rate of its profile. Where
+   something answers at several, or garbage is heard, there is more than one: plug in one at a time.
+2. What answers must be recognised as a sensor of the profile, and must be there alone (`lfs10d.reconfiguration.procedures.recognition`):
+   nothing is ever written to another device.
+3. A new id is free if not one byte is heard there, at no rate. The candidates are tried in order.
+4. One intent, on the disk before the first write, covers all. First the rate is written, while the sensor still has
+   its factory id: cut short there, it is found again by the same request. Then it is given its id, verified as in
+   `lfs10d.reconfiguration.procedures.readdress`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from typing import Any
+
+from lfs10d.line.jobs.procedure import Aside, LineLostError, Step
+from lfs10d.reconfiguration.journal import Spot
+from lfs10d.reconfiguration.procedures.baudrate import Sensor, restored, shifted
+from lfs10d.reconfiguration.procedures.identity_query import Asking
+from lfs10d.reconfiguration.procedures.readdress import (
+    ECHO_READS,
+    Ending,
+    Verdict,
+    Write,
+    alone,
+    free,
+    judge,
+    parted,
+    present,
+    verified,
+    written,
+)
+from lfs10d.reconfiguration.procedures.recognition import recognised
+
+
+@dataclass(frozen=True, slots=True)
+class Newcomer:
+    """What is wanted: the sensor at slave id `factory` at one of `candidates` and at `line_rate`.
+
+    `rates` are those of its profile, in the order in which it is looked for.
+    """
+
+    factory: int
+    candidates: tuple[int, ...]
+    line_rate: int
+    rates: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Adopted:
+    """How it ended: the sensor was at `old`, and was to get `to` (None: no id is free)."""
+
+    verdict: Verdict
+    old: Spot | None = None
+    to: int | None = None
+    at_rate: bool = True
+    """False: it ended with the write of the rate; its id is as it was."""
+    rate_code: int | None = None
+    """What its register of the rate held when it was recognised."""
+
+
+def adopt(wish: Newcomer, asking: Asking, echo_known: Callable[[], bool]) -> Generator[Step, Any, Adopted]:
+    """Carry it out; see the rules."""
+    try:
+        looked = yield from _looked_before(wish, asking, echo_known)
+        if looked.verdict.ending is not Ending.FREE or looked.old is None or looked.to is None:
+            return looked
+        old, to = looked.old, looked.to
+        new = Spot(slave=to, baudrate=wish.line_rate)
+        why = yield Aside(Write(old, new, looked.verdict.register))
+        if why is not None:
+            return Adopted(Verdict(Ending.UNWRITTEN, why=str(why)), old, to)
+    except LineLostError:
+        return Adopted(Verdict(Ending.LOST_BEFORE))
+    try:
+        if old.baudrate != wish.line_rate:
+            verdict = yield from _at_line_rate(old, wish.line_rate, asking.knowing(old.baudrate, looked.rate_code))
+            if verdict is not None:
+                return Adopted(verdict, old, to, at_rate=False)
+        here = Spot(slave=old.slave, baudrate=wish.line_rate)
+        exception = yield from written(here, asking.id_register, to, asking)
+        found = yield from verified(here, new, asking)
+        verdict = judge(found, looked.verdict.register, exception, to)
+        return Adopted((yield from parted(verdict, here, to, asking)), old, to)
+    except LineLostError:
+        return Adopted(Verdict(Ending.NOWHERE, stays_open=True), old, to)
+
+
+def _looked_before(wish: Newcomer, asking: Asking, echo_known: Callable[[], bool]) -> Generator[Step, Any, Adopted]:
+    """Find the newcomer and a free id; `FREE` where it may be written."""
+    newcomer = yield from _newcomer(wish, asking)
+    old = newcomer.old
+    if newcomer.verdict.ending is not Ending.FREE or old is None:
+        return newcomer
+    to, refusal = yield from _free_id(wish, old, asking)
+    if to is None:
+        return Adopted(Verdict(Ending.TAKEN, at=old.baudrate), old, next(iter(wish.candidates), None))
+    if refusal is not None:
+        return Adopted(refusal, old, to)
+    for _ in range(ECHO_READS):
+        if echo_known():
+            break
+        yield from asking.who(old)
+    if not echo_known():
+        return Adopted(Verdict(Ending.DEAF), old, to)
+    again = yield from present(old, asking)
+    if not again.answers or not (yield from asking.settle(old)):
+        return Adopted(Verdict(Ending.ABSENT), old, to)
+    return Adopted(newcomer.verdict, old, to, rate_code=newcomer.rate_code)
+
+
+def _newcomer(wish: Newcomer, asking: Asking) -> Generator[Step, Any, Adopted]:
+    """Find the one sensor at the factory id; `FREE` if there is just one, and it is recognised."""
+    found: list[Adopted] = []
+    for rate in wish.rates:
+        spot = Spot(slave=wish.factory, baudrate=rate)
+        reply = yield from present(spot, asking)
+        if reply.silent:
+            continue
+        ending, why, code = Ending.BOTH, "", None
+        if reply.answers:
+            recognition = yield from recognised(spot, reply, asking)
+            why, code = recognition.why or "", recognition.rate_code
+            if not recognition.spoilt:  # the winds of two differ, though both say the same id
+                ending = Ending.UNRECOGNISED if why else Ending.FREE
+        verdict = Verdict(ending, reply.register, reply.exception, rate, why)
+        found.append(Adopted(verdict, spot, rate_code=code))
+    if not found:
+        return Adopted(Verdict(Ending.ABSENT))
+    if len(found) > 1:
+        return Adopted(Verdict(Ending.BOTH, at=found[0].verdict.at), found[0].old)
+    return found[0]
+
+
+def _free_id(wish: Newcomer, old: Spot, asking: Asking) -> Generator[Step, Any, tuple[int | None, Verdict | None]]:
+    """Return the first candidate at which nothing is heard, None if there is none, and why it must not be written.
+
+    At the newcomer's own rate the candidate is listened to while it is found out whether the newcomer is alone.
+    """
+    for candidate in wish.candidates:
+        clear = True
+        for rate in wish.rates:
+            if rate != old.baudrate:
+                clear = clear and (yield from free(Spot(slave=candidate, baudrate=rate), asking))
+        refusal = (yield from alone(old, candidate, asking)) if clear else Verdict(Ending.TAKEN)
+        if refusal is None or refusal.ending is not Ending.TAKEN:
+            return candidate, refusal
+    return None, None
+
+
+def _at_line_rate(old: Spot, rate: int, asking: Asking) -> Generator[Step, Any, Verdict | None]:
+    """Bring the newcomer to the line's rate; return why that failed, None if it did not."""
+    sensor = Sensor("", old.slave, asking)
+    exception, at, twins = yield from shifted(sensor, old.baudrate, rate)
+    if twins:
+        back = yield from restored(sensor, old.baudrate, rate)
+        return Verdict(Ending.BOTH, at=old.baudrate, stays_open=back is None)
+    if at == rate:
+        return None
+    if at is None:
+        return Verdict(Ending.NOWHERE, exception=exception, stays_open=True)
+    if exception is not None:
+        back = yield from restored(sensor, old.baudrate, rate)
+        return Verdict(Ending.REFUSED, exception=exception, stays_open=back is None)
+    # What it stored may stay: after a power cycle the same request finds it at the line's rate.
+    return Verdict(Ending.PENDING)

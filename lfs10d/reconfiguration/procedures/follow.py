@@ -1,0 +1,87 @@
+"""Following a sensor that was written to and may answer at either of two places, until it is found. Pure.
+
+Rules
+-----
+1. The first look is as long as the verification of a write, for the daemon may have died right after that.
+2. Then both places are asked now and then, within the share of probes: after 1 s, 2 s, 4 s ... Anything new has the
+   places looked at in full, and told.
+3. It is over when the sensor answers at the new place and the old one is silent, or when it answers at the old one
+   and its register does not say the new id. A register that does may still be obeyed, at the next power cycle.
+4. A newcomer at its new place is found though somebody answers at the factory's id: that is the next newcomer,
+   unless the register there says the new id too.
+5. It writes in one case only: where somebody is at the new place, one at the old place whose register says the new id
+   has his own written back. They would meet at his next power-up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from typing import Any
+
+from lfs10d.line.jobs.job import Hold
+from lfs10d.line.jobs.procedure import Aside, Step
+from lfs10d.reconfiguration.journal import Spot
+from lfs10d.reconfiguration.procedures.identity_query import Asking
+from lfs10d.reconfiguration.procedures.readdress import (
+    QUICK_LOOK,
+    Ending,
+    Found,
+    Verdict,
+    judge,
+    parted,
+    told,
+    verified,
+)
+
+FIRST_PAUSE = 1.0
+"""Between the first look and the first probes, in s; doubled after each."""
+
+DECIDED = frozenset({Ending.MOVED, Ending.LOCKED})
+"""With these the sensor is found: at the new place, or at the old one to stay."""
+
+
+def follow(
+    old: Spot, new: Spot, asking: Asking, *, longest_pause: float, before: Spot | None = None, newcomer: bool = False
+) -> Generator[Step, Any, Verdict]:
+    """Ask until the sensor is found; each look that did not find it goes aside.
+
+    `before` is where it was before it came to `old`: it may be there still. `newcomer`: `old` is a factory's id.
+    """
+    found = yield from verified(old, new, asking, QUICK_LOOK)
+    verdict = yield from _judged(found, before, old, new, asking, newcomer=newcomer)
+    pause = min(FIRST_PAUSE, longest_pause)
+    while verdict.ending not in DECIDED:
+        yield Aside(verdict)
+        while True:
+            yield Hold(asking.clock.now + pause)
+            pause = min(2 * pause, longest_pause)
+            at_new = yield from asking.who(new)
+            if not at_new.silent:
+                break  # the full look asks the old place too, and silence is dear
+            at_old = yield from asking.who(old)
+            if at_old.answers and at_old.register != new.slave:
+                break
+            if at_old.silent and (yield from _still_there(before, new, asking)):
+                break
+        found = yield from told(old, new, asking)
+        verdict = yield from _judged(found, before, old, new, asking, newcomer=newcomer)
+    return verdict
+
+
+def _judged(
+    found: Found, before: Spot | None, old: Spot, new: Spot, asking: Asking, *, newcomer: bool
+) -> Generator[Step, Any, Verdict]:
+    if newcomer and found.new.answers and not found.spoilt and found.old.register != new.slave:
+        return Verdict(Ending.MOVED, found.new.register)
+    verdict = yield from parted(judge(found, None, None, new.slave), old, new.slave, asking)
+    if verdict.ending is Ending.NOWHERE:
+        return (yield from _still_there(before, new, asking)) or verdict
+    return verdict
+
+
+def _still_there(before: Spot | None, new: Spot, asking: Asking) -> Generator[Step, Any, Verdict | None]:
+    """Ask the place of before, while the later ones are silent; return that the sensor stays there, None if not."""
+    if before is None:
+        return None
+    reply = yield from asking.who(before)
+    return Verdict(Ending.LOCKED, reply.register) if reply.answers and reply.register != new.slave else None

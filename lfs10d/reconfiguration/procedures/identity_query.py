@@ -1,0 +1,194 @@
+"""Asking one place who is there, so that a late answer to an older question never passes for the answer. Pure.
+
+Rules
+-----
+1. The register of the slave id is asked. While an older read of that shape may still be answered, a read of the
+   values goes first: its answer, having another length, proves that nothing older is to come.
+2. A slave that may not be asked for the moment is waited for.
+3. Echoes of writes prove nothing and are not looked at.
+4. A slave whose answers have come late is waited for long, whoever was being asked when they came.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, field, replace
+
+from lfs10d.line.jobs.identification import shortest_answer, strangers
+from lfs10d.line.jobs.job import Ask, Hold
+from lfs10d.line.jobs.procedure import Now, Step
+from lfs10d.modbus.exchange import Outcome
+from lfs10d.modbus.frames import NOT_FINAL, Codec, ReadRegisters
+from lfs10d.modbus.pending import Unanswered
+from lfs10d.profiles.blocks import Block
+from lfs10d.profiles.profile import Profile
+from lfs10d.reading import FaultCode
+from lfs10d.reconfiguration.journal import Spot
+
+QUICK = 0.2
+"""How long a sensor is usually waited for, in s."""
+SLOW_FROM = 0.1
+"""A sensor that took longer than this, in s, is waited for `PATIENT` from then on."""
+PATIENT = 1.0
+"""How long one that is slow, or must not be missed, is waited for, in s."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """What one place said.
+
+    `answers`: a right frame of its own, with `register` as the content of its id register, or `exception`.
+    `noise`: other bytes came. Neither: silence. `words` are the registers of an answered read of values; replies are
+    compared without them.
+    """
+
+    answers: bool = False
+    noise: bool = False
+    register: int | None = None
+    exception: int | None = None
+    words: tuple[int, ...] | None = field(default=None, compare=False)
+
+    @property
+    def silent(self) -> bool:
+        """Nothing at all was heard."""
+        return not (self.answers or self.noise)
+
+
+SILENCE = Reply()
+
+
+class Asking:
+    """Asks devices of one profile. `line_rate` is the line's own; `clock` is that of the course this is for."""
+
+    def __init__(self, profile: Profile, codec: Codec, unanswered: Unanswered, clock: Now, *, line_rate: int) -> None:
+        if profile.slave_id is None:
+            raise ValueError(f"profile {profile.name} knows no register of the slave id")
+        self.profile = profile
+        self.codec = codec
+        self.clock = clock
+        self.timeout = QUICK
+        self.id_register = profile.slave_id.register
+        self._unanswered = unanswered
+        self.line_rate = line_rate
+
+    def who(
+        self, spot: Spot, timeout: float | None = None, *, register: int | None = None
+    ) -> Generator[Step, Outcome, Reply]:
+        """Ask a place for its id register, or for another one."""
+        identity = ReadRegisters(spot.slave, self.id_register if register is None else register, 1)
+        allowed = yield from self._allowed(identity, spot, timeout)
+        if allowed is not None:
+            return allowed
+        return self._reply((yield self._ask(identity, spot, timeout)))
+
+    def knowing(self, baudrate: int, code: int | None) -> Asking:
+        """Return the same with the content of the rate's register for a rate that the profile has no code for.
+
+        A sensor that came at such a rate can so be brought back to it.
+        """
+        register = self.profile.baudrate
+        if register is None or code is None or baudrate in register.codes:
+            return self
+        known = register.model_copy(update={"codes": {**register.codes, baudrate: code}})
+        profile = self.profile.model_copy(update={"baudrate": known})
+        return Asking(profile, self.codec, self._unanswered, self.clock, line_rate=self.line_rate)
+
+    def values(
+        self, spot: Spot, timeout: float | None = None, *, block: Block | None = None
+    ) -> Generator[Step, Outcome, Reply]:
+        """Ask a place for its values, whatever they are (the first `block` of the profile, or this one).
+
+        A late answer to an older such question counts.
+        """
+        until = self._unanswered.left_alone_until(spot.slave, self.clock.now)
+        if until is not None:
+            yield Hold(until)
+        return self._reply((yield self._ask(self._values_of(spot, block), spot, timeout)), values=True)
+
+    def listen(self, silent: Spot, timeout: float, before: int) -> Generator[Step, Outcome, tuple[Reply, bool]]:
+        """Ask a place that is expected to be silent directly behind another question; return what was received there.
+
+        The second says that a right frame of slave `before` came which answers no older request to it: another device
+        of that id, or a repeater.
+        """
+        asked = replace(self._ask(self._values_of(silent), silent, timeout), at_once=True)
+        outcome: Outcome = yield asked
+        late = {late.request.slave for late in outcome.late}
+        extra = before in strangers(outcome, self.codec) - late
+        return self._reply(outcome, values=True), extra
+
+    def settle(self, spot: Spot) -> Generator[Step, Outcome, bool]:
+        """Ask until no answer to an older question can come from a place; whether that could be reached."""
+        for _ in range(8):
+            if not self._unanswered.earlier(spot.slave):
+                return True
+            until = self._unanswered.left_alone_until(spot.slave, self.clock.now)
+            if until is None:
+                reply = yield from self.who(spot, PATIENT)
+                if not reply.answers:
+                    reply = yield from self.values(spot, PATIENT)
+                self._unanswered.lingering_until(self._values_of(spot), self.codec, self.clock.now)
+                if not self._unanswered.earlier(spot.slave):
+                    return True
+                until = self.clock.now + 0.25
+            yield Hold(until)
+        return not self._unanswered.earlier(spot.slave)
+
+    def _values_of(self, spot: Spot, block: Block | None = None) -> ReadRegisters:
+        block = block or self.profile.reads()[0]
+        return ReadRegisters(spot.slave, block.address, block.count, block.function)
+
+    def _ask(self, request: ReadRegisters, spot: Spot, timeout: float | None) -> Ask:
+        baudrate = None if spot.baudrate == self.line_rate else spot.baudrate
+        waits = self.timeout if timeout is None else timeout
+        if self._unanswered.tardy(spot.slave):
+            waits = max(waits, PATIENT)
+        return Ask(request, self.codec, waits, None, baudrate, request_gap=self.profile.request_gap)
+
+    def _allowed(
+        self, request: ReadRegisters, spot: Spot, timeout: float | None
+    ) -> Generator[Step, Outcome, Reply | None]:
+        """Wait and ask what must be asked before `request` may be; return what came instead of an answer, if so."""
+        unanswered, other = self._unanswered, self._values_of(spot)
+        apart = self.codec.shapes(other)[0] != self.codec.shapes(request)[0]
+        while True:
+            now = self.clock.now
+            until = unanswered.left_alone_until(spot.slave, now)
+            if until is not None:
+                yield Hold(until)
+            elif unanswered.confusable(request, self.codec):
+                if not apart:
+                    unanswered.leave_alone(spot.slave, self.timeout)
+                    continue
+                reply = self._reply((yield self._ask(other, spot, timeout)), values=True)
+                if not reply.answers or reply.exception in NOT_FINAL:
+                    return reply
+            elif (until := unanswered.lingering_until(request, self.codec, now)) is not None:
+                yield Hold(until)
+            else:
+                return None
+
+    def _reply(self, outcome: Outcome, *, values: bool = False) -> Reply:
+        if outcome.turnaround is not None and outcome.turnaround > SLOW_FROM:
+            self.timeout = PATIENT
+        if any(late.request.slave == outcome.request.slave for late in outcome.late):
+            self.timeout = PATIENT
+        fault = outcome.fault
+        if fault is None and outcome.answer is not None:
+            extra = outcome.unsolicited >= shortest_answer(self.codec)
+            if values:
+                return Reply(answers=True, noise=extra, words=outcome.answer)
+            return Reply(answers=True, noise=extra, register=outcome.answer[0])
+        if fault is not None and fault.code is FaultCode.EXCEPTION and not outcome.ambiguous:
+            return Reply(answers=True, exception=fault.exception_code)
+        return Reply(noise=not quiet(outcome))
+
+
+def quiet(outcome: Outcome) -> bool:
+    """Whether nothing was heard but our own echo, and late answers of others."""
+    fault = outcome.fault
+    if fault is None or outcome.unsolicited:
+        return False
+    if fault.code is FaultCode.LATE:
+        return all(late.request.slave != outcome.request.slave for late in outcome.late)
+    return fault.code is FaultCode.TIMEOUT

@@ -1,0 +1,202 @@
+"""Is there one sensor of a profile at a place, and one only? Asked before anything is written to it. Pure.
+
+Rules
+-----
+1. *Recognised*: the register of the slave id has answered with the id it was asked by, the register of the rate (where
+   the profile has one) holds one of its codes, and every value has answered in range each time it was read.
+2. *One alone*: the value is read three times, and behind each read a silent slave id is asked, so that the line is
+   listened to for 0.2, 0.2 and 0.6 s. Two sensors share the id where any of these answers collides, is followed by
+   another or by bytes that no longer come when the silent id alone is asked, or is impossible (not in range, no finite
+   number), and where the values are those of two sensors (rule 3).
+3. Wind varies: two reads of one sensor may differ by any amount. So values are those of two only if they jump there
+   and back between two groups: nine reads fall into two groups, the distance between these is more than `APART` times
+   the width of each and more than `LEAST` of the profile's range, and it was crossed at least `CROSSINGS` times. Where
+   the first three do not jump there and back, six more are not read.
+4. Two sensors that answer bit-identically at the same time are one to whoever listens.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from lfs10d.line.jobs.identification import rate_fits
+from lfs10d.line.jobs.procedure import Step
+from lfs10d.modbus.exchange import Outcome
+from lfs10d.profiles.blocks import Block
+from lfs10d.profiles.values import Value
+from lfs10d.reading import Fault
+from lfs10d.reconfiguration.journal import Spot
+from lfs10d.reconfiguration.procedures.identity_query import PATIENT, QUICK, SILENCE, Asking, Reply
+
+READS = 3
+"""How often a value is read."""
+LISTENING = (QUICK, QUICK, 0.6)
+"""How long the line is listened to behind each read, in s."""
+MORE_READS = 6
+"""How often it is read besides where the first reads jump there and back."""
+APART = 5.0
+"""Two groups of values are so many times as far apart as each is wide."""
+LEAST = 0.02
+"""The least distance between two groups, as a part of the range: a display that flickers by one digit is one sensor."""
+CROSSINGS = 3
+"""So often two sensors take turns in nine reads; a gust comes and goes once."""
+FULL_CIRCLE = 360.0
+
+
+@dataclass(frozen=True, slots=True)
+class Recognition:
+    """Whether it is recognised: `why` not, in words, None if it is; `rate_code` is the content of its rate register.
+
+    `spoilt`: its answers collided every time.
+    """
+
+    why: str | None = None
+    rate_code: int | None = None
+    spoilt: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What was found out about one place. `answers`: the value could be read. `twins`: how two show, in words.
+
+    `taken`: something was received from the place that was to be silent. `exception` is the code of a refusal.
+    """
+
+    answers: bool = True
+    twins: str | None = None
+    taken: bool = False
+    exception: int | None = None
+
+
+def recognised(spot: Spot, identity: Reply, asking: Asking) -> Generator[Step, Outcome, Recognition]:
+    """Find out whether a sensor of the profile is at a place where `identity` was the answer to who is there."""
+    profile = asking.profile
+    if identity.exception is not None:
+        return Recognition(f"it refuses register 0x{asking.id_register:04X} (exception {identity.exception:02X})")
+    if identity.register != spot.slave:
+        return Recognition(f"its register 0x{asking.id_register:04X} says {identity.register}, not {spot.slave}")
+    for block in profile.reads():
+        found = yield from _values_fit(block, spot, asking)
+        if found.why is not None or found.spoilt:
+            return found
+    if profile.baudrate is None:
+        return Recognition()
+    return (yield from _rate_fits(profile.baudrate.register, spot, asking))
+
+
+def _rate_fits(register: int, spot: Spot, asking: Asking) -> Generator[Step, Outcome, Recognition]:
+    reply = SILENCE
+    for timeout in _timeouts(asking):
+        reply = yield from asking.who(spot, timeout, register=register)
+        if reply.answers:
+            break
+    if rate_fits(asking.profile, reply.register, spot.baudrate):
+        return Recognition(rate_code=reply.register)
+    says = "does not answer" if reply.register is None else f"says {reply.register}, which is no rate"
+    return Recognition(f"its register 0x{register:04X} {says}")
+
+
+def _timeouts(asking: Asking) -> tuple[float | None, ...]:
+    return (None, 2 * asking.timeout, PATIENT)
+
+
+def _values_fit(block: Block, spot: Spot, asking: Asking) -> Generator[Step, Outcome, Recognition]:
+    """Read a block of values `READS` times; the first answer that is none of such a device decides."""
+    spoilt = answered = 0
+    exception: int | None = None
+    for timeout in _timeouts(asking):
+        reply = yield from asking.values(spot, timeout, block=block)
+        spoilt += reply.noise
+        exception = reply.exception
+        if reply.words is None:
+            continue
+        answered += 1
+        values = block.decode(reply.words)
+        if isinstance(values, Fault):
+            return Recognition(values.message)
+    if spoilt >= READS:
+        return Recognition(spoilt=True)
+    if answered:
+        return Recognition()
+    how = "does not answer for" if exception is None else f"refuses (exception {exception:02X})"
+    return Recognition(f"it {how} its values at 0x{block.address:04X}")
+
+
+def one_alone(spot: Spot, silent: Spot, asking: Asking) -> Generator[Step, Outcome, Look]:
+    """Find out whether one sensor is at a place, not two (rules 2 and 3); `silent` is a slave id that nobody has."""
+    value = asking.profile.values[0]
+    block = next(block for block in asking.profile.reads() if value in block.values)
+    numbers: list[float] = []
+    for window in LISTENING:
+        look = yield from _measured(value, block, spot, asking)
+        if isinstance(look, Look):
+            return look
+        numbers.append(look)
+        received, extra = yield from asking.listen(silent, window, spot.slave)
+        if extra:
+            return Look(twins="a second answer came behind the first")
+        if not received.silent:
+            return (yield from _whose(silent, asking))
+    return (yield from _take_turns(value, block, numbers, spot, asking))
+
+
+def _whose(silent: Spot, asking: Asking) -> Generator[Step, Outcome, Look]:
+    """Find out whether what was received behind a read came from the place that was to be silent."""
+    for _ in range(READS - 1):
+        reply = yield from asking.values(silent, QUICK)
+        if not reply.silent:
+            return Look(taken=True)
+    return Look(twins="something is received behind its answer")
+
+
+def _take_turns(
+    value: Value, block: Block, numbers: list[float], spot: Spot, asking: Asking
+) -> Generator[Step, Outcome, Look]:
+    """Read it more often where the `numbers` so far jump there and back; find out whether that goes on."""
+    if jumps(value, numbers) < READS - 1:
+        return Look()
+    for _ in range(MORE_READS):
+        look = yield from _measured(value, block, spot, asking)
+        if isinstance(look, Look):
+            return look
+        numbers.append(look)
+    if jumps(value, numbers) < CROSSINGS:
+        return Look()
+    return Look(twins=f"its values jump there and back between {numbers[0]:g} and {numbers[1]:g} {value.unit}")
+
+
+def _measured(value: Value, block: Block, spot: Spot, asking: Asking) -> Generator[Step, Outcome, Look | float]:
+    """Return the value; a `Look` that ends it where there is none."""
+    exception: int | None = None
+    for timeout in _timeouts(asking):
+        reply = yield from asking.values(spot, timeout, block=block)
+        if reply.noise:
+            return Look(twins="answers collide there")
+        if reply.words is not None:
+            values = block.decode(reply.words)
+            if isinstance(values, Fault):
+                return Look(twins=f"what it answers is impossible: {values.message}")
+            return float(values[value.name])
+        exception = reply.exception
+    return Look(answers=False, exception=exception)
+
+
+def jumps(value: Value, numbers: Sequence[float]) -> int:
+    """Return how often numbers jump between two groups that are apart as those of two sensors are; 0 if none are.
+
+    There are at least two numbers.
+    """
+    if value.range is None:
+        return 0
+    low, high = value.range
+    if value.device_class == "wind_direction":  # 359 and 1 are neighbours
+        numbers = [(each - numbers[0] + FULL_CIRCLE / 2) % FULL_CIRCLE for each in numbers]
+    ordered = sorted(numbers)
+    distance, split = max((after - before, n) for n, (before, after) in enumerate(pairwise(ordered)))
+    width = max(ordered[split] - ordered[0], ordered[-1] - ordered[split + 1])
+    if distance <= max(APART * width, LEAST * (high - low)):
+        return 0
+    above = [each > ordered[split] for each in numbers]
+    return sum(before != after for before, after in pairwise(above))

@@ -1,0 +1,154 @@
+"""Sensors of a change of rate that is still open: put back, or awaited, however long it takes. Pure.
+
+What the daemon did not live to finish is undone, unless every sensor is at the new rate already: what answers is put
+back at once, what is lost is looked for until it is found and then put back too. Sensors that have
+stored the new rate and want their power switched are asked there until they come up; nothing is written to them. Where
+somebody answers at the old rate too there are two of that slave id, and one of them has still to come.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass
+from math import inf
+from typing import Any
+
+from lfs10d.line.jobs.job import Hold
+from lfs10d.line.jobs.procedure import Aside, Step
+from lfs10d.reconfiguration.procedures.baudrate import (
+    FIRST_PAUSE,
+    Ended,
+    RateVerdict,
+    Sensor,
+    found_at,
+    restored,
+    written_back,
+)
+from lfs10d.reconfiguration.procedures.identity_query import PATIENT
+
+PATIENT_EVERY = 4
+"""Every so many rounds a lost sensor is waited for long, at each rate in turn: it may be slow."""
+
+
+@dataclass(frozen=True, slots=True)
+class CameUp:
+    """A sensor answers at the new rate."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class StillLost:
+    """Some are not found again, and have not been for long."""
+
+
+@dataclass(frozen=True, slots=True)
+class Twins:
+    """A sensor answers at both rates: it is two."""
+
+    name: str
+
+
+def look_back(
+    sensors: Sequence[Sensor], rate: int, other: int, where: dict[str, int | None], *, own: int
+) -> Generator[Step, Any, dict[str, int | None]]:
+    """Look once for each sensor after a change of rate that was cut short, at the line's `own` rate first.
+
+    One that answers at `rate` and has stored another is written back at once, before it comes up there: none waits
+    for one that is lost. `where` learns where each is, and is returned.
+    """
+    for sensor in sensors:
+        says, at = yield from found_at(sensor, _first(own, rate, other), tries=1)
+        where[sensor.name] = at
+        if at == rate and says != sensor.code(rate):
+            yield from written_back(sensor, rate)
+    return where
+
+
+def put_back(
+    sensors: Sequence[Sensor], rate: int, other: int, where: dict[str, int | None]
+) -> Generator[Step, Any, RateVerdict]:
+    """Bring those of these sensors that were found to `rate`; the verdict speaks of all in `where`.
+
+    One that answers at the `other` rate too is two sensors: that goes aside, and it counts as being there.
+    """
+    for sensor in sensors:
+        if where[sensor.name] is None:
+            continue
+        where[sensor.name] = yield from restored(sensor, rate, other)
+        if where[sensor.name] == rate and (yield from sensor.asking.who(sensor.at(other))).answers:
+            where[sensor.name] = other
+            yield Aside(Twins(sensor.name))
+    names = tuple(name for name, at in where.items() if at != rate)
+    return RateVerdict(Ended.UNVERIFIED if names else Ended.ROLLED_BACK, dict(where), names)
+
+
+def await_lost(
+    sensors: Sequence[Sensor],
+    rate: int,
+    other: int,
+    where: Mapping[str, int | None],
+    *,
+    own: int,
+    pause: float,
+    longest_pause: float,
+    tell_at: float,
+) -> Generator[Step, Any, tuple[Sensor, ...]]:
+    """Return the first of these sensors that can be put back, however long it takes; nothing is written.
+
+    They are asked after `pause` s, twice that ... up to `longest_pause`, at the line's `own` rate first, but where each
+    was found if it was. One that answers at the `other` rate and has stored `rate` waits for its power cycle, and is
+    waited for. From the time `tell_at` on, once, `StillLost` goes aside.
+    """
+    rounds = 0
+    while True:
+        now = sensors[0].asking.clock.now
+        if now >= tell_at:
+            yield Aside(StillLost())
+            tell_at = inf
+        yield Hold(now + pause)
+        pause = min(2 * pause, longest_pause)
+        found: list[Sensor] = []
+        turn, rest = divmod(rounds, PATIENT_EVERY)
+        for sensor in sensors:
+            for n, asked in enumerate(_first(where[sensor.name] or own, rate, other)):
+                timeout = PATIENT if rest == PATIENT_EVERY - 1 and turn % 2 == n else None
+                reply = yield from sensor.asking.who(sensor.at(asked), timeout, register=sensor.register)
+                if reply.answers and not (asked == other and reply.register == sensor.code(rate)):
+                    found.append(sensor)
+                if reply.answers:
+                    break
+        if found:
+            return tuple(found)
+        rounds += 1
+
+
+def _first(own: int, *rates: int) -> tuple[int, ...]:
+    return tuple(sorted(rates, key=lambda each: each != own))
+
+
+def await_power(
+    sensors: Sequence[Sensor], old: int, to: int, *, longest_pause: float
+) -> Generator[Step, Any, RateVerdict]:
+    """Ask sensors that want a power cycle at the new rate until all have come up there; each goes aside.
+
+    So does, once, each that is two.
+    """
+    missing = list(sensors)
+    twins: set[str] = set()
+    pause = min(FIRST_PAUSE, longest_pause)
+    while missing:
+        for sensor in tuple(missing):
+            reply = yield from sensor.asking.who(sensor.at(to))
+            if not reply.answers:
+                continue
+            if not (yield from sensor.asking.who(sensor.at(old))).answers:
+                missing.remove(sensor)
+                yield Aside(CameUp(sensor.name))
+            elif sensor.name not in twins:
+                twins.add(sensor.name)
+                yield Aside(Twins(sensor.name))
+        if missing:
+            yield Hold(missing[0].asking.clock.now + pause)
+            pause = min(2 * pause, longest_pause)
+    return RateVerdict(Ended.MOVED, {sensor.name: to for sensor in sensors})

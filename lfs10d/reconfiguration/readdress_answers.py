@@ -1,0 +1,106 @@
+"""What is answered when a sensor was given another place: the contract's codes, and words for the one on the ladder.
+
+Pure. Each message says what was heard and what to do next, and names the other possible cause.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from lfs10d.command import Answer, ErrorCode, failed, ok, rejected
+from lfs10d.profiles.profile import Profile
+from lfs10d.reconfiguration.procedures.readdress import NOTHING_WRITTEN, Ending, Verdict, Wish
+
+_READDRESSED: Mapping[Ending, tuple[ErrorCode, str]] = {
+    Ending.TAKEN: (
+        "address_in_use",
+        (
+            "somebody is heard at slave id {to}, at {at} baud; choose another id, or see who it is: "
+            "lfs10d request line/scan ids={to}"
+        ),
+    ),
+    Ending.ABSENT: ("timeout", "{device} does not answer at slave id {old}{refusal}; nothing was written"),
+    Ending.DEAF: (
+        "line_error",
+        (
+            "whether the adapter returns our own bytes is not clear yet, and nothing was written; "
+            "try again later, or set line.echo to on or off"
+        ),
+    ),
+    Ending.LOST_BEFORE: ("line_error", "the port was lost; nothing was written"),
+    Ending.UNWRITTEN: ("storage_full", "{why}; nothing was written"),
+    Ending.TWINS: (
+        "duplicate_id",
+        (
+            "two sensors seem to have slave id {old}: {why}; nothing was written, for both would move. Take one of "
+            "them off the line. A repeater or noise looks alike; try again"
+        ),
+    ),
+    Ending.UNRECOGNISED: (
+        "not_recognised",
+        "what answers at slave id {old} is not recognised as {device}: {why}; nothing was written",
+    ),
+    Ending.BOTH: (
+        "duplicate_id",
+        (
+            "slave ids {old} and {to} both answer since the write: two sensors had id {old}, or another one came up at "
+            "{to}. Take one of them off the line"
+        ),
+    ),
+    Ending.GARBAGE: (
+        "duplicate_id",
+        (
+            "at slave id {to} several answer at once since the write, or there is noise, and {old} is silent; take the "
+            "other sensor off the line. {device} was at {old} last"
+        ),
+    ),
+    Ending.REFUSED: (
+        "refused",
+        "{device} refused the write{refusal} and stays at slave id {old}; perhaps its {lock} overrules it",
+    ),
+    Ending.LOCKED: (
+        "dip_switch",
+        (
+            "{device} stays at slave id {old}: its {lock} overrules the write; set that to 0 and try again. "
+            "Or it wants its power switched off and on before it obeys"
+        ),
+    ),
+    Ending.PENDING: (
+        "power_cycle_needed",
+        (
+            "{device} took slave id {to} but still answers at {old}: switch its power off and on. "
+            "If it stays at {old} then, its {lock} overrules the write"
+        ),
+    ),
+    Ending.NOWHERE: (
+        "not_verified",
+        (
+            "since the write {device} answers neither at slave id {old}, where it was last, nor at {to}; "
+            "both are asked until it is found"
+        ),
+    ),
+}
+
+
+def readdressed(device: str, wish: Wish, verdict: Verdict, profile: Profile) -> Answer:
+    """Return the answer to `device/readdress`."""
+    data: dict[str, Any] = {"device": device, "from": wish.old.slave, "to": wish.to}
+    if verdict.ending is Ending.MOVED:
+        return ok(data)
+    if verdict.ending is Ending.FREE:
+        return ok({**data, "dry_run": True})
+    code, text = _READDRESSED[verdict.ending]
+    message = text.format(
+        device=device,
+        old=wish.old.slave,
+        to=wish.to,
+        at=verdict.at,
+        why=verdict.why,
+        refusal="" if verdict.exception is None else f" (exception {verdict.exception:02X})",
+        lock=(profile.slave_id and profile.slave_id.locked_by) or "address switch",
+    )
+    facts: dict[str, Any] = {} if verdict.exception is None else {"exception_code": verdict.exception}
+    if verdict.ending in NOTHING_WRITTEN:
+        return rejected(code, message, param="to" if code == "address_in_use" else None, **facts)
+    return failed(code, message, data=data, **facts)

@@ -1,0 +1,54 @@
+"""Who has the one place that scans and physical changes share, and the slave ids that nobody may be given now. Pure."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterable, Iterator, Mapping
+
+from lfs10d.command import Answer, RefusedError, rejected
+from lfs10d.reconfiguration.journal import OpenChange
+
+
+class Reserving:
+    """`underway` is the name of the request that has the place, None if nobody has it.
+
+    `opened()` are the open changes; `update` must be called when they are others.
+    """
+
+    def __init__(self, opened: Callable[[], Iterable[OpenChange]]) -> None:
+        self.underway: str | None = None
+        self.brought: frozenset[int] = frozenset()
+        """The slave ids that the request underway may bring into use."""
+        self.reserved: Mapping[int, str] = {}
+        """The slave ids that nobody may be given now, with the reason."""
+        self._opened = opened
+
+    @property
+    def busy(self) -> Answer | None:
+        """The rejection of whatever must wait until a scan or a physical change is over, None if nothing must."""
+        if self.underway is None:
+            return None
+        return rejected("busy", f"{self.underway} is being carried out; try again when it is over")
+
+    @contextlib.contextmanager
+    def held(self, request: str, slaves: frozenset[int] = frozenset()) -> Iterator[None]:
+        """Hold the place; raises RefusedError where it is taken. `slaves` are the ids that it may bring into use."""
+        if (busy := self.busy) is not None:
+            raise RefusedError(busy)
+        self.underway, self.brought = request, slaves
+        self.update()
+        try:
+            yield
+        finally:
+            self.underway, self.brought = None, frozenset()
+            self.update()
+
+    def update(self) -> None:
+        """Take note of what is open now."""
+        reserved: dict[int, str] = {}
+        for change in self._opened():
+            whose = ", ".join(sorted(change.devices))
+            reserved |= dict.fromkeys(change.slaves, f"is reserved by the open change of {whose}")
+        if self.underway is not None:
+            reserved |= dict.fromkeys(self.brought, f"is about to be used by {self.underway}")
+        self.reserved = reserved

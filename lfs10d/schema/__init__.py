@@ -1,0 +1,1 @@
+"""Text to validated data, for files and for requests."""

@@ -1,0 +1,375 @@
+"""What one value in a file or a request may be, each kind with words for the person who wrote another.
+
+A kind is the metadata of an annotated pydantic field: `interval: Annotated[float, Duration(0.02, 86400)]`.
+Its `words` complete "must be ..." and are what the reference documentation prints.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import unicodedata
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Annotated
+
+from pydantic import GetCoreSchemaHandler, TypeAdapter
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from lfs10d.schema.quantities import duration_text, seconds, size, size_text
+
+_SHOWN_CHARACTERS = 40
+
+PLAIN_ERROR = "plain"
+"""The type of a pydantic error whose message is already meant for a person."""
+
+
+def shown(value: object) -> str:
+    """Return a wrong value in words fit for one line: its kind, its beginning, nothing unescaped."""
+    match value:
+        case None:
+            return "empty"
+        case bool():
+            return "true" if value else "false"
+        case int() | float():
+            digits = repr(value) if isinstance(value, float) or abs(value) < 10**_SHOWN_CHARACTERS else "a huge number"
+            return {"inf": ".inf", "-inf": "-.inf", "nan": ".nan"}.get(digits, digits)
+        case str():
+            return f"text {quoted(value)}"
+        case Mapping():
+            return "a mapping"
+        case _:
+            return "a list"
+
+
+def quoted(text: str, longest: int = _SHOWN_CHARACTERS) -> str:
+    """Return text in double quotes on one line, shortened, with every character that does not print escaped."""
+    cut = text if len(text) <= longest else text[: longest - 3] + "..."
+    return "".join(
+        character if character.isprintable() else json.dumps(character)[1:-1]
+        for character in json.dumps(cut, ensure_ascii=False)
+    )
+
+
+class RefusedError(ValueError):
+    """A value is not of the kind; the message says what it must be."""
+
+
+class Kind:
+    """One kind of value."""
+
+    @property
+    @abstractmethod
+    def words(self) -> str:
+        """What a value of this kind is: completes "must be ..."."""
+
+    @abstractmethod
+    def accept(self, value: object) -> object:
+        """Return the value as the program uses it; raise RefusedError with the whole message otherwise."""
+
+    def refusal(self, value: object) -> RefusedError:
+        """Return the error for this value."""
+        return RefusedError(f"must be {self.words}, not {shown(value)}")
+
+    def _validated(self, value: object) -> object:
+        try:
+            return self.accept(value)
+        except RefusedError as error:
+            # As a value of the context: braces in the message are no placeholders.
+            raise PydanticCustomError(PLAIN_ERROR, "{message}", {"message": str(error)}) from None
+
+    def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Let pydantic validate with `accept` alone."""
+        return core_schema.no_info_plain_validator_function(self._validated)
+
+
+@dataclass(frozen=True)
+class Whole(Kind):
+    """A whole number within a range, both ends included."""
+
+    first: int
+    last: int
+
+    @property
+    def words(self) -> str:
+        """Its range."""
+        return f"a whole number from {self.first} to {self.last}"
+
+    def accept(self, value: object) -> int:
+        """Take integers only: neither text, true nor 9.0."""
+        if isinstance(value, bool) or not isinstance(value, int) or not self.first <= value <= self.last:
+            raise self.refusal(value)
+        return value
+
+
+@dataclass(frozen=True)
+class Flag(Kind):
+    """True or false, in these words only."""
+
+    @property
+    def words(self) -> str:
+        """The two words."""
+        return "true or false"
+
+    def accept(self, value: object) -> bool:
+        """Take booleans only."""
+        if not isinstance(value, bool):
+            raise self.refusal(value)
+        return value
+
+
+@dataclass(frozen=True)
+class Choice(Kind):
+    """One of a few values; `meaning` maps a way of writing one to the value it means, `null` lets it be empty."""
+
+    values: tuple[int | str, ...]
+    null: bool = False
+    meaning: Mapping[int | str, int | str] = field(default_factory=dict, hash=False)
+
+    @property
+    def words(self) -> str:
+        """All of them."""
+        *others, last = [str(value) for value in self.values] + (["null"] if self.null else [])
+        return f"{', '.join(others)} or {last}" if others else last
+
+    def accept(self, value: object) -> int | str | None:
+        """Take a listed value of exactly its type: true is not 1, "9600" is not 9600."""
+        if value is None and self.null:
+            return None
+        if type(value) is int or type(value) is str:
+            if value in self.meaning:
+                return self.meaning[value]
+            if value in self.values:
+                return value
+        raise self.refusal(value)
+
+
+@dataclass(frozen=True)
+class Duration(Kind):
+    """Seconds within a range; `zero` adds 0, `auto` adds the word auto, which means None."""
+
+    first: float
+    last: float
+    zero: str = ""
+    auto: str = ""
+
+    @property
+    def words(self) -> str:
+        """Its range, and how to write it."""
+        words = f"a duration from {duration_text(self.first)} to {duration_text(self.last)}"
+        words += f", or 0 ({self.zero})" if self.zero else ""
+        words += f", or auto ({self.auto})" if self.auto else ""
+        return f"{words}, written as 250ms, 1.5s, 5m, 24h, 7d or a number of seconds"
+
+    def accept(self, value: object) -> float | None:
+        """Take a number of seconds or text such as 250ms."""
+        if self.auto and value == "auto":
+            return None
+        try:
+            duration = seconds(value)
+        except ValueError:
+            raise self.refusal(value) from None
+        if not (self.first <= duration <= self.last or (self.zero and duration == 0)):
+            raise self.refusal(value)
+        return duration
+
+
+@dataclass(frozen=True)
+class Size(Kind):
+    """Bytes within a range."""
+
+    first: int
+    last: int
+
+    @property
+    def words(self) -> str:
+        """Its range, and how to write it."""
+        return f"a size from {size_text(self.first)} to {size_text(self.last)}, written as 512MB or a number of bytes"
+
+    def accept(self, value: object) -> int:
+        """Take a number of bytes or text such as 512MB."""
+        try:
+            count = size(value)
+        except ValueError:
+            raise self.refusal(value) from None
+        if not self.first <= count <= self.last:
+            raise self.refusal(value)
+        return count
+
+
+@dataclass(frozen=True)
+class Name(Kind):
+    """A part of a topic, stable for life."""
+
+    pattern = re.compile(r"[a-z0-9_-]{1,32}")
+
+    @property
+    def words(self) -> str:
+        """Its characters."""
+        return "a name of 1 to 32 of the characters a-z 0-9 _ -"
+
+    def accept(self, value: object) -> str:
+        """Take text that fits."""
+        if not isinstance(value, str) or self.pattern.fullmatch(value) is None:
+            raise self.refusal(value)
+        return value
+
+
+@dataclass(frozen=True)
+class Text(Kind):
+    """Free text on one line: no control characters, not empty; `null` lets it be absent."""
+
+    longest: int
+    what: str = "text"
+    null: bool = False
+
+    @property
+    def words(self) -> str:
+        """Its length."""
+        words = f"{self.what} of 1 to {self.longest} characters on one line, without control characters"
+        return f"{words}, or null" if self.null else words
+
+    def accept(self, value: object) -> str | None:
+        """Take text that prints on one line."""
+        if value is None and self.null:
+            return None
+        if not isinstance(value, str) or not 1 <= len(value) <= self.longest or not _one_line(value):
+            raise self.refusal(value)
+        return value
+
+
+def _one_line(text: str) -> bool:
+    return all(unicodedata.category(character) not in {"Cc", "Cs", "Zl", "Zp"} for character in text)
+
+
+@dataclass(frozen=True)
+class FilePath(Text):
+    """The path of a file."""
+
+    longest: int = 4096
+    what: str = "a path"
+
+    def accept(self, value: object) -> str | None:
+        """Take text that can be a path, not an address such as tcp://..."""
+        path = super().accept(value)
+        if path is not None and "://" in path:
+            raise RefusedError("must be a path in the file system; network addresses are not supported")
+        return path
+
+
+@dataclass(frozen=True)
+class Host(Kind):
+    """A host name or an address. A wrong one is never shown: it may hold a login."""
+
+    pattern = re.compile(r"[\w.-]{1,253}|[0-9A-Fa-f]*:[0-9A-Fa-f:.]*:[0-9A-Fa-f:.]*(%[\w.-]+)?")
+
+    @property
+    def words(self) -> str:
+        """Its form."""
+        return "a host name or address, such as localhost or 192.0.2.7 (no mqtt://, no port, no login)"
+
+    def accept(self, value: object) -> str:
+        """Take text that fits."""
+        if not isinstance(value, str) or self.pattern.fullmatch(value) is None:
+            raise RefusedError(f"must be {self.words}")
+        return value
+
+
+@dataclass(frozen=True)
+class Node(Host):
+    """One node of several: a host, with its port where it is not everybody's. A wrong one is never shown."""
+
+    @property
+    def words(self) -> str:
+        """Its form."""
+        return (
+            'a host name or address, with a port or without, such as broker-b, "broker-b:8884" or "[2001:db8::7]:1883"'
+        )
+
+    def accept(self, value: object) -> str:
+        """Take text that fits."""
+        if isinstance(value, str):
+            host, port = split_node(value)
+            if self.pattern.fullmatch(host) and (port is None or 1 <= port <= LAST_PORT):
+                return value
+        raise RefusedError(f"must be {self.words} (no mqtt://, no login)")
+
+
+LAST_PORT = 65_535
+
+_NODE = re.compile(
+    r"\[(?P<six>[^\[\]]*:[^\[\]]*)\](:(?P<port6>[0-9]{1,5}))?|(?P<host>[^:\[\]]*)(:(?P<port>[0-9]{1,5}))?"
+)
+
+
+def split_node(text: str) -> tuple[str, int | None]:
+    """Return host and port (None: not given) of one node as it is written; a host that is none stays as it is."""
+    found = _NODE.fullmatch(text)
+    if found is None:
+        return text, None  # an IPv6 address without brackets, or nonsense
+    port = found["port6"] or found["port"]
+    return found["six"] or found["host"], None if port is None else int(port)
+
+
+def node_text(host: str, port: int) -> str:
+    """Return a node as it is written, an IPv6 address in brackets (RFC 3986, section 3.2.2)."""
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+
+
+@dataclass(frozen=True)
+class Hosts(Kind):
+    """One host, or a list of nodes. A wrong one is never shown: it may hold a login."""
+
+    most: int = 16
+
+    @property
+    def words(self) -> str:
+        """Its form."""
+        return f"{Host().words}; or a list of 1 to {self.most}, each with a port of its own where it needs one"
+
+    def accept(self, value: object) -> str | tuple[str, ...]:
+        """Take one host or several nodes."""
+        if not isinstance(value, list | tuple):
+            return Host().accept(value)
+        nodes = tuple(Node().accept(each) for each in value)
+        if not 1 <= len(nodes) <= self.most or len({split_node(each) for each in nodes}) < len(nodes):
+            raise RefusedError(f"must be a list of 1 to {self.most} nodes, each once")
+        return nodes
+
+    def _validated(self, value: object) -> object:
+        if isinstance(value, list | tuple):
+            _NODES.validate_python(tuple(value))  # its errors have the places of wrong nodes
+        return super()._validated(value)
+
+
+_NODES: TypeAdapter[tuple[str, ...]] = TypeAdapter(tuple[Annotated[str, Node()], ...])
+
+
+@dataclass(frozen=True)
+class BaseTopic(Kind):
+    """The first levels of every topic (MQTT 5.0, section 4.7: no wildcards, and `$` is the broker's)."""
+
+    longest: int = 200
+
+    @property
+    def words(self) -> str:
+        """Its form."""
+        return (
+            f"1 to {self.longest} characters as levels joined by /, such as site/%H: "
+            "no + or #, no empty level, not beginning with $ (%H is the host name)"
+        )
+
+    def accept(self, value: object) -> str:
+        """Take text that can begin a topic."""
+        if (
+            not isinstance(value, str)
+            or not 1 <= len(value) <= self.longest
+            or not _one_line(value)
+            or "+" in value
+            or "#" in value
+            or value.startswith("$")
+            or "" in value.split("/")
+        ):
+            raise self.refusal(value)
+        return value

@@ -1,0 +1,96 @@
+"""What pydantic finds, in words for the person who wrote the file."""
+
+from __future__ import annotations
+
+import difflib
+from typing import TypeAlias, get_args
+
+from pydantic import BaseModel
+from pydantic_core import ErrorDetails
+
+from lfs10d.schema.fields import PLAIN_ERROR, shown
+
+KeyPath: TypeAlias = tuple[str | int, ...]
+"""Where a value stands: keys of mappings and indexes of lists."""
+
+
+def unknown_key(key: str, known: tuple[str, ...]) -> str:
+    """Return what to say of a key that is not one of those known in its place."""
+    near = difflib.get_close_matches(key, known, n=1, cutoff=0.6)
+    if near:
+        return f"is not a known key; did you mean {near[0]}?"
+    return f"is not a known key; known here: {', '.join(known)}" if known else "is not a known key"
+
+
+def missing(model: type[BaseModel] | None, path: KeyPath) -> str:
+    """Return what to say of a key that must be there; with the model, what to write."""
+    for found in _models_at(model, path[:-1]) if model else ():
+        known = found.model_fields.get(str(path[-1]))
+        if known is not None and (description := known.description):
+            return f"is missing; write here: {description[0].lower()}{description[1:].rstrip('.')}"
+    return "is missing"
+
+
+def keys_at(model: type[BaseModel], path: KeyPath) -> tuple[str, ...]:
+    """Return the keys that a mapping at this path may have."""
+    return tuple(field.alias or name for found in _models_at(model, path) for name, field in found.model_fields.items())
+
+
+def _models_at(model: type[BaseModel], path: KeyPath) -> list[type[BaseModel]]:
+    """Return the models whose keys may stand in the mapping at this path."""
+    models = [model]
+    for step in path:
+        if isinstance(step, str):
+            models = [
+                inner
+                for outer in models
+                if step in outer.model_fields
+                for inner in _models_in(outer.model_fields[step].annotation)
+            ]
+    return models
+
+
+def _models_in(annotation: object) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for argument in get_args(annotation) for model in _models_in(argument)]
+
+
+_WORDS = {
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "float_type": "a number",
+    "finite_number": "a finite number",
+    "bool_type": "true or false",
+    "string_type": "text",
+    "list_type": "a list",
+    "tuple_type": "a list",
+    "dict_type": "a mapping of keys to values",
+    "model_type": "a mapping of keys to values",
+    "model_attributes_type": "a mapping of keys to values",
+    "none_required": "null",
+    "greater_than": "more than {gt}",
+    "greater_than_equal": "at least {ge}",
+    "less_than": "less than {lt}",
+    "less_than_equal": "at most {le}",
+    "literal_error": "one of {expected}",
+    "enum": "one of {expected}",
+    "string_pattern_mismatch": "text that fits {pattern}",
+    "string_too_short": "text of at least {min_length} characters",
+    "string_too_long": "text of at most {max_length} characters",
+    "too_short": "at least {min_length} items long",
+    "too_long": "at most {max_length} items long",
+}
+
+
+def in_words(detail: ErrorDetails) -> str:
+    """Return one error that is neither a missing nor an unknown key."""
+    context = detail.get("ctx", {})
+    if detail["type"] in _WORDS:
+        wanted = _WORDS[detail["type"]].format_map(context)
+        return f"must be {wanted}, not {shown(detail['input'])}"
+    if detail["type"] == PLAIN_ERROR:
+        return detail["msg"]
+    # A validator's own ValueError carries the message; anything else pydantic words well enough.
+    text = str(context.get("error", detail["msg"]))
+    return " ".join(text.split())

@@ -1,0 +1,84 @@
+"""A whole line from a few words: ids, rate, framing, device, faults."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+from lfs10d.simulator.fault_file import FaultFile, SlaveEntry
+from lfs10d.simulator.faults import window
+from lfs10d.simulator.line import SimulatedLine
+from lfs10d.simulator.line_faults import babble, second_master, stray
+from lfs10d.simulator.registers import LFS10, READ_HOLDING, Blueprint
+from lfs10d.simulator.sensor import Sensor
+from lfs10d.simulator.wind import Wind
+from lfs10d.simulator.wire import Format, Framing
+
+LAST_ID = 255
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What kind of line; times in seconds."""
+
+    slaves: Sequence[int]
+    format: Format = field(default_factory=Format)
+    framing: Framing = "rtu"
+    blueprint: Blueprint = LFS10
+    turnaround: float = 0.005
+    jitter: float = 0.0
+    seed: int = 1
+    unique: bool = False
+    """Values unique in the run, in place of moving wind."""
+
+
+def build(plan: Plan, faults: FaultFile | None = None, *, keep_log: bool = False) -> SimulatedLine:
+    """Return the line with its sensors and everything that ails them and it, but for echo and latency.
+
+    Those are the adapter's: hand `faults.line.echo` and `.latency` to the port or the `PtyLine`.
+    """
+    faults = faults or FaultFile()
+    line = SimulatedLine(format=plan.format, framing=plan.framing, seed=plan.seed, keep_log=keep_log)
+    for slave in plan.slaves:
+        entry = faults.slaves.get(slave, SlaveEntry())
+        for copy in range(entry.copies):
+            sensor = line.add(_sensor(plan, slave, entry, plan.seed + copy))
+            sensor.ailments += [fault.ailment for fault in (*faults.all, *entry.faults)]
+    for spell in faults.line.babble:
+        babble(line, spell.after, spell.last, spell.every)
+    for noise in faults.line.noise:
+        when = window(noise.after, noise.last, noise.every)
+        stray(line, noise.rate, length=noise.bytes, delay=noise.delay, window=when)
+    for other in faults.line.second_master:
+        signal = plan.blueprint.signals[0]
+        words = signal.address.to_bytes(2, "big") + signal.count.to_bytes(2, "big")
+        second_master(line, bytes((other.slave, READ_HOLDING)) + words, other.after, other.every)
+    return line
+
+
+def _sensor(plan: Plan, slave: int, entry: SlaveEntry, seed: int) -> Sensor:
+    shape = plan.format if entry.baudrate is None else replace(plan.format, baudrate=entry.baudrate)
+    return Sensor(
+        slave,
+        blueprint=plan.blueprint,
+        format=shape,
+        framing=plan.framing,
+        turnaround=plan.turnaround if entry.turnaround is None else entry.turnaround,
+        jitter=plan.jitter if entry.jitter is None else entry.jitter,
+        source=None if plan.unique else Wind(seed * (LAST_ID + 1) + slave),
+        seed=seed,
+    )
+
+
+def slave_ids(text: str) -> tuple[int, ...]:
+    """Return the ids of text such as `1-8,12`, in order; raises ValueError that says what is wrong."""
+    ids: set[int] = set()
+    for part in text.split(","):
+        first, dash, last = part.strip().partition("-")
+        if not (first.isascii() and first.isdigit() and (not dash or (last.isascii() and last.isdigit()))):
+            raise ValueError(f"{part.strip()!r} is neither an id such as 3 nor a range such as 1-8")
+        low, high = int(first), int(last or first)
+        if not 1 <= low <= high <= LAST_ID:
+            raise ValueError(f"{part.strip()!r}: ids go from 1 to {LAST_ID}, the smaller first")
+        ids.update(range(low, high + 1))
+    return tuple(sorted(ids))

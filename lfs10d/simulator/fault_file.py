@@ -1,0 +1,188 @@
+"""The faults file: what ails which sensor and the line, in YAML, with the place of every mistake.
+
+::
+
+    line:
+      echo: true                                  # the adapter returns the master's own bytes
+      latency: 16ms                               # it delivers in pieces
+      babble: [{after: 20s, for: 2s}]
+      noise: [{rate: 0.02, bytes: 3, delay: 1ms}] # stray bytes after that share of the requests
+      second_master: [{slave: 1, every: 3s}]
+    all: [{fault: noisy, rate: 0.01}]             # of every sensor
+    slaves:
+      3: silent
+      4: [nan, {fault: late, delay: 700ms, rate: 0.05}]
+      5: {turnaround: 20ms, baudrate: 19200, copies: 2, faults: [{fault: silent, after: 10s, for: 5s}]}
+
+The kinds of faults are those of `lfs10d.simulator.faults.Kind`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from pathlib import Path
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+
+from lfs10d.errors import ConfigError, Problem
+from lfs10d.schema.document import decode, parse
+from lfs10d.schema.fields import Choice, Duration, Flag, Whole
+from lfs10d.simulator.faults import Ailment, Kind, ailment
+
+DAY = 86400
+MOST_COPIES = 8
+LONGEST_NOISE = 256
+BAUDRATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
+
+Time: TypeAlias = Annotated[float, Duration(0, DAY)]
+Share: TypeAlias = Annotated[float, Field(ge=0, le=1)]
+Length: TypeAlias = Annotated[int, Whole(1, LONGEST_NOISE)]
+
+
+class _Entry(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class WindowEntry(_Entry):
+    """When something holds; without times always."""
+
+    after: Time = Field(0.0, description="When it begins, after the simulator's start.")
+    lasts: Time | None = Field(None, alias="for", description="How long it lasts; for ever if left out.")
+    every: Time | None = Field(None, description="How long from one beginning to the next.")
+
+    @model_validator(mode="after")
+    def _repeats_what_ends(self) -> WindowEntry:
+        if self.every is not None and (self.lasts is None or not 0 < self.lasts < self.every):
+            raise ValueError("`every` repeats what ends: give `for`, shorter than `every`")
+        return self
+
+    @property
+    def last(self) -> float | None:
+        """When it ends first (s)."""
+        return None if self.lasts is None else self.after + self.lasts
+
+
+class FaultEntry(WindowEntry):
+    """One fault of a sensor."""
+
+    fault: Annotated[str, Choice(tuple(kind.value for kind in Kind))] = Field(description="What ails it.")
+    rate: Share = Field(1.0, description="In what share of its answers it shows.")
+    delay: Time | None = Field(
+        None, description="Of late, slow_bytes, slow_flash, needs_rest, sleeps, twin, repeated and gateway."
+    )
+    code: Annotated[int, Whole(1, 255)] | None = Field(None, description="Of exception, dip_locked and gateway.")
+    id: Annotated[int, Whole(0, 255)] | None = Field(None, description="Of wrong_id.")
+    bytes: Length | None = Field(None, description="Of garbage, truncated, leading_noise and trailing_noise.")
+    answer: Literal["echo", "exception"] = Field("echo", description="How one that is dip_locked answers a write.")
+    reads: Literal["old", "new"] = Field("old", description="What its id register holds then.")
+
+    @property
+    def ailment(self) -> Ailment:
+        """The fault as the simulator plays it."""
+        return ailment(
+            self.fault,
+            self.rate,
+            delay=self.delay,
+            first=self.after,
+            last=self.last,
+            every=self.every,
+            code=self.code,
+            value=self.id,
+            length=self.bytes,
+            answer=self.answer,
+            reads=self.reads,
+        )
+
+
+def _named(item: object) -> object:
+    return {"fault": item} if isinstance(item, str) else item
+
+
+Faults: TypeAlias = Annotated[
+    tuple[Annotated[FaultEntry, BeforeValidator(_named)], ...],
+    BeforeValidator(lambda item: (item,) if isinstance(item, str | dict) else item),
+    Field(strict=False),
+]
+
+
+class SlaveEntry(_Entry):
+    """One sensor's faults, and where it differs from the others."""
+
+    faults: Faults = Field((), description="What ails it.")
+    turnaround: Time | None = Field(None, description="From a request's last bit to its answer's first.")
+    jitter: Time | None = Field(None, description="Up to so much more, drawn each time.")
+    baudrate: Annotated[int, Choice(BAUDRATES)] | None = Field(None, description="If not the line's.")
+    copies: Annotated[int, Whole(1, MOST_COPIES)] = Field(1, description="How many sensors have this id.")
+
+
+def _slave(item: object) -> object:
+    if isinstance(item, dict) and "fault" not in item:
+        return item
+    return {"faults": item}
+
+
+class NoiseEntry(WindowEntry):
+    """Stray bytes after requests."""
+
+    rate: Share = Field(1.0, description="After what share of the requests.")
+    bytes: Length = Field(3, description="How many.")
+    delay: Time = Field(0.001, description="How long after the request.")
+
+
+class SecondMasterEntry(_Entry):
+    """Another master that does not listen before it speaks."""
+
+    slave: Annotated[int, Whole(0, 255)] = Field(description="Whom it reads.")
+    every: Annotated[float, Duration(0.01, DAY)] = Field(description="How often.")
+    after: Time = Field(0.0, description="From when on.")
+
+
+class LineEntry(_Entry):
+    """What troubles the whole line."""
+
+    echo: Annotated[bool, Flag()] = Field(default=False, description="The adapter returns the master's bytes.")
+    latency: Annotated[float, Duration(0, 1)] = Field(0.0, description="The adapter delivers in pieces so far apart.")
+    babble: Annotated[tuple[WindowEntry, ...], Field(strict=False)] = Field((), description="Bytes without a pause.")
+    noise: Annotated[tuple[NoiseEntry, ...], Field(strict=False)] = Field((), description="Stray bytes.")
+    second_master: Annotated[tuple[SecondMasterEntry, ...], Field(strict=False)] = Field(
+        (), description="Another master."
+    )
+
+
+class FaultFile(_Entry):
+    """The whole file."""
+
+    line: LineEntry = Field(LineEntry(), description="What troubles the line.")
+    all: Faults = Field((), description="What ails every sensor.")
+    slaves: dict[Annotated[int, Whole(1, 255)], Annotated[SlaveEntry, BeforeValidator(_slave)]] = Field(
+        {}, description="By slave id."
+    )
+
+
+def parse_faults(text: str, file: str, slaves: Collection[int]) -> FaultFile:
+    """Read faults of sensors with these ids; raises ConfigError with every problem and its place."""
+    document = parse(text, file)
+    problems: tuple[Problem, ...] = document.problems
+    faults = FaultFile()
+    try:
+        faults = FaultFile.model_validate(document.data)
+    except ValidationError as error:
+        problems += document.problems_of(error, FaultFile)
+    problems += tuple(
+        document.problem(("slaves", slave), "is not on this line; see --slaves", key=True)
+        for slave in faults.slaves
+        if slave not in slaves
+    )
+    if problems:
+        raise ConfigError(tuple(sorted(problems)))
+    return faults
+
+
+def load_faults(path: Path, slaves: Collection[int]) -> FaultFile:
+    """Read a faults file; raises ConfigError, also if it cannot be read."""
+    try:
+        raw = path.read_bytes()
+    except OSError as error:
+        raise ConfigError((Problem(str(path), 1, 1, "", f"cannot be read: {error.strerror}"),)) from error
+    return parse_faults(decode(raw, str(path)), str(path), slaves)

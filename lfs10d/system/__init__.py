@@ -1,0 +1,1 @@
+"""The operating system: disk, threads, systemd, logs, clock."""

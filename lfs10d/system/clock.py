@@ -1,0 +1,131 @@
+"""Is the wall clock synchronised? Asked of systemd, for the daemon's sandbox forbids adjtimex.
+
+systemd-timesyncd leaves a mark in /run once it has set the clock. Any other (chrony, ntpd) is known to timedate1,
+which reads the kernel's flag. Without both nobody knows.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import subprocess
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, TypeAlias
+
+from lfs10d.system import clock_step
+from lfs10d.system.threads import aside
+
+ClockState: TypeAlias = Literal["synced", "unsynced", "unknown"]
+
+MARK = Path("/run/systemd/timesync/synchronized")
+"""Touched by systemd-timesyncd at each synchronisation (systemd-timesyncd.service(8)); /run is empty after a boot."""
+
+QUESTION = ("timedatectl", "show", "--property=NTPSynchronized", "--value")
+"""org.freedesktop.timedate1 in words; prints yes or no."""
+
+PATIENCE = 2.0
+"""How long timedate1 may take, s: it is started by the question."""
+
+LOOK_AGAIN: dict[ClockState, float] = {"synced": 600.0, "unsynced": 15.0, "unknown": 600.0}
+"""How long an answer is good for, s. A clock is usually synchronised within a minute of the network."""
+
+SOON_AFTER_START = 600.0
+"""For so long, s, nobody knowing is no answer yet: timedate1 and what it asks may still be starting."""
+
+
+def look_again(state: ClockState, age: float) -> float:
+    """Return in how many seconds to look again, `age` seconds after the start."""
+    soon = state == "unknown" and age < SOON_AFTER_START
+    return LOOK_AGAIN["unsynced" if soon else state]
+
+
+def look(*, mark: Path = MARK, question: Sequence[str] = QUESTION, patience: float = PATIENCE) -> ClockState:
+    """Tell the state of the wall clock. Blocks up to `patience` seconds, so never call it on loop or line thread."""
+    if os.path.lexists(mark):
+        return "synced"
+    return judge(_ask(question, patience))
+
+
+def judge(answer: str | None) -> ClockState:
+    """Take timedate1's answer, None if there was none."""
+    match answer:
+        case "yes":
+            return "synced"
+        case "no":
+            return "unsynced"
+        case _:
+            return "unknown"
+
+
+def _ask(question: Sequence[str], patience: float) -> str | None:
+    # When it fails it tells the service manager, in our place, which the manager complains of.
+    environment = {name: value for name, value in os.environ.items() if name != "NOTIFY_SOCKET"}
+    try:
+        answer = subprocess.run(  # noqa: S603 - a constant command, no shell
+            question,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env=environment,
+            timeout=patience,
+            check=True,
+        )
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return answer.stdout.decode("ascii", "replace").strip()
+
+
+@dataclass(frozen=True, slots=True)
+class Instant:
+    """One moment: `mono` in s of the line thread's clock, `wall` in s since the epoch, how far to trust it."""
+
+    mono: float
+    wall: float
+    clock: ClockState
+
+    def ts(self, at: float | None = None) -> int:
+        """Return epoch milliseconds of this moment, or of the monotonic time `at` as seen from it."""
+        return round((self.wall if at is None else self.wall - self.mono + at) * 1000)
+
+
+class Moments:
+    """`synchronised()` is called whenever the wall clock has become synchronised.
+
+    `stepped()` is called when it was set while it was not known to be synchronised. Built and used in one thread.
+    """
+
+    def __init__(self, synchronised: Callable[[], None], stepped: Callable[[], None]) -> None:
+        self._synchronised = synchronised
+        self._stepped = stepped
+        self._state: ClockState = "unknown"
+        self._start = time.monotonic()
+        self._shift = round((time.time() - self._start) * 1000)
+        self._set = asyncio.Event()
+        """The wall clock was set since `watch` has looked."""
+
+    def now(self) -> Instant:
+        """Return this moment."""
+        now = Instant(time.monotonic(), time.time(), self._state)
+        shift = round((now.wall - now.mono) * 1000)
+        if clock_step.stepped(self._shift, shift):
+            self._set.set()
+        self._shift = shift
+        return now
+
+    async def watch(self) -> None:
+        """Look after the wall clock until cancelled; at once when it was set."""
+        while True:
+            if self._set.is_set():
+                self._set.clear()
+                if self._state != "synced":
+                    self._stepped()
+            before, self._state = self._state, await aside(look, "clock")
+            if self._state == "synced" != before:
+                self._synchronised()
+            patience = look_again(self._state, time.monotonic() - self._start)
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._set.wait(), patience)

@@ -1,0 +1,152 @@
+"""Files that survive a power cut: write, fsync, rename, fsync of the folder.
+
+`Disk` holds the order of the steps, `Files` are the steps. `tests.support.volatile_disk` has other `Files` for tests, which
+forget at a cut what was not synced.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from pathlib import Path
+from typing import Protocol
+
+from lfs10d.system.regular_file import read_regular, write_new
+
+
+class Files(Protocol):
+    """The smallest steps on a file system. All raise OSError."""
+
+    def read(self, path: Path) -> bytes:
+        """Return the content."""
+
+    def write(self, path: Path, data: bytes, *, mode: int) -> None:
+        """Write a new file, in the place of one that is there; nothing is safe yet."""
+
+    def append(self, path: Path, data: bytes, *, mode: int) -> None:
+        """Write at the end, creating the file if need be; nothing is safe yet."""
+
+    def truncate(self, path: Path, length: int) -> None:
+        """Cut the file; nothing is safe yet."""
+
+    def sync(self, path: Path) -> None:
+        """Return when the content is on the disk."""
+
+    def rename(self, source: Path, target: Path) -> None:
+        """Put one file in place of another, in one step."""
+
+    def remove(self, path: Path) -> None:
+        """Take the name away."""
+
+    def sync_folder(self, folder: Path) -> None:
+        """Return when the folder's names are on the disk."""
+
+    def exists(self, path: Path) -> bool:
+        """Tell whether there is such a file."""
+
+
+class SystemFiles:
+    """The steps as system calls."""
+
+    def read(self, path: Path) -> bytes:
+        """Return the content; raises OSError where it is no regular file, and never waits."""
+        return read_regular(path)
+
+    def write(self, path: Path, data: bytes, *, mode: int) -> None:
+        """Write a new file, in the place of one that is there."""
+        write_new(path, data, mode=mode)
+
+    def append(self, path: Path, data: bytes, *, mode: int) -> None:
+        """Write at the end, creating the file if need be."""
+        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW | os.O_CLOEXEC, mode)
+        try:
+            rest = memoryview(data)
+            while rest:
+                rest = rest[os.write(descriptor, rest) :]
+        finally:
+            os.close(descriptor)
+
+    def truncate(self, path: Path, length: int) -> None:
+        """Cut the file."""
+        os.truncate(path, length)
+
+    def sync(self, path: Path) -> None:
+        """Return when the content is on the disk."""
+        self._synced(path, os.O_RDONLY)
+
+    def rename(self, source: Path, target: Path) -> None:
+        """Put one file in place of another."""
+        source.replace(target)
+
+    def remove(self, path: Path) -> None:
+        """Take the name away."""
+        path.unlink()
+
+    def sync_folder(self, folder: Path) -> None:
+        """Return when the folder's names are on the disk."""
+        self._synced(folder, os.O_RDONLY | os.O_DIRECTORY)
+
+    def _synced(self, path: Path, flags: int) -> None:
+        descriptor = os.open(path, flags | os.O_CLOEXEC)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
+
+    def exists(self, path: Path) -> bool:
+        """Tell whether there is such a file."""
+        return path.exists()
+
+
+class Disk:
+    """Writes that have happened when the call returns, and else have not happened or (append) only in part.
+
+    All raise OSError. New files are readable by their owner only, unless `mode` says otherwise.
+    """
+
+    def __init__(self, files: Files | None = None) -> None:
+        self.files: Files = SystemFiles() if files is None else files
+
+    def read(self, path: Path) -> bytes:
+        """Return the content of a file."""
+        return self.files.read(path)
+
+    def replace(self, path: Path, data: bytes, *, mode: int = 0o600) -> None:
+        """Put `data` in the place of the whole file: after a cut the old content is there, or the new."""
+        draft = path.with_name(f".{path.name}.new")
+        try:
+            self.files.write(draft, data, mode=mode)
+            self.files.sync(draft)
+            self.files.rename(draft, path)
+        except OSError:
+            with contextlib.suppress(OSError):
+                self.files.remove(draft)
+            raise
+        self.files.sync_folder(path.parent)
+
+    def append(self, path: Path, data: bytes, *, mode: int = 0o600) -> None:
+        """Write at the end; after a cut any part of `data` may be there: the reader judges each record.
+
+        If it fails (a full disk), what was written of it is taken back as far as that is possible.
+        """
+        length = len(self.files.read(path)) if self.files.exists(path) else None
+        try:
+            self.files.append(path, data, mode=mode)
+            self.files.sync(path)
+        except OSError:
+            with contextlib.suppress(OSError):
+                self.files.truncate(path, length or 0)
+            raise
+        if length is None:
+            self.files.sync_folder(path.parent)
+
+    def remove(self, path: Path) -> None:
+        """Take a file away; one that is not there is none."""
+        if self.files.exists(path):
+            self.files.remove(path)
+            self.files.sync_folder(path.parent)
+
+    def put_aside(self, path: Path, target: Path) -> None:
+        """Give a file another name in the same folder."""
+        self.files.rename(path, target)
+        self.files.sync_folder(path.parent)

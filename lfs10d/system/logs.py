@@ -1,0 +1,252 @@
+"""Logging: one line per record, for the journal, a terminal or a pipe, and nothing foreign unescaped.
+
+Standard error may be closed, full, or nobody may read it: no record is worth an exception or a standstill. What could
+not be written is counted, and the count is the first thing written afterwards.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import select
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Mapping
+from enum import StrEnum
+from typing import TypeVar
+
+T = TypeVar("T")
+
+OUR_PACKAGE = "lfs10d"
+
+LIMIT = 4096
+"""Most bytes of one line: a pipe that is ready takes this much (PIPE_BUF, pipe(7)) without blocking."""
+
+PATIENCE = 0.05
+"""How long the first refused record waits for a slow reader, s; those after it do not wait until one is taken."""
+
+LEVELS = {"debug": logging.DEBUG, "info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
+
+_PRIORITIES = ((logging.CRITICAL, 2), (logging.ERROR, 3), (logging.WARNING, 4), (logging.INFO, 6))
+_DEBUG_PRIORITY = 7
+"""Priorities of syslog(3), each from that level on."""
+
+_COLOURS = ((logging.ERROR, "\x1b[31m"), (logging.WARNING, "\x1b[33m"), (logging.INFO, ""))
+_DIM, _RESET = "\x1b[2m", "\x1b[0m"
+
+_CUT = b" ... "
+
+_JSON_FRAME = 128
+"""Bytes of a JSON line beside its message, and some more."""
+
+
+class Style(StrEnum):
+    """How a line looks."""
+
+    JOURNAL = "journal"
+    """`<4>message`: the journal takes the priority off and adds the time (sd-daemon(3))."""
+    COLOUR = "colour"
+    """`21:53:42 CET warning message` with colour, local time: for a person at a terminal."""
+    PLAIN = "plain"
+    """`2026-11-21T21:53:42.003Z warning message`: for a file or another program."""
+    BARE = "bare"
+    """`warning message`: where the reader adds the time."""
+    JSON = "json"
+    """`{"time": "2026-11-21T21:53:42.003Z", "level": "warning", "logger": "lfs10d.line.poller", "message": "..."}`."""
+
+
+def escape(text: str) -> str:
+    r"""Return text that cannot break a line, move a cursor or fool a reader: `\n`, `\x1b`, `\u2028` for what would.
+
+    Printable text is returned as it is; to escape twice changes nothing.
+    """
+    if text.isprintable():
+        return text
+    return "".join(sign if sign.isprintable() else sign.encode("unicode_escape").decode("ascii") for sign in text)
+
+
+def shortened(line: str, limit: int = LIMIT - 1) -> str:
+    """Return the line with its middle left out where it has more than `limit` bytes: both ends tell the most."""
+    raw = line.encode("utf-8", "backslashreplace")
+    if len(raw) <= limit:
+        return line
+    half = (limit - len(_CUT)) // 2
+    return (raw[:half] + _CUT + raw[-half:]).decode("utf-8", "ignore")
+
+
+def style_of(wanted: str, *, journal: bool, terminal: bool, coloured: bool = True) -> Style:
+    """Choose the style for log.format `auto`, `journal`, `text`, `plain` or `json`.
+
+    `journal` and `terminal` say what standard error is, `coloured` whether its reader likes colour.
+    """
+    if wanted == "json":
+        return Style.JSON
+    if wanted == "journal" or (wanted == "auto" and journal):
+        return Style.JOURNAL
+    if wanted != "plain" and terminal and coloured:
+        return Style.COLOUR
+    return Style.BARE if journal else Style.PLAIN
+
+
+def is_journal(descriptor: int, variables: Mapping[str, str]) -> bool:
+    """Tell whether the descriptor is the journal's, by `$JOURNAL_STREAM` (systemd.exec(5))."""
+    try:
+        status = os.fstat(descriptor)
+    except OSError:
+        return False
+    return variables.get("JOURNAL_STREAM") == f"{status.st_dev}:{status.st_ino}"
+
+
+def likes_colour(variables: Mapping[str, str]) -> bool:
+    """Heed `$NO_COLOR` (no-color.org) and terminals that know no colour."""
+    return not variables.get("NO_COLOR") and variables.get("TERM") != "dumb"
+
+
+class LineFormatter(logging.Formatter):
+    """One record, one line, printable throughout; an exception is its type and text.
+
+    With `tracebacks` the traceback follows on the same line, escaped. Other packages' records begin with their name.
+    """
+
+    def __init__(self, look: Style, *, tracebacks: bool = False) -> None:
+        super().__init__()
+        self._look = look
+        self._tracebacks = tracebacks
+
+    def format(self, record: logging.LogRecord) -> str:
+        """Return the line without its end."""
+        words = escape(self._said(record))
+        level = record.levelname.lower()
+        if self._look is Style.JOURNAL:
+            return f"<{_at_level(_PRIORITIES, record.levelno, _DEBUG_PRIORITY)}>{words}"
+        if self._look is Style.COLOUR:
+            stamp = time.strftime("%H:%M:%S %Z", time.localtime(record.created))
+            colour = _at_level(_COLOURS, record.levelno, _DIM)
+            return f"{_DIM}{stamp}{_RESET} {colour}{level:<7} {words}{_RESET}"
+        if self._look is Style.BARE:
+            return f"{level} {words}"
+        if self._look is Style.JSON:
+            # Cut before quoting, which may double its length: half an object is no JSON.
+            message = shortened(words, LIMIT // 2 - _JSON_FRAME)
+            entry = {"time": _utc(record.created), "level": level, "logger": record.name, "message": message}
+            return json.dumps(entry, ensure_ascii=False)
+        return f"{_utc(record.created)} {level} {words}"
+
+    def _said(self, record: logging.LogRecord) -> str:
+        try:
+            words = record.getMessage()
+        except Exception as wrong:  # noqa: BLE001 - whatever a faulty log call raises, its record is still told
+            words = f"{record.msg} {record.args} ({wrong})"
+        if record.name.partition(".")[0] != OUR_PACKAGE:
+            words = f"{record.name}: {words}"
+        error = record.exc_info[1] if record.exc_info else None
+        if error is None:
+            return words
+        trace = " | " + "".join(traceback.format_exception(error)).rstrip() if self._tracebacks else ""
+        return f"{words}: {_summary(error)}{trace}"
+
+
+class DescriptorHandler(logging.Handler):
+    """Writes each record to a file descriptor by one call; never raises and never waits for a reader who stopped.
+
+    `dropped` counts the records nobody took since the last one that was taken.
+    """
+
+    def __init__(self, descriptor: int) -> None:
+        super().__init__()
+        self.dropped = 0
+        self._descriptor = descriptor
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write one line, or count it as dropped."""
+        if not (self._told_dropped(record) and self._write(self.format(record))):
+            self.dropped += 1
+
+    def _told_dropped(self, record: logging.LogRecord) -> bool:
+        """Tell of what was lost, if anything was; False if that is not taken either."""
+        if not self.dropped:
+            return True
+        lost = logging.LogRecord(
+            name=OUR_PACKAGE,
+            level=logging.WARNING,
+            pathname="",
+            lineno=0,
+            msg="%d log records were lost: nobody took them from standard error",
+            args=(self.dropped,),
+            exc_info=None,
+        )
+        lost.created = record.created
+        taken = self._write(self.format(lost))
+        if taken:
+            self.dropped = 0
+        return taken
+
+    def _write(self, line: str) -> bool:
+        data = shortened(line).encode("utf-8", "backslashreplace") + b"\n"
+        try:
+            return self._ready() and os.write(self._descriptor, data) == len(data)
+        except (OSError, ValueError):
+            return False
+
+    def _ready(self) -> bool:
+        poll = select.poll()
+        poll.register(self._descriptor, select.POLLOUT)
+        found = poll.poll(0 if self.dropped else PATIENCE * 1000)
+        return any(flags & select.POLLOUT for _, flags in found)
+
+
+def install(level: str = "info", wanted: str = "auto", *, descriptor: int = 2) -> None:
+    """Log to standard error from now on, in place of any handler before; again after a reload.
+
+    `level` is one of `LEVELS`; other packages are heard from warning on. What nobody caught in a thread or a
+    destructor is logged too, instead of a traceback on the screen.
+    """
+    variables = os.environ
+    style = style_of(
+        wanted,
+        journal=is_journal(descriptor, variables),
+        terminal=os.isatty(descriptor),
+        coloured=likes_colour(variables),
+    )
+    least = LEVELS[level]
+    handler = DescriptorHandler(descriptor)
+    handler.setFormatter(LineFormatter(style, tracebacks=least <= logging.DEBUG))
+    root = logging.getLogger()
+    for other in root.handlers[:]:
+        root.removeHandler(other)
+    root.addHandler(handler)
+    root.setLevel(max(least, logging.WARNING))
+    logging.getLogger(OUR_PACKAGE).setLevel(least)
+    logging.captureWarnings(capture=True)
+    threading.excepthook = _log_thread
+    sys.unraisablehook = _log_unraisable
+
+
+def _log_thread(stray: threading.ExceptHookArgs) -> None:
+    name = stray.thread.name if stray.thread else "unknown"
+    _log_stray(f"the thread {name} ended", stray.exc_value)
+
+
+def _log_unraisable(stray: sys.UnraisableHookArgs) -> None:
+    _log_stray(stray.err_msg or "an error where none can be raised", stray.exc_value)
+
+
+def _log_stray(words: str, error: BaseException | None) -> None:
+    logging.getLogger(OUR_PACKAGE).error("%s", words, exc_info=error)
+
+
+def _at_level(ladder: tuple[tuple[int, T], ...], level: int, below: T) -> T:
+    return next((value for least, value in ladder if level >= least), below)
+
+
+def _utc(seconds: float) -> str:
+    whole, milliseconds = divmod(int(seconds * 1000), 1000)
+    return f"{time.strftime('%Y-%m-%dT%H:%M:%S', time.gmtime(whole))}.{milliseconds:03}Z"
+
+
+def _summary(error: BaseException) -> str:
+    words = str(error)
+    return f"{type(error).__name__}: {words}" if words else type(error).__name__

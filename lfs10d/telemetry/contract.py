@@ -1,0 +1,110 @@
+"""The table of what goes out: every topic under `B`, its payload's model, and when it is published.
+
+For `docs/mqtt.md` and for the tests; like `lfs10d.telemetry.payloads` it is not imported by the running daemon.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Annotated, Any
+
+from pydantic import Field, TypeAdapter
+
+from lfs10d.telemetry import publication
+from lfs10d.telemetry.payloads import (
+    Availability,
+    DeviceConfig,
+    DeviceEntry,
+    DeviceStats,
+    Dropped,
+    Error,
+    Event,
+    Info,
+    LineState,
+    LineStats,
+    Response,
+    SamplePayload,
+    Trace,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Outbound:
+    """One topic under `B`; `+` stands for any one level, `form` is what its JSON is validated against."""
+
+    topic: str
+    form: Any
+    retain: bool
+    qos: int
+    when: str
+
+    def matches(self, topic: str) -> bool:
+        """Whether `topic` (under `B`) is one of these."""
+        pattern, levels = self.topic.split("/"), topic.split("/")
+        return len(pattern) == len(levels) and all(
+            wanted in ("+", level) for wanted, level in zip(pattern, levels, strict=True)
+        )
+
+
+def _device(leaf: str) -> str:
+    return publication.device_topic("+", leaf)
+
+
+CHANGE = "connect, change"
+RISE = "rise, change of code, clear"
+
+OUTBOUND = (
+    Outbound(publication.INFO, Info, retain=True, qos=1, when=CHANGE),
+    Outbound(publication.DEVICES, list[DeviceEntry], retain=True, qos=1, when=CHANGE),
+    Outbound(publication.LINE_STATE, LineState, retain=True, qos=1, when=CHANGE),
+    Outbound(publication.LINE_ERROR, Error, retain=True, qos=1, when=RISE),
+    Outbound(publication.LINE_STATS, LineStats, retain=True, qos=0, when="30 s"),
+    Outbound(
+        _device(publication.STATE),
+        SamplePayload,
+        retain=True,
+        qos=1,
+        when="the newest at most every `mqtt.state_every`; a change of quality or error at once",
+    ),
+    Outbound(_device(publication.TELEMETRY), SamplePayload, retain=False, qos=1, when="each poll"),
+    Outbound(
+        _device(publication.HISTORY),
+        Annotated[list[SamplePayload], Field(max_length=100)],
+        retain=False,
+        qos=1,
+        when="what is older than 3 s; what may have been lost at a reconnect",
+    ),
+    Outbound(_device(publication.CONFIG), DeviceConfig, retain=True, qos=1, when=CHANGE),
+    Outbound(_device(publication.AVAILABILITY), Availability, retain=True, qos=1, when=CHANGE),
+    Outbound(_device(publication.ERROR), Error, retain=True, qos=1, when=RISE),
+    Outbound(_device(publication.STATS), DeviceStats, retain=True, qos=0, when="30 s"),
+    Outbound(publication.EVENT, Dropped | Event, retain=False, qos=1, when="as it happens"),
+    Outbound("response/+/+", Response, retain=False, qos=1, when="one per request"),
+    Outbound("response/+", Response, retain=False, qos=1, when="one per request of one level"),
+    Outbound(publication.TRACE, Trace, retain=False, qos=0, when="while `line/trace` runs"),
+)
+
+
+def outbound(topic: str) -> Outbound:
+    """Return the row of the table for a topic under `B`; KeyError if the daemon promises none such."""
+    for row in OUTBOUND:
+        if row.matches(topic):
+            return row
+    raise KeyError(topic)
+
+
+def check(topic: str, text: str) -> object:
+    """Return the model of a payload as it goes over the wire; ValidationError if it breaks the promise.
+
+    `text` is JSON, but for a bare word.
+    """
+    row = outbound(topic)
+    validator = _validator(row.topic)
+    return validator.validate_python(text) if row.form is Availability else validator.validate_json(text)
+
+
+@cache
+def _validator(pattern: str) -> TypeAdapter[object]:
+    """Return what validates the payloads of one row; building it takes milliseconds."""
+    return TypeAdapter(next(row.form for row in OUTBOUND if row.topic == pattern))

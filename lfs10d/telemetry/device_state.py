@@ -1,0 +1,260 @@
+"""What is said about one device: its samples, state, availability, error and statistics.
+
+Rules
+-----
+1. Every reading is one sample, numbered from 1 without gaps; `seq` goes on even when the device is removed and
+   added again.
+2. A number is published only with a good reading, and availability is `online` while one is shown: it goes
+   before a good state and after a bad one.
+3. The state shows the newest sample at most every `state_every`, but a change of quality or error at once.
+4. Before its first sample a device's state has no value and the error `starting` (a disabled one `disabled`), which
+   is never in its error topic.
+5. A disabled device has one sample that says so, and then none but those of polls that a request wants; of these
+   nothing else is shown.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+from lfs10d.reading import PORT_CODES, AnsweredTwice, FaultCode, Reading
+from lfs10d.system.clock import Instant
+from lfs10d.telemetry.alarms import DeviceAlarm
+from lfs10d.telemetry.counters import DeviceTally
+from lfs10d.telemetry.info import DeviceFacts
+from lfs10d.telemetry.publication import (
+    AVAILABILITY,
+    CONFIG,
+    ERROR,
+    STATE,
+    STATS,
+    TELEMETRY,
+    WIND,
+    Kind,
+    Publication,
+    Sample,
+    device_topic,
+    event,
+    retained,
+)
+
+STATE_EARLY: Final = 0.01
+"""So many s a state may come before its time (the next one then waits as much longer): a device polled every
+second would else miss its turn by the jitter of its polls and be shown late each time."""
+
+
+class Standing:
+    """One device as the broker knows it; `seq` is its last number used in this boot (0: none)."""
+
+    __slots__ = (
+        "_alarm",
+        "_boot",
+        "_gap",
+        "_last_good",
+        "_line",
+        "_payload",
+        "_sample",
+        "_state_from",
+        "_telemetry",
+        "_topics",
+        "facts",
+        "online",
+        "seq",
+        "state_due",
+        "tally",
+    )
+
+    def __init__(self, facts: DeviceFacts, *, line: str, boot: str, seq: int, now: Instant) -> None:
+        self.facts = facts
+        self.seq = seq
+        self.online = False
+        self.state_due: float | None = None
+        """Monotonic time at which a newer state than the one shown may be published; None: none waits."""
+        self._line = line
+        self._boot = boot
+        self._topics = {leaf: device_topic(facts.name, leaf) for leaf in (STATE, AVAILABILITY, ERROR, STATS)}
+        self._telemetry = device_topic(facts.name, TELEMETRY)
+        self._alarm = DeviceAlarm(facts.offline_after)
+        self._gap = facts.request_gap
+        self.tally = DeviceTally(facts.response_timeout, facts.request_gap)
+        self._last_good: float | None = None
+        self._state_from = now.mono
+        code = FaultCode.STARTING if facts.enabled else FaultCode.DISABLED
+        self._sample = replace(self._form(0, now.ts(), now), error=code.value)
+        self._payload = self._sample.payload(line)
+
+    def read(self, reading: Reading, now: Instant, *, masked: bool) -> list[Publication]:
+        """Take one reading; return what it makes known. `tally` has counted it already.
+
+        `masked`: the port is lost, so that failures say nothing about the device.
+        """
+        fault = reading.fault
+        ts = now.ts(reading.at)
+        rested = self._rest(reading.request_gap)
+        if not self.facts.enabled:
+            self.seq += 1
+            sample = self._form(self.seq, ts, now, reading)
+            return [self._telling(sample, sample.payload(self._line)), *rested]
+        if fault is None:
+            self._last_good = reading.at
+            changed = self._alarm.ended(ts)
+        elif masked or fault.code in PORT_CODES:
+            changed = self._alarm.ended(ts)
+        else:
+            changed = not fault.busy and self._alarm.failed(fault, ts)
+        self.seq += 1
+        sample = self._form(self.seq, ts, now, reading)
+        published = self._show(sample, now, online=reading.online or fault is None)
+        if changed:
+            published.append(self._error())
+        return published + rested
+
+    def _rest(self, gap: float) -> list[Publication]:
+        """Take the rest in s that the device is given; return its configuration where that changes it."""
+        if gap == self._gap:
+            return []
+        self._gap = gap
+        return [self._config()]
+
+    def disable(self, now: Instant) -> list[Publication]:
+        """Publish the one sample of a device that is no longer polled; its error becomes inactive."""
+        self.seq += 1
+        sample = replace(self._form(self.seq, now.ts(), now), error=FaultCode.DISABLED.value)
+        return self._show(sample, now, online=False) + self.mask(now)
+
+    def mask(self, now: Instant) -> list[Publication]:
+        """Take the device's own error back: what ails it is not the device."""
+        ended = self._alarm.ended(now.ts())
+        return [self._error()] if self._alarm.stands(None, now.ts()) or ended else []
+
+    def answered_twice(self, heard: AnsweredTwice, now: Instant) -> list[Publication]:
+        """Take that a second answer comes to each request, or no longer does."""
+        ts = now.ts(heard.at)
+        published = []
+        if self._alarm.stands(heard.fault, ts):
+            published.append(self._error())
+            if heard.fault is not None:
+                facts = {"device": self.facts.name, "slave": heard.slave, "message": heard.fault.message}
+                published.append(event("duplicate_id", ts, **facts))
+        return published
+
+    def reconfigure(self, facts: DeviceFacts, now: Instant) -> list[Publication]:
+        """Take new facts about the same device on the same profile; return what changed."""
+        before, self.facts = self.facts, facts
+        self._alarm.rise_after = facts.offline_after
+        if facts.request_gap != before.request_gap:
+            self._gap = facts.request_gap
+        self._state_from = min(self._state_from, now.mono + facts.state_every)
+        if self.state_due is not None:
+            self.state_due = self._state_from
+        published = [self._config()] if facts.payload() != before.payload() else []
+        if before.enabled and not facts.enabled:
+            published += self.disable(now)
+        return published
+
+    def due_state(self, now: Instant) -> Publication | None:
+        """Return the state that waited, if its time has come."""
+        if self.state_due is None or self.state_due > now.mono:
+            return None
+        return self._state(now, refresh=True)
+
+    def burst(self, now: Instant) -> list[Publication]:
+        """Return every retained topic of this device."""
+        return [
+            self._state(now),
+            self._config(),
+            self._availability(),
+            self._error(),
+            self.stats(now),
+        ]
+
+    def stats(self, now: Instant) -> Publication:
+        """Return the statistics."""
+        return retained(self._topics[STATS], self.tally.payload(now.ts()), qos=0, refresh=True)
+
+    def snapshot(self, now: Instant) -> dict[str, object]:
+        """Return what a live view shows of this device; `age_s` is the age of the last good reading."""
+        facts, sample, last_good = self.facts, self._sample, self._last_good
+        return {
+            "name": facts.name,
+            "slave": facts.slave,
+            "label": facts.label,
+            "profile": facts.profile,
+            "enabled": facts.enabled,
+            "interval": facts.interval,
+            "online": self.online,
+            "seq": sample.seq,
+            "ts": sample.ts,
+            "values": dict.fromkeys(sample.names) if sample.values is None else dict(sample.values),
+            "units": dict(sample.units),
+            "quality": sample.quality,
+            "error": sample.error,
+            "rtt_ms": sample.rtt_ms,
+            "age_s": None if last_good is None else round(max(0.0, now.mono - last_good), 1),
+            "alarm": self._alarm.payload(),
+        }
+
+    def _form(self, seq: int, ts: int, now: Instant, reading: Reading | None = None) -> Sample:
+        """Return the sample of a reading, or of none: bad, and nobody's fault."""
+        values = fault = rtt = None
+        if reading is not None:
+            values, fault, rtt = reading.values, reading.fault, reading.rtt
+        return Sample(
+            device=self.facts.name,
+            boot=self._boot,
+            seq=seq,
+            ts=ts,
+            clock=now.clock,
+            values=values,
+            units=self.facts.units,
+            names=self.facts.value_names,
+            quality="bad" if values is None else "good",
+            error=None if fault is None else fault.code.value,
+            rtt_ms=None if values is None or rtt is None else round(rtt * 1000, 1),
+        )
+
+    def _show(self, sample: Sample, now: Instant, *, online: bool) -> list[Publication]:
+        """Publish a sample, and the state and availability as far as they change by it."""
+        shown = self._sample
+        self._sample = sample
+        self._payload = sample.payload(self._line)
+        published = [self._telling(sample, self._payload)]
+        turned, self.online = online is not self.online, online
+        if turned and online:
+            published.append(self._availability())
+        if sample.error != shown.error or sample.quality != shown.quality:
+            published.append(self._state(now))
+        elif now.mono >= self._state_from - STATE_EARLY:
+            published.append(self._state(now, refresh=True))
+        else:
+            self.state_due = self._state_from
+        if turned and not online:
+            published.append(self._availability())
+        return published
+
+    def _telling(self, sample: Sample, payload: dict[str, object]) -> Publication:
+        return Publication(self._telemetry, payload, Kind.SAMPLE, retain=False, qos=1, sample=sample)
+
+    def _state(self, now: Instant, *, refresh: bool = False) -> Publication:
+        """Return the newest state, which is then shown; `refresh`: quality and error are those shown before."""
+        on_time = abs(now.mono - self._state_from) <= STATE_EARLY
+        self._state_from = (self._state_from if on_time else now.mono) + self.facts.state_every
+        self.state_due = None
+        return retained(self._topics[STATE], self._payload, refresh=refresh)
+
+    def _availability(self) -> Publication:
+        return retained(self._topics[AVAILABILITY], "online" if self.online else "offline")
+
+    def _error(self) -> Publication:
+        return retained(self._topics[ERROR], self._alarm.payload())
+
+    def _config(self) -> Publication:
+        return retained(device_topic(self.facts.name, CONFIG), self.facts.payload(self._gap))
+
+
+RETAINED_LEAVES: Final = (STATE, CONFIG, AVAILABILITY, ERROR, STATS)
+"""What every device has."""
+
+CLEARED_LEAVES: Final = (*RETAINED_LEAVES, WIND)
+"""What is cleared of a device that is gone."""

@@ -1,0 +1,279 @@
+"""Models of every outbound payload, for `docs/mqtt.md` and for the tests.
+
+The daemon builds plain dictionaries and never validates what it sends: these models say what it promises.
+Which of them goes to which topic is told by `lfs10d.telemetry.contract`.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self, TypeAlias
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from lfs10d.reading import FaultCode, Number
+from lfs10d.system.clock import ClockState
+
+Milliseconds = Annotated[int, Field(description="epoch milliseconds, UTC")]
+Count = Annotated[int, Field(ge=0, description="since boot")]
+Version = Annotated[Literal[1], Field(description="of the payload's form")]
+Clock = Annotated[ClockState, Field(description="how far the wall clock can be trusted")]
+Errors = Annotated[dict[FaultCode, Count], Field(description="how often each failure happened")]
+
+
+class Payload(BaseModel):
+    """What all share: exactly these keys, exactly these types, no NaN and no Infinity."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class SamplePayload(Payload):
+    """One finished poll; the values stand beside these keys under the names of the profile."""
+
+    model_config = ConfigDict(extra="allow")
+    __pydantic_extra__: dict[str, int | float | None]
+
+    v: Version
+    line: str
+    device: str
+    boot: str = Field(min_length=8, max_length=8, description="one life of the daemon, sortable by start")
+    seq: int = Field(ge=0, description="from 1 per device and boot, without gaps; 0 only in a first state")
+    ts: Milliseconds
+    time: str = Field(pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z$", description="`ts` in ISO 8601")
+    clock: Clock
+    unit: str | None = Field(None, description="unit of the one value")
+    units: dict[str, str] | None = Field(None, description="units by name, where there are several values")
+    quality: Literal["good", "bad"] = Field(description="of the value")
+    error: FaultCode | None = Field(description="why there is no value")
+    rtt_ms: float | None = Field(ge=0, description="first bit of the request to last of the answer")
+    historical: Literal[True] | None = Field(None, description="set on `history`")
+
+    @property
+    def values(self) -> dict[str, Number | None]:
+        """The values by the profile's names."""
+        return dict(self.__pydantic_extra__)
+
+    @model_validator(mode="after")
+    def _speak_with_one_voice(self) -> Self:
+        """Refuse a good sample without values, a bad one with one, and units that do not fit them."""
+        values = self.values.values()
+        if not self.values:
+            raise ValueError("a sample has a value")
+        if self.quality == "good" and (None in values or self.error is not None or self.seq == 0):
+            raise ValueError("a good sample has every value, no error and a number")
+        if self.quality == "bad" and (any(value is not None for value in values) or self.rtt_ms is not None):
+            raise ValueError("a bad sample has neither a value nor a time of answer")
+        if {"unit", "units"} & self.model_fields_set != ({"unit"} if len(values) == 1 else {"units"}):
+            raise ValueError("one value has a unit, several have units")
+        return self
+
+
+class ActiveError(Payload):
+    """An error that holds."""
+
+    v: Version
+    active: Literal[True]
+    code: FaultCode
+    also: list[FaultCode] = Field(description="other codes of this run of failures, or what else ails the line")
+    message: str = Field(description="for people")
+    exception_code: int | None = Field(ge=0, le=255, description="of a Modbus exception")
+    heard: str = Field(pattern=r"^([0-9A-F]{2}( [0-9A-F]{2}){0,31})?$", description="the last 32 bytes, in hex")
+    since: Milliseconds
+    last: Milliseconds
+    count: int = Field(ge=1, description="failures since then")
+
+
+class NoError(Payload):
+    """All is well."""
+
+    v: Version
+    active: Literal[False]
+    code: None
+    last_code: FaultCode | None = Field(description="what it was")
+    cleared: Milliseconds | None
+
+
+class Info(Payload):
+    """The daemon."""
+
+    v: Version
+    version: str = Field(description="of lfs10d")
+    host: str = Field(description="name of the gateway")
+    boot: str = Field(description="this life of the daemon, sortable by start")
+    previous_boot: str | None = Field(description="the one before; null: not known")
+    started: Milliseconds
+    config_hash: str = Field(description="differs where the effective configuration differs")
+    changes: int = Field(ge=0, description="changes made by requests that the file does not say")
+    mqtt: dict[str, Any] = Field(description="protocol in use")
+    features: list[str] = Field(description="what this daemon can do")
+    clock: Clock
+
+
+class DeviceEntry(Payload):
+    """One polled slave."""
+
+    name: str
+    id: int = Field(ge=1, le=255, description="slave id")
+    label: str | None
+    profile: str
+    enabled: bool
+    interval: float = Field(ge=0, description="s")
+
+
+class LineState(Payload):
+    """The line as it is used now."""
+
+    v: Version
+    port: str
+    baudrate: int
+    parity: Literal["none", "even", "odd"]
+    databits: Literal[7, 8]
+    stopbits: Literal[1, 2]
+    framing: Literal["rtu", "ascii"]
+    open: bool = Field(description="the port can be used")
+    activity: str = Field(description="polling, scanning, changing_baudrate, paused ...")
+    requests: Literal["ok", "denied"] = Field(description="denied: the broker refused us `B/request/#`")
+
+
+class Gaps(Payload):
+    """Silence measured before our requests, in us."""
+
+    min: float | None = Field(description="since boot, or since the line's rate changed")
+    p50: float | None = Field(description="of the last 1000")
+    p99: float | None
+
+
+class Uart(Payload):
+    """The driver's own counters."""
+
+    framing: int = Field(description="stop bit missing: wrong rate, A and B swapped, noise")
+    parity: int = Field(description="parity wrong")
+    overrun: int = Field(description="bytes lost in the adapter or the kernel")
+    break_: int = Field(alias="break", description="line held low for longer than a character")
+
+
+class Store(Payload):
+    """What waits for the broker."""
+
+    depth: int = Field(ge=0, description="samples")
+    oldest_ts: Milliseconds | None
+    dropped: Count
+
+
+class LineStats(Payload):
+    """The line's figures; rates are of the last 30 s."""
+
+    v: Version
+    ts: Milliseconds
+    load_pct: float | None = Field(ge=0, le=100, description="share of the time in which the line is in use")
+    polls_per_s: float | None = Field(ge=0, description="good and failed")
+    cycle_s: float | None = Field(ge=0, description="longest time between two polls of one device")
+    gap_required_us: float = Field(description="silence kept before each request")
+    gap_us: Gaps = Field(description="silence measured before our requests")
+    exchanges: Count
+    errors: Errors
+    unsolicited_bytes: int = Field(ge=0, description="heard and part of no answer, since boot")
+    uart: Uart | None = Field(description="errors the driver counted; null where it does not")
+    store: Store = Field(description="what waits for the broker")
+
+
+class DeviceConfig(Payload):
+    """How a device is polled."""
+
+    v: Version
+    slave: int = Field(ge=1, le=255, description="slave id")
+    label: str | None
+    profile: str
+    interval: float = Field(ge=0, description="s")
+    enabled: bool
+    response_timeout: float | Literal["auto"] = Field(description="s; auto: learned")
+    request_gap: float = Field(ge=0, description="rest before each request to it in s, as set or learned")
+
+
+class RoundTrip(Payload):
+    """Times of answers in ms, of the last 100."""
+
+    p50: float | None
+    p95: float | None
+
+
+class DeviceStats(Payload):
+    """A device's figures."""
+
+    v: Version
+    ts: Milliseconds
+    polls: Count
+    good: Count
+    errors: Errors
+    rtt_ms: RoundTrip = Field(description="times of its last 100 answers")
+    response_timeout_ms: float | None = Field(description="as set or learned")
+    request_gap_ms: float = Field(ge=0, description="rest before each request to it, as set or learned")
+    last_good_ts: Milliseconds | None
+
+
+class Event(Payload):
+    """Something that happened once; each type has facts of its own."""
+
+    model_config = ConfigDict(extra="allow")
+
+    v: Version
+    type: str
+    ts: Milliseconds
+
+    @model_validator(mode="after")
+    def _leave_dropped_alone(self) -> Self:
+        """Refuse the one type that has a model of its own."""
+        if self.type == "dropped":
+            raise ValueError("dropped has facts of its own")
+        return self
+
+
+class Dropped(Payload):
+    """Samples of one device that are lost, within `from_seq`..`to_seq` both included."""
+
+    v: Version
+    type: Literal["dropped"]
+    ts: Milliseconds
+    device: str
+    boot: str
+    from_seq: int
+    to_seq: int
+    count: int
+
+
+class RequestError(Payload):
+    """Why a request was not carried out."""
+
+    code: str = Field(description="see below")
+    message: str = Field(description="for people")
+    param: str | None = Field(None, description="the parameter that is wrong")
+    exception_code: int | None = Field(None, description="of a sensor's Modbus exception")
+
+
+class Response(Payload):
+    """The one answer to a request."""
+
+    v: Version
+    id: str | int | None = Field(description="as in the request")
+    transaction: str | int | None = Field(None, description="as in the request, where it had one")
+    request: str | None = Field(description="its name")
+    status: Literal["ok", "rejected", "failed"] = Field(
+        description="rejected: no write was sent and nothing changed; failed: a write may have been sent"
+    )
+    data: Any = Field(description="what was asked for")
+    error: RequestError | None
+    took_ms: float = Field(ge=0, description="from its arrival to this answer")
+
+
+class Trace(Payload):
+    """One frame on the line."""
+
+    v: Version
+    ts: Milliseconds
+    direction: Literal["tx", "rx"] = Field(description="tx: sent by us")
+    gap_us: float | None = Field(description="silence before it")
+    hex: str = Field(description="its bytes")
+    text: str = Field(description="its meaning, for people")
+
+
+Error: TypeAlias = ActiveError | NoError
+Availability: TypeAlias = Literal["online", "offline"]

@@ -1,0 +1,158 @@
+"""What goes out: samples, publications and events as plain values, and the topics under `B` they go to.
+
+`B` is `<base topic>/<line name>`; nothing here knows it. The models of the payloads, for the documentation
+and the tests, are in `lfs10d.telemetry.payloads`: building them costs megabytes that a running daemon need not spend.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from enum import StrEnum
+from typing import Literal, TypeAlias
+
+from lfs10d.reading import Number
+from lfs10d.system.clock import ClockState
+
+VERSION = 1
+"""`v` of every payload that is an object."""
+
+Payload: TypeAlias = Mapping[str, object] | list[dict[str, object]] | str | None
+
+INFO = "info"
+DEVICES = "devices"
+LINE_STATE = "line/state"
+LINE_ERROR = "line/error"
+LINE_STATS = "line/stats"
+EVENT = "event"
+TRACE = "trace"
+
+STATE = "state"
+CONFIG = "config"
+AVAILABILITY = "availability"
+ERROR = "error"
+STATS = "stats"
+WIND = "wind"
+TELEMETRY = "telemetry"
+HISTORY = "history"
+
+
+def device_topic(device: str, leaf: str) -> str:
+    """Return the topic under `B` of one thing about a device: `device/mast-top/state`."""
+    return f"device/{device}/{leaf}"
+
+
+def device_of(topic: str, leaf: str) -> str | None:
+    """Return the device that `device_topic` gave this topic, None where it is another leaf or no device's."""
+    levels = topic.split("/")
+    return levels[1] if len(levels) == 3 and levels[0] == "device" and levels[2] == leaf else None  # noqa: PLR2004 - device/<name>/<leaf>
+
+
+class Kind(StrEnum):
+    """How a publication is treated while the broker is away."""
+
+    RETAINED = "retained"
+    """Not kept: every burst after a connect holds its newest form."""
+    SAMPLE = "sample"
+    """Never lost while the daemon lives: kept, and sent as history when older than 3 s."""
+    EVENT = "event"
+    RESPONSE = "response"
+    TRACE = "trace"
+
+
+def iso_time(ts: int) -> str:
+    """Return epoch milliseconds as ISO 8601 in UTC with milliseconds: `2026-11-21T21:53:42.003Z`."""
+    seconds, milliseconds = divmod(ts, 1000)
+    return f"{datetime.fromtimestamp(seconds, UTC).replace(tzinfo=None).isoformat()}.{milliseconds:03d}Z"
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One finished poll as it is published; (line, device, boot, seq) is its key for ever.
+
+    `ts` is epoch milliseconds. `names` are the profile's value names, so that a bad sample carries nulls;
+    `values` is None exactly when `quality` is bad, and finite otherwise.
+    """
+
+    device: str
+    boot: str
+    seq: int
+    ts: int
+    clock: ClockState
+    values: Mapping[str, Number] | None
+    units: Mapping[str, str]
+    names: tuple[str, ...]
+    quality: Literal["good", "bad"]
+    error: str | None
+    rtt_ms: float | None
+
+    def payload(self, line: str, *, historical: bool = False) -> dict[str, object]:
+        """Return the flat JSON object: all value names, then `unit`, or `units` where there are several."""
+        payload: dict[str, object] = {
+            "v": VERSION,
+            "line": line,
+            "device": self.device,
+            "boot": self.boot,
+            "seq": self.seq,
+            "ts": self.ts,
+            "time": iso_time(self.ts),
+            "clock": self.clock,
+        }
+        if self.values is None:
+            payload.update(dict.fromkeys(self.names))
+        else:
+            payload.update(self.values)
+        if len(self.names) == 1:
+            payload["unit"] = self.units.get(self.names[0])
+        else:
+            payload["units"] = dict(self.units)
+        payload["quality"] = self.quality
+        payload["error"] = self.error
+        payload["rtt_ms"] = self.rtt_ms
+        if historical:
+            payload["historical"] = True
+        return payload
+
+
+@dataclass(frozen=True, slots=True)
+class Publication:
+    """One message for the broker; `topic` is under `B`.
+
+    `payload` is an object or an array to be written as JSON, a bare word, or None to clear a retained topic.
+    `sample` is set for kind SAMPLE alone, whose topic is `device/<name>/telemetry`. `refresh`: only newer figures of a
+    retained topic, which may wait where the broker is slow and be replaced by the next.
+    """
+
+    topic: str
+    payload: Payload
+    kind: Kind
+    retain: bool
+    qos: int
+    sample: Sample | None = None
+    refresh: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Backlog:
+    """What waits for the broker: samples, epoch ms of the oldest (None: none), samples evicted since boot."""
+
+    depth: int = 0
+    oldest_ts: int | None = None
+    dropped: int = 0
+
+
+def retained(topic: str, payload: Payload, *, qos: int = 1, refresh: bool = False) -> Publication:
+    """Return a retained publication; payload None clears the topic."""
+    return Publication(topic, payload, Kind.RETAINED, retain=True, qos=qos, refresh=refresh)
+
+
+def event(kind: str, ts: int, **facts: object) -> Publication:
+    """Return a publication on `event` of type `kind` at `ts` (epoch ms)."""
+    payload = {"v": VERSION, "type": kind, "ts": ts, **facts}
+    return Publication(EVENT, payload, Kind.EVENT, retain=False, qos=1)
+
+
+def dropped(device: str, boot: str, from_seq: int, to_seq: int, *, count: int, ts: int) -> Publication:
+    """Return the event that declares `count` samples lost, within `from_seq`..`to_seq` both included."""
+    return event("dropped", ts, device=device, boot=boot, from_seq=from_seq, to_seq=to_seq, count=count)

@@ -1,0 +1,177 @@
+"""Mounting sensors one after the other, answer by answer."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from lfs10d.cli.adopt_loop import AGAIN, FOLLOWED, PATIENCE, Adopted, Mounting, Turn
+
+
+def ok(device: str, slave: object) -> dict[str, Any]:
+    return {"status": "ok", "data": {"device": device, "slave": slave, "from": 1}, "error": None}
+
+
+def no(code: str, status: str = "rejected", data: object = None, **facts: object) -> dict[str, Any]:
+    return {"status": status, "data": data, "error": {"code": code, "message": f"it is {code}", **facts}}
+
+
+def pending(code: str, device: str = "slave-3") -> dict[str, Any]:
+    return no(code, "failed", {"device": device, "from": 1, "to": 3})
+
+
+def health(*devices: tuple[str, object], baudrate: object = 19200) -> dict[str, Any]:
+    return {"line": {"baudrate": baudrate}, "devices": [{"name": name, "slave": slave} for name, slave in devices]}
+
+
+def begun(*names: str, **wishes: object) -> Mounting:
+    """Return a mounting on a line with one sensor, which is looked at already."""
+    mounting = Mounting(names, wishes)
+    steps = [mounting.doubtful, list(mounting.looked(health(("slave-2", 2)))), mounting.doubtful]
+    assert steps == [True, [], False]
+    return mounting
+
+
+ABSENT = no("timeout")
+NAMED = Adopted("slave-3", 3, 19200)
+
+
+def test_each_sensor_gets_its_default_name_and_it_never_ends_by_itself() -> None:
+    mounting = begun(label="Roof")
+    assert mounting.content == {"label": "Roof"}
+    assert mounting.heard(ok("slave-3", 3)) == Turn(NAMED, pause=0.0)
+    assert mounting.heard(ok("slave-4", 4)).adopted == Adopted("slave-4", 4, 19200)
+    assert [each.device for each in mounting.adopted] == ["slave-3", "slave-4"]
+    assert not mounting.complete
+    assert not mounting.lacking
+
+
+def test_names_are_given_in_turn_and_the_last_completes_it() -> None:
+    mounting = begun("north", "south", label="Roof")
+    assert mounting.content == {"label": "Roof", "name": "north"}
+    mounting.heard(ABSENT)
+    assert mounting.content["name"] == "north"
+    mounting.heard(ok("north", 3))
+    assert mounting.content["name"] == "south"
+    assert (mounting.complete, mounting.lacking) == (False, True)
+    mounting.heard(ok("south", 4))
+    assert (mounting.complete, mounting.lacking) == (True, False)
+    assert mounting.content == {"label": "Roof"}
+
+
+def test_while_nobody_is_there_nothing_is_told() -> None:
+    mounting = begun()
+    assert [mounting.heard(ABSENT) for _ in range(3)] == [Turn()] * 3
+    assert Turn().pause == AGAIN
+
+
+def test_a_trouble_is_told_once_until_another_comes_or_a_sensor_is_adopted() -> None:
+    mounting = begun()
+    busy, lost = no("busy"), no("line_error")
+    told = [mounting.heard(each).trouble for each in (busy, busy, lost, lost, busy, ok("slave-3", 3), busy)]
+    words = "busy: it is busy"
+    assert told == [words, None, "line_error: it is line_error", None, words, None, words]
+
+
+def test_two_sensors_are_told_when_they_are_heard_twice_in_a_row() -> None:
+    mounting = begun()
+    crowd = no("duplicate_id")
+    told = [mounting.heard(each).trouble for each in (crowd, ABSENT, crowd, crowd)]
+    assert told == [None, None, None, "duplicate_id: it is duplicate_id"]
+
+
+@pytest.mark.parametrize("code", ["busy", "line_error", "rate_limited", "cancelled"])
+def test_what_passes_does_not_end_it(code: str) -> None:
+    assert not begun().heard(no(code)).ends
+
+
+@pytest.mark.parametrize("code", ["not_allowed", "invalid_param", "storage_full", "address_in_use", "internal"])
+def test_what_no_plugging_mends_ends_it_and_is_told(code: str) -> None:
+    assert begun().heard(no(code, param="from")) == Turn(trouble=f"{code}: it is {code}", ends=True)
+
+
+@pytest.mark.parametrize("code", ["dip_switch", "refused", "duplicate_id"])
+def test_a_sensor_that_does_not_obey_is_left_alone_for_a_while(code: str) -> None:
+    mounting = begun()
+    assert mounting.heard(pending(code)) == Turn(trouble=f"{code}: it is {code}", pause=PATIENCE)
+    assert mounting.heard(pending(code)) == Turn(pause=PATIENCE)
+    assert not mounting.doubtful
+
+
+def test_a_sensor_whose_place_cannot_be_kept_ends_it() -> None:
+    assert begun().heard(no("storage_full", "failed")).ends
+
+
+@pytest.mark.parametrize("code", ["power_cycle_needed", "not_verified"])
+def test_a_sensor_that_is_looked_for_counts_once_it_is_polled(code: str) -> None:
+    mounting = begun("north", "south")
+    mounting.heard(pending(code, "north"))
+    assert list(mounting.looked(health(("slave-2", 2)))) == []
+    assert mounting.heard(no("address_in_use", param="from")) == Turn(pause=FOLLOWED)
+    assert mounting.content["name"] == "north"
+    found = list(mounting.looked(health(("slave-2", 2), ("north", 3), ("other", 9))))
+    assert found == [Adopted("north", 3, 19200)]
+    assert not mounting.doubtful
+    assert mounting.content["name"] == "south"
+
+
+def test_where_an_answer_was_lost_a_device_that_came_up_is_the_one() -> None:
+    mounting = begun()
+    mounting.lost()
+    assert list(mounting.looked(health(("slave-2", 2), ("slave-3", 3)))) == [NAMED]
+    assert list(mounting.looked(health(("slave-2", 2), ("slave-3", 3)))) == []
+
+
+def test_a_device_that_somebody_else_adds_does_not_count() -> None:
+    mounting = begun()
+    assert list(mounting.looked(health(("slave-2", 2), ("slave-9", 9)))) == []
+    mounting.lost()
+    assert list(mounting.looked(health(("slave-2", 2), ("slave-9", 9)))) == []
+
+
+@pytest.mark.parametrize("settling", [ABSENT, ok("slave-3", 3)])
+def test_the_next_clear_answer_settles_that_nothing_was_lost(settling: dict[str, Any]) -> None:
+    mounting = begun()
+    mounting.lost()
+    mounting.heard(settling)
+    assert not mounting.doubtful
+
+
+def test_a_daemon_that_ends_in_the_middle_may_have_adopted() -> None:
+    mounting = begun()
+    assert not mounting.heard(no("cancelled", "failed")).ends
+    assert mounting.doubtful
+
+
+def test_an_adopted_sensor_is_told_in_words_and_as_data() -> None:
+    assert NAMED.words == "slave-3: slave id 3, 19200 baud"
+    assert Adopted("\x1b[2J", None, None).words == r"\x1b[2J: slave id ?"
+    assert NAMED.data == {"device": "slave-3", "slave": 3, "baudrate": 19200}
+
+
+@pytest.mark.parametrize(
+    "answer", [{}, {"line": [], "devices": {}}, {"line": {"baudrate": "x"}, "devices": [1, {}]}, 5]
+)
+def test_a_health_of_another_form_tells_nothing(answer: object) -> None:
+    mounting = Mounting()
+    assert list(mounting.looked(answer)) == []
+    assert mounting.heard(ok("slave-3", "three")).adopted == Adopted("slave-3", None, None)
+
+
+def test_an_answer_of_another_form_ends_it() -> None:
+    assert begun().heard({"status": "rejected", "error": 5}).ends
+    assert begun().heard({"status": "ok", "data": None, "error": None}).trouble == "None: None"
+
+
+def test_an_internal_error_ends_it_for_it_would_come_again() -> None:
+    # It asked every 10 s for ever before.
+    turn = begun().heard(no("internal", "failed"))
+    assert (turn.trouble, turn.ends) == ("internal: it is internal", True)
+
+
+def test_a_device_that_is_not_recognised_is_told_once_and_waited_for_to_be_unplugged() -> None:
+    mounting = begun()
+    assert mounting.heard(no("not_recognised")) == Turn(trouble="not_recognised: it is not_recognised", pause=AGAIN)
+    assert mounting.heard(no("not_recognised")) == Turn()
+    assert mounting.heard(ok("slave-3", 3)).adopted == NAMED

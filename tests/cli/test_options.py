@@ -1,0 +1,50 @@
+"""How the characters on a line look, as options."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+import pytest
+
+from lfs10d.cli.options import baudrate_of, take
+from lfs10d.modbus.port_settings import PortSettings
+
+
+def options(**changes: object) -> dict[str, Any]:
+    usual = {"port": "/dev/x", "parity": "none", "databits": None, "stopbits": "1", "framing": "rtu", "timeout": None}
+    return {**usual, "other": 1, **changes}
+
+
+def test_they_are_taken_out_of_a_commands_options() -> None:
+    given = options()
+    line = take(given)
+    assert given == {"other": 1}
+    assert line.settings(19200) == PortSettings("/dev/x", 19200)
+    assert line.timing(9600).bits == 10
+
+
+@pytest.mark.parametrize(
+    ("changes", "character"),
+    [
+        ({}, "8N1"),
+        ({"parity": "even"}, "8E1"),
+        ({"stopbits": "2", "databits": "8"}, "8N2"),
+        ({"framing": "ascii"}, "7N1"),
+        ({"framing": "ascii", "databits": "8", "parity": "odd"}, "8O1"),
+    ],
+)
+def test_characters_have_their_usual_short_word(changes: dict[str, str], character: str) -> None:
+    assert take(options(**changes)).character == character
+
+
+def test_rtu_needs_eight_data_bits() -> None:
+    with pytest.raises(click.BadParameter, match="8 data bits"):
+        take(options(databits="7"))
+
+
+def test_a_rate_is_one_of_the_known_ones() -> None:
+    assert baudrate_of(" 19200 ") == 19200
+    for text in ("", "9601", "9600.0", "²"):
+        with pytest.raises(click.BadParameter, match="is none of 1200"):
+            baudrate_of(text)

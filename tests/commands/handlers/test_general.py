@@ -1,0 +1,15 @@
+"""`health` and `republish`."""
+
+from __future__ import annotations
+
+from tests.support.context import Ask, FakePowers
+
+
+def test_health_is_told(ask: Ask) -> None:
+    answer = ask("health")
+    assert (answer.status, answer.data) == ("ok", {"v": 1})
+
+
+def test_republish_sends_everything_once_more_and_tells_how_much(ask: Ask, powers: FakePowers) -> None:
+    assert ask("republish").data == {"topics": 17}
+    assert powers.done == ["republish"]

@@ -1,0 +1,39 @@
+"""`line/trace`, `line/pause` and `line/cancel`."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.support.context import Ask, FakePowers
+
+
+@pytest.mark.parametrize(
+    ("payload", "seconds"), [("{}", 30.0), ('{"for":"10m"}', 600.0), ('{"for":5}', 5.0), ('{"for":"250ms"}', 0.25)]
+)
+@pytest.mark.parametrize("name", ["line/trace", "line/pause"])
+def test_a_trace_or_a_pause_begins_for_the_time_asked_or_half_a_minute(
+    ask: Ask, powers: FakePowers, name: str, payload: str, seconds: float
+) -> None:
+    answer = ask(name, payload)
+    assert (answer.status, answer.data, powers.done) == ("ok", {"for": seconds}, [seconds])
+
+
+@pytest.mark.parametrize("payload", ['{"for":"10m1s"}', '{"for":601}', '{"for":0}', '{"for":-1}', '{"for":"5"}'])
+@pytest.mark.parametrize("name", ["line/trace", "line/pause"])
+def test_one_longer_than_ten_minutes_or_of_no_duration_is_refused(
+    ask: Ask, powers: FakePowers, name: str, payload: str
+) -> None:
+    answer = ask(name, payload)
+    assert (answer.code, answer.facts["param"], powers.done) == ("invalid_param", "for", [])
+
+
+def test_a_pause_waits_for_what_must_not_be_cut_off(ask: Ask, powers: FakePowers) -> None:
+    powers.busy = True
+    answer = ask("line/pause")
+    assert (answer.status, answer.code, powers.done) == ("rejected", "busy", [])
+
+
+def test_what_is_cancelled_is_told(ask: Ask, powers: FakePowers) -> None:
+    powers.running = ("trace",)
+    assert ask("line/cancel").data == {"cancelled": ["trace"]}
+    assert ask("line/cancel").data == {"cancelled": []}

@@ -1,0 +1,344 @@
+"""The file as it is, as it was, and what a request changed: a person's edit wins, and nothing else is ever lost."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lfs10d.config.changes import Changes, DeviceChange, Place, Rate, Said, Verified
+from lfs10d.config.merge import Dropped, Merged, merge
+
+USUAL = {
+    "interval": 1.0,
+    "enabled": True,
+    "label": None,
+    "response_timeout": None,
+    "profile": "lfs10",
+    "checksum": None,
+}
+
+
+def file(baudrate: int = 9600, **slaves: dict[str, Any]) -> Said:
+    return Said(slaves, baudrate, USUAL)
+
+
+def lost(merged: Merged) -> list[tuple[str, Any]]:
+    return [(dropped.key, dropped.lost) for dropped in merged.dropped]
+
+
+# -- options
+
+SLOW = Changes().setting("a", {"interval": 5.0}, file(a={"id": 1, "interval": 2.0}))
+
+
+def test_a_change_holds_while_the_file_says_what_it_said() -> None:
+    merged = merge(file(b={"id": 9}, a={"interval": 2.0, "id": 1, "label": "new"}), SLOW)
+    assert merged.devices == {"b": {"id": 9}, "a": {"id": 1, "interval": 5.0, "label": "new"}}
+    assert merged.changed == {"b": frozenset(), "a": {"interval"}}
+    assert (merged.changes, merged.dropped, merged.contested) == (SLOW, (), {})
+
+
+@pytest.mark.parametrize(
+    ("entry", "interval", "told"),
+    [
+        ({"id": 1, "interval": 3.0}, 3.0, [("slaves.a.interval", 5.0)]),
+        ({"id": 1}, None, [("slaves.a.interval", 5.0)]),
+        ({"id": 1, "interval": 5.0}, 5.0, []),
+    ],
+)
+def test_an_edit_of_the_key_wins_and_is_told_unless_it_says_the_same(
+    entry: dict[str, Any], interval: float | None, told: list[tuple[str, Any]]
+) -> None:
+    merged = merge(file(a=entry), SLOW)
+    assert merged.devices["a"].get("interval") == interval
+    assert lost(merged) == told
+    assert merged.changes == Changes()
+
+
+def test_what_is_taken_out_of_the_file_is_no_news_where_the_rest_of_it_now_gives_the_same() -> None:
+    changes = Changes().setting("a", {"interval": 1.0}, file(a={"id": 1, "interval": 2.0}))
+    merged = merge(file(a={"id": 1}), changes)
+    assert (merged.dropped, merged.changes) == ((), Changes())
+
+
+def test_a_key_that_the_file_begins_to_state_is_an_edit() -> None:
+    changes = Changes().setting("a", {"enabled": False}, file(a={"id": 1}))
+    merged = merge(file(a={"id": 1, "enabled": True}), changes)
+    assert merged.devices["a"]["enabled"] is True
+    assert lost(merged) == [("slaves.a.enabled", False)]
+
+
+def test_what_every_slave_inherits_is_another_key() -> None:
+    changes = Changes().setting("a", {"interval": 5.0}, file(a={"id": 1}))
+    merged = merge(replace(file(a={"id": 1}), usual={**USUAL, "interval": 7.0}), changes)
+    assert merged.devices["a"]["interval"] == 5.0
+
+
+def test_changes_of_a_device_that_the_file_has_no_more_are_lost() -> None:
+    changes = SLOW.with_device("a", replace(SLOW.of("a"), verified=Verified(Place(7), 1)))
+    merged = merge(file(), changes)
+    assert lost(merged) == [("slaves.a.interval", 5.0), ("slaves.a.id", 7)]
+    assert (merged.devices, merged.changes) == ({}, Changes())
+
+
+# -- devices that requests added or removed
+
+ROOF = Changes().adding("roof", {"id": 9, "interval": 5.0, "profile": "eh600"}, Place(9))
+
+
+def test_what_was_added_is_polled_after_those_of_the_file() -> None:
+    merged = merge(file(a={"id": 1}), ROOF)
+    assert list(merged.devices) == ["a", "roof"]
+    assert merged.devices["roof"] == {"id": 9, "interval": 5.0, "profile": "eh600"}
+    assert merged.changed["roof"] == {"id", "interval", "profile"}
+    assert (merged.changes, merged.dropped) == (ROOF, ())
+
+
+def test_what_was_added_and_stands_in_the_file_now_is_no_change_any_more() -> None:
+    merged = merge(file(roof={"id": 9, "interval": 5.0, "profile": "eh600", "label": "x"}), ROOF)
+    assert (merged.changes, merged.dropped, merged.contested) == (Changes(), (), {})
+
+
+def test_of_what_was_added_the_file_decides_what_it_says_and_the_options_stay() -> None:
+    merged = merge(file(roof={"id": 9}), ROOF)
+    assert lost(merged) == [("slaves.roof.profile", "eh600")]
+    assert merged.devices["roof"] == {"id": 9, "interval": 5.0}
+    assert merge(file(roof={"id": 9}), merged.changes) == replace(merged, dropped=())
+
+
+def test_what_was_added_where_it_never_answered_gives_way_to_the_id_in_the_file() -> None:
+    unproven = Changes().adding("roof", {"id": 9})
+    merged = merge(file(roof={"id": 8}), unproven)
+    assert lost(merged) == [("slaves.roof.id", 9)]
+    assert (merged.devices["roof"], merged.contested) == ({"id": 8}, {})
+
+
+def test_where_it_answered_it_is_looked_for_after_the_file_s_place() -> None:
+    merged = merge(file(roof={"id": 8, "profile": "eh600"}), ROOF)
+    assert merged.devices["roof"]["id"] == 8
+    assert merged.contested == {"roof": (Place(8, 9600), Place(9, 9600))}
+    assert merged.dropped == ()
+    again = merge(file(roof={"id": 8, "profile": "eh600"}), merged.changes)
+    assert again.contested == merged.contested
+    settled = merge(file(roof={"id": 9, "profile": "eh600"}), merged.changes)
+    assert (settled.contested, settled.changes.of("roof").verified) == ({}, None)
+
+
+BEFORE = file(a={"id": 1, "label": "x"}, b={"id": 2})
+GONE = Changes().removing("a", BEFORE)
+
+
+def test_what_was_removed_is_not_polled() -> None:
+    merged = merge(BEFORE, GONE)
+    assert (list(merged.devices), merged.changes, merged.dropped) == (["b"], GONE, ())
+
+
+def test_what_is_taken_out_of_the_file_too_is_no_change_any_more() -> None:
+    merged = merge(file(b={"id": 2}), GONE)
+    assert (list(merged.devices), merged.changes, merged.dropped) == (["b"], Changes(), ())
+
+
+def test_what_was_removed_comes_back_when_its_entry_is_edited() -> None:
+    merged = merge(file(a={"id": 1, "label": "y"}, b={"id": 2}), GONE)
+    assert merged.devices["a"] == {"id": 1, "label": "y"}
+    assert lost(merged) == [("slaves.a", {"removed": True})]
+    assert merged.changes == Changes()
+
+
+REPLACED = GONE.adding("a", {"id": 5}, Place(5))
+
+
+def test_a_name_that_was_removed_can_be_added_again_and_keeps_its_place_among_the_devices() -> None:
+    merged = merge(BEFORE, REPLACED)
+    assert list(merged.devices.items()) == [("a", {"id": 5}), ("b", {"id": 2})]
+    assert merged.changes == REPLACED
+
+
+@pytest.mark.parametrize(
+    ("entry", "told", "left"),
+    [
+        ({"id": 1, "label": "y"}, [("slaves.a", {"id": 5})], {}),
+        ({"id": 5}, [], {}),
+        (None, [], {"a": DeviceChange(added={"id": 5}, added_at=Place(5))}),
+    ],
+)
+def test_an_edit_of_what_was_replaced_concerns_both(
+    entry: dict[str, Any] | None, told: list[tuple[str, Any]], left: dict[str, DeviceChange]
+) -> None:
+    merged = merge(file(b={"id": 2}) if entry is None else file(a=entry, b={"id": 2}), REPLACED)
+    assert lost(merged) == told
+    assert merged.devices["a"] == (entry or {"id": 5})
+    assert merged.changes == Changes(left)
+
+
+# -- facts
+
+MOVED = Changes({"a": DeviceChange(verified=Verified(Place(7), file=1))})
+
+
+def test_a_slave_id_that_was_verified_holds_while_the_file_is_not_edited() -> None:
+    merged = merge(file(a={"id": 1}), MOVED)
+    assert (merged.devices["a"], merged.contested) == ({"id": 7}, {})
+    assert merged.changed["a"] == {"id"}
+    assert merged.changes == MOVED
+
+
+def test_a_slave_id_that_the_file_now_names_is_no_change_any_more() -> None:
+    merged = merge(file(a={"id": 7}), MOVED)
+    assert (merged.devices["a"], merged.changes, merged.dropped) == ({"id": 7}, Changes(), ())
+
+
+def test_a_slave_id_edited_to_a_third_one_is_looked_for_in_both_places_and_the_fact_is_kept() -> None:
+    merged = merge(file(a={"id": 4}), MOVED)
+    assert merged.contested == {"a": (Place(4, 9600), Place(7, 9600))}
+    assert (merged.devices["a"], merged.changes, merged.dropped) == ({"id": 4}, MOVED, ())
+
+
+def test_a_fact_outlives_the_removal_of_its_device_and_its_return() -> None:
+    said = file(a={"id": 1})
+    removed = MOVED.removing("a", said)
+    assert merge(said, removed).changes == removed
+    assert merge(said, removed.resetting("a")).devices["a"] == {"id": 7}
+    assert merge(file(a={"id": 1, "label": "x"}), removed).devices["a"] == {"id": 7, "label": "x"}
+    assert merge(file(), removed).changes == Changes()
+
+
+def test_a_device_verified_at_another_rate_than_the_line_s_is_looked_for_there() -> None:
+    straggler = Changes({"a": DeviceChange(verified=Verified(Place(1, 19200), file=1))})
+    merged = merge(file(a={"id": 1}), straggler)
+    assert merged.changes == straggler
+    assert merged.contested == {}
+    moved = merge(file(a={"id": 2}), straggler)
+    assert moved.contested == {"a": (Place(2, 9600), Place(1, 19200))}
+    settled = merge(file(19200, a={"id": 1}), Changes({"a": DeviceChange(verified=Verified(Place(1, 19200), file=2))}))
+    assert settled.changes == Changes()
+    kept = merge(file(a={"id": 1}), Changes({"a": DeviceChange(verified=Verified(Place(1, 19200), file=2))}))
+    assert kept.changes == straggler
+
+
+RATE = Changes(baudrate=Rate(file=9600, now=19200))
+
+
+@pytest.mark.parametrize(
+    ("said", "rate", "left", "places"),
+    [
+        (9600, 19200, RATE, None),
+        (19200, 19200, Changes(), None),
+        (38400, 38400, RATE, (Place(1, 38400), Place(1, 19200))),
+    ],
+)
+def test_the_line_s_rate_is_a_fact_too(said: int, rate: int, left: Changes, places: tuple[Place, ...] | None) -> None:
+    merged = merge(file(said, a={"id": 1}), RATE)
+    assert (merged.baudrate, merged.changes, merged.contested.get("a")) == (rate, left, places)
+
+
+def test_one_place_in_question_is_no_question() -> None:
+    changes = Changes({"a": DeviceChange(verified=Verified(Place(1, 38400), file=1))}, RATE.baudrate)
+    assert merge(file(38400, a={"id": 1}), changes).contested == {}
+
+
+# -- laws
+
+NAMES = ("a", "b", "c")
+VALUES = {
+    "interval": st.sampled_from([0.0, 0.5, 1.0, 2.0]),
+    "enabled": st.booleans(),
+    "label": st.sampled_from([None, "x", "y"]),
+    "response_timeout": st.sampled_from([None, 0.1]),
+}
+OPTIONS = st.fixed_dictionaries({}, optional=VALUES)
+ENTRIES = st.builds(lambda number, options: {"id": number, **options}, st.integers(1, 4), OPTIONS)
+FILES = st.dictionaries(st.sampled_from(NAMES), ENTRIES).map(lambda slaves: Said(slaves, 9600, USUAL))
+STEPS = st.lists(
+    st.tuples(st.sampled_from(["set", "add", "remove", "reset", "edit", "restart"]), st.sampled_from(NAMES), ENTRIES),
+    max_size=12,
+)
+
+
+def held(merged: Merged, name: str) -> dict[str, Any] | None:
+    """Return every key of a device that holds, inherited ones too."""
+    return {**USUAL, **merged.devices[name]} if name in merged.devices else None
+
+
+class Life:
+    """A file, and what requests and persons do one after the other; each step proves what it alone changes."""
+
+    def __init__(self, said: Said) -> None:
+        self.said = said
+        self.merged = merge(said, Changes())
+
+    def step(self, verb: str, name: str, entry: dict[str, Any]) -> None:
+        before = self.merged = replace(self.merged, dropped=())
+        getattr(self, verb)(name, entry)
+        assert verb == "edit" or self.merged.dropped == ()
+        assert all(dropped.device == name for dropped in self.merged.dropped)
+        for other in set(NAMES) - {name}:
+            assert held(self.merged, other) == held(before, other)
+            assert self.merged.changes.of(other) == before.changes.of(other)
+        assert merge(self.said, self.merged.changes) == replace(self.merged, dropped=())
+
+    def _request(self, changes: Changes) -> None:
+        self.merged = merge(self.said, changes)
+
+    def set(self, name: str, entry: dict[str, Any]) -> None:
+        before = held(self.merged, name)
+        if before is not None:
+            wishes = {key: value for key, value in entry.items() if key != "id"}
+            self._request(self.merged.changes.setting(name, wishes, self.said))
+            assert held(self.merged, name) == {**before, **wishes}
+
+    def add(self, name: str, entry: dict[str, Any]) -> None:
+        if name not in self.merged.devices:
+            self._request(self.merged.changes.adding(name, entry, Place(entry["id"])))
+            assert held(self.merged, name) == {**USUAL, **entry}
+
+    def remove(self, name: str, _: dict[str, Any]) -> None:
+        if name in self.merged.devices:
+            self._request(self.merged.changes.removing(name, self.said))
+            assert name not in self.merged.devices
+
+    def reset(self, name: str, _: dict[str, Any]) -> None:
+        self._request(self.merged.changes.resetting(name))
+        filed = self.said.slaves.get(name)
+        assert held(self.merged, name) == (None if filed is None else {**USUAL, **filed})
+
+    def edit(self, name: str, entry: dict[str, Any]) -> None:
+        previous = self.said.slaves.get(name, {})
+        self.said = Said({**self.said.slaves, name: entry}, 9600, USUAL)
+        self._request(self.merged.changes)
+        for key, value in entry.items():
+            if key not in previous or previous[key] != value:
+                assert self.merged.devices[name][key] == value
+
+    def restart(self, _: str, __: dict[str, Any]) -> None:
+        before = self.merged
+        self._request(before.changes)
+        assert self.merged == before
+
+
+@given(FILES, STEPS)
+def test_a_person_s_edit_always_wins_and_nothing_else_is_ever_lost(
+    said: Said, steps: list[tuple[str, str, dict[str, Any]]]
+) -> None:
+    life = Life(said)
+    for verb, name, entry in steps:
+        life.step(verb, name, entry)
+
+
+@given(FILES, STEPS)
+def test_what_is_dropped_did_differ_from_what_holds(said: Said, steps: list[tuple[str, str, dict[str, Any]]]) -> None:
+    changes = Changes()
+    for _, name, entry in steps:
+        wishes = {key: value for key, value in entry.items() if key != "id"}
+        if name in said.slaves:
+            changes = merge(said, changes.setting(name, wishes, said)).changes
+        said = Said({**said.slaves, name: entry}, 9600, USUAL)
+        merged = merge(said, changes)
+        for dropped in merged.dropped:
+            assert isinstance(dropped, Dropped)
+            _, device, key = dropped.key.split(".")
+            assert (held(merged, device) or {})[key] != dropped.lost

@@ -1,0 +1,24 @@
+"""A line full of sensors as a course meets it: questions go in, outcomes come out, time is a number.
+
+It knows no bytes; how each sensor takes a write is set in the test.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from lfs10d.modbus.exchange import Outcome
+from tests.support.sensors import Pretence, heard
+
+
+@pytest.fixture
+def pretence() -> Pretence:
+    return Pretence()
+
+
+@pytest.fixture(name="heard")
+def _heard() -> Callable[..., Outcome]:
+    """Give the function that makes outcomes."""
+    return heard

@@ -1,0 +1,217 @@
+"""Frames are found through noise, at every offset, in any pieces."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lfs10d.modbus.frame_search import KEPT, Catch, Hunt, Quarry
+from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
+
+RTU = Codec(Framing.RTU)
+NORMAL, EXCEPTION = RTU.shapes(ReadRegisters(1, 0x0001, 2))
+ANSWER = bytes.fromhex("010304414FD70A002F")
+BROKEN = bytes.fromhex("010304414FD70A0030")
+
+
+def fed(*pieces: bytes) -> tuple[Hunt, Quarry, Catch | None]:
+    """Feed pieces at 0, 1, 2 ... s; return what was caught first."""
+    hunt, quarry, caught = Hunt(), Quarry(RTU, NORMAL), None
+    for now, piece in enumerate(pieces):
+        hunt.feed(piece, float(now))
+        caught = caught or hunt.seek(quarry)
+    return hunt, quarry, caught
+
+
+def test_a_frame_is_caught_the_moment_it_is_whole() -> None:
+    hunt, quarry, caught = fed(ANSWER[:-1])
+    assert caught is None
+    assert quarry.partial
+    hunt.feed(ANSWER[-1:], 7.0)
+    assert hunt.seek(quarry) == Catch(ANSWER[:-2], 0, 9, 0.0, 7.0)
+
+
+@given(st.binary(max_size=40), st.binary(max_size=40), st.lists(st.integers(0, 89), max_size=6))
+def test_noise_and_pieces_hide_no_frame(before: bytes, after: bytes, cuts: list[int]) -> None:
+    stream = before + ANSWER + after
+    places = [0, *sorted(min(cut, len(stream)) for cut in cuts), len(stream)]
+    pieces = [stream[begin:end] for begin, end in pairwise(places)]
+    _, _, caught = fed(*pieces)
+    assert caught is not None
+    assert caught.body == ANSWER[:-2]
+
+
+def test_a_false_beginning_does_not_hide_the_frame() -> None:
+    _, quarry, caught = fed(ANSWER[:3] + ANSWER)
+    assert caught is not None
+    assert (caught.begin, caught.end, quarry.start) == (3, 12, 12)
+
+
+def test_a_frame_with_a_wrong_check_counts_as_begun_only() -> None:
+    hunt, quarry, caught = fed(BROKEN)
+    assert caught is None
+    assert hunt.begins(quarry)
+
+
+@pytest.mark.parametrize(("tail", "begins"), [("01", False), ("0103", True), ("010302", False), ("000103", True)])
+def test_slave_and_function_at_the_end_are_a_beginning(tail: str, *, begins: bool) -> None:
+    hunt, quarry, _ = fed(bytes.fromhex(tail))
+    assert hunt.begins(quarry) is begins
+
+
+def test_what_came_before_the_start_is_not_looked_at() -> None:
+    hunt, quarry, _ = fed(b"\x00" * 3)
+    quarry.skip(5)
+    quarry.skip(4)
+    assert quarry.start == 5
+    hunt.feed(b"\x01\x01" + ANSWER, 1.0)
+    caught = hunt.seek(quarry)
+    assert caught is not None
+    assert caught.begin == 5
+
+
+def test_first_and_last_byte_have_their_own_times() -> None:
+    _, _, caught = fed(b"\x00" + ANSWER[:1], ANSWER[1:5], ANSWER[5:])
+    assert caught is not None
+    assert (caught.first_at, caught.last_at) == (0.0, 2.0)
+
+
+def test_a_frame_is_claimed_where_one_byte_of_it_is() -> None:
+    hunt, _, caught = fed(ANSWER)
+    assert caught is not None
+    assert not hunt.claimed(caught)
+    hunt.claim(caught)
+    assert hunt.claimed(caught)
+    assert hunt.claimed(Catch(b"", 8, 12, 0.0, 0.0))
+    assert not hunt.claimed(Catch(b"", 9, 12, 0.0, 0.0))
+
+
+def test_claimed_frames_are_explained() -> None:
+    hunt, quarry, caught = fed(b"\xaa" + ANSWER + b"\xbb")
+    assert caught is not None
+    hunt.claim(caught)
+    assert hunt.unclaimed(0) == b"\xaa\xbb"
+    assert hunt.unclaimed(5) == b"\xbb"
+    assert (hunt.unclaimed_count(0), hunt.unclaimed_count(5), hunt.unclaimed_count(10)) == (2, 1, 1)
+    hunt.feed(ANSWER, 1.0)
+    again = hunt.seek(quarry)
+    assert again is not None
+    hunt.claim(again)
+    assert hunt.unclaimed(0) == b"\xaa\xbb"
+
+
+def test_long_garbage_is_forgotten_and_the_frame_behind_it_found() -> None:
+    pieces = [b"\x01\x03" * 300] * 20
+    hunt, _, caught = fed(*pieces, ANSWER)
+    assert caught is not None
+    assert caught.begin == 20 * 600
+    assert caught.last_at == 20.0
+    assert len(hunt._stream) < 3 * KEPT
+    assert len(hunt.unclaimed(0)) == KEPT
+    assert hunt.unclaimed_count(0) == 20 * 600 + 9
+
+
+def test_one_huge_piece_is_searched_whole() -> None:
+    _, _, caught = fed(b"\x00" * 5000 + ANSWER + b"\x00" * 5000)
+    assert caught is not None
+    assert caught.begin == 5000
+
+
+@pytest.mark.parametrize(
+    ("heard", "missing"),
+    [
+        ("", 0),
+        ("FF", 0),
+        ("01", 8),
+        ("0103", 7),
+        ("010304", 6),
+        ("010304414F", 4),
+        ("0183", 3),
+        ("018302C0", 1),
+        ("010304018302", 2),
+        ("FF01", 8),
+        ("010304414FD70A002F01", 8),
+    ],
+)
+def test_what_is_missing_is_what_the_soonest_frame_still_needs(heard: str, missing: int) -> None:
+    hunt, normal, exception = Hunt(), Quarry(RTU, NORMAL), Quarry(RTU, EXCEPTION)
+    hunt.feed(bytes.fromhex(heard), 0.0)
+    for quarry in (normal, exception):
+        hunt.seek(quarry)
+    assert hunt.missing([normal, exception]) == missing
+
+
+def test_of_two_frames_the_first_is_caught_first() -> None:
+    hunt, quarry, caught = fed(ANSWER + ANSWER)
+    assert caught is not None
+    assert (caught.begin, caught.end) == (0, 9)
+    again = hunt.seek(quarry)
+    assert again is not None
+    assert (again.begin, again.end) == (9, 18)
+
+
+def test_a_head_that_overlaps_a_false_one_is_found() -> None:
+    (normal, _) = RTU.shapes(ReadRegisters(4, 0x0001, 2, 4))
+    frame = RTU.wrap(bytes.fromhex("040404414FD70A"))
+    hunt, quarry = Hunt(), Quarry(RTU, normal)
+    hunt.feed(b"\x04" + frame, 0.0)
+    caught = hunt.seek(quarry)
+    assert caught is not None
+    assert caught.begin == 1
+
+
+def test_skipping_ahead_leaves_a_frame_begun_there_and_skipping_on_the_spot_does_not() -> None:
+    _, quarry, _ = fed(ANSWER[:5])
+    quarry.skip(quarry.start)
+    assert quarry.partial
+    quarry.skip(quarry.start + 1)
+    assert not quarry.partial
+
+
+def test_a_frame_that_spans_what_is_forgotten_keeps_the_time_of_its_first_byte() -> None:
+    _, _, caught = fed(b"\xff" * 2 * KEPT, ANSWER[:5], ANSWER[5:])
+    assert caught is not None
+    assert (caught.first_at, caught.last_at) == (1.0, 2.0)
+
+
+def test_no_more_is_kept_than_twice_the_least() -> None:
+    hunt = Hunt()
+    for now in range(100):
+        hunt.feed(b"\xff" * 100, float(now))
+        assert len(hunt._stream) <= 2 * KEPT + 100
+    assert hunt.end == 10_000
+
+
+def test_frames_side_by_side_do_not_claim_each_other() -> None:
+    hunt, quarry, first = fed(ANSWER + ANSWER)
+    second = hunt.seek(quarry)
+    assert first is not None
+    assert second is not None
+    hunt.claim(second)
+    assert not hunt.claimed(first)
+    assert hunt.unclaimed(0) == ANSWER
+
+
+def test_a_frame_at_the_very_beginning_is_explained_whole() -> None:
+    hunt, _, caught = fed(ANSWER + b"\xff")
+    assert caught is not None
+    hunt.claim(caught)
+    assert hunt.unclaimed(0) == b"\xff"
+
+
+def test_what_lies_around_a_claimed_frame_is_told_though_older_bytes_are_forgotten() -> None:
+    hunt, _, caught = fed(b"\xff" * 3 * KEPT, b"\xfe" * 3, ANSWER, b"\xfd")
+    assert caught is not None
+    hunt.claim(caught)
+    assert hunt.unclaimed(3 * KEPT) == b"\xfe\xfe\xfe\xfd"
+
+
+def test_a_head_that_began_before_the_start_is_no_beginning() -> None:
+    hunt, quarry = Hunt(), Quarry(RTU, NORMAL)
+    quarry.skip(1)
+    hunt.feed(ANSWER[:2], 0.0)
+    assert hunt.seek(quarry) is None
+    assert not hunt.begins(quarry)

@@ -1,0 +1,319 @@
+"""What may still be answered is remembered, and nothing that could be confused with it is believed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lfs10d.modbus.exchange import LateAnswer
+from lfs10d.modbus.frames import Codec, Framing, ReadRegisters, Request, WriteRegister
+from lfs10d.modbus.pending import EQUALS_KEPT, Unanswered
+from lfs10d.reading import Fault, FaultCode
+from tests.support.outcomes import ended
+
+RTU = Codec(Framing.RTU)
+WIND, WHO = ReadRegisters(1, 0x0001, 2), ReadRegisters(1, 0x0005, 1)
+WHERE = ReadRegisters(1, 0x0004, 1)
+"""Of the shape of `WHO`."""
+OTHER = ReadRegisters(2, 0x0001, 2)
+EXCHANGE = 0.02
+"""s between two requests at least: no two were ever sent at the same moment."""
+PLAIN = ended(WIND, fault=Fault(FaultCode.TIMEOUT, "no answer"))
+
+
+class Line:
+    """An `Unanswered` and what happens on its line."""
+
+    def __init__(self) -> None:
+        self.unanswered = Unanswered()
+
+    def silent(self, request: Request, at: float, code: FaultCode = FaultCode.TIMEOUT, *late: Request) -> None:
+        self._settle(request, at, fault=Fault(code, ""), late=late)
+
+    def answered(self, request: Request, at: float, *late: Request) -> None:
+        self._settle(request, at, answer=(7,), fault=None, answered=True, late=late)
+
+    def begun(self, request: Request, at: float) -> None:
+        self._settle(request, at, fault=Fault(FaultCode.CRC, ""), answered=True)
+
+    def refused(self, request: Request, at: float, *, ambiguous: bool) -> None:
+        self._settle(request, at, fault=Fault(FaultCode.EXCEPTION, "", 2), answered=True, ambiguous=ambiguous)
+
+    def _settle(
+        self,
+        request: Request,
+        at: float,
+        *,
+        late: tuple[Request, ...] = (),
+        answer: tuple[int, ...] | None = None,
+        fault: Fault | None,
+        answered: bool = False,
+        ambiguous: bool = False,
+    ) -> None:
+        told = tuple(LateAnswer(each, 0.3) for each in late)
+        outcome = replace(
+            PLAIN,
+            request=request,
+            sent_end=at,
+            late=told,
+            answer=answer,
+            fault=fault,
+            answered=answered,
+            ambiguous=ambiguous,
+        )
+        self.unanswered.settled(outcome, RTU, 0.2, at + 0.2)
+
+    def pending(self, slave: int = 1) -> list[Request]:
+        return [each.request for each in self.unanswered.earlier(slave)]
+
+    def free(self, request: Request, now: float) -> bool:
+        """Whether a value may be asked now."""
+        if self.unanswered.left_alone_until(request.slave, now) is not None:
+            return False
+        if self.unanswered.confusable(request, RTU):
+            return False
+        return self.unanswered.lingering_until(request, RTU, now) is None
+
+
+@pytest.fixture
+def line() -> Line:
+    return Line()
+
+
+def test_an_answer_leaves_nothing_pending(line: Line) -> None:
+    line.answered(WIND, 0.0)
+    assert line.pending() == []
+    assert line.free(WIND, 0.2)
+    assert not line.unanswered.everybodys
+
+
+def test_after_silence_only_another_shape_may_be_asked(line: Line) -> None:
+    line.silent(WIND, 0.0)
+    assert line.unanswered.confusable(WIND, RTU)
+    assert not line.unanswered.confusable(WHO, RTU)
+    assert not line.unanswered.confusable(OTHER, RTU)
+    assert list(line.unanswered.everybodys) == [1]
+
+
+def test_an_answered_barrier_ends_it_once_the_silent_request_has_lingered(line: Line) -> None:
+    line.silent(WIND, 0.0)
+    line.answered(WHO, 0.3)
+    assert not line.unanswered.confusable(WIND, RTU)
+    assert line.unanswered.lingering_until(WIND, RTU, 0.6) == 1.0
+    assert line.unanswered.lingering_until(WHO, RTU, 0.6) is None
+    assert line.free(WIND, 1.0)
+    assert line.pending() == []
+
+
+def test_after_broken_bytes_nothing_lingers(line: Line) -> None:
+    line.silent(WIND, 0.0, FaultCode.MALFORMED)
+    assert line.unanswered.confusable(WIND, RTU)
+    line.answered(WHO, 0.3)
+    assert line.free(WIND, 0.5)
+
+
+def test_an_answer_to_a_barrier_may_be_that_of_the_barrier_before(line: Line) -> None:
+    line.silent(WIND, 0.0)
+    line.silent(WHO, 2.0)
+    line.answered(WHO, 4.0)
+    assert line.pending() == [WHO]
+    assert line.free(WIND, 4.2)
+    line.silent(WIND, 4.2)
+    line.answered(WHO, 6.0)  # of the barrier at 4.0, for all we know
+    assert line.pending() == [WIND, WHO]
+    line.answered(WHO, 8.0)
+    assert line.free(WIND, 8.2)
+    line.answered(WIND, 8.2)
+    assert line.pending() == []
+
+
+def test_another_request_of_the_same_shape_is_confusable_too(line: Line) -> None:
+    line.silent(WHERE, 0.0)
+    assert line.unanswered.confusable(WHO, RTU)
+    line.answered(WHO, 2.0)
+    assert line.pending() == [WHO]
+
+
+def test_a_late_answer_ends_its_request_and_those_before(line: Line) -> None:
+    line.silent(WIND, 0.0, FaultCode.CRC)
+    line.silent(WHERE, 0.3, FaultCode.CRC)
+    line.silent(WHO, 0.6, FaultCode.LATE, WHERE)
+    assert line.pending() == [WHO]
+    line.silent(OTHER, 0.9, FaultCode.TIMEOUT, WHO, WHO)
+    assert line.pending() == []
+    assert line.pending(2) == [OTHER]
+
+
+def test_a_late_answer_that_came_is_not_waited_for(line: Line) -> None:
+    line.silent(WIND, 0.0)
+    line.answered(WHO, 0.3, WIND)
+    assert line.free(WIND, 0.5)
+
+
+def test_bytes_that_only_begin_as_an_answer_end_the_oldest(line: Line) -> None:
+    line.begun(WIND, 0.0)
+    assert line.pending() == []
+    line.silent(WIND, 0.0, FaultCode.CRC)
+    line.silent(WHERE, 0.3, FaultCode.CRC)
+    line.begun(WHO, 0.6)
+    assert line.pending() == [WHERE, WHO]
+
+
+def test_an_ambiguous_exception_has_the_slave_left_alone_for_a_second(line: Line) -> None:
+    line.silent(WIND, 0.0)
+    line.refused(WHO, 0.3, ambiguous=True)
+    assert line.unanswered.left_alone_until(1, 1.0) == 1.3
+    assert line.unanswered.left_alone_until(2, 1.0) is None
+    assert line.unanswered.left_alone_until(1, 1.3) is None
+    assert line.pending() == []
+    assert line.free(WIND, 1.3)
+
+
+def test_an_exception_that_can_only_be_ours_proves_that_nothing_is_pending(line: Line) -> None:
+    line.silent(WIND, 0.0, FaultCode.CRC)
+    line.refused(WHO, 0.3, ambiguous=False)
+    assert line.pending() == []
+
+
+def test_a_late_answer_to_the_last_one_ends_the_rest_of_the_slave_too(line: Line) -> None:
+    line.silent(WIND, 0.0, FaultCode.CRC)
+    line.refused(WHO, 0.3, ambiguous=True)
+    line.answered(OTHER, 0.6, WHO)
+    assert line.unanswered.left_alone_until(1, 0.7) is None
+
+
+def test_a_slave_without_barrier_is_left_alone_for_twice_its_time_out(line: Line) -> None:
+    line.silent(WIND, 5.0)
+    line.unanswered.leave_alone(1, 0.8)
+    assert line.unanswered.left_alone_until(1, 6.0) == 6.6
+
+
+def test_what_was_never_sent_and_what_nobody_answers_is_not_pending(line: Line) -> None:
+    line.unanswered.settled(replace(PLAIN, sent_end=None), RTU, 0.2, 0.2)
+    everybody = replace(PLAIN, request=WriteRegister(0, 4, 1))
+    line.unanswered.settled(everybody, RTU, 0.2, 0.2)
+    line.unanswered.abandoned(everybody.request, RTU, 0.2, 0.2)
+    assert not line.unanswered.everybodys
+
+
+def test_an_exchange_that_was_cut_off_may_still_be_answered(line: Line) -> None:
+    line.unanswered.abandoned(WIND, RTU, 0.2, 3.0)
+    assert line.unanswered.confusable(WIND, RTU)
+    line.answered(WHO, 3.1)
+    assert line.unanswered.lingering_until(WIND, RTU, 3.4) == 4.0
+
+
+def test_of_equal_requests_the_newest_are_remembered(line: Line) -> None:
+    line.silent(WIND, 0.0)
+    for n in range(20):
+        line.silent(WHO, 1.0 + n)
+    pending = line.unanswered.earlier(1)
+    assert [each.request for each in pending] == [WIND] + [WHO] * EQUALS_KEPT
+    assert pending[-1].sent_end == 20.0
+
+
+def test_answers_to_many_barriers_do_not_end_a_value_asked_after_those(line: Line) -> None:
+    before, after = 4, 5
+    for n in range(before):
+        line.silent(WHO, 1.0 + n)
+    line.silent(WIND, 10.0)
+    for n in range(after):
+        line.silent(WHO, 20.0 + n)
+    for n in range(before):
+        line.answered(WHO, 30.0 + n)
+    assert line.unanswered.confusable(WIND, RTU)
+
+
+@given(
+    st.lists(st.tuples(st.sampled_from(["asks", "answers"]), st.floats(0.0, 0.4)), max_size=60),
+    st.integers(0, 3),
+)
+def test_no_answer_of_a_slave_that_answers_in_turn_is_taken_for_another(
+    steps: list[tuple[str, float]], lag: int
+) -> None:
+    """The slave answers up to `lag` requests late; the master believes a value only where it may."""
+    line, now = Line(), 0.0
+    backlog: list[tuple[Request, int]] = []
+    for number, (step, pause) in enumerate(steps):
+        now += EXCHANGE + pause
+        request = WIND if line.free(WIND, now) else WHO
+        if request is WIND or line.unanswered.left_alone_until(1, now) is None:
+            backlog.append((request, number))
+        else:
+            continue
+        if step == "asks" and len(backlog) <= lag:
+            line.silent(request, now, FaultCode.CRC)
+            continue
+        late: list[Request] = []
+        while backlog:
+            heard, asked = backlog.pop(0)
+            if heard == request:
+                assert request is WHO or asked == number
+                line.answered(request, now, *late)
+                break
+            late.append(heard)
+
+
+def test_a_slave_whose_answer_came_while_another_was_asked_is_tardy() -> None:
+    line = Line()
+    line.silent(WIND, 0.0)
+    assert not line.unanswered.tardy(1)
+    line.answered(OTHER, 0.3, WIND)
+    assert line.unanswered.tardy(1)
+    assert not line.unanswered.tardy(2)
+
+
+@pytest.mark.parametrize("exception", [5, 10, 11])
+@pytest.mark.parametrize("ambiguous", [True, False])
+def test_after_an_exception_that_does_not_end_it_a_request_stays_pending(exception: int, *, ambiguous: bool) -> None:
+    line = Line()
+    line.silent(WHO, 0.0)
+    outcome = ended(WIND, fault=Fault(FaultCode.EXCEPTION, "", exception), answered=True, ambiguous=ambiguous)
+    line.unanswered.settled(replace(outcome, sent_end=1.0), RTU, 0.2, 1.1)
+    assert [each.request for each in line.unanswered.earlier(1)] == [WHO, WIND]
+    assert line.unanswered.confusable(WIND, RTU)
+    assert line.unanswered.left_alone_until(1, 1.1) is None
+
+
+def test_another_masters_request_is_pending_until_its_answer_is_heard() -> None:
+    line = Line()
+    unanswered = line.unanswered
+    assert not unanswered.overheard(1, 9, exception=False, now=0.0)
+    unanswered.asked_by_another(WIND, RTU, 1.0)
+    assert unanswered.confusable(WIND, RTU)
+    assert unanswered.overheard(1, 7, exception=False, now=1.1)  # of another shape: something is owed, but not this
+    assert unanswered.overheard(1, 9, exception=False, now=1.2)
+    assert unanswered.earlier(1) == ()
+    unanswered.asked_by_another(WIND, RTU, 2.0)
+    assert unanswered.overheard(1, 5, exception=True, now=2.1)
+    assert unanswered.earlier(1) == ()
+
+
+def test_a_request_of_ours_is_not_answered_by_what_is_overheard() -> None:
+    line = Line()
+    line.silent(WIND, 0.0)
+    assert line.unanswered.overheard(1, 9, exception=False, now=0.1)
+    assert [each.request for each in line.unanswered.earlier(1)] == [WIND]
+
+
+def test_the_answer_to_another_master_that_comes_in_our_exchange_makes_nobody_tardy() -> None:
+    line = Line()
+    line.unanswered.asked_by_another(WIND, RTU, 0.0)
+    outcome = ended(WHO, answer=(7,), fault=None, answered=True, late=(LateAnswer(WIND, 0.1, ours=False),))
+    line.unanswered.settled(replace(outcome, sent_end=0.1), RTU, 0.2, 0.2)
+    assert line.unanswered.earlier(1) == ()
+    assert not line.unanswered.tardy(1)
+
+
+def test_a_slave_that_is_answered_for_twice_is_left_alone() -> None:
+    line = Line()
+    line.unanswered.duplicates.answered(1, 1.0)
+    until = line.unanswered.left_alone_until(1, 1.0)
+    assert until is not None
+    assert line.unanswered.left_alone_until(1, until) is None
+    line.silent(WIND, 1.0)
+    line.unanswered.leave_alone(1, 0.2)
+    assert line.unanswered.left_alone_until(1, 1.1) == 2.0

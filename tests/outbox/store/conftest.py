@@ -1,0 +1,3 @@
+"""Samples for the store, and files of it."""
+
+from __future__ import annotations

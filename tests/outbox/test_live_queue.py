@@ -1,0 +1,89 @@
+"""Live samples wait in turn."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lfs10d.outbox.history import Kept
+from lfs10d.outbox.items import Live
+from lfs10d.outbox.live_queue import LiveQueue
+from lfs10d.telemetry.publication import Kind, Publication, Sample
+
+
+def live(device: str, seq: int, since: float = 0.0) -> Live:
+    measured = Sample(device, "k", seq, 1000 * seq, "synced", None, {}, (), "bad", "timeout", None)
+    return Live(
+        Publication(f"device/{device}/telemetry", {}, Kind.SAMPLE, retain=False, qos=1, sample=measured),
+        Kept(measured, since),
+    )
+
+
+def told(letter: Live | None) -> tuple[str, int] | None:
+    return None if letter is None else (letter.kept.sample.device, letter.kept.sample.seq)
+
+
+def everything(queue: LiveQueue) -> list[tuple[str, int] | None]:
+    return [told(queue.take()) for _ in range(len(queue))]
+
+
+def test_where_none_waits_there_is_none() -> None:
+    queue = LiveQueue()
+    assert (queue.take(), queue.take_oldest(), queue.oldest(), len(queue)) == (None, None, None, 0)
+
+
+def test_devices_go_in_turn() -> None:
+    queue = LiveQueue()
+    for device, seq in (("a", 1), ("a", 2), ("a", 3), ("b", 1), ("c", 1)):
+        queue.add(live(device, seq))
+    assert everything(queue) == [("a", 1), ("b", 1), ("c", 1), ("a", 2), ("a", 3)]
+
+
+def test_what_is_put_back_goes_before_the_others_of_its_device() -> None:
+    queue = LiveQueue()
+    for seq in (1, 2, 3):
+        queue.add(live("a", seq))
+    first, second = queue.take(), queue.take()
+    assert first is not None
+    assert second is not None
+    queue.put_back(second)
+    queue.put_back(first)
+    assert queue.oldest() is first
+    assert everything(queue) == [("a", 1), ("a", 2), ("a", 3)]
+
+
+def test_the_oldest_may_be_taken_out_of_its_turn() -> None:
+    queue = LiveQueue()
+    for device, seq in (("a", 1), ("b", 1), ("b", 2)):
+        queue.add(live(device, seq))
+    assert [told(queue.take_oldest()) for _ in range(2)] == [("a", 1), ("b", 1)]
+    assert everything(queue) == [("b", 2)]
+
+
+def test_what_is_changed_keeps_its_turn() -> None:
+    queue = LiveQueue()
+    for device, seq in (("a", 1), ("a", 2), ("b", 1)):
+        queue.add(live(device, seq, 1.0))
+    queue.change(lambda each: replace(each, kept=replace(each.kept, since=2.0)))
+    oldest = queue.oldest()
+    assert oldest is not None
+    assert oldest.kept.since == 2.0
+    assert everything(queue) == [("a", 1), ("b", 1), ("a", 2)]
+
+
+@given(st.lists(st.one_of(st.sampled_from("abc"), st.none(), st.just(""))))
+def test_nothing_is_lost_and_each_device_stays_in_order(steps: list[str | None]) -> None:
+    queue, seqs = LiveQueue(), dict.fromkeys("abc", 0)
+    gone: list[tuple[str, int] | None] = []
+    for step in steps:
+        if step:
+            seqs[step] += 1
+            queue.add(live(step, seqs[step], len(gone) + sum(seqs.values())))
+        else:
+            gone.append(told(queue.take() if step is None else queue.take_oldest()))
+    gone += everything(queue)
+    assert len(queue) == 0
+    for device, last in seqs.items():
+        assert [each[1] for each in gone if each and each[0] == device] == list(range(1, last + 1))

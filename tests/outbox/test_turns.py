@@ -1,0 +1,60 @@
+"""Turns by weight."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lfs10d.outbox.turns import Turns
+
+
+def test_equals_go_in_their_order_and_then_in_turn() -> None:
+    turns = Turns(3)
+    went = []
+    for _ in range(6):
+        number = turns.order()[0]
+        turns.went(number, 8)
+        went.append(number)
+    assert went == [0, 1, 2, 0, 1, 2]
+
+
+@given(st.lists(st.integers(1, 64), min_size=2, max_size=6))
+def test_each_has_its_part_of_the_messages(weights: list[int]) -> None:
+    turns = Turns(len(weights))
+    went: Counter[int] = Counter()
+    for _ in range(3 * sum(weights)):
+        number = turns.order()[0]
+        turns.went(number, weights[number])
+        went[number] += 1
+    assert all(abs(went[number] - 3 * weight) <= 1 for number, weight in enumerate(weights))
+
+
+def test_a_class_that_had_nothing_has_saved_no_turns() -> None:
+    turns = Turns(2)
+    for _ in range(100):
+        turns.passed(1)
+        turns.went(0, 1)
+    went = []
+    for _ in range(4):
+        number = turns.order()[0]
+        turns.went(number, 1)
+        went.append(number)
+    assert went == [1, 0, 1, 0]
+
+
+def test_a_class_that_was_never_asked_owes_and_is_owed_nothing() -> None:
+    turns = Turns(2)
+    for _ in range(100):
+        turns.went(0, 1)
+    turns.went(1, 1)
+    assert turns.order() == [0, 1]
+
+
+def test_the_first_classes_go_before_the_others() -> None:
+    turns = Turns(4)
+    for _ in range(5):
+        turns.went(0, 1)
+    assert turns.order(first=2) == [1, 0, 2, 3]
+    assert turns.order() == [1, 2, 3, 0]

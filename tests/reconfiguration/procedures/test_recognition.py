@@ -1,0 +1,308 @@
+"""One sensor of a profile is at a place and no other: recognised by what it answers, and told from two of one id."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterable, Iterator
+from itertools import chain, cycle, repeat
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lfs10d.line.jobs.identification import rate_fits
+from lfs10d.line.jobs.job import Ask
+from lfs10d.modbus.exchange import Outcome
+from lfs10d.modbus.frames import ReadRegisters
+from lfs10d.profiles.library import parse_profile
+from lfs10d.reading import FaultCode
+from lfs10d.reconfiguration.journal import Spot
+from lfs10d.reconfiguration.procedures.identity_query import QUICK, Reply
+from lfs10d.reconfiguration.procedures.recognition import (
+    CROSSINGS,
+    LEAST,
+    MORE_READS,
+    READS,
+    Look,
+    Recognition,
+    jumps,
+    one_alone,
+    recognised,
+)
+from tests.support.sensors import CODEC, LFS10, Mimic, Pretence, heard
+
+HERE, SILENT = Spot(slave=3, baudrate=9600), Spot(slave=9, baudrate=9600)
+SAYS_3 = Reply(answers=True, register=3)
+WIND = LFS10.values[0]
+VANE = parse_profile(
+    """
+name: vane
+title: A vane
+values:
+  - {name: direction, register: 1, type: uint16, unit: "1", range: [0, 360], device_class: wind_direction}
+  - {name: bare, register: 2, type: uint16, unit: "1"}
+slave_id: {register: 5}
+""",
+    "vane.yaml",
+)
+DIRECTION, BARE = VANE.values
+
+
+def words(number: float) -> tuple[int, int]:
+    """Return the two registers of a float32."""
+    high, low = struct.unpack(">HH", struct.pack(">f", number))
+    return high, low
+
+
+class Blowing(Mimic):
+    """A sensor whose value is another one at each read."""
+
+    def blow(self, numbers: Iterable[float]) -> None:
+        self._numbers: Iterator[float] = iter(numbers)
+
+    def read(self, request: ReadRegisters) -> tuple[int, ...]:
+        return words(next(self._numbers)) if request.address == 1 else super().read(request)
+
+
+def look(pretence: Pretence) -> Look:
+    return pretence.carry_out(one_alone(HERE, SILENT, pretence.asking()))
+
+
+def blowing(pretence: Pretence, numbers: Iterable[float]) -> Look:
+    sensor = Blowing(3)
+    sensor.blow(numbers)
+    pretence.sensors.append(sensor)
+    return look(pretence)
+
+
+def recognition(pretence: Pretence, identity: Reply = SAYS_3) -> Recognition:
+    return pretence.carry_out(recognised(HERE, identity, pretence.asking()))
+
+
+# -- recognised
+
+
+def test_a_sensor_is_recognised_by_its_id_its_values_and_the_register_of_its_rate(pretence: Pretence) -> None:
+    pretence.sensor(3)
+    assert recognition(pretence) == Recognition(rate_code=1)
+    assert pretence.requests == [*READS * [ReadRegisters(3, 1, 2)], ReadRegisters(3, 4, 1)]
+
+
+@pytest.mark.parametrize(
+    ("identity", "why"),
+    [
+        (Reply(answers=True, exception=2), "it refuses register 0x0005 (exception 02)"),
+        (Reply(answers=True, register=700), "its register 0x0005 says 700, not 3"),
+    ],
+)
+def test_one_whose_id_register_says_otherwise_is_not_asked_more(pretence: Pretence, identity: Reply, why: str) -> None:
+    pretence.sensor(3)
+    assert recognition(pretence, identity) == Recognition(why)
+    assert pretence.asked == []
+
+
+@pytest.mark.parametrize("number", [1e6, -1.0, float("nan"), float("inf"), 2e-40])
+def test_one_value_that_cannot_be_is_enough_to_be_another_device(pretence: Pretence, number: float) -> None:
+    pretence.sensor(3, wind=words(number))
+    why = recognition(pretence).why
+    assert why is not None
+    assert why.startswith("wind_speed")
+
+
+def test_values_that_are_refused_or_not_answered_are_none_of_such_a_sensor(pretence: Pretence) -> None:
+    pretence.sensor(3, exception=2)
+    assert recognition(pretence) == Recognition("it refuses (exception 02) its values at 0x0001")
+    pretence.sensors.clear()
+    assert recognition(pretence) == Recognition("it does not answer for its values at 0x0001")
+
+
+def test_values_that_collide_each_time_are_two_sensors(pretence: Pretence) -> None:
+    pretence.noise.add((3, 9600))
+    assert recognition(pretence) == Recognition(spoilt=True)
+
+
+def test_one_answer_spoilt_by_noise_hides_no_sensor(pretence: Pretence, monkeypatch: pytest.MonkeyPatch) -> None:
+    pretence.sensor(3)
+    spoil(pretence, monkeypatch, {0: heard(ReadRegisters(3, 1, 2), FaultCode.CRC)})
+    assert recognition(pretence) == Recognition(rate_code=1)
+
+
+@pytest.mark.parametrize(("content", "says"), [(7, "says 7, which is no rate"), (0, "says 0, which is no rate")])
+def test_a_rate_register_that_holds_no_rate_is_another_devices(pretence: Pretence, content: int, says: str) -> None:
+    pretence.sensor(3, stored={4: content})
+    assert recognition(pretence) == Recognition(f"its register 0x0004 {says}")
+
+
+def test_a_rate_register_that_does_not_answer_is_another_devices(
+    pretence: Pretence, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pretence.sensor(3)
+    refused = heard(ReadRegisters(3, 4, 1), exception=2)
+    spoil(pretence, monkeypatch, {3: refused})
+    assert recognition(pretence) == Recognition("its register 0x0004 does not answer")
+    silent = heard(ReadRegisters(3, 4, 1), FaultCode.TIMEOUT)
+    pretence.asked.clear()
+    spoil(pretence, monkeypatch, dict.fromkeys(range(3, 9), silent))
+    assert recognition(pretence) == Recognition("its register 0x0004 does not answer")
+
+
+def test_without_a_register_of_the_rate_none_is_asked(pretence: Pretence) -> None:
+    pretence.sensor(3, wind=(12, 40))
+    found = pretence.carry_out(recognised(HERE, SAYS_3, pretence.asking(VANE)))
+    assert found == Recognition()
+    assert rate_fits(VANE, None, 9600)
+
+
+def test_a_rate_that_the_profile_has_no_code_for_may_have_any_content() -> None:
+    assert rate_fits(LFS10, 77, 4800)
+    assert not rate_fits(LFS10, None, 4800)
+    assert not rate_fits(LFS10, 77, 9600)
+    assert rate_fits(LFS10, 2, 9600)  # it may have stored another rate and not obeyed yet
+
+
+# -- one alone
+
+
+def spoil(pretence: Pretence, monkeypatch: pytest.MonkeyPatch, outcomes: dict[int, Outcome]) -> None:
+    """Let the questions of these numbers end so, the others as the line has it."""
+    plain = type(pretence).outcome
+
+    def outcome(ask: Ask) -> Outcome:
+        number = len(pretence.asked)
+        if number not in outcomes:
+            return plain(pretence, ask)
+        pretence.asked.append(ask)
+        return pretence.settle(ask, outcomes[number])
+
+    monkeypatch.setattr(pretence, "outcome", outcome)
+
+
+def test_one_sensor_is_read_three_times_and_the_line_is_listened_to_behind_each_read(pretence: Pretence) -> None:
+    pretence.sensor(3)
+    assert look(pretence) == Look()
+    assert [(ask.request.slave, ask.at_once) for ask in pretence.asked] == READS * [(3, False), (9, True)]
+    assert [ask.timeout for ask in pretence.asked[1::2]] == [0.2, 0.2, 0.6]
+
+
+def test_answers_that_collide_are_of_two(pretence: Pretence) -> None:
+    pretence.sensor(3)
+    pretence.sensor(3, wind=(0, 0))
+    assert look(pretence) == Look(twins="answers collide there")
+
+
+@pytest.mark.parametrize("number", [0, 2, 4])
+def test_one_collision_in_three_reads_is_enough(
+    pretence: Pretence, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    pretence.sensor(3)
+    spoil(pretence, monkeypatch, {number: heard(ReadRegisters(3, 1, 2), FaultCode.CRC)})
+    assert look(pretence) == Look(twins="answers collide there")
+
+
+@pytest.mark.parametrize("number", [1, 3, 5])
+def test_a_second_answer_behind_the_first_is_of_another(
+    pretence: Pretence, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    pretence.sensor(3)
+    frame = CODEC.wrap(bytes((3, 3, 4, 0, 0, 0, 0)))
+    extra = heard(ReadRegisters(9, 1, 2), FaultCode.WRONG_SLAVE, heard=frame, unsolicited=len(frame))
+    spoil(pretence, monkeypatch, {number: extra})
+    assert look(pretence) == Look(twins="a second answer came behind the first")
+
+
+def test_a_late_answer_to_an_older_question_is_its_own(pretence: Pretence, monkeypatch: pytest.MonkeyPatch) -> None:
+    pretence.sensor(3)
+    frame = CODEC.wrap(bytes((3, 3, 4, 0, 0, 0, 0)))
+    late = heard(ReadRegisters(9, 1, 2), FaultCode.LATE, heard=frame, late=(late_answer(),))
+    spoil(pretence, monkeypatch, {1: late})
+    assert look(pretence) == Look()
+
+
+def late_answer() -> Any:  # noqa: ANN401 - the package's own type, built here alone
+    from lfs10d.modbus.exchange import LateAnswer  # noqa: PLC0415 - beside its one use
+
+    return LateAnswer(ReadRegisters(3, 1, 2), 0.3)
+
+
+@pytest.mark.parametrize(("slave", "noise"), [(9, False), (9, True)])
+def test_anything_received_from_the_new_id_means_that_it_is_taken(
+    pretence: Pretence, slave: int, *, noise: bool
+) -> None:
+    pretence.sensor(3)
+    if noise:
+        pretence.noise.add((slave, 9600))
+    else:
+        pretence.sensor(slave)
+    assert look(pretence) == Look(taken=True)
+
+
+def test_bytes_that_come_behind_a_read_only_are_of_another(pretence: Pretence, monkeypatch: pytest.MonkeyPatch) -> None:
+    pretence.sensor(3)
+    spoil(pretence, monkeypatch, {1: heard(ReadRegisters(9, 1, 2), FaultCode.MALFORMED)})
+    assert look(pretence) == Look(twins="something is received behind its answer")
+
+
+def test_a_value_that_cannot_be_is_of_two(pretence: Pretence) -> None:
+    pretence.sensor(3, wind=words(1e6))
+    found = look(pretence)
+    assert found.twins is not None
+    assert found.twins.startswith("what it answers is impossible: wind_speed")
+
+
+def test_one_that_gives_no_value_is_not_there(pretence: Pretence) -> None:
+    assert look(pretence) == Look(answers=False)
+    pretence.sensor(3, exception=4)
+    assert look(pretence) == Look(answers=False, exception=4)
+    assert pretence.asked[-1].timeout > QUICK
+
+
+def test_one_silence_is_asked_again(pretence: Pretence, monkeypatch: pytest.MonkeyPatch) -> None:
+    pretence.sensor(3)
+    spoil(pretence, monkeypatch, {0: heard(ReadRegisters(3, 1, 2), FaultCode.TIMEOUT)})
+    assert look(pretence) == Look()
+
+
+# -- values of two
+
+
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        [5.0, 5.0, 5.0],
+        [5.0, 9.0, 14.0],  # a gust that rises
+        [5.0, 9.0, 5.1, *repeat(5.2, 6)],  # one that came and went
+        [5.0, 9.0, 5.1, 7.0, 8.0, 6.0, 5.5, 9.5, 5.0],  # turbulence
+        [0.0, 0.7, 0.0, 0.7, 0.0, 0.7, 0.0, 0.7, 0.0],  # the last digit flickers
+    ],
+)
+def test_the_wind_of_one_sensor_may_vary_as_it_likes(pretence: Pretence, numbers: list[float]) -> None:
+    assert blowing(pretence, numbers) == Look()
+
+
+def test_values_that_take_turns_are_of_two(pretence: Pretence) -> None:
+    found = blowing(pretence, cycle([3.0, 12.5, 3.1, 12.4]))
+    assert found == Look(twins="its values jump there and back between 3 and 12.5 m/s")
+    assert len(pretence.asked) == 2 * READS + MORE_READS
+
+
+def test_a_collision_among_the_further_reads_is_of_two(pretence: Pretence, monkeypatch: pytest.MonkeyPatch) -> None:
+    spoil(pretence, monkeypatch, {7: heard(ReadRegisters(3, 1, 2), FaultCode.CRC)})
+    assert blowing(pretence, chain([3.0, 12.5, 3.1], repeat(3.0))).twins == "answers collide there"
+
+
+def test_a_vane_around_north_is_one(pretence: Pretence) -> None:
+    del pretence
+    assert jumps(DIRECTION, [359.0, 1.0, 359.0]) == 0
+    assert jumps(DIRECTION, [90.0, 270.0, 90.0]) == 2
+
+
+def test_values_without_a_range_are_not_judged() -> None:
+    assert jumps(BARE, [0.0, 60000.0, 0.0]) == 0
+
+
+@given(st.lists(st.floats(0, 100), min_size=2, max_size=9), st.floats(0, 1))
+def test_what_only_rises_or_falls_never_takes_turns(numbers: list[float], tip: float) -> None:
+    assert jumps(WIND, sorted(numbers)) < CROSSINGS - 1
+    assert jumps(WIND, sorted(numbers, reverse=True)) < CROSSINGS - 1
+    assert jumps(WIND, [50 + each / 100 * LEAST * 100 * tip for each in numbers]) == 0

@@ -1,0 +1,131 @@
+"""Stories of test_laws.py that once ended badly, each as short as it could be made."""
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias
+
+import pytest
+
+from tests.support.lives import Bench
+from tests.support.story import Story
+
+Ails: TypeAlias = tuple[str, dict[str, Any]]
+
+DONE = ("finish", 0)
+WELL: Ails = ("none", {})
+READS_NEW: Ails = ("dip_locked", {"answer": "echo", "reads": "new"})
+STORES: Ails = ("stores_but_ignores", {})
+LOSES_ECHOES: Ails = ("echo_losing", {})
+POWER_CYCLE: Ails = ("power_cycle", {})
+SILENT: Ails = ("silent", {})
+
+
+def late(delay: float) -> Ails:
+    return ("late", {"delay": delay})
+
+
+def slow(delay: float) -> Ails:
+    return ("slow_flash", {"delay": delay})
+
+
+ALONE: dict[str, tuple[list[Ails], list[Any]]] = {
+    "of two changes that a crash left unanswered the overtaken one is answered too": (
+        [STORES, WELL, WELL],
+        [("readdress", "s3", 9, ("leave", 247)), ("readdress", "s3", 200, ("leave", 247))],
+    ),
+    "two changes to one id that a crash left unanswered are answered once each": (
+        [READS_NEW, WELL, WELL],
+        [("readdress", "s3", 10, ("leave", 166)), ("readdress", "s3", 10, ("leave", 166))],
+    ),
+    "a change of the rate that is taken back takes back what earlier ones have stored": (
+        [STORES] * 3,
+        [("baudrate", True, 0, DONE), ("baudrate", False, 0, DONE)],
+    ),
+    "an adoption goes on while an earlier change is found and answered": (
+        [late(0.75), STORES, late(0.35)],
+        [
+            ("readdress", "s3", 9, ("crash", 6)),
+            ("heal", 0, 0, DONE),
+            ("plug", 9600, ("at_once", {}), DONE),
+            ("adopt", 0, 0, DONE),
+        ],
+    ),
+    "a newcomer that moves at its power cycle is found beside the next one at the factory's id": (
+        [WELL] * 3,
+        [("plug", 9600, READS_NEW, DONE), ("adopt", 0, 0, DONE), ("plug", 9600, READS_NEW, DONE)],
+    ),
+    "a newcomer that has the line's rate already is not taken for the next one at the other rate": (
+        [WELL] * 3,
+        [("plug", 19200, READS_NEW, DONE), ("adopt", 0, 0, DONE), ("plug", 19200, WELL, DONE)],
+    ),
+}
+TWINNED: dict[str, tuple[list[Ails], tuple[Ails, Ails | None], float, list[Any]]] = {
+    "a slow one of two that part is heard at the new id": (
+        [late(0.75), late(0.35), late(0.35)],
+        (READS_NEW, READS_NEW),
+        0.04,
+        [("readdress", "s3", 10, DONE)],
+    ),
+    "one that stores a rate while its twin obeys is not left behind": (
+        [POWER_CYCLE, WELL, WELL],
+        (WELL, WELL),
+        0.005,
+        [("baudrate", True, 0, DONE)],
+    ),
+    "one that is deaf while its twin is brought back is looked for once more": (
+        [slow(5.0), POWER_CYCLE, slow(5.0)],
+        (WELL, WELL),
+        0.04,
+        [("baudrate", True, 0, DONE)],
+    ),
+    "one that waits for its power cycle is not taken for its slow twin at the new rate": (
+        [POWER_CYCLE, WELL, WELL],
+        (late(0.35), None),
+        0.009,
+        [("baudrate", True, 0, DONE), ("baudrate", True, 0, ("sigterm", 71)), ("wait", 20.0, 0, DONE)],
+    ),
+    "one of two that the daemon finds parted after a crash forgets the id of the other": (
+        [late(0.35), WELL, WELL],
+        (POWER_CYCLE, None),
+        0.0055,
+        [("readdress", "s3", 10, ("leave", 184)), ("wait", 20.0, 0, DONE)],
+    ),
+    "two that meet again before the daemon could part them had one id before": (
+        [late(0.35), READS_NEW, READS_NEW],
+        (STORES, None),
+        0.04,
+        [("readdress", "s3", 10, ("leave", 380))],
+    ),
+    "one that is silent has its twin taken for it at a change of the rate": (
+        [SILENT, READS_NEW, LOSES_ECHOES],
+        (LOSES_ECHOES, slow(1.0)),
+        0.009,
+        [("baudrate", False, 0, DONE)],
+    ),
+    "one that is deaf since the change before has its twin taken for it": (
+        [slow(5.0), WELL, WELL],
+        (WELL, None),
+        0.005,
+        [("baudrate", False, 0, DONE), ("baudrate", False, 0, DONE)],
+    ),
+    "one that is silent has its twin taken for it at a change of the id": (
+        [("silent", {"first": 8.0}), WELL, WELL],
+        (WELL, WELL),
+        0.005,
+        [("wait", 6.0, 0, DONE), ("readdress", "s3", 10, ("sigterm", 228))],
+    ),
+}
+
+
+@pytest.mark.parametrize("tale", ALONE)
+def test_a_line_of_different_ids(bench: Bench, tale: str) -> None:
+    ails, steps = ALONE[tale]
+    story = Story(bench, ails)
+    story.tell(steps)
+    story.newcomers_known()
+
+
+@pytest.mark.parametrize("tale", TWINNED)
+def test_a_line_on_which_two_share_an_id(bench: Bench, tale: str) -> None:
+    ails, (twin, stranger), turnaround, steps = TWINNED[tale]
+    Story(bench, ails, twin=twin, stranger=stranger, turnaround=turnaround).tell(steps)

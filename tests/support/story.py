@@ -1,0 +1,318 @@
+"""A story of a line: requests, faults, crashes and power cuts in any order, and what must hold after each of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from lfs10d.simulator.registers import Blueprint
+from lfs10d.simulator.sensor import Sensor
+from lfs10d.simulator.wire import Format
+from tests.support.lives import Bench, Life
+from tests.support.volatile_disk import PowerCutError
+
+IDS = (3, 4, 5)
+RATES = 9600 + 19200
+LONGEST = 4000
+"""Turns of 50 ms after which a request counts as never answered."""
+
+
+FOREIGN: list[dict[int, int]] = [
+    {0: 3, 1: 225, 2: 0, 3: 7, 4: 9, 5: 700},
+    {1: 225, 2: 0, 4: 1, 5: 1},
+    {1: 0x414F, 2: 0xD70A, 4: 9, 5: 1},
+    {1: 0x414F, 2: 0xD70A, 4: 1, 5: 9},
+    {0: 87, 2000: 1, 2001: 2},
+]
+"""The registers of devices that are no LFS10, as they come at the factory's id."""
+
+
+class Foreigner(Sensor):
+    """A device of another kind that takes any write; `written` is how many came."""
+
+    written = 0
+
+    def __init__(self, words: dict[int, int], baudrate: int) -> None:
+        anything = range(1 << 16)
+        kind = Blueprint("foreign", (), words, dict.fromkeys(words, anything))
+        super().__init__(1, blueprint=kind, format=Format(baudrate))
+
+    def _write(self, *args: Any) -> bytes:  # noqa: ANN401 - passed on
+        self.written += 1
+        return super()._write(*args)
+
+
+@dataclass
+class Asked:
+    """One request, and how often its answer was heard before it was repeated."""
+
+    name: str
+    parameters: dict[str, Any]
+    journalled: bool = False
+    """Its intent was on the disk, or its life went on to the end: it has to be answered."""
+    answers: list[dict[str, Any]] = field(default_factory=list)
+
+
+class Story:
+    """One run. `ails` are those of `s3`, `s4` and `s5`, of a twin of s3 and of a stranger at 9 if there are."""
+
+    def __init__(
+        self,
+        bench: Bench,
+        ails: Sequence[tuple[str, dict[str, Any]]],
+        *,
+        twin: tuple[str, dict[str, Any]] | None = None,
+        stranger: tuple[str, dict[str, Any]] | None = None,
+        turnaround: float = 0.005,
+    ) -> None:
+        self.bench = bench
+        self.life: Life = bench.sensors(*IDS, poll="{interval: 500ms}")
+        self.by_name = {f"s{sensor.slave}": sensor for sensor in bench.line.sensors}
+        self.others: list[Sensor] = []
+        self.newcomers: list[Sensor] = []
+        self.foreigners: list[Foreigner] = []
+        self.asked: list[Asked] = []
+        self.told: list[tuple[str, Any]] = []
+        """Events of the lives that are over."""
+        self.twin: Sensor | None = None
+        self.hushed = ails[0][0] == "silent"
+        """Nobody can hear s3 beside its twin, for some time or ever: then the daemon may take the twin for it."""
+        for sensor, ailment in zip(bench.line.sensors, ails, strict=True):
+            _ail(sensor, ailment)
+        for slave, its in ((3, twin), (9, stranger)):
+            if its is not None:
+                other = bench.line.add(Sensor(slave, format=Format(9600), turnaround=turnaround))
+                _ail(other, its)
+                self.others.append(other)
+                self.twin = other if slave == 3 else self.twin
+        self.reunited = False
+        self.before = self._ids()
+        bench.go(self.life, 3.0)
+
+    # -- what happens
+
+    def tell(self, steps: Iterable[tuple[str, Any, Any, tuple[str, int]]]) -> None:
+        """Let things happen one after the other, mend all in the end, and judge."""
+        for step in steps:
+            self.step(*step)
+        self.mend()
+        self.settled()
+
+    def step(self, what: str, one: Any, more: Any, end: tuple[str, int]) -> None:  # noqa: ANN401 - as it wants
+        """Let one thing happen, and judge."""
+        bench = self.bench
+        match what:
+            case "readdress":
+                self.ask("device/readdress", end, device=one, to=more)
+            case "baudrate":
+                self.ask("line/baudrate", end, to=RATES - self.rate, power_cycle=one)
+            case "adopt":
+                self.ask("line/adopt", end)
+            case "plug":
+                self.newcomers.append(bench.line.add(Sensor(1, format=Format(one))))
+                _ail(self.newcomers[-1], more)
+                self.before = self._ids()
+            case "foreign":
+                self.foreigners.append(Foreigner(more, one))
+                bench.line.add(self.foreigners[-1])
+            case "power":
+                self._powered()
+                self.sensors[one % len(self.sensors)].power_cycle()
+            case "heal":
+                self.sensors[one % len(self.sensors)].heal()
+            case "wait":
+                bench.go(self.life, one)
+            case "unplug":
+                bench.port.unplug()
+                bench.go(self.life, one)
+                bench.port.replug()
+                bench.go(self.life, 3.0)
+        self.check()
+
+    def ask(self, name: str, end: tuple[str, int], **parameters: Any) -> Asked:  # noqa: ANN401 - any JSON
+        """Send a request, and end the daemon as `end` says: at its answer, at a step on the disk, after some turns."""
+        bench = self.bench
+        asked = Asked(name, {"id": len(self.asked), **parameters})
+        self.asked.append(asked)
+        self.hushed |= self.by_name["s3"].deaf_until > bench.clock.now * 1e9  # its flash is not done yet
+        pair = self._pair() if (name, parameters.get("device")) == ("device/readdress", "s3") else ()
+        together = [each.slave for each in pair]
+        how, after = end
+        if how == "crash":
+            bench.files.steps_left = bench.files.steps + after
+        try:
+            self.life.request(name, **asked.parameters)
+            for _ in range(after if how in ("leave", "sigterm") else LONGEST):
+                bench.turn(self.life)
+                if self.answers_of(asked) or self._dead:
+                    break
+        except PowerCutError:  # the loop was told by the task that met it
+            pass
+        asked.journalled = any(change.asked and change.asked.id == asked.parameters["id"] for change in self._open)
+        if how == "sigterm":
+            self.life.end()
+            assert self.answers_of(asked), "SIGTERM answers what is under way"
+        assert [each.slave for each in pair] == together, "of two sensors of one id none is moved"
+        dead, bench.files.steps_left = self._dead, None
+        if how in ("leave", "sigterm") or dead:
+            self.restart()
+        else:
+            assert self.answers_of(asked), "a request is answered"
+        return asked
+
+    def _pair(self) -> tuple[Sensor, ...]:
+        """Return s3 and its twin where both can be heard at one id and rate, else nothing."""
+        one, now = self.by_name["s3"], self.bench.clock.now * 1e9
+        if self.twin is None or (one.slave, one.format) != (self.twin.slave, self.twin.format):
+            return ()
+        pair = (one, self.twin)
+        mute = any(each.deaf_until > now or any(ail.kind == "silent" for ail in each.ailments) for each in pair)
+        return () if mute else pair
+
+    @property
+    def _dead(self) -> bool:
+        left = self.bench.files.steps_left
+        return left is not None and self.bench.files.steps >= left
+
+    @property
+    def _open(self) -> Any:  # noqa: ANN401 - changes
+        return self.life.physical.open
+
+    def restart(self) -> None:
+        """Cut the gateway's power and begin another life."""
+        self.told += self.life.events
+        self.bench.cut()
+        self.life = self.bench.begin()
+        self.bench.go(self.life, 1.0)
+
+    def mend(self, seconds: float = 200.0) -> None:
+        """Heal everybody, switch the power of all off and on, take the others off, and wait until nothing is open."""
+        self._powered()
+        for sensor in self.sensors:
+            sensor.heal()
+            sensor.power_cycle()
+        for other in (*self.others, *self.foreigners):
+            self.bench.line.sensors.remove(other)
+        self.restart()
+        begun = self.bench.clock.now
+        while self.bench.clock.now < begun + (seconds if self._open else 5.0):
+            self.bench.turn(self.life)
+
+    def _powered(self) -> None:
+        """Note whether s3 and its twin may meet again at a power cycle, before the daemon had the time to part them."""
+        self.reunited |= any("s3" in change.devices and not change.answered for change in self._open)
+
+    # -- what must hold
+
+    @property
+    def sensors(self) -> list[Sensor]:
+        """Everybody on the line."""
+        return [*self.by_name.values(), *self.others, *self.newcomers]
+
+    @property
+    def rate(self) -> int:
+        """The line's."""
+        return self.life.running.now.config.line.baudrate
+
+    def _ids(self) -> dict[int, int]:
+        return {id(sensor): sensor.slave for sensor in self.sensors}
+
+    def answers_of(self, asked: Asked) -> list[dict[str, Any]]:
+        """Return every response to a request so far."""
+        key = asked.parameters["id"]
+        return [each for each in self.bench.responses if (each["request"], each["id"]) == (asked.name, key)]
+
+    def check(self) -> None:
+        """Judge: ids, places, rates and responses."""
+        self._apart()
+        for name, sensor in self.by_name.items():
+            self._known(name, sensor)
+        assert not any(each.written for each in self.foreigners), "nothing is written to another kind of device"
+        for asked in self.asked:
+            assert len(self.answers_of(asked)) <= 1, "no request is answered twice"
+
+    def _apart(self) -> None:
+        """Nobody who had another id than somebody else has the same now."""
+        now = self._ids()
+        for one, its in now.items():
+            for other, others in now.items():
+                together = self.reunited and self.twin and {one, other} == {id(self.by_name["s3"]), id(self.twin)}
+                if one < other and its == others and not together:
+                    assert self.before[one] == self.before[other], "two sensors that had different ids share one"
+        self.before = now
+
+    def _known(self, name: str, sensor: Sensor) -> None:
+        """Judge that a configured sensor is where the daemon has it, or where it says it may be."""
+        place, reserved = self.life.place(name), set(self.life.physical.reserved())
+        where = f"{name} is at {sensor.slave}, {sensor.format.baudrate}; configured at {place}, reserved {reserved}"
+        excused = self.twin is not None and name == "s3" and self._beside(sensor, self.twin)
+        assert self._placed(name, sensor) or excused, where
+
+    def _placed(self, name: str, sensor: Sensor) -> bool:
+        place, reserved = self.life.place(name), set(self.life.physical.reserved())
+        return self._at_rate(name, sensor) and (sensor.slave == place or {sensor.slave, place} <= reserved)
+
+    def _at_rate(self, name: str, sensor: Sensor) -> bool:
+        opened = any(name in change.devices for change in self._open if change.kind == "baudrate")
+        return opened or sensor.format.baudrate == self.rate
+
+    def _beside(self, sensor: Sensor, twin: Sensor) -> bool:
+        """Whether s3 is where it was told that two are, or keeps silent while its twin answers for it."""
+        slaves = {facts["slave"] for kind, facts in (*self.told, *self.life.events) if kind == "duplicate_id"}
+        told = sensor.slave in slaves and self._at_rate("s3", sensor)
+        return told or (self.hushed and self._placed("s3", twin))
+
+    def settled(self) -> None:
+        """Judge the end: all are found, every request has its answer, and its repeat gets the same."""
+        self.check()
+        for name, sensor in self.by_name.items():
+            if not (self.twin is not None and name == "s3"):
+                assert sensor.slave == self.life.place(name), "healed and powered anew, it is found"
+                assert sensor.format.baudrate == self.rate
+        assert not [change for change in self._open if not change.answered], "every request has its answer"
+        for asked in self.asked:
+            self._repeated(asked)
+
+    def newcomers_known(self) -> None:
+        """Judge that each newcomer is polled, or still at the factory's id, where it can be adopted."""
+        errors = [response["error"] for response in self.bench.responses if response["request"] == "line/adopt"]
+        if any(error and error["code"] == "duplicate_id" for error in errors):
+            return  # two were plugged in at once: that was told, and a person must part them
+        places = {slave.id for slave in self.life.running.now.config.slaves}
+        for newcomer in self.newcomers:
+            polled = newcomer.slave in places and newcomer.format.baudrate == self.rate
+            assert newcomer.slave == 1 or polled, f"a newcomer is at {newcomer.slave}, {newcomer.format.baudrate}"
+
+    def _repeated(self, asked: Asked) -> None:
+        """Judge that a request that was answered, or may have written, is answered alike and not carried out twice."""
+        heard, first = len(self.bench.responses), self.answers_of(asked)
+        if not first and not asked.journalled:
+            return  # it died with its life before anything was written
+        if first and self._forgotten(asked, first[0]):
+            return
+        writes = self._writes()
+        self.life.request(asked.name, **asked.parameters)
+        self.bench.turn(self.life)
+        (again,) = self.bench.responses[heard:]
+        assert self._writes() == writes
+        if first:
+            assert {**again, "took_ms": 0} == {**first[0], "took_ms": 0}
+
+    def _forgotten(self, asked: Asked, answer: dict[str, Any]) -> bool:
+        """Whether the answer to a request that wrote nothing was lost in a power cut.
+
+        It is on the disk some seconds later only (a flood of refused requests must not wear it out); asked again,
+        the request is judged anew.
+        """
+        keys = {told.asked.id for told in self.life.physical.journal.answers}
+        return answer["status"] != "failed" and not asked.journalled and asked.parameters["id"] not in keys
+
+    def _writes(self) -> int:
+        return sum(request.body[1:2] == b"\x06" for request in self.bench.line.log)
+
+
+def _ail(sensor: Sensor, ailment: tuple[str, dict[str, Any]]) -> None:
+    kind, particulars = ailment
+    if kind != "none":
+        sensor.ail(kind, **particulars)

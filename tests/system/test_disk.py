@@ -1,0 +1,123 @@
+"""Files that survive a power cut, proved with files that forget what was not synced."""
+
+from __future__ import annotations
+
+import errno
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lfs10d.system.disk import Disk
+from tests.support.volatile_disk import ForgetfulFiles, PowerCutError
+
+FILE = Path("/state/changes.yaml")
+DRAFT = Path("/state/.changes.yaml.new")
+STEPS_OF_REPLACE = 4
+
+
+def begun() -> tuple[ForgetfulFiles, Disk]:
+    """Return files with an old content safely on the disk."""
+    files = ForgetfulFiles()
+    disk = Disk(files)
+    disk.replace(FILE, b"old")
+    return files, disk
+
+
+@given(st.integers(0, STEPS_OF_REPLACE), st.sets(st.sampled_from([FILE, DRAFT])))
+def test_a_replaced_file_is_old_or_new_whenever_the_power_fails(cut: int, surviving: set[Path]) -> None:
+    files, disk = begun()
+    files.steps_left = files.steps + cut
+    try:
+        disk.replace(FILE, b"new")
+        returned = True
+    except PowerCutError:
+        returned = False
+    files.power_cut(surviving)
+    assert returned == (cut == STEPS_OF_REPLACE)
+    assert disk.read(FILE) in ({b"new"} if returned else {b"old", b"new"})
+
+
+@given(st.integers(0, 2), st.booleans())
+def test_what_was_appended_is_there_once_the_call_returned(cut: int, survives: bool) -> None:  # noqa: FBT001 - the test's parameter
+    files, disk = begun()
+    files.steps_left = files.steps + cut
+    try:
+        disk.append(FILE, b" and more")
+        returned = True
+    except PowerCutError:
+        returned = False
+    files.power_cut({FILE} if survives else ())
+    assert disk.read(FILE) == b"old and more" if returned else disk.read(FILE).startswith(b"old")
+
+
+def test_a_file_begun_by_an_append_has_its_name_on_the_disk() -> None:
+    files = ForgetfulFiles()
+    Disk(files).append(FILE, b"first")
+    files.power_cut()
+    assert Disk(files).read(FILE) == b"first"
+
+
+def test_a_removed_file_stays_removed() -> None:
+    files, disk = begun()
+    disk.remove(FILE)
+    disk.remove(FILE)
+    files.power_cut()
+    assert not files.exists(FILE)
+
+
+def test_a_full_disk_leaves_the_old_content_and_no_draft() -> None:
+    files, disk = begun()
+    files.full = 2
+    with pytest.raises(OSError, match="No space left") as failed:
+        disk.replace(FILE, b"new content")
+    assert failed.value.errno == errno.ENOSPC
+    assert disk.read(FILE) == b"old"
+    assert set(files.seen) == {FILE}
+
+
+def test_an_append_that_failed_is_taken_back() -> None:
+    files, disk = begun()
+    files.full = 2
+    with pytest.raises(OSError, match="No space left"):
+        disk.append(FILE, b"more")
+    assert disk.read(FILE) == b"old"
+    with pytest.raises(OSError, match="No space left"):
+        disk.append(Path("/state/other"), b"more")
+    assert disk.read(Path("/state/other")) == b""
+
+
+def test_on_the_real_file_system_the_same_steps_do_the_same(tmp_path: Path) -> None:
+    disk, file = Disk(), tmp_path / "file"
+    disk.replace(file, b"one")
+    disk.append(file, b" two")
+    assert disk.read(file) == b"one two"
+    assert file.stat().st_mode & 0o777 == 0o600
+    disk.append(tmp_path / "new", b"x")
+    disk.files.truncate(file, 3)
+    assert file.read_bytes() == b"one"
+    disk.remove(file)
+    assert [path.name for path in tmp_path.iterdir()] == ["new"]
+
+
+def test_a_folder_that_is_not_there_is_an_error_of_the_system(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        Disk().replace(tmp_path / "none" / "file", b"x")
+    with pytest.raises(FileNotFoundError):
+        Disk().append(tmp_path / "none" / "file", b"x")
+
+
+@pytest.mark.parametrize("cut", range(3))
+def test_a_file_put_aside_is_under_one_of_its_names_whenever_the_power_fails(cut: int) -> None:
+    files, disk = begun()
+    aside = FILE.with_name("aside")
+    files.steps_left = files.steps + cut
+    if cut < 2:
+        with pytest.raises(PowerCutError):
+            disk.put_aside(FILE, aside)
+    else:
+        disk.put_aside(FILE, aside)
+    files.power_cut()
+    assert files.read(aside if cut == 2 else FILE) == b"old"
+    assert files.exists(aside) is not files.exists(FILE)

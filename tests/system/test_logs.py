@@ -1,0 +1,421 @@
+"""One line per record, whatever is in it and wherever it goes."""
+
+from __future__ import annotations
+
+import gc
+import json
+import logging
+import os
+import re
+import sys
+import threading
+import warnings
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lfs10d.system.logs import (
+    LIMIT,
+    DescriptorHandler,
+    LineFormatter,
+    Style,
+    escape,
+    install,
+    is_journal,
+    likes_colour,
+    shortened,
+    style_of,
+)
+
+WHEN = 1_795_298_022.003
+"""2026-11-21T21:53:42.003Z."""
+
+
+def record(
+    words: str = "slave 3 is offline",
+    *arguments: object,
+    level: int = logging.WARNING,
+    name: str = "lfs10d.line.poller",
+    error: BaseException | None = None,
+) -> logging.LogRecord:
+    """Return a record as the logging package would make it."""
+    trouble = None if error is None else (type(error), error, error.__traceback__)
+    made = logging.LogRecord(name, level, __file__, 1, words, arguments, trouble)
+    made.created = WHEN
+    return made
+
+
+def fail(error: ValueError) -> None:
+    """Raise it."""
+    raise error
+
+
+def raised(words: str = "no such\nregister") -> ValueError:
+    """Return an error with a traceback."""
+    made = ValueError(words)
+    with suppress(ValueError):
+        fail(made)
+    return made
+
+
+@pytest.mark.parametrize(
+    ("text", "safe"),
+    [
+        ("Mast, 10 m \u2013 Nord\u00f6st \U0001f32c", "Mast, 10 m \u2013 Nord\u00f6st \U0001f32c"),
+        ("a\nb\r\tc", "a\\nb\\r\\tc"),
+        ("\x1b[2J\x07\x7f\x9b", "\\x1b[2J\\x07\\x7f\\x9b"),
+        ("a\u2028b\u202ec", "a\\u2028b\\u202ec"),
+        ("\udc80\U000e0041", "\\udc80\\U000e0041"),
+        ("C:\\new", "C:\\new"),
+        ("", ""),
+    ],
+)
+def test_what_could_fool_a_reader_is_spelled_out(text: str, safe: str) -> None:
+    assert escape(text) == safe
+
+
+@given(st.text())
+def test_escaped_text_is_printable_and_stays_as_it_is(text: str) -> None:
+    once = escape(text)
+
+    assert once.isprintable()
+    assert escape(once) == once
+    if text.isprintable():
+        assert once == text
+
+
+@given(st.text(max_size=200), st.integers(20, 100))
+def test_a_shortened_line_is_within_its_limit_and_keeps_both_ends(text: str, limit: int) -> None:
+    line = escape(text)
+    cut = shortened(line, limit)
+
+    assert len(cut.encode()) <= limit
+    if len(line.encode()) <= limit:
+        assert cut == line
+    else:
+        begin, _, end = cut.partition(" ... ")
+        assert line.startswith(begin)
+        assert line.endswith(end)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "journal", "terminal", "coloured", "style"),
+    [
+        ("auto", True, False, True, Style.JOURNAL),
+        ("auto", False, True, True, Style.COLOUR),
+        ("auto", False, True, False, Style.PLAIN),
+        ("auto", False, False, True, Style.PLAIN),
+        ("journal", False, True, True, Style.JOURNAL),
+        ("text", False, True, True, Style.COLOUR),
+        ("text", False, False, True, Style.PLAIN),
+        ("text", True, False, True, Style.BARE),
+        ("plain", False, True, True, Style.PLAIN),
+        ("plain", True, False, True, Style.BARE),
+        ("json", True, False, True, Style.JSON),
+        ("json", False, True, True, Style.JSON),
+    ],
+)
+def test_the_style_suits_where_the_lines_go(
+    wanted: str, style: Style, *, journal: bool, terminal: bool, coloured: bool
+) -> None:
+    assert style_of(wanted, journal=journal, terminal=terminal, coloured=coloured) is style
+
+
+@pytest.mark.parametrize(
+    ("variables", "liked"),
+    [
+        ({}, True),
+        ({"TERM": "xterm"}, True),
+        ({"TERM": "dumb"}, False),
+        ({"NO_COLOR": "1"}, False),
+        ({"NO_COLOR": ""}, True),
+    ],
+)
+def test_colour_is_left_out_where_it_is_not_liked(variables: dict[str, str], *, liked: bool) -> None:
+    assert likes_colour(variables) == liked
+
+
+def test_the_journal_is_known_by_device_and_inode(tmp_path: Path) -> None:
+    fd = os.open(tmp_path / "stream", os.O_WRONLY | os.O_CREAT)
+    status = os.fstat(fd)
+
+    assert is_journal(fd, {"JOURNAL_STREAM": f"{status.st_dev}:{status.st_ino}"})
+    assert not is_journal(fd, {"JOURNAL_STREAM": f"{status.st_dev}:{status.st_ino + 1}"})
+    assert not is_journal(fd, {})
+    os.close(fd)
+    assert not is_journal(fd, {"JOURNAL_STREAM": f"{status.st_dev}:{status.st_ino}"})
+
+
+@pytest.mark.parametrize(
+    ("level", "priority"),
+    [(logging.CRITICAL, 2), (logging.ERROR, 3), (logging.WARNING, 4), (logging.INFO, 6), (logging.DEBUG, 7), (1, 7)],
+)
+def test_the_journal_is_told_the_priority(level: int, priority: int) -> None:
+    line = LineFormatter(Style.JOURNAL).format(record(level=level))
+
+    assert line == f"<{priority}>slave 3 is offline"
+
+
+@pytest.mark.parametrize(
+    ("style", "line"),
+    [
+        (Style.PLAIN, "2026-11-21T21:53:42.003Z warning slave 3 is offline"),
+        (Style.BARE, "warning slave 3 is offline"),
+    ],
+)
+def test_a_line_says_when_how_bad_and_what(style: Style, line: str) -> None:
+    assert LineFormatter(style).format(record()) == line
+
+
+@pytest.mark.parametrize(
+    ("level", "colour"),
+    [(logging.ERROR, "\x1b[31m"), (logging.WARNING, "\x1b[33m"), (logging.INFO, ""), (logging.DEBUG, "\x1b[2m")],
+)
+def test_on_a_terminal_colour_says_how_bad(level: int, colour: str) -> None:
+    line = LineFormatter(Style.COLOUR).format(record(level=level))
+
+    name = logging.getLevelName(level).lower()
+    assert line.endswith(f"\x1b[0m {colour}{name:<7} slave 3 is offline\x1b[0m")
+    assert re.match(r"\x1b\[2m\d\d:\d\d:\d\d \S+\x1b", line)  # the time has the name of its zone
+
+
+def test_json_is_one_object_a_line() -> None:
+    line = LineFormatter(Style.JSON).format(record('label "M\u00e4st"\n'))
+
+    assert json.loads(line) == {
+        "time": "2026-11-21T21:53:42.003Z",
+        "level": "warning",
+        "logger": "lfs10d.line.poller",
+        "message": 'label "M\u00e4st"\\n',
+    }
+
+
+def test_json_stays_json_however_long_the_message() -> None:
+    line = LineFormatter(Style.JSON).format(record('"' * 10_000))
+
+    assert len(line) < LIMIT
+    assert json.loads(line)["message"].startswith('"""')
+
+
+@pytest.mark.parametrize("style", list(Style))
+@given(words=st.text(), argument=st.text())
+def test_no_record_breaks_its_line(style: Style, words: str, argument: str) -> None:
+    line = LineFormatter(style, tracebacks=True).format(record(words + "%s", argument, error=raised(argument)))
+
+    plain = line.replace("\x1b[0m", "").replace("\x1b[2m", "").replace("\x1b[33m", "")
+    assert plain.isprintable()
+
+
+def test_an_error_is_its_type_and_text_on_the_same_line() -> None:
+    line = LineFormatter(Style.BARE).format(record("slave %d", 3, error=raised()))
+
+    assert line == "warning slave 3: ValueError: no such\\nregister"
+
+
+def test_an_error_without_text_is_its_type() -> None:
+    assert LineFormatter(Style.BARE).format(record("slave 3", error=raised(""))) == "warning slave 3: ValueError"
+
+
+def test_a_traceback_is_told_on_the_same_line_where_it_is_wanted() -> None:
+    line = LineFormatter(Style.BARE, tracebacks=True).format(record("slave 3", error=raised()))
+
+    assert line.startswith("warning slave 3: ValueError: no such\\nregister | Traceback (most recent call last):\\n")
+    assert "in fail" in line
+
+
+def test_exc_info_without_an_exception_says_nothing_more() -> None:
+    made = record()
+    made.exc_info = (None, None, None)
+
+    assert LineFormatter(Style.BARE).format(made) == "warning slave 3 is offline"
+
+
+def test_another_packages_record_begins_with_its_name() -> None:
+    line = LineFormatter(Style.BARE).format(record("Task was destroyed", name="asyncio"))
+
+    assert line == "warning asyncio: Task was destroyed"
+
+
+def test_a_faulty_log_call_is_told_as_it_is() -> None:
+    line = LineFormatter(Style.BARE).format(record("%d slaves", "two"))
+
+    assert line.startswith("warning %d slaves ('two',) (")
+
+
+@pytest.fixture
+def pipe() -> Iterator[tuple[int, int]]:
+    """Give both ends of a pipe, the end to write to in second place."""
+    ends = os.pipe()
+    yield ends
+    for end in ends:
+        try:
+            os.close(end)
+        except OSError:
+            continue  # the test closed it
+
+
+def handler_on(descriptor: int) -> DescriptorHandler:
+    """Return a handler of bare lines."""
+    handler = DescriptorHandler(descriptor)
+    handler.setFormatter(LineFormatter(Style.BARE))
+    return handler
+
+
+def test_each_record_is_a_line(pipe: tuple[int, int]) -> None:
+    handler = handler_on(pipe[1])
+
+    handler.handle(record("one"))
+    handler.handle(record("two\nlines", level=logging.INFO))
+
+    assert os.read(pipe[0], 4096) == b"warning one\ninfo two\\nlines\n"
+    assert handler.dropped == 0
+
+
+def test_a_line_too_long_for_one_write_loses_its_middle(pipe: tuple[int, int]) -> None:
+    handler_on(pipe[1]).handle(record("begin" + "x" * 10_000 + "end"))
+
+    line = os.read(pipe[0], 20_000)
+
+    assert len(line) <= LIMIT
+    assert line.startswith(b"warning beginxxx")
+    assert line.endswith(b"xxxend\n")
+
+
+def test_a_reader_who_stops_costs_records_and_is_told_how_many(pipe: tuple[int, int]) -> None:
+    handler = handler_on(pipe[1])
+    for _ in range(100):
+        handler.handle(record("x" * 4000))
+    lost = handler.dropped
+    assert lost > 0
+
+    os.read(pipe[0], 1_000_000)
+    handler.handle(record("again"))
+
+    assert os.read(pipe[0], 4096).decode() == (
+        f"warning {lost} log records were lost: nobody took them from standard error\nwarning again\n"
+    )
+    assert handler.dropped == 0
+
+
+def test_a_reader_who_is_gone_costs_records_and_nothing_else(pipe: tuple[int, int]) -> None:
+    os.close(pipe[0])
+    handler = handler_on(pipe[1])
+
+    for _ in range(3):
+        handler.handle(record())
+
+    assert handler.dropped == 3
+
+
+def test_a_closed_descriptor_costs_records_and_nothing_else(pipe: tuple[int, int]) -> None:
+    os.close(pipe[1])
+    handler = handler_on(pipe[1])
+
+    handler.handle(record())
+
+    assert handler.dropped == 1
+
+
+def test_a_full_disk_costs_records_and_nothing_else() -> None:
+    fd = os.open("/dev/full", os.O_WRONLY)
+    handler = handler_on(fd)
+
+    handler.handle(record())
+
+    assert handler.dropped == 1
+    os.close(fd)
+
+
+def test_a_negative_descriptor_costs_records_and_nothing_else() -> None:
+    handler = handler_on(-1)
+
+    handler.handle(record())
+
+    assert handler.dropped == 1
+
+
+@pytest.fixture
+def logging_restored(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Put the logging of the process back as it was."""
+    monkeypatch.setattr(threading, "excepthook", threading.excepthook)
+    monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
+    monkeypatch.delenv("JOURNAL_STREAM", raising=False)
+    root, ours = logging.getLogger(), logging.getLogger("lfs10d")
+    before = root.handlers[:], root.level, ours.level
+    yield
+    logging.captureWarnings(capture=False)
+    root.handlers[:], root_level, our_level = before
+    root.setLevel(root_level)
+    ours.setLevel(our_level)
+
+
+@pytest.mark.usefixtures("logging_restored")
+def test_installed_logging_tells_us_by_level_and_others_from_warning_on(pipe: tuple[int, int]) -> None:
+    install("info", "plain", descriptor=pipe[1])
+
+    logging.getLogger("lfs10d.modbus").debug("frame")
+    logging.getLogger("lfs10d.modbus").info("port open")
+    logging.getLogger("paho").info("chatter")
+    logging.getLogger("paho").warning("trouble")
+
+    lines = os.read(pipe[0], 4096).decode().splitlines()
+    assert [line.partition("Z ")[2] for line in lines] == ["info port open", "warning paho: trouble"]
+
+
+@pytest.mark.usefixtures("logging_restored")
+def test_installed_again_it_takes_the_place_of_the_first(pipe: tuple[int, int]) -> None:
+    install("error", "plain", descriptor=pipe[1])
+    install("debug", "journal", descriptor=pipe[1])
+
+    logging.getLogger("lfs10d").debug("frame", exc_info=raised())
+
+    line = os.read(pipe[0], 4096)
+    assert line.startswith(b"<7>frame: ValueError: no such\\nregister | Traceback")
+    assert line.count(b"\n") == 1
+
+
+@pytest.mark.usefixtures("logging_restored")
+def test_under_the_journal_lines_have_a_priority_by_themselves(
+    pipe: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    status = os.fstat(pipe[1])
+    monkeypatch.setenv("JOURNAL_STREAM", f"{status.st_dev}:{status.st_ino}")
+    install("info", descriptor=pipe[1])
+
+    logging.getLogger("lfs10d").error("broken")
+
+    assert os.read(pipe[0], 4096) == b"<3>broken\n"
+
+
+@pytest.mark.usefixtures("logging_restored")
+def test_what_nobody_caught_is_one_line_too(pipe: tuple[int, int]) -> None:
+    install("info", "journal", descriptor=pipe[1])
+
+    class Spiteful:
+        def __del__(self) -> None:
+            raise ValueError("in a destructor")
+
+    thread = threading.Thread(target=fail, args=(ValueError("in a thread"),), name="line")
+    thread.start()
+    thread.join()
+    Spiteful()
+    gc.collect()
+
+    first, second = os.read(pipe[0], 4096).decode().splitlines()
+    assert first == "<3>the thread line ended: ValueError: in a thread"
+    assert second.startswith("<3>")
+    assert second.endswith("ValueError: in a destructor")
+
+
+@pytest.mark.usefixtures("logging_restored")
+def test_a_thread_that_is_gone_already_is_told_without_its_name(pipe: tuple[int, int]) -> None:
+    install("info", "journal", descriptor=pipe[1])
+
+    threading.excepthook(threading.ExceptHookArgs((ValueError, ValueError("late"), None, None)))
+
+    assert os.read(pipe[0], 4096) == b"<3>the thread unknown ended: ValueError: late\n"

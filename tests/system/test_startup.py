@@ -1,0 +1,72 @@
+"""A verb starts without what it does not need."""
+
+from __future__ import annotations
+
+import gc
+import subprocess
+import sys
+
+import pytest
+
+from lfs10d.system import startup
+from lfs10d.system.startup import NoPlugins
+
+NEVER = ("importlib.metadata", "zipfile", "csv", "rich", "http.client", "email")
+"""Megabytes that no running daemon needs."""
+
+
+def in_a_fresh_interpreter(code: str) -> str:
+    """Return what Python prints that has imported nothing yet."""
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
+
+
+def test_the_daemon_is_imported_without_what_it_does_not_need() -> None:
+    code = (
+        "import sys, lfs10d.cli.exit_status; from lfs10d import startup; startup.begin()\n"
+        f"import lfs10d.cli.run; print([name for name in {NEVER!r} if name in sys.modules])"
+    )
+    assert in_a_fresh_interpreter(code) == "[]"
+
+
+@pytest.fixture
+def no_loader(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let nobody have looked for plugins yet."""
+    monkeypatch.delitem(sys.modules, startup._LOADER, raising=False)
+
+
+def test_nobody_looks_for_garbage_among_what_was_imported() -> None:
+    try:
+        startup.done()
+        assert gc.get_freeze_count() > 10_000
+    finally:
+        gc.unfreeze()
+
+
+@pytest.mark.usefixtures("no_loader")
+def test_no_plugins_are_found_and_the_rest_of_the_loader_is_the_true_one() -> None:
+    startup.begin()
+    loader = sys.modules[startup._LOADER]
+    assert isinstance(loader, NoPlugins)
+    assert loader.get_plugins() == ()
+    assert not hasattr(loader, "__path__")
+    assert loader.PYDANTIC_ENTRY_POINT_GROUP == "pydantic"
+    assert sys.modules[startup._LOADER] is not loader
+    assert loader.PYDANTIC_ENTRY_POINT_GROUP == "pydantic"
+
+
+def test_what_stands_in_for_a_client_of_the_web_gives_way_to_it() -> None:
+    code = (
+        "import sys; from lfs10d import startup; startup.begin()\n"
+        "import urllib.request as web; print(type(web).__name__, 'http.client' in sys.modules)\n"
+        "print(web.getproxies.__module__, web.Request.__name__, 'http.client' in sys.modules)\n"
+        "import urllib.request; print(type(urllib.request).__name__)"
+    )
+    assert in_a_fresh_interpreter(code).splitlines() == ["Later False", "urllib.request Request True", "module"]
+
+
+def test_a_client_of_the_web_that_is_there_stays() -> None:
+    code = (
+        "import urllib.request; there = urllib.request; from lfs10d import startup; startup.begin()\n"
+        "import urllib.request; print(urllib.request is there)"
+    )
+    assert in_a_fresh_interpreter(code) == "True"

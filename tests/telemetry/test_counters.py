@@ -1,0 +1,377 @@
+"""Counts since boot and figures of the last half minute."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import cast
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lfs10d.reading import Errand, Exchanged, Fault, FaultCode, Reading, UartCounters
+from lfs10d.telemetry.counters import DeviceTally, LineTally, percentile, scaled
+from lfs10d.telemetry.publication import Backlog
+
+START = 1000.0
+TIMEOUT = Fault(FaultCode.TIMEOUT, "")
+BUSY = Fault(FaultCode.EXCEPTION, "busy", exception_code=6, busy=True)
+LOST = Fault(FaultCode.PORT_LOST, "")
+
+
+def exchange(
+    at: float,
+    *,
+    took: float = 0.03,
+    gap: float | None = 0.004,
+    errand: Errand = Errand.POLL,
+    unsolicited: int = 0,
+    late: int = 0,
+) -> Exchanged:
+    return Exchanged(
+        at=at,
+        asked=at - took,
+        began=at - took,
+        gap=gap,
+        slave=1,
+        errand=errand,
+        fault=None,
+        sent=b"",
+        heard=b"",
+        unsolicited=unsolicited,
+        late=late,
+    )
+
+
+def reading(
+    at: float,
+    fault: Fault | None = None,
+    *,
+    rtt: float | None = 0.02,
+    probe: bool = False,
+    failed: tuple[FaultCode, ...] = (),
+    overruns: int = 0,
+) -> Reading:
+    return Reading(
+        device="a",
+        at=at,
+        values={"wind_speed": 1.0} if fault is None else None,
+        fault=fault,
+        rtt=rtt if fault is None else None,
+        online=True,
+        response_timeout=0.2,
+        probe=probe,
+        failed_attempts=failed,
+        overruns=overruns,
+    )
+
+
+def figures(tally: LineTally, now: float = START + 30) -> Mapping[str, object]:
+    return tally.payload(now, ts=7, gap_required=0.0036458, backlog=Backlog(5, 3, 2))
+
+
+def gaps(tally: LineTally) -> dict[str, float | None]:
+    return cast("dict[str, float | None]", figures(tally)["gap_us"])
+
+
+@given(st.lists(st.floats(0, 1), min_size=1, max_size=50), st.integers(1, 100))
+def test_a_percentile_is_the_smallest_value_that_enough_do_not_exceed(values: list[float], percent: int) -> None:
+    found = percentile(values, percent)
+    assert found is not None
+    enough = len(values) * percent / 100
+    assert sum(value <= found for value in values) >= enough
+    assert sum(value < found for value in values) < enough
+
+
+def test_of_nothing_there_is_no_percentile() -> None:
+    assert percentile([], 50) is None
+    assert scaled(None, 1e3, 1) is None
+
+
+def test_before_anything_happened_all_that_is_unknown_is_null() -> None:
+    assert LineTally(START).payload(START, ts=7, gap_required=0.0036458, backlog=Backlog()) == {
+        "v": 1,
+        "ts": 7,
+        "load_pct": None,
+        "polls_per_s": None,
+        "cycle_s": None,
+        "gap_required_us": 3645.8,
+        "gap_us": {"min": None, "p50": None, "p99": None},
+        "exchanges": 0,
+        "errors": {},
+        "unsolicited_bytes": 0,
+        "uart": None,
+        "store": {"depth": 0, "oldest_ts": None, "dropped": 0},
+    }
+
+
+def test_an_idle_line_is_known_to_be_idle() -> None:
+    payload = figures(LineTally(START))
+    assert (payload["load_pct"], payload["polls_per_s"], payload["cycle_s"]) == (0.0, 0.0, None)
+
+
+def test_the_load_is_the_share_of_the_time_the_line_was_given_away() -> None:
+    tally = LineTally(START)
+    for number in range(600):
+        tally.exchanged(exchange(START + 0.05 * (number + 1), took=0.02))
+    payload = figures(tally)
+    assert payload["load_pct"] == pytest.approx(40, abs=1)
+    assert payload["exchanges"] == 600
+
+
+def test_the_load_never_exceeds_the_line() -> None:
+    tally = LineTally(START)
+    tally.exchanged(exchange(START + 0.1, took=5.0))
+    assert figures(tally, START + 1.5)["load_pct"] == 100.0
+
+
+def test_rates_are_of_the_last_half_minute_alone() -> None:
+    tally = LineTally(START)
+    for number in range(1000):
+        tally.polled(reading(START + 0.1 * number), 0.1)
+    assert figures(tally, START + 100)["polls_per_s"] == pytest.approx(10, abs=0.1)
+    assert figures(tally, START + 115)["polls_per_s"] == pytest.approx(5, abs=0.2)
+    assert figures(tally, START + 200)["polls_per_s"] == 0.0
+
+
+def test_shortly_after_the_start_rates_are_of_the_time_since() -> None:
+    tally = LineTally(START)
+    for number in range(20):
+        tally.polled(reading(START + 0.1 * number), None)
+    assert figures(tally, START + 2)["polls_per_s"] == 10.0
+
+
+@pytest.mark.parametrize("since", [0.0, 5e-324, 0.9])
+def test_within_the_first_second_no_rate_is_known(since: float) -> None:
+    tally = LineTally(0.0)
+    tally.exchanged(exchange(0.0))
+    tally.polled(reading(0.0), None)
+    payload = figures(tally, since)
+    assert (payload["load_pct"], payload["polls_per_s"]) == (None, None)
+
+
+def test_the_cycle_is_the_longest_time_between_two_polls_of_one_device() -> None:
+    tally = LineTally(START)
+    for apart in (0.3, 0.9, None, 0.5):
+        tally.polled(reading(START + 1), apart)
+    assert figures(tally)["cycle_s"] == 0.9
+    assert figures(tally, START + 60)["cycle_s"] is None
+
+
+def test_an_event_that_comes_in_late_joins_the_newest_second() -> None:
+    tally = LineTally(START)
+    tally.polled(reading(START + 5), None)
+    tally.polled(reading(START + 3.9), None)
+    assert figures(tally, START + 10)["polls_per_s"] == 0.2
+
+
+def test_gaps_are_told_by_their_least_median_and_99th_percentile() -> None:
+    tally = LineTally(START)
+    for number in range(100):
+        tally.exchanged(exchange(START, gap=0.004 + number * 1e-5))
+    assert gaps(tally) == {"min": 4000.0, "p50": 4490.0, "p99": 4980.0}
+
+
+def test_the_least_gap_is_since_boot_and_the_others_of_the_last_thousand() -> None:
+    tally = LineTally(START)
+    tally.exchanged(exchange(START, gap=0.0037))
+    for _ in range(1000):
+        tally.exchanged(exchange(START, gap=0.005))
+    assert gaps(tally) == {"min": 3700.0, "p50": 5000.0, "p99": 5000.0}
+
+
+@pytest.mark.parametrize("errand", [Errand.SCAN, Errand.CHANGE])
+def test_gaps_at_other_rates_are_left_out(errand: Errand) -> None:
+    tally = LineTally(START)
+    tally.exchanged(exchange(START, gap=0.001, errand=errand))
+    tally.exchanged(exchange(START, gap=None))
+    assert gaps(tally) == {"min": None, "p50": None, "p99": None}
+
+
+def test_a_line_at_another_rate_has_no_gaps_yet() -> None:
+    tally = LineTally(START)
+    tally.exchanged(exchange(START, gap=0.0019))
+    tally.retimed()
+    tally.exchanged(exchange(START, gap=0.0040))
+    assert gaps(tally)["min"] == 4000.0
+
+
+def test_errors_count_every_attempt_of_a_poll_but_no_busy_device() -> None:
+    tally = LineTally(START)
+    tally.polled(reading(START, failed=(FaultCode.CRC,)), None)
+    tally.polled(reading(START, TIMEOUT, failed=(FaultCode.CRC,)), None)
+    tally.polled(reading(START, BUSY), None)
+    assert figures(tally)["errors"] == {"crc": 2, "timeout": 1}
+
+
+def test_late_answers_are_counted_one_by_one_and_not_again_with_their_poll() -> None:
+    tally = LineTally(START)
+    tally.exchanged(exchange(START, late=2))
+    tally.polled(reading(START, Fault(FaultCode.LATE, ""), failed=(FaultCode.LATE,)), None)
+    assert figures(tally)["errors"] == {"late": 2}
+
+
+def test_losses_of_the_port_and_missed_points_of_the_grid_are_counted() -> None:
+    tally = LineTally(START)
+    tally.lost(FaultCode.PORT_BUSY)
+    tally.overran(3)
+    assert figures(tally)["errors"] == {"port_busy": 1, "overrun": 3}
+
+
+def test_unsolicited_bytes_uart_and_store_are_told() -> None:
+    tally = LineTally(START)
+    tally.exchanged(exchange(START, unsolicited=4))
+    tally.exchanged(exchange(START, unsolicited=1))
+    tally.uart = UartCounters(framing=1, parity=2, overrun=3, breaks=4)
+    payload = figures(tally)
+    assert payload["unsolicited_bytes"] == 5
+    assert payload["uart"] == {"framing": 1, "parity": 2, "overrun": 3, "break": 4}
+    assert payload["store"] == {"depth": 5, "oldest_ts": 3, "dropped": 2}
+
+
+def test_a_device_never_polled_has_nulls() -> None:
+    assert DeviceTally(None).payload(7) == {
+        "v": 1,
+        "ts": 7,
+        "polls": 0,
+        "good": 0,
+        "errors": {},
+        "rtt_ms": {"p50": None, "p95": None},
+        "response_timeout_ms": None,
+        "request_gap_ms": 0.0,
+        "last_good_ts": None,
+    }
+
+
+def test_a_fixed_time_out_is_known_before_the_first_poll() -> None:
+    assert DeviceTally(0.25).payload(7)["response_timeout_ms"] == 250.0
+
+
+def test_a_configured_rest_is_known_before_the_first_poll_and_a_learned_one_after_it() -> None:
+    tally = DeviceTally(None, 0.1)
+    assert tally.payload(7)["request_gap_ms"] == 100.0
+    tally.polled(replace(reading(1.0), request_gap=0.4), 7)
+    assert tally.payload(7)["request_gap_ms"] == 400.0
+
+
+def test_a_device_s_polls_values_errors_and_times_are_told() -> None:
+    tally = DeviceTally(None)
+    for number in range(100):
+        tally.polled(reading(START + number, rtt=0.0101 + number / 1000), 5000 + number)
+    tally.polled(reading(START + 100, TIMEOUT, overruns=2), 6000)
+    tally.polled(reading(START + 101, BUSY), 6001)
+    assert tally.payload(7) == {
+        "v": 1,
+        "ts": 7,
+        "polls": 102,
+        "good": 100,
+        "errors": {"overrun": 2, "timeout": 1},
+        "rtt_ms": {"p50": 59.1, "p95": 104.1},
+        "response_timeout_ms": 200.0,
+        "request_gap_ms": 0.0,
+        "last_good_ts": 5099,
+    }
+
+
+def test_a_good_reading_without_a_time_of_answer_spoils_no_percentile() -> None:
+    tally = DeviceTally(None)
+    tally.polled(reading(START, rtt=None), 1)
+    assert (tally.payload(7)["good"], tally.payload(7)["rtt_ms"]) == (1, {"p50": None, "p95": None})
+
+
+def test_the_time_between_two_polls_is_told() -> None:
+    tally = DeviceTally(None)
+    assert tally.polled(reading(START), 1) is None
+    assert tally.polled(reading(START + 0.5, TIMEOUT), 2) == 0.5
+
+
+def test_probes_are_polls_but_stand_apart() -> None:
+    tally = DeviceTally(None)
+    tally.polled(reading(START), 1)
+    assert tally.polled(reading(START + 15, TIMEOUT, probe=True), 2) is None
+    assert tally.polled(reading(START + 30), 3) is None
+    assert tally.payload(7)["polls"] == 3
+
+
+def test_a_lost_port_is_an_error_but_no_poll() -> None:
+    tally = DeviceTally(None)
+    tally.polled(reading(START), 1)
+    assert tally.polled(reading(START + 1, LOST), 2) is None
+    assert tally.polled(reading(START + 9), 3) is None
+    assert (tally.payload(7)["polls"], tally.payload(7)["errors"]) == (2, {"port_lost": 1})
+
+
+def test_a_percentile_is_not_one_too_small_where_the_share_is_just_above_a_whole_number() -> None:
+    assert percentile([float(n) for n in range(26)], 77) == 20.0
+
+
+def test_figures_are_told_to_a_tenth_of_their_unit() -> None:
+    tally = LineTally(START)
+    odd = 0.50000014
+    tally.exchanged(exchange(START + 1.0, gap=odd))
+    told = tally.payload(START + 30, ts=7, gap_required=odd, backlog=Backlog())
+    assert told["gap_required_us"] == 500_000.1
+    assert told["gap_us"] == {"min": 500_000.1, "p50": 500_000.1, "p99": 500_000.1}
+    device = DeviceTally(0.50014)
+    device.polled(reading(START, rtt=0.50014), 7)
+    device.response_timeout = 0.50014
+    told = device.payload(7)
+    assert told["rtt_ms"] == {"p50": 500.1, "p95": 500.1}
+    assert told["response_timeout_ms"] == 500.1
+
+
+def test_rates_are_told_in_tenths_of_a_percent_hundredths_of_a_poll_and_milliseconds() -> None:
+    tally = LineTally(START)
+    tally.exchanged(exchange(START + 1.0, took=0.37037))
+    tally.polled(reading(START + 1.0), 1.23456)
+    rates = tally.rates(START + 3.0)
+    assert (rates.load_pct, rates.polls_per_s, rates.cycle_s) == (12.3, 0.33, 1.235)
+
+
+def test_a_load_of_half_the_time_is_half() -> None:
+    tally = LineTally(START)
+    for second in range(30):
+        tally.exchanged(exchange(START + second + 0.6, took=0.5))
+    assert tally.rates(START + 30).load_pct == pytest.approx(50.0, abs=0.1)
+
+
+def test_within_the_first_second_the_cycle_is_known_and_after_it_the_rates() -> None:
+    tally = LineTally(START)
+    tally.polled(reading(START + 0.5), 0.25)
+    assert tally.rates(START + 0.9).payload() == {"load_pct": None, "polls_per_s": None, "cycle_s": 0.25}
+    assert tally.rates(START + 1.0).polls_per_s == 1.0
+
+
+def test_the_events_of_one_second_are_kept_as_one() -> None:
+    tally = LineTally(START)
+    for n in range(1000):
+        tally.exchanged(exchange(START + n / 1001, took=0.0))
+    assert len(tally._seconds) == 1
+
+
+def test_of_gaps_only_the_last_thousand_are_kept() -> None:
+    tally = LineTally(START)
+    for gap in (0.5, 0.25):
+        for n in range(1000):
+            tally.exchanged(exchange(START + n, gap=gap))
+    assert gaps(tally) == {"min": 250_000.0, "p50": 250_000.0, "p99": 250_000.0}
+
+
+def test_of_answer_times_only_the_last_hundred_are_kept() -> None:
+    tally = DeviceTally(None)
+    for rtt in (0.5, 0.25):
+        for n in range(100):
+            tally.polled(reading(START + n, rtt=rtt), 7)
+    assert tally.payload(7)["rtt_ms"] == {"p50": 250.0, "p95": 250.0}
+
+
+def test_what_happens_twice_counts_twice() -> None:
+    line, device = LineTally(START), DeviceTally(None)
+    for at in (START, START + 1):
+        line.exchanged(exchange(at, late=2))
+        line.overran(3)
+        line.lost(FaultCode.PORT_LOST)
+        device.polled(reading(at, TIMEOUT, overruns=4), 7)
+    assert line.errors == {"late": 4, "overrun": 6, "port_lost": 2}
+    assert device.errors == {"timeout": 2, "overrun": 8}

@@ -1,0 +1,120 @@
+"""What a person reads in the log."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+
+import pytest
+
+from lfs10d.reading import Errand, Exchanged, Fault, FaultCode, PortChanged, Reading
+from lfs10d.telemetry.event_log import Logbook
+from lfs10d.telemetry.publication import Kind, Publication, Sample, device_topic, retained
+
+PORT = "/dev/ttyUSB0"
+
+
+def a_sample(*, good: bool, device: str = "mast") -> Publication:
+    sample = Sample(
+        device=device, boot="00000000", seq=1, ts=0, clock="synced", values={"wind_speed": 1.0} if good else None,
+        units={"wind_speed": "m/s"}, names=("wind_speed",), quality="good" if good else "bad",
+        error=None if good else "timeout", rtt_ms=None,
+    )  # fmt: skip
+    topic = device_topic(device, "telemetry")
+    return Publication(topic, sample.payload("line0"), Kind.SAMPLE, retain=False, qos=1, sample=sample)
+
+
+def an_error(code: str | None, device: str = "mast") -> Publication:
+    payload = {"active": code is not None, "code": code, "message": "no answer in 200 ms"}
+    return retained(device_topic(device, "error"), payload)
+
+
+def test_a_failing_device_is_told_once_and_its_recovery_too() -> None:
+    book = Logbook()
+
+    assert not book.published([a_sample(good=False)])
+    risen = book.published([a_sample(good=False), an_error("timeout")])
+    turned = book.published([an_error("crc")])
+    well = book.published([a_sample(good=True), an_error(None)])
+
+    assert risen == [(logging.WARNING, "mast: timeout: no answer in 200 ms")]
+    assert turned == [(logging.DEBUG, "mast: crc: no answer in 200 ms")]
+    assert well == [(logging.INFO, "mast: answers well again after crc")]
+    assert not book.published([a_sample(good=True), an_error(None)])
+
+
+def test_an_error_that_is_masked_is_no_recovery_and_may_rise_anew() -> None:
+    book = Logbook()
+    book.published([an_error("timeout")])
+
+    assert not book.published([an_error(None)])
+    assert not book.published([a_sample(good=True, device="other"), an_error(None)])
+    assert book.published([an_error("timeout")])[0].level == logging.WARNING
+
+
+def test_a_device_that_is_removed_is_forgotten() -> None:
+    book = Logbook()
+    book.published([an_error("timeout")])
+
+    assert not book.published([retained(device_topic("mast", "error"), None)])
+    assert book.published([an_error("timeout")])[0].level == logging.WARNING
+
+
+def test_other_topics_say_nothing() -> None:
+    assert not Logbook().published([retained("line/error", {"active": True}), retained("info", {})])
+
+
+def test_the_port_is_told_with_what_one_should_know_of_it() -> None:
+    book = Logbook()
+
+    lost = PortChanged(0.0, Fault(FaultCode.PORT_LOST, f"{PORT}: hung up"))
+    assert book.happened(lost, port=PORT, notices=(), frames=False) == [
+        (logging.WARNING, f"{PORT}: hung up; tried again until it is back")
+    ]
+    assert book.happened(PortChanged(0.0, None), port=PORT, notices=("no RS485 mode",), frames=False) == [
+        (logging.INFO, f"{PORT}: the port is open"),
+        (logging.WARNING, "no RS485 mode"),
+    ]
+
+
+def test_a_port_that_is_freed_on_request_is_no_warning() -> None:
+    freed = PortChanged(0.0, Fault(FaultCode.PORT_LOST, "freed"), freed=True)
+    told = Logbook().happened(freed, port=PORT, notices=(), frames=False)
+    assert told == [(logging.INFO, f"{PORT}: freed for another program")]
+
+
+@pytest.mark.parametrize(
+    ("heard", "fault", "words"),
+    [
+        (b"\x01\x03", FaultCode.MALFORMED, "slave 1: sent 01 03 00, heard 01 03: malformed"),
+        (b"", None, "slave 1: sent 01 03 00, heard nothing"),
+    ],
+)
+def test_frames_are_told_at_debug_where_they_are_wanted(heard: bytes, fault: FaultCode | None, words: str) -> None:
+    happened = Exchanged(
+        at=1.0, asked=0.0, began=0.1, gap=0.004, slave=1, errand=Errand.POLL, fault=fault, sent=b"\x01\x03\x00",
+        heard=heard,
+    )  # fmt: skip
+    book = Logbook()
+
+    assert book.happened(happened, port=PORT, notices=(), frames=True) == [(logging.DEBUG, words)]
+    assert not book.happened(happened, port=PORT, notices=(), frames=False)
+
+
+def test_a_learned_rest_is_told_once_with_what_to_set() -> None:
+    book = Logbook()
+    plain = Reading("mast", 1.0, {"a": 1.0}, None, 0.02, online=True, response_timeout=0.2, request_gap=0.2)
+    rested = replace(plain, request_gap=0.4, gap_learned=True)
+
+    def told(reading: Reading) -> list[tuple[int, str]]:
+        return [*book.happened(reading, port=PORT, notices=(), frames=False)]
+
+    assert not told(plain)
+    ((level, text),) = told(rested)
+    assert level == logging.WARNING
+    assert text == (
+        "mast: ignores a request right behind another, and is now given 400ms of rest before each (more if that is too "
+        "short, see device/mast/config): set request_gap for it in the configuration"
+    )
+    assert not told(replace(rested, request_gap=0.8))
+    assert told(replace(rested, device="other"))

@@ -1,0 +1,506 @@
+"""From what the line tells to what the broker is told."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import cast
+
+import pytest
+
+from lfs10d.reading import Errand, Exchanged, FaultCode, PortChanged, UartCounted, UartCounters
+from lfs10d.telemetry.contract import outbound
+from lfs10d.telemetry.publication import Backlog, Kind, Payload
+from lfs10d.telemetry.station import Instant, Station
+from tests.support.stations import (
+    DAEMON,
+    LINE,
+    LINE_TOPICS,
+    LOCKED,
+    LOST,
+    ONE_VALUE,
+    THIRD,
+    TIMEOUT,
+    TWO_VALUES,
+    WALL,
+    ail,
+    failed,
+    fields,
+    good,
+    instant,
+    shown,
+    station,
+    topics,
+)
+
+# -- the burst ----------------------------------------------------------------------------------------------------
+
+
+def test_a_burst_holds_every_retained_topic_once_and_the_line_before_the_devices() -> None:
+    fresh = station()
+    burst = fresh.burst(instant(0))
+    assert topics(burst) == [
+        "info",
+        "devices",
+        "line/state",
+        "line/error",
+        "line/stats",
+        *(f"device/a/{leaf}" for leaf in ("state", "config", "availability", "error", "stats")),
+        *(f"device/b/{leaf}" for leaf in ("state", "config", "availability", "error", "stats")),
+    ]
+    assert fresh.topics() == set(topics(burst))
+
+
+def test_retention_and_quality_of_service_are_the_contract_s() -> None:
+    running = station()
+    published = running.burst(instant(0)) + running.heard(good("a", 1), instant(1))
+    published += running.configure(LINE, [ONE_VALUE], instant(2))
+    assert published
+    for each in published:
+        if each.payload is not None:
+            row = outbound(each.topic)
+            assert (each.retain, each.qos) == (row.retain, row.qos), each.topic
+
+
+def test_in_the_first_burst_of_a_boot_every_device_is_starting_without_a_value_or_a_number() -> None:
+    fresh = station()
+    assert fields(shown(fresh, "device/b/state"), "output_current", "speed", "quality", "error", "seq") == (
+        None,
+        None,
+        "bad",
+        "starting",
+        0,
+    )
+    assert shown(fresh, "device/b/availability") == "offline"
+    assert fields(shown(fresh, "line/state"), "open", "activity", "requests") == (False, "polling", "ok")
+
+
+def test_a_later_burst_shows_the_newest_sample() -> None:
+    running = station()
+    running.heard(good("a", 1), instant(1))
+    running.heard(good("a", 1.1), instant(1.1))
+    assert fields(shown(running, "device/a/state", 1.2), "seq", "wind_speed") == (2, 12.34)
+
+
+def test_devices_are_listed_in_the_order_of_the_file() -> None:
+    assert shown(station(TWO_VALUES, ONE_VALUE), "devices") == [TWO_VALUES.entry(), ONE_VALUE.entry()]
+
+
+# -- readings -----------------------------------------------------------------------------------------------------
+
+
+def test_every_device_counts_its_own_samples_from_one() -> None:
+    running = station()
+    numbers = [
+        (each.sample.device, each.sample.seq)
+        for device in ("a", "b", "a", "a", "b")
+        for each in running.heard(good(device, 1), instant(1))
+        if each.sample is not None
+    ]
+    assert numbers == [("a", 1), ("b", 1), ("a", 2), ("a", 3), ("b", 2)]
+
+
+def test_a_sample_is_dated_when_its_answer_ended_not_when_it_is_published() -> None:
+    published = station().heard(good("a", 1.25), instant(1.5))
+    assert fields(published[0].payload, "ts") == (round((WALL + 1.25) * 1000),)
+
+
+@pytest.mark.parametrize("device", ["gone", "c"])
+def test_a_reading_of_a_device_unknown_or_disabled_is_passed_over(device: str) -> None:
+    running = station(ONE_VALUE, replace(THIRD, enabled=False))
+    assert running.heard(good(device, 1), instant(1)) == []
+    assert fields(shown(running, "line/stats", 10), "polls_per_s") == (0.0,)
+
+
+def test_an_exchange_changes_figures_alone() -> None:
+    running = station()
+    happened = Exchanged(1.0, 0.9, 0.9, 0.004, 2, Errand.POLL, None, b"", b"", unsolicited=3)
+    assert running.heard(happened, instant(1)) == []
+    assert fields(shown(running, "line/stats", 10), "exchanges", "unsolicited_bytes") == (1, 3)
+
+
+def test_the_driver_s_counters_are_passed_on() -> None:
+    running = station()
+    assert running.heard(UartCounted(1, UartCounters(4, 3, 2, 1)), instant(1)) == []
+    assert fields(shown(running, "line/stats"), "uart") == ({"framing": 4, "parity": 3, "overrun": 2, "break": 1},)
+
+
+def test_an_overrun_is_counted_and_never_raised() -> None:
+    running = station()
+    published = running.heard(replace(good("a", 1), overruns=4), instant(1))
+    assert "device/a/error" not in topics(published)
+    assert fields(shown(running, "line/stats"), "errors") == ({"overrun": 4},)
+    assert fields(shown(running, "device/a/stats"), "errors") == ({"overrun": 4},)
+
+
+def test_the_cycle_is_measured_per_device() -> None:
+    running = station()
+    for device, at in (("a", 1.0), ("b", 1.4), ("a", 1.5), ("b", 2.2)):
+        running.heard(good(device, at), instant(at))
+    assert fields(shown(running, "line/stats", 3), "cycle_s") == (0.8,)
+
+
+# -- the port -----------------------------------------------------------------------------------------------------
+
+
+def test_an_opened_port_is_shown_and_no_error() -> None:
+    running = station()
+    assert topics(running.heard(PortChanged(1, None), instant(1))) == ["line/state"]
+    assert fields(shown(running, "line/state"), "open") == (True,)
+
+
+def test_a_lost_port_is_one_error_of_the_line_at_once() -> None:
+    running = station()
+    running.heard(PortChanged(1, None), instant(1))
+    assert topics(running.heard(PortChanged(2, LOST), instant(2))) == ["line/state", "line/error"]
+    assert fields(shown(running, "line/error"), "code", "message", "since") == (
+        "port_lost",
+        "absent: plug it in",
+        round((WALL + 2) * 1000),
+    )
+    assert fields(shown(running, "line/stats"), "errors") == ({"port_lost": 1},)
+
+
+def test_another_fault_of_the_port_changes_the_error() -> None:
+    running = station()
+    running.heard(PortChanged(1, LOST), instant(1))
+    assert topics(running.heard(PortChanged(2, LOCKED), instant(2))) == ["line/error"]
+    assert fields(shown(running, "line/error"), "code", "also") == ("port_busy", [])
+
+
+def test_the_same_fault_of_the_port_again_is_nothing_new() -> None:
+    running = station()
+    running.heard(PortChanged(1, LOST), instant(1))
+    assert running.heard(PortChanged(2, LOST), instant(2)) == []
+
+
+def test_when_every_device_ails_and_the_port_goes_one_error_is_left() -> None:
+    running = station()
+    assert "device/a/error" in ail(running, "a")
+    assert "device/b/error" in ail(running, "b")
+    published = running.heard(PortChanged(3, LOST), instant(3))
+    assert topics(published) == ["line/error", "device/a/error", "device/b/error"]
+    for device in ("a", "b"):
+        running.heard(failed(device, 3, LOST), instant(3))
+        assert fields(shown(running, f"device/{device}/error"), "active", "last_code") == (False, "timeout")
+        assert fields(shown(running, f"device/{device}/state"), "error") == ("port_lost",)
+    assert fields(shown(running, "line/error"), "active") == (True,)
+
+
+def test_the_loss_of_the_port_is_no_poll_and_one_loss_for_the_line() -> None:
+    running = station()
+    running.heard(PortChanged(1, LOST), instant(1))
+    for device in ("a", "b"):
+        running.heard(failed(device, 1, LOST), instant(1))
+    assert fields(shown(running, "line/stats", 10), "errors", "polls_per_s") == ({"port_lost": 1}, 0.0)
+    assert fields(shown(running, "device/a/stats"), "polls", "errors") == (0, {"port_lost": 1})
+
+
+def test_when_the_port_is_back_the_line_is_fine_and_devices_ail_by_the_same_rule() -> None:
+    running = station()
+    ail(running)
+    running.heard(PortChanged(3, LOST), instant(3))
+    running.heard(failed("a", 3, LOST), instant(3))
+    assert topics(running.heard(PortChanged(4, None), instant(4))) == ["line/state", "line/error"]
+    assert fields(shown(running, "line/error"), "active", "last_code") == (False, "port_lost")
+    assert "device/a/error" not in topics(running.heard(failed("a", 5, TIMEOUT), instant(5)))
+    assert "device/a/error" in topics(running.heard(failed("a", 6, TIMEOUT), instant(6)))
+
+
+def test_a_pause_is_a_lost_port_without_an_error() -> None:
+    running = station()
+    running.heard(PortChanged(0, None), instant(0))
+    ail(running)
+    assert topics(running.acting("paused", instant(2))) == ["line/state", "device/a/error"]
+    assert topics(running.heard(PortChanged(2, LOST), instant(2))) == ["line/state"]
+    running.heard(failed("a", 2, LOST), instant(2))
+    assert fields(shown(running, "line/error"), "active") == (False,)
+    assert fields(shown(running, "line/stats"), "errors") == ({"timeout": 2},)
+    assert topics(running.acting("polling", instant(9))) == ["line/state"]
+    assert topics(running.heard(PortChanged(9, None), instant(9))) == ["line/state"]
+
+
+def test_a_pause_takes_an_error_of_the_port_back() -> None:
+    running = station()
+    running.heard(PortChanged(1, LOCKED), instant(1))
+    assert topics(running.acting("paused", instant(2))) == ["line/state", "line/error"]
+
+
+# -- other facts --------------------------------------------------------------------------------------------------
+
+
+def test_what_the_line_is_busy_with_is_told_once() -> None:
+    running = station()
+    assert topics(running.acting("scanning", instant(1))) == ["line/state"]
+    assert running.acting("scanning", instant(2)) == []
+    assert fields(shown(running, "line/state"), "activity") == ("scanning",)
+
+
+def test_refused_requests_are_told_once() -> None:
+    running = station()
+    assert running.admitting("ok", instant(1)) == []
+    assert topics(running.admitting("denied", instant(1))) == ["line/state"]
+    assert fields(shown(running, "line/state"), "requests") == ("denied",)
+
+
+def test_new_facts_about_the_daemon_are_told_once() -> None:
+    running = station()
+    newer = replace(DAEMON, mqtt={"version": "3.1.1"}, changes=3)
+    assert running.introduce(DAEMON, instant(1)) == []
+    assert topics(running.introduce(newer, instant(1))) == ["info"]
+    assert fields(shown(running, "info"), "mqtt", "changes") == ({"version": "3.1.1"}, 3)
+
+
+def test_errors_from_elsewhere_are_errors_of_the_line() -> None:
+    running = station()
+    assert topics(running.line_failed(FaultCode.STORAGE_FULL, "disk full", instant(1))) == ["line/error"]
+    assert running.line_failed(FaultCode.STORAGE_FULL, "disk full", instant(2)) == []
+    assert fields(shown(running, "line/error"), "code", "count") == ("storage_full", 2)
+    assert topics(running.line_recovered(FaultCode.STORAGE_FULL, instant(3))) == ["line/error"]
+    assert running.line_recovered(FaultCode.STORAGE_FULL, instant(4)) == []
+
+
+def test_when_the_clock_is_set_the_start_is_told_by_it() -> None:
+    running = Station(DAEMON, LINE, [ONE_VALUE], Instant(0, 1000.0, "unsynced"))
+    assert fields(shown_by(running, Instant(1, 1001.0, "unsynced")), "started", "clock") == (
+        1_000_000,
+        "unsynced",
+    )
+    published = running.tick(instant(5))
+    assert topics(published) == ["info"]
+    assert fields(published[0].payload, "started", "clock") == (round(WALL * 1000), "synced")
+    assert running.tick(instant(6)) == []
+
+
+def shown_by(of: Station, now: Instant) -> Payload:
+    return of.burst(now)[0].payload
+
+
+# -- time ---------------------------------------------------------------------------------------------------------
+
+
+def test_statistics_come_every_half_minute_and_are_not_made_up_for_a_sleep() -> None:
+    running = station()
+    due = running.due()
+    assert due == 30.0
+    assert running.tick(instant(29.999)) == []
+    expected = ["line/stats", "device/a/stats", "device/b/stats"]
+    assert topics(running.tick(instant(30.01))) == expected
+    assert running.due() == 60.0
+    assert topics(running.tick(instant(1000))) == expected
+    assert running.due() == 1030.0
+    assert running.tick(instant(1000.1)) == []
+
+
+def test_statistics_tell_what_waits_for_the_broker() -> None:
+    waiting = Station(DAEMON, LINE, [ONE_VALUE], instant(0), backlog=lambda: Backlog(7, 5, 2))
+    published = waiting.tick(instant(30))
+    assert fields(published[0].payload, "store") == ({"depth": 7, "oldest_ts": 5, "dropped": 2},)
+
+
+def test_a_state_that_waits_is_published_when_its_time_comes() -> None:
+    running = station()
+    for at in (1.0, 1.25, 1.5):
+        running.heard(good("a", at), instant(at))
+    running.heard(good("b", 1.6), instant(1.6))
+    running.heard(good("b", 1.7), instant(1.7))
+    assert running.due() == 2.0
+    assert running.tick(instant(1.9)) == []
+    published = running.tick(instant(2.0))
+    assert topics(published) == ["device/a/state"]
+    assert fields(published[0].payload, "seq") == (3,)
+    assert running.due() == 2.6
+    assert topics(running.tick(instant(2.6))) == ["device/b/state"]
+    assert running.due() == 30.0
+
+
+# -- configuration ------------------------------------------------------------------------------------------------
+
+
+def test_the_same_configuration_again_says_nothing() -> None:
+    assert station().configure(LINE, [ONE_VALUE, TWO_VALUES], instant(1)) == []
+
+
+def test_an_added_device_is_announced_with_all_its_topics() -> None:
+    running = station()
+    published = running.configure(LINE, [ONE_VALUE, TWO_VALUES, THIRD], instant(1))
+    assert topics(published) == [
+        "event",
+        *(f"device/c/{leaf}" for leaf in ("state", "config", "availability", "error", "stats")),
+        "devices",
+    ]
+    assert fields(published[0].payload, "type", "device", "slave") == ("device_added", "c", 4)
+    assert published[0].kind is Kind.EVENT
+    assert fields(published[1].payload, "quality", "seq", "error") == ("bad", 0, "starting")
+
+
+def test_of_a_removed_device_every_topic_is_cleared() -> None:
+    running = station()
+    published = running.configure(LINE, [ONE_VALUE], instant(1))
+    cleared = {each.topic for each in published if each.payload is None}
+    assert cleared == {f"device/b/{leaf}" for leaf in ("state", "config", "availability", "error", "stats", "wind")}
+    assert all(each.retain for each in published if each.payload is None)
+    (event,) = [each for each in published if each.topic == "event"]
+    assert fields(event.payload, "type", "device", "slave") == ("device_removed", "b", 3)
+    assert published[-1].payload == [ONE_VALUE.entry()]
+    assert running.topics() == LINE_TOPICS | {
+        f"device/a/{leaf}" for leaf in ("state", "config", "availability", "error", "stats")
+    }
+
+
+def test_a_renamed_device_is_one_removed_and_one_added() -> None:
+    published = station().configure(LINE, [ONE_VALUE, replace(TWO_VALUES, name="fan")], instant(1))
+    types = [fields(each.payload, "type")[0] for each in published if each.topic == "event"]
+    assert types == ["device_removed", "device_added"]
+
+
+def test_the_key_of_a_sample_is_not_used_twice_when_a_device_comes_back() -> None:
+    running = station()
+    running.heard(good("a", 1), instant(1))
+    running.heard(good("a", 2), instant(2))
+    running.configure(LINE, [TWO_VALUES], instant(3))
+    running.configure(LINE, [TWO_VALUES, ONE_VALUE], instant(4))
+    assert fields(shown(running, "device/a/state"), "seq") == (0,)
+    assert fields(running.heard(good("a", 5), instant(5))[0].payload, "seq") == (3,)
+
+
+def test_a_changed_option_changes_config_and_list() -> None:
+    running = station()
+    slower = replace(ONE_VALUE, interval=5.0)
+    published = running.configure(LINE, [slower, TWO_VALUES], instant(1))
+    assert topics(published) == ["device/a/config", "devices"]
+
+
+def test_a_changed_time_out_is_no_matter_of_the_list() -> None:
+    published = station().configure(LINE, [replace(ONE_VALUE, response_timeout=0.5), TWO_VALUES], instant(1))
+    assert topics(published) == ["device/a/config"]
+
+
+def test_disabling_is_one_sample_and_then_none() -> None:
+    running = station()
+    running.heard(good("a", 1), instant(1))
+    published = running.configure(LINE, [replace(ONE_VALUE, enabled=False), TWO_VALUES], instant(2))
+    assert topics(published) == [
+        "device/a/config",
+        "device/a/telemetry",
+        "device/a/state",
+        "device/a/availability",
+        "devices",
+    ]
+    assert fields(published[1].payload, "error", "seq") == ("disabled", 2)
+    assert running.heard(good("a", 2.1), instant(2.1)) == []
+
+
+def test_a_device_on_another_profile_starts_anew_but_for_its_numbers() -> None:
+    running = station()
+    running.heard(good("a", 1), instant(1))
+    turned = replace(ONE_VALUE, profile="ld-e", value_names=("displacement",), units={"displacement": "1"})
+    published = running.configure(LINE, [turned, TWO_VALUES], instant(2))
+    assert "event" not in topics(published)
+    state = published[0].payload
+    assert "wind_speed" not in cast("Mapping[str, object]", state)
+    assert fields(state, "displacement", "seq") == (None, 0)
+    answer = replace(good("a", 3), values={"displacement": 53493})
+    assert fields(running.heard(answer, instant(3))[0].payload, "seq", "displacement") == (2, 53493)
+
+
+def test_another_rate_is_shown_and_its_gaps_are_measured_anew() -> None:
+    running = station()
+    running.heard(Exchanged(1, 1, 1, 0.0037, 2, Errand.POLL, None, b"", b""), instant(1))
+    faster = replace(LINE, baudrate=19200, gap_required=0.0018229)
+    assert topics(running.configure(faster, [ONE_VALUE, TWO_VALUES], instant(2))) == ["line/state"]
+    stats = shown(running, "line/stats")
+    assert fields(stats, "gap_required_us", "gap_us") == (1822.9, {"min": None, "p50": None, "p99": None})
+
+
+def test_another_port_keeps_the_gaps() -> None:
+    running = station()
+    running.heard(Exchanged(1, 1, 1, 0.0037, 2, Errand.POLL, None, b"", b""), instant(1))
+    moved = replace(LINE, port="/dev/ttyUSB1")
+    assert topics(running.configure(moved, [ONE_VALUE, TWO_VALUES], instant(2))) == ["line/state"]
+    assert fields(shown(running, "line/stats"), "gap_us") == ({"min": 3700.0, "p50": 3700.0, "p99": 3700.0},)
+
+
+# -- what a live view shows ---------------------------------------------------------------------------------------
+
+
+def test_a_snapshot_is_plain_json_with_line_and_devices() -> None:
+    running = station()
+    running.heard(PortChanged(0, None), instant(0))
+    running.heard(good("a", 1), instant(1))
+    running.line_failed(FaultCode.STORAGE_FULL, "disk full", instant(2))
+    snapshot = json.loads(json.dumps(running.snapshot(instant(2)), allow_nan=False))
+    assert (snapshot["v"], snapshot["info"]["boot"]) == (1, "k3f9a2c7")
+    assert (snapshot["line"]["name"], snapshot["line"]["open"], snapshot["line"]["polls_per_s"]) == (
+        "line0",
+        True,
+        0.5,
+    )
+    assert snapshot["line"]["error"]["code"] == "storage_full"
+    assert [(each["name"], each["online"], each["age_s"]) for each in snapshot["devices"]] == [
+        ("a", True, 1.0),
+        ("b", False, None),
+    ]
+
+
+def test_a_reading_of_a_disabled_device_is_told_only_if_a_request_wants_it() -> None:
+    told = station(replace(ONE_VALUE, enabled=False))
+    assert told.heard(good("a", 1), instant(1)) == []
+    assert topics(told.heard(replace(good("a", 2), requests=(1,)), instant(2))) == ["device/a/telemetry"]
+
+
+def test_statistics_that_are_due_just_now_are_due_once() -> None:
+    running = station()
+    assert running.due() == 30
+    assert "line/stats" in topics(running.tick(instant(60)))
+    assert running.due() == 90
+
+
+def test_a_snapshot_says_when_it_is_and_since_when_the_daemon_runs() -> None:
+    snapshot = station().snapshot(instant(2))
+    assert (snapshot["ts"], snapshot["time"]) == (1_795_298_002_000, "2026-11-21T21:53:22.000Z")
+    assert fields(snapshot["info"], "started", "clock") == (1_795_298_000_000, "synced")
+
+
+def test_a_summary_counts_who_is_polled_and_says_how_busy_the_line_is() -> None:
+    running = station(ONE_VALUE, TWO_VALUES, replace(THIRD, enabled=False))
+    running.heard(good("a", 0.4), instant(0.4))
+    assert running.summary(instant(0.5)) == "1 of 2 slaves online"
+    running.heard(Exchanged(1.5, 0.0, 0.0, None, 2, Errand.POLL, None, b"", b""), instant(1.5))
+    assert running.summary(instant(2)) == "1 of 2 slaves online, line 75 % busy"
+
+
+def test_what_is_told_late_is_dated_when_it_happened() -> None:
+    running = station()
+    running.heard(good("a", 1), instant(5))
+    assert fields(shown(running, "device/a/stats", 5), "last_good_ts") == (1_795_298_001_000,)
+    running.heard(PortChanged(6, LOST), instant(9))
+    assert fields(shown(running, "line/error", 9), "since") == (1_795_298_006_000,)
+    running.heard(PortChanged(10, None), instant(11))
+    assert fields(shown(running, "line/error", 11), "cleared") == (1_795_298_011_000,)
+
+
+def test_while_the_port_is_lost_no_failure_is_held_against_a_device() -> None:
+    running = station()
+    running.heard(PortChanged(0, LOST), instant(0))
+    assert "device/a/error" not in ail(running, since=1)
+    assert fields(shown(running, "device/a/error"), "active") == (False,)
+
+
+def test_everything_that_changes_at_once_is_told() -> None:
+    running = station(ONE_VALUE, TWO_VALUES, THIRD)
+    told = topics(running.configure(LINE, [replace(THIRD, label="x")], instant(1)))
+    assert {"device/a/state", "device/b/state", "device/c/config", "devices"} <= set(told)
+    assert told.count("event") == 2
+
+
+def test_another_pace_of_states_is_taken_up_by_a_reload() -> None:
+    slow = replace(ONE_VALUE, state_every=600.0)
+    running = station(slow)
+    running.heard(good("a", 1.0), instant(1.0))
+    running.heard(good("a", 2.0), instant(2.0))
+    assert running.due() == 30.0
+    running.configure(LINE, [replace(slow, state_every=5.0)], instant(3.0))
+    assert running.due() == 8.0
+    assert [each.topic for each in running.tick(instant(8.0))] == ["device/a/state"]
