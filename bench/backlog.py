@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 
 from lfs10d.outbox.store.database import Limits
-from lfs10d.outbox.store.sample_file import Entry, SampleFile
+from lfs10d.outbox.store.sample_file import SampleFile, StoreEntry
 from lfs10d.telemetry.publication import Sample
 
 BOOT = "k0000000"
@@ -38,7 +38,7 @@ def _made(count: int) -> Path:
     file = SampleFile(folder / "backlog.db", boot=BOOT, limits=_LIMITS)
     for start in range(0, each, 10 * TOGETHER):
         entries = [
-            Entry(_sample(device, seq, now - (each - seq) * EVERY_MS), 0)
+            StoreEntry(_sample(device, seq, now - (each - seq) * EVERY_MS), 0)
             for part in range(start, min(each, start + 10 * TOGETHER), TOGETHER)
             for device in range(1, DEVICES + 1)
             for seq in range(part + 1, min(part + TOGETHER, each) + 1)

@@ -22,10 +22,10 @@ from bench.broker import Broker
 from lfs10d.mqtt.settings import BrokerSettings
 from lfs10d.mqtt.uplink import Uplink
 from lfs10d.outbox.store.database import Limits
-from lfs10d.outbox.store.sample_file import Entry, SampleFile
+from lfs10d.outbox.store.sample_file import SampleFile, StoreEntry
 from lfs10d.outbox.store.store import Store
 from lfs10d.telemetry import publication
-from lfs10d.telemetry.publication import Kind, Publication, Sample
+from lfs10d.telemetry.publication import Publication, PublicationKind, Sample
 
 LIMITS = Limits(size=10**12, age=10**12)
 DEVICES = 32
@@ -48,7 +48,7 @@ def fill(folder: Path, count: int) -> None:
     file = SampleFile(folder / "backlog.db", boot="k0000001", limits=LIMITS)
     for start in range(0, count // DEVICES, BATCH // DEVICES):
         entries = [
-            Entry(sample(device, seq, "k0000001"), 0)
+            StoreEntry(sample(device, seq, "k0000001"), 0)
             for part in range(start, start + BATCH // DEVICES, 20)
             for device in range(1, DEVICES + 1)
             for seq in range(part + 1, part + 21)
@@ -112,7 +112,7 @@ async def live(uplink: Uplink, rate: float, seconds: float) -> None:
         measured = sample(device, number // DEVICES + 1, "k0000002")
         payload = measured.payload("line0") | {"ts": int(time.time() * 1000)}
         topic = publication.device_topic(measured.device, publication.TELEMETRY)
-        uplink.publish([Publication(topic, payload, Kind.SAMPLE, retain=False, qos=1, sample=measured)])
+        uplink.publish([Publication(topic, payload, PublicationKind.SAMPLE, retain=False, qos=1, sample=measured)])
         await asyncio.sleep(max(0.0, began + number / rate - loop.time()))
 
 

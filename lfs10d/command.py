@@ -6,17 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
-from lfs10d.telemetry.publication import VERSION
-
 Identifier: TypeAlias = str | int
-
-
 RequestClass: TypeAlias = Literal["always", "polling", "sensors", "registers"]
-
-
 Status: TypeAlias = Literal["ok", "rejected", "failed"]
-
-
 ErrorCode: TypeAlias = Literal[
     "not_recognised",
     "invalid_json",
@@ -45,7 +37,7 @@ ErrorCode: TypeAlias = Literal[
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class Result:
     """How a request ended.
 
     `rejected`: no write was sent and nothing changed. `failed`: a write may have been sent, or the reading asked
@@ -66,23 +58,23 @@ class Answer:
         return {"code": self.code, "message": self.message, **self.facts}
 
 
-def ok(data: object = None) -> Answer:
+def ok(data: object = None) -> Result:
     """Return the answer to a request that was carried out."""
-    return Answer("ok", data)
+    return Result("ok", data)
 
 
-def rejected(code: ErrorCode, message: str, *, param: str | None = None, **facts: object) -> Answer:
+def rejected(code: ErrorCode, message: str, *, param: str | None = None, **facts: object) -> Result:
     """Return the answer to a request that changed nothing."""
-    return Answer("rejected", code=code, message=message, facts={"param": param, **facts})
+    return Result("rejected", code=code, message=message, facts={"param": param, **facts})
 
 
-def failed(code: ErrorCode, message: str, *, data: object = None, **facts: object) -> Answer:
+def failed(code: ErrorCode, message: str, *, data: object = None, **facts: object) -> Result:
     """Return the answer to a request that may have sent a write, or asked for a reading that failed."""
-    return Answer("failed", data, code, message, {"param": None, **facts})
+    return Result("failed", data, code, message, {"param": None, **facts})
 
 
 @dataclass(frozen=True, slots=True)
-class Call:
+class Command:
     """What could be read of a request: its ids, what it asks in its own words, and the same as one text.
 
     `topic` (under B) and `correlation` are where its answer goes, once it is being performed.
@@ -102,24 +94,10 @@ class Call:
         """What tells a repeat; None: it cannot be told."""
         return self.transaction if self.id is None else self.id
 
-    def response(self, name: str, answer: Answer, took_ms: float) -> dict[str, object]:
-        """Return the response to it under the request's `name`."""
-        response: dict[str, object] = {"v": VERSION, "id": self.id}
-        if self.transaction is not None:
-            response["transaction"] = self.transaction
-        return {
-            **response,
-            "request": name,
-            "status": answer.status,
-            "data": answer.data,
-            "error": answer.error(),
-            "took_ms": round(took_ms, 1),
-        }
-
 
 class RefusedError(Exception):
     """A request is refused where it is being carried out; `answer` says why."""
 
-    def __init__(self, answer: Answer) -> None:
+    def __init__(self, answer: Result) -> None:
         super().__init__(answer.message)
         self.answer = answer

@@ -95,7 +95,7 @@ class Reading:
     gap_learned: bool = False
 
 
-class Errand(StrEnum):
+class Purpose(StrEnum):
     """What an exchange was for."""
 
     POLL = "poll"
@@ -119,7 +119,7 @@ class Exchanged:
     began: float | None
     gap: float | None
     slave: int
-    errand: Errand
+    errand: Purpose
     fault: FaultCode | None
     sent: bytes
     heard: bytes

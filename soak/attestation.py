@@ -24,7 +24,7 @@ from operator import itemgetter
 from typing import Any
 
 from lfs10d.simulator.burst import MASTER
-from lfs10d.simulator.line import Answer, Request
+from lfs10d.simulator.line import HeardRequest, SensorAnswer
 from lfs10d.simulator.wire import SECOND, unseal
 
 ANSWER = 9
@@ -123,13 +123,13 @@ class Oracle:
     The numbers in the log are unique; `epoch` is the wall clock at the line's time 0 (s).
     """
 
-    def __init__(self, log: Sequence[Request], handed: Sequence[tuple[float, bytes]], *, epoch: float) -> None:
+    def __init__(self, log: Sequence[HeardRequest], handed: Sequence[tuple[float, bytes]], *, epoch: float) -> None:
         self._epoch = epoch
         self._handed = handed
         self._requests = [request for request in log if request.speaker is MASTER]
         self._begun = [request.begun for request in self._requests]
         self._replies = [(request, answer) for request in log for answer in request.answers if answer.believable]
-        self._answers: dict[float, tuple[Request, Answer]] = {}
+        self._answers: dict[float, tuple[HeardRequest, SensorAnswer]] = {}
         self._published: set[float] = set()
         for request in log:
             for answer in request.answers:
@@ -182,14 +182,14 @@ class Oracle:
             found.good += 1
         return wrong
 
-    def _last_asked(self, at: int) -> Request | None:
+    def _last_asked(self, at: int) -> HeardRequest | None:
         """Return our last request that had ended by then, by a `ts` in whole ms."""
         place = bisect_right(self._begun, at + ROUNDED)
         while place and self._requests[place - 1].ended > at + ROUNDED:
             place -= 1
         return self._requests[place - 1] if place else None
 
-    def _displaced(self, asked: Request, last: Request) -> bool:
+    def _displaced(self, asked: HeardRequest, last: HeardRequest) -> bool:
         """Tell whether, before `last`, an answer to another master came in the place of the answer to `asked`.
 
         Nothing tells it from ours, so ours comes in the place of the next, and so on until one is missing.
@@ -205,7 +205,7 @@ class Oracle:
                 return True
         return False
 
-    def _was_handed(self, last: Request, sample: Mapping[str, Any], slave: int) -> bool:
+    def _was_handed(self, last: HeardRequest, sample: Mapping[str, Any], slave: int) -> bool:
         """Tell whether the master was handed, after it had asked, a whole frame of that slave with that number."""
         since, until = last.begun / SECOND, sample["ts"] / 1000 - self._epoch + 0.001
         place = bisect_left(self._handed, since, key=itemgetter(0))

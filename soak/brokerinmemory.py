@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from lfs10d.mqtt.connection import Connection
 from lfs10d.mqtt.messages import Accepted, Events, Filter, Will
-from lfs10d.mqtt.reasons import Ended, Ending
+from lfs10d.mqtt.reasons import Disconnect, DisconnectReason
 from lfs10d.mqtt.settings import BrokerSettings, Version
 
 
@@ -24,7 +24,7 @@ class BrokerInMemory:
         """Be away from now on; what was not acknowledged was taken all the same."""
         self.up = False
         if self.connection is not None:
-            self.connection.tell("ended", Ended(Ending.LOST, "the broker is away"))
+            self.connection.tell("ended", Disconnect(DisconnectReason.LOST, "the broker is away"))
             self.connection = None
 
     def come(self) -> None:
@@ -54,7 +54,7 @@ class ConnectionInMemory(Connection):
             self.home.connection = self
             self.tell("accepted", Accepted(version))
         else:
-            self.tell("ended", Ended(Ending.UNREACHABLE, "the broker is away"))
+            self.tell("ended", Disconnect(DisconnectReason.UNREACHABLE, "the broker is away"))
 
     def tell(self, what: str, *values: object) -> None:
         """Tell the uplink soon, unless it has abandoned this connection until then."""
@@ -99,7 +99,7 @@ class ConnectionInMemory(Connection):
 
     def leave(self) -> None:
         """End in order."""
-        self.tell("ended", Ended(Ending.LEFT, "left"))
+        self.tell("ended", Disconnect(DisconnectReason.LEFT, "left"))
 
     def abandon(self) -> None:
         """End without a word."""

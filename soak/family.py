@@ -19,9 +19,9 @@ from lfs10d.config.defaults import resolved
 from lfs10d.config.models import Config
 from lfs10d.profiles.library import load_profile
 from lfs10d.simulator.burst import MASTER
-from lfs10d.simulator.judge import Verdict
+from lfs10d.simulator.judge import JudgeReport
 from lfs10d.simulator.line import SimulatedLine
-from lfs10d.simulator.queued_sensor import InTurn
+from lfs10d.simulator.queued_sensor import QueuedSensor
 from lfs10d.simulator.wire import SECOND, Format
 from soak.attestation import Oracle, Samples, codes, parsed
 from soak.troubles import FAMILY, Fault, mix
@@ -139,7 +139,9 @@ class Life:
         )
         config = resolved(config, stem="lfs10d", host="soak")
         shape = Format(baudrate)
-        sensors = [InTurn(slave, format=shape, jitter=0.002, seed=self.random.getrandbits(32)) for slave in DEVICES]
+        sensors = [
+            QueuedSensor(slave, format=shape, jitter=0.002, seed=self.random.getrandbits(32)) for slave in DEVICES
+        ]
         self.line = SimulatedLine(sensors, format=shape, seed=self.random.getrandbits(32))
         self.daemon = DaemonInMemory(
             self.line,
@@ -231,9 +233,9 @@ class Life:
         if self.daemon.port.unread:
             self._find(f"{self.daemon.port.unread} requests while bytes lay unread")
         for request in self.line.log:
-            if request.speaker is MASTER and request.verdict in (Verdict.GAP, Verdict.COLLISION):
+            if request.speaker is MASTER and request.verdict in (JudgeReport.GAP, JudgeReport.COLLISION):
                 # Of a byte that is not over, or that an adapter still holds back, nobody can know.
-                hidden = bool(self.latency) or request.verdict is Verdict.COLLISION
+                hidden = bool(self.latency) or request.verdict is JudgeReport.COLLISION
                 if hidden and not self._was_handed_lately(request.begun / SECOND):
                     self.account.unknowable += 1
                 else:

@@ -8,10 +8,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 
-from lfs10d.simulator.builder import Plan, build
+from lfs10d.simulator.builder import LinePlan, build
 from lfs10d.simulator.burst import MASTER
-from lfs10d.simulator.faults import Kind
-from lfs10d.simulator.line import Request, SimulatedLine
+from lfs10d.simulator.faults import FaultKind
+from lfs10d.simulator.line import HeardRequest, SimulatedLine
 from lfs10d.simulator.line_faults import stray
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.sensor import Sensor
@@ -32,19 +32,19 @@ PATIENCE = 5.0
 
 def ail(line: SimulatedLine) -> None:
     """Give each sensor but the first what ails it, and the line its stray bytes."""
-    line.sensor(2).ail(Kind.NOISY, 0.03)
-    line.sensor(2).ail(Kind.GARBAGE, 0.01)
-    line.sensor(3).ail(Kind.LATE, 0.01, delay=0.6)
-    line.sensor(3).ail(Kind.LATE, 0.01, delay=0.15)
-    line.sensor(4).ail(Kind.SILENT, first=20.0, last=26.0, every=60.0)
-    for kind in (Kind.NAN, Kind.INFINITE, Kind.OUT_OF_RANGE, Kind.SUBNORMAL):
+    line.sensor(2).ail(FaultKind.NOISY, 0.03)
+    line.sensor(2).ail(FaultKind.GARBAGE, 0.01)
+    line.sensor(3).ail(FaultKind.LATE, 0.01, delay=0.6)
+    line.sensor(3).ail(FaultKind.LATE, 0.01, delay=0.15)
+    line.sensor(4).ail(FaultKind.SILENT, first=20.0, last=26.0, every=60.0)
+    for kind in (FaultKind.NAN, FaultKind.INFINITE, FaultKind.OUT_OF_RANGE, FaultKind.SUBNORMAL):
         line.sensor(5).ail(kind, 0.01)
-    for kind in (Kind.TRUNCATED, Kind.LEADING_NOISE, Kind.TRAILING_NOISE):
+    for kind in (FaultKind.TRUNCATED, FaultKind.LEADING_NOISE, FaultKind.TRAILING_NOISE):
         line.sensor(6).ail(kind, 0.01)
-    for kind in (Kind.WRONG_ID, Kind.WRONG_FUNCTION, Kind.EXCEPTION):
+    for kind in (FaultKind.WRONG_ID, FaultKind.WRONG_FUNCTION, FaultKind.EXCEPTION):
         line.sensor(7).ail(kind, 0.01)
-    line.sensor(8).ail(Kind.SLOW_BYTES, 0.01)
-    line.sensor(8).ail(Kind.SILENT, 0.02)
+    line.sensor(8).ail(FaultKind.SLOW_BYTES, 0.01)
+    line.sensor(8).ail(FaultKind.SILENT, 0.02)
     stray(line, 0.005)
 
 
@@ -52,7 +52,7 @@ class Line:
     """The line at `link`; `pull` and `plug` its adapter, `answers` takes what was sent since the last call."""
 
     def __init__(self, link: Path, seed: int) -> None:
-        simulated = build(Plan(SLAVES, Format(BAUDRATE), turnaround=0.003, jitter=0.002, seed=seed), keep_log=True)
+        simulated = build(LinePlan(SLAVES, Format(BAUDRATE), turnaround=0.003, jitter=0.002, seed=seed), keep_log=True)
         numbered = Numbered()
         for sensor in simulated.sensors:
             sensor.source = numbered
@@ -96,7 +96,7 @@ class Line:
         """Return the answers with a value whose fate is settled, in order; nothing while the adapter is out."""
         if not self._in:
             return []
-        taken: list[list[Request]] = []
+        taken: list[list[HeardRequest]] = []
         settled = 0
         done = threading.Event()
 
@@ -119,7 +119,7 @@ class Line:
 
 
 def answers_of(
-    going: Iterable[Request], requests: Sequence[Request], names: Mapping[Sensor, str], origin: float
+    going: Iterable[HeardRequest], requests: Sequence[HeardRequest], names: Mapping[Sensor, str], origin: float
 ) -> list[Sent]:
     """Return the answers with a value to the first of the `requests`, those `going`; all are in order of time.
 

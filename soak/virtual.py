@@ -16,7 +16,7 @@ from lfs10d.config.models import Config
 from lfs10d.daemon.settings import config_hash, device_facts, line_facts
 from lfs10d.line.budget import timing_of
 from lfs10d.line.poller import Poller
-from lfs10d.line.scheduler import Schedule
+from lfs10d.line.scheduler import Scheduler
 from lfs10d.line.settings import device_specs, line_rules, poll_rules, port_settings
 from lfs10d.modbus.bus import Bus
 from lfs10d.mqtt.settings import BrokerSettings
@@ -28,7 +28,7 @@ from lfs10d.simulator.port import STANDSTILL, SimulatedPort, VirtualClock
 from lfs10d.simulator.wire import nanoseconds
 from lfs10d.system.clock import Instant
 from lfs10d.telemetry.first_burst import FirstBurst
-from lfs10d.telemetry.info import DaemonFacts
+from lfs10d.telemetry.info import DaemonInfo
 from lfs10d.telemetry.publication import Publication
 from lfs10d.telemetry.station import Station
 from soak.brokerinmemory import BrokerInMemory
@@ -115,10 +115,10 @@ class DaemonInMemory:
         self._told = False
         self.mistakes: list[str] = []
         """What ended by a mistake in the loop."""
-        schedule = Schedule(timing_of(config.line), 0.0)
+        schedule = Scheduler(timing_of(config.line), 0.0)
         schedule.replace(device_specs(config, profiles), poll_rules(config.poll), 0.0)
         self.poller = Poller(Bus(self.port, line_rules(config.line), self.clock), schedule, self._take_over, self.clock)
-        facts = DaemonFacts("0", "soak", boot, None, config_hash(config))
+        facts = DaemonInfo("0", "soak", boot, None, config_hash(config))
         devices = device_facts(config, profiles)
         self._station = Station(
             facts, line_facts(config.line), devices, self.now(), backlog=lambda: self._uplink.backlog

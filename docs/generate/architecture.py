@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -12,24 +13,24 @@ from lfs10d.modbus.exchange import TRANSITIONS, State
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "lfs10d"
-FLOORS = "The floors: a module imports only from floors below"
+FLOORS = "The floors: a package imports only from floors below"
 """The contract's name in pyproject.toml."""
 
 
 def parts() -> Mapping[str, str]:
     """Return the generated parts by name."""
     return {
-        "floors": table(("floor", "module", "what it is for"), _floors()),
+        "floors": table(("floor", "package", "what it is for"), _floors()),
         "exchange": "\n".join(("```mermaid", "stateDiagram-v2", *_transitions(), "```")),
     }
 
 
 def floors() -> list[list[str]]:
-    """Return the names of the modules on each floor, the ground floor first; what is not built yet is left out."""
+    """Return the names of the packages on each floor, the ground floor first; what is not built yet is left out."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     contracts = project["tool"]["importlinter"]["contracts"]
     layers = next(contract["layers"] for contract in contracts if contract["name"] == FLOORS)
-    names = [[name.strip(" ()") for name in layer.split(":")] for layer in reversed(layers)]
+    names = [[name.strip(" ()") for name in re.split("[:|]", layer)] for layer in reversed(layers)]
     return [[name for name in floor if _file(name) is not None] for floor in names]
 
 

@@ -14,7 +14,7 @@ from docs.generate.markdown import plain
 from lfs10d.config.diff import RESTART_KEYS
 from lfs10d.config.models import LATER_SECTIONS, Config
 from lfs10d.profiles.library import builtin_names
-from lfs10d.schema.fields import Duration, Kind, Size
+from lfs10d.schema.fields import Duration, FieldKind, Size
 from lfs10d.schema.quantities import duration_text, size_text
 
 Model: TypeAlias = type[BaseModel]
@@ -98,9 +98,9 @@ def written(field: FieldInfo) -> str:
     return value if isinstance(value, str) else json.dumps(value)
 
 
-def kind_of(field: FieldInfo) -> Kind | None:
+def kind_of(field: FieldInfo) -> FieldKind | None:
     """Return what one value may be; None for sections and lists."""
-    return next((each for each in field.metadata if isinstance(each, Kind)), None)
+    return next((each for each in field.metadata if isinstance(each, FieldKind)), None)
 
 
 def model_in(annotation: Any) -> Model | None:  # noqa: ANN401  # any annotation
@@ -110,10 +110,10 @@ def model_in(annotation: Any) -> Model | None:  # noqa: ANN401  # any annotation
     return next(filter(None, map(model_in, get_args(annotation))), None)
 
 
-def kinds_within(annotation: Any) -> Iterator[Kind]:  # noqa: ANN401 - an annotation is of any type
+def kinds_within(annotation: Any) -> Iterator[FieldKind]:  # noqa: ANN401 - an annotation is of any type
     """Yield what single values within an annotation may be."""
     if get_origin(annotation) is Annotated:
-        yield from (each for each in get_args(annotation)[1:] if isinstance(each, Kind))
+        yield from (each for each in get_args(annotation)[1:] if isinstance(each, FieldKind))
     for inner in get_args(annotation):
         yield from kinds_within(inner)
 

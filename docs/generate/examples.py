@@ -10,15 +10,16 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Final
 
-from lfs10d.command import Call, ok, rejected
+from lfs10d.command import Command, ok, rejected
+from lfs10d.commands.message import response
 from lfs10d.modbus import diagnosis
 from lfs10d.modbus.timing import LineTiming
-from lfs10d.reading import Errand, Exchanged, Fault, FaultCode, PortChanged, Reading, UartCounted, UartCounters
+from lfs10d.reading import Exchanged, Fault, FaultCode, PortChanged, Purpose, Reading, UartCounted, UartCounters
 from lfs10d.system.clock import Instant
 from lfs10d.telemetry import publication
-from lfs10d.telemetry.info import DaemonFacts, DeviceFacts, LineFacts
-from lfs10d.telemetry.payloads import Trace
-from lfs10d.telemetry.publication import Backlog, Publication, Sample
+from lfs10d.telemetry.info import DaemonInfo, DeviceInfo, LineInfo
+from lfs10d.telemetry.payloads import TracePayload
+from lfs10d.telemetry.publication import BacklogStats, Publication, Sample
 from lfs10d.telemetry.station import Station
 
 LINE: Final = "line0"
@@ -29,7 +30,7 @@ BEGUN: Final = 1795298000.0
 SENT, HEARD = bytes.fromhex("02030001000295f8"), bytes.fromhex("020304414fd70a332f")
 """Slave 2 is read, and answers 12.99 m/s."""
 
-_MAST = DeviceFacts(
+_MAST = DeviceInfo(
     name="mast-top",
     slave=2,
     label="Mast, 10 m",
@@ -42,7 +43,7 @@ _MAST = DeviceFacts(
     offline_after=3,
 )
 _ROOF = replace(_MAST, name="slave-3", slave=3, label=None)
-_LINE = LineFacts(
+_LINE = LineInfo(
     name=LINE,
     port="/dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A50285BI-if00-port0",
     baudrate=9600,
@@ -52,7 +53,7 @@ _LINE = LineFacts(
     framing="rtu",
     gap_required=LineTiming.of(9600).gap,
 )
-_DAEMON = DaemonFacts(
+_DAEMON = DaemonInfo(
     version="1.0.0",
     host="gateway-17",
     boot=BOOT,
@@ -73,7 +74,7 @@ class Story:
     def __init__(self) -> None:
         self.by_topic: dict[str, list[object]] = {}
         self._samples: list[Sample] = []
-        self._station = Station(_DAEMON, _LINE, (_MAST, _ROOF), _at(0), backlog=Backlog)
+        self._station = Station(_DAEMON, _LINE, (_MAST, _ROOF), _at(0), backlog=BacklogStats)
         self._note(self._station.burst(_at(0)))
         self._note(self._station.heard(PortChanged(0.05, None), _at(0.05)))
         counters = UartCounters(framing=0, parity=0, overrun=0, breaks=0)
@@ -85,7 +86,7 @@ class Story:
     def _poll(self, second: int) -> None:
         at = second + 0.003
         asked = Exchanged(
-            at, at - 0.0265, at - 0.0228, 0.003701, 2, Errand.POLL, fault=None, sent=SENT, heard=HEARD
+            at, at - 0.0265, at - 0.0228, 0.003701, 2, Purpose.POLL, fault=None, sent=SENT, heard=HEARD
         )  # fmt: skip
         values = {"wind_speed": (12.99, 12.34, 11.87)[second % 3]}
         good = Reading("mast-top", at, values, None, rtt=0.0182, online=True, response_timeout=0.062)
@@ -131,7 +132,7 @@ def events() -> Iterator[object]:
 
 def trace() -> object:
     """Return one traced frame."""
-    return Trace(
+    return TracePayload(
         v=1,
         ts=_at(1).ts(),
         direction="tx",
@@ -144,6 +145,6 @@ def trace() -> object:
 def responses() -> Iterator[object]:
     """Yield an answer that says yes, and one that says no."""
     done = {"applied": ["slaves.mast-top.interval"], "restart_required": []}
-    yield Call(id="a1").response("config/reload", ok(done), 8.4)
+    yield response(Command(id="a1"), "config/reload", ok(done), 8.4)
     message = "no such parameter; known are: none"
-    yield Call(id="a2").response("config/reload", rejected("invalid_param", message, param="file"), 0.3)
+    yield response(Command(id="a2"), "config/reload", rejected("invalid_param", message, param="file"), 0.3)

@@ -16,7 +16,7 @@ from docs.generate.markdown import example, plain, table
 from docs.generate.meanings import ERROR_CODES, FAULT_CODES
 from docs.generate.uplink import bytes_table
 from lfs10d.command import ErrorCode
-from lfs10d.commands.context import Request
+from lfs10d.commands.context import Handler
 from lfs10d.commands.handlers.registry import REQUESTS
 from lfs10d.reading import FaultCode
 from lfs10d.telemetry.contract import OUTBOUND, Outbound
@@ -198,7 +198,7 @@ def _requests() -> Iterator[str]:
             yield "No parameters."
 
 
-def _does(request: Request) -> str:
+def _does(request: Handler) -> str:
     """Return the first sentence of what performs it; ValueError where it says nothing."""
     words = inspect.getdoc(request.perform)
     if not words:

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from docs.generate.commands import BAUDRATE, CONFIG, RECORDED, SLAVES, WALK
-from lfs10d.simulator.builder import Plan, build
+from lfs10d.simulator.builder import LinePlan, build
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
@@ -30,7 +30,7 @@ def main() -> None:
     """Record; CalledProcessError where a request has no answer."""
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        line = build(Plan(SLAVES, Format(BAUDRATE)))
+        line = build(LinePlan(SLAVES, Format(BAUDRATE)))
         line.add(Sensor(1, format=Format(9600)))
         served = PtyLine(line, link=folder / "ttyUSB0")
         served.start()

@@ -10,8 +10,8 @@ from lfs10d.mqtt.encoding import encode, packet_size
 from lfs10d.mqtt.settings import Version
 from lfs10d.reading import Reading
 from lfs10d.system.clock import Instant
-from lfs10d.telemetry.info import DaemonFacts, DeviceFacts, LineFacts
-from lfs10d.telemetry.publication import Kind, Publication
+from lfs10d.telemetry.info import DaemonInfo, DeviceInfo, LineInfo
+from lfs10d.telemetry.publication import Publication, PublicationKind
 from lfs10d.telemetry.station import Station
 
 DAY = 86_400
@@ -23,7 +23,7 @@ PUBACK = 4
 
 WALL = 1_795_298_000.0
 TOPICS = "lfs10d/line0"
-DEVICE = DeviceFacts(
+DEVICE = DeviceInfo(
     name="slave-2",
     slave=2,
     label=None,
@@ -44,8 +44,8 @@ SENSORS = (1, 8, 32)
 def bytes_a_day(sensors: int, *, telemetry: bool, state_every: float) -> tuple[int, int]:
     """Return the bytes of MQTT a day to the broker and back, of sensors that answer every second, without a burst."""
     devices = [replace(DEVICE, name=f"slave-{2 + n}", slave=2 + n, state_every=state_every) for n in range(sensors)]
-    line = LineFacts("line0", "/dev/ttyUSB0", 9600, "none", 8, 1, "rtu", 0.0036458)
-    daemon = DaemonFacts("0.1", "gateway", "k3f9a2c7", None, "0123456789ab", 0, {"version": "5"}, ())
+    line = LineInfo("line0", "/dev/ttyUSB0", 9600, "none", 8, 1, "rtu", 0.0036458)
+    daemon = DaemonInfo("0.1", "gateway", "k3f9a2c7", None, "0123456789ab", 0, {"version": "5"}, ())
     station = Station(daemon, line, devices, Instant(0.0, WALL, "synced"))
     there = back = 0
     for second in range(-60, MEASURED):  # what begins with the start is over before it is counted
@@ -54,7 +54,9 @@ def bytes_a_day(sensors: int, *, telemetry: bool, state_every: float) -> tuple[i
             values = {"wind_speed": round(3.0 + (second * 7 + number) % 900 / 100, 2)}
             reading = Reading(device.name, now, values, None, 0.0182, online=True, response_timeout=0.2)
             instant = Instant(now, WALL + now, "synced")
-            sent = [each for each in station.heard(reading, instant) if telemetry or each.kind is not Kind.SAMPLE]
+            sent = [
+                each for each in station.heard(reading, instant) if telemetry or each.kind is not PublicationKind.SAMPLE
+            ]
             if station.due() <= now:
                 sent += station.tick(instant)
             if second >= 0:

@@ -36,7 +36,7 @@ NEXT: Final = "Plug in the next one."
 
 
 @dataclass(frozen=True, slots=True)
-class Adopted:
+class AdoptedSensor:
     """One sensor that is polled now, by its name, slave id and rate; None where the daemon did not say."""
 
     device: str
@@ -56,23 +56,23 @@ class Adopted:
 
 
 @dataclass(frozen=True, slots=True)
-class Turn:
+class AdoptTurn:
     """What follows from an answer: a sensor, a trouble in words, so many s to wait; `ends`: there is no going on."""
 
-    adopted: Adopted | None = None
+    adopted: AdoptedSensor | None = None
     trouble: str | None = None
     pause: float = AGAIN
     ends: bool = False
 
 
-class Mounting:
+class AdoptLoop:
     """`names` are given in turn, and it is complete when all are; without, each sensor gets its default name.
 
     `wishes` are the other parameters of every request.
     """
 
     def __init__(self, names: Sequence[str] = (), wishes: Mapping[str, Any] | None = None) -> None:
-        self.adopted: list[Adopted] = []
+        self.adopted: list[AdoptedSensor] = []
         self._names = tuple(names)
         self._wishes = dict(wishes or {})
         self._baudrate: int | None = None
@@ -112,7 +112,7 @@ class Mounting:
         """Note that an answer may have been lost."""
         self._lost = True
 
-    def looked(self, health: object) -> Iterator[Adopted]:
+    def looked(self, health: object) -> Iterator[AdoptedSensor]:
         """Take the daemon's health; yield the sensors that are polled now though no answer said so."""
         line, devices = _of(health, "line"), _of(health, "devices")
         rate = line.get("baudrate") if isinstance(line, Mapping) else None
@@ -127,36 +127,36 @@ class Mounting:
                 self._awaited.discard(name)
                 yield self._adopt(name, now[name])
 
-    def heard(self, response: Mapping[str, Any]) -> Turn:
+    def heard(self, response: Mapping[str, Any]) -> AdoptTurn:
         """Take an answer to `line/adopt`."""
         data, error = response.get("data"), response.get("error")
         code = error.get("code") if isinstance(error, Mapping) else None
         if response.get("status") == "ok" and isinstance(data, Mapping):
             self._lost = False
-            return Turn(self._adopt(str(data.get("device")), data.get("slave")), pause=0.0)
+            return AdoptTurn(self._adopt(str(data.get("device")), data.get("slave")), pause=0.0)
         if response.get("status") == "failed":
             return self._disobeyed(data, code, error)
         crowded, self._crowded = self._crowded, code == "duplicate_id"
         if code == "timeout":
             self._lost = False
-            return Turn()
+            return AdoptTurn()
         if code == "duplicate_id" and not crowded:
-            return Turn()
+            return AdoptTurn()
         if code == "address_in_use" and self.doubtful and _of(error, "param") == "from":
-            return Turn(pause=FOLLOWED)  # its old id is kept for the one that is looked for
-        return Turn(trouble=self._once(_message(error)), ends=code not in PASSING)
+            return AdoptTurn(pause=FOLLOWED)  # its old id is kept for the one that is looked for
+        return AdoptTurn(trouble=self._once(_message(error)), ends=code not in PASSING)
 
-    def _disobeyed(self, data: object, code: object, error: object) -> Turn:
+    def _disobeyed(self, data: object, code: object, error: object) -> AdoptTurn:
         device = _of(data, "device")
         if code in {"not_verified", "power_cycle_needed"} and isinstance(device, str):
             self._awaited.add(device)
         self._lost = self._lost or code == "cancelled"
-        return Turn(trouble=self._once(_message(error)), pause=PATIENCE, ends=code in HOPELESS)
+        return AdoptTurn(trouble=self._once(_message(error)), pause=PATIENCE, ends=code in HOPELESS)
 
-    def _adopt(self, device: str, slave: object) -> Adopted:
+    def _adopt(self, device: str, slave: object) -> AdoptedSensor:
         self._told, self._crowded = None, False
         self._known = (self._known or frozenset()) | {device}
-        one = Adopted(device, slave if isinstance(slave, int) else None, self._baudrate)
+        one = AdoptedSensor(device, slave if isinstance(slave, int) else None, self._baudrate)
         self.adopted.append(one)
         return one
 

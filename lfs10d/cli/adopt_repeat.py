@@ -1,4 +1,4 @@
-"""`lfs10d request line/adopt --repeat`: the shell around `Mounting`, at a terminal, in a pipe or for a program."""
+"""`lfs10d request line/adopt --repeat`: the shell around `AdoptLoop`, at a terminal, in a pipe or for a program."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from typing import Any, Final
 import click
 
 from lfs10d.cli import EXIT_FAILED
-from lfs10d.cli.adopt_loop import FIRST, NEXT, Adopted, Mounting
-from lfs10d.cli.client import Visitor
+from lfs10d.cli.adopt_loop import FIRST, NEXT, AdoptedSensor, AdoptLoop
+from lfs10d.cli.client import CommandClient
 from lfs10d.cli.login import Login
 from lfs10d.cli.render.spinner import spinning
 from lfs10d.cli.render.table import columns
@@ -24,13 +24,13 @@ HEALTH_WITHIN: Final = 10.0
 WORDS: Final = "waiting for a sensor ..."
 
 
-async def mount(visited: Login, mounting: Mounting, *, as_json: bool) -> int:
+async def mount(visited: Login, mounting: AdoptLoop, *, as_json: bool) -> int:
     """Have sensors adopted until all names are given or it is cancelled; return the exit code.
 
     0 if all were adopted that were named, or, without names, any. Raises BrokerError where broker or daemon is not
     there at the beginning; later they are waited for.
     """
-    visitor = Visitor(visited)
+    visitor = CommandClient(visited)
     ended_well = True
     try:
         with contextlib.suppress(asyncio.CancelledError):  # a signal: all are mounted
@@ -45,7 +45,7 @@ async def mount(visited: Login, mounting: Mounting, *, as_json: bool) -> int:
     return 0 if ended_well and mounting.adopted and not mounting.lacking else EXIT_FAILED
 
 
-def summary(adopted: Sequence[Adopted]) -> list[str]:
+def summary(adopted: Sequence[AdoptedSensor]) -> list[str]:
     """Return what was mounted, as a table."""
     rows = [[each.device, str(each.slave or "?"), str(each.baudrate or "?")] for each in adopted]
     count = f"{len(adopted)} {'sensor' if len(adopted) == 1 else 'sensors'} adopted:"
@@ -55,7 +55,7 @@ def summary(adopted: Sequence[Adopted]) -> list[str]:
 class _Repeating:
     """What is asked and told, until it is cancelled."""
 
-    def __init__(self, visitor: Visitor, mounting: Mounting, *, as_json: bool) -> None:
+    def __init__(self, visitor: CommandClient, mounting: AdoptLoop, *, as_json: bool) -> None:
         self._visitor = visitor
         self._mounting = mounting
         self._as_json = as_json
@@ -116,7 +116,7 @@ class _Repeating:
             return content
         return {**content, "id": secrets.token_hex(6)}
 
-    def _tell(self, adopted: Adopted) -> None:
+    def _tell(self, adopted: AdoptedSensor) -> None:
         if self._as_json:
             click.echo(json.dumps(adopted.data))
         else:

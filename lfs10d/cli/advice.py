@@ -6,7 +6,7 @@ import ipaddress
 from collections.abc import Iterator
 
 from lfs10d.config.credentials import missing_in_authorities
-from lfs10d.config.loader import Loaded
+from lfs10d.config.loader import LoadedConfig
 from lfs10d.config.models import LATER_SECTIONS, default_line_name
 from lfs10d.errors import ConfigError, Problem
 from lfs10d.line.budget import ASSUMED_TURNAROUND, Budget
@@ -18,7 +18,7 @@ COMMON_HOST_NAMES = frozenset({"localhost", "raspberrypi", "debian", "raspbian",
 """Names that systems come with: two gateways soon have the same."""
 
 
-def advice(loaded: Loaded, budget: Budget, host: str) -> tuple[Problem, ...]:
+def advice(loaded: LoadedConfig, budget: Budget, host: str) -> tuple[Problem, ...]:
     """Return the warnings for a valid configuration on the host of this name, in order of place."""
     warnings = (
         *_load(loaded, budget),
@@ -30,7 +30,7 @@ def advice(loaded: Loaded, budget: Budget, host: str) -> tuple[Problem, ...]:
     return tuple(sorted(loaded.document.problem(path, f"warning: {message}") for path, message in warnings))
 
 
-def _load(loaded: Loaded, budget: Budget) -> Iterator[tuple[KeyPath, str]]:
+def _load(loaded: LoadedConfig, budget: Budget) -> Iterator[tuple[KeyPath, str]]:
     path: KeyPath = ("poll", "interval") if loaded.document.holds(("poll", "interval")) else ("slaves",)
     for share in budget.shares:
         if share.rest and share.load_with_turnaround is not None and share.load_with_turnaround > 1:
@@ -75,7 +75,7 @@ def loopback(host: str) -> bool:
         return False
 
 
-def _login(loaded: Loaded) -> Iterator[tuple[KeyPath, str]]:
+def _login(loaded: LoadedConfig) -> Iterator[tuple[KeyPath, str]]:
     mqtt = loaded.config.mqtt
     if all(loopback(host) for host, _ in mqtt.nodes):
         return
@@ -92,7 +92,7 @@ def _login(loaded: Loaded) -> Iterator[tuple[KeyPath, str]]:
         yield ("mqtt", "username"), "the password crosses the network unencrypted; set mqtt.tls"
 
 
-def _files(loaded: Loaded) -> Iterator[tuple[KeyPath, str]]:
+def _files(loaded: LoadedConfig) -> Iterator[tuple[KeyPath, str]]:
     """Look into the files of the login, as far as they can be read."""
     mqtt = loaded.config.mqtt
     try:
@@ -113,7 +113,7 @@ def _files(loaded: Loaded) -> Iterator[tuple[KeyPath, str]]:
         )
 
 
-def _names(loaded: Loaded, host: str) -> Iterator[tuple[KeyPath, str]]:
+def _names(loaded: LoadedConfig, host: str) -> Iterator[tuple[KeyPath, str]]:
     """Two gateways at one broker must not publish under one name; a broker on this host has one gateway."""
     document, config = loaded.document, loaded.config
     if not document.holds(("line", "name")):
@@ -146,7 +146,7 @@ def _names(loaded: Loaded, host: str) -> Iterator[tuple[KeyPath, str]]:
             )
 
 
-def _unused(loaded: Loaded) -> Iterator[tuple[KeyPath, str]]:
+def _unused(loaded: LoadedConfig) -> Iterator[tuple[KeyPath, str]]:
     for section in LATER_SECTIONS:
         if loaded.document.holds((section,)):
             yield (section,), "has no effect yet"

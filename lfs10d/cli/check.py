@@ -13,7 +13,7 @@ import click
 from lfs10d.cli import EXIT_CONFIG, config_option, json_option
 from lfs10d.cli.advice import advice
 from lfs10d.cli.render.table import columns
-from lfs10d.config.loader import Loaded, load
+from lfs10d.config.loader import LoadedConfig, load
 from lfs10d.errors import ConfigError, Problem
 from lfs10d.line.budget import Budget, budget
 from lfs10d.schema.quantities import duration_text
@@ -66,7 +66,7 @@ def _plain(problem: Problem) -> dict[str, Any]:
     }
 
 
-def _report(loaded: Loaded, found: Budget, warnings: tuple[Problem, ...]) -> dict[str, Any]:
+def _report(loaded: LoadedConfig, found: Budget, warnings: tuple[Problem, ...]) -> dict[str, Any]:
     return {
         "valid": True,
         "warnings": [_plain(warning) for warning in warnings],
@@ -94,7 +94,7 @@ def _report(loaded: Loaded, found: Budget, warnings: tuple[Problem, ...]) -> dic
     }
 
 
-def _lines(loaded: Loaded, found: Budget) -> Iterator[str]:
+def _lines(loaded: LoadedConfig, found: Budget) -> Iterator[str]:
     line, mqtt = loaded.config.line, loaded.config.mqtt
     character = f"{line.databits}{line.parity[0].upper()}{line.stopbits}"
     yield f"{loaded.path}: valid"

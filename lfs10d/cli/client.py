@@ -13,9 +13,9 @@ from typing import Any, Final
 
 from lfs10d.cli.login import Login
 from lfs10d.errors import BrokerError, FailedError
-from lfs10d.mqtt.broker_client import Link
+from lfs10d.mqtt.broker_client import BrokerClient
 from lfs10d.mqtt.messages import Accepted, Filter, Incoming
-from lfs10d.mqtt.reasons import REFUSED_FROM, Ended, reason_in_words
+from lfs10d.mqtt.reasons import REFUSED_FROM, Disconnect, reason_in_words
 from lfs10d.mqtt.topics import OFFLINE, ONLINE
 
 CONNECTS_WITHIN: Final = 15.0
@@ -29,7 +29,7 @@ NOBODY_LISTENS: Final = 0x10
 """PUBACK of a message without a subscriber (MQTT 5.0, section 3.4.2.1)."""
 
 
-class Visitor:
+class CommandClient:
     """One visit. `arrived` is given what comes on `filters`; responses and our daemon's availability are kept here."""
 
     def __init__(
@@ -52,7 +52,7 @@ class Visitor:
             Filter(self._own),
             *filters,
         ]
-        self._link = Link(login.settings, self)
+        self._link = BrokerClient(login.settings, self)
         self._changed = asyncio.Event()
         self._settled: dict[int, tuple[int, ...]] = {}
         """What the broker said to a subscription or a publication, by message id."""
@@ -196,7 +196,7 @@ class Visitor:
             self._link.standing.subscribe(self._filters)
         self._changed.set()
 
-    def ended(self, ended: Ended) -> None:
+    def ended(self, ended: Disconnect) -> None:
         """Note that the connection is lost."""
         self.ended_by = ended.message
         self.availability = None

@@ -15,10 +15,10 @@ from lfs10d.cli import EXIT_FAILED, config_option, json_option
 from lfs10d.cli.json_text import json_text
 from lfs10d.cli.render.table import columns
 from lfs10d.config.changes import Changes
-from lfs10d.config.changes_file import ChangeFile
+from lfs10d.config.changes_file import ChangesFile
 from lfs10d.config.credentials import reason
 from lfs10d.config.effective import Effective, effective, merged_data
-from lfs10d.config.loader import Loaded, leaves, load
+from lfs10d.config.loader import LoadedConfig, leaves, load
 from lfs10d.config.models import Config, Section
 from lfs10d.daemon.state_directory import state_directory
 from lfs10d.errors import FailedError, StateError
@@ -89,7 +89,7 @@ def command(config: Path, state_dir: Path | None, *, merged: bool, as_json: bool
     return 0
 
 
-def _with_changes(file: Loaded, directory: Path, *, chosen: bool) -> Effective:
+def _with_changes(file: LoadedConfig, directory: Path, *, chosen: bool) -> Effective:
     """Return what holds; raises StateError rather than tell half of it.
 
     Where nobody named the directory and there is none, no daemon ever ran by this file, and nothing was changed.
@@ -104,7 +104,7 @@ def _with_changes(file: Loaded, directory: Path, *, chosen: bool) -> Effective:
         why = reason(error)
     if why is not None:
         raise StateError(f"the state directory {directory} cannot be read: {why}")
-    found = ChangeFile(directory, Disk()).read()
+    found = ChangesFile(directory, Disk()).read()
     if found.trouble is not None:
         raise StateError(f"what requests changed cannot be understood: {found.trouble}")
     return effective(file, found.changes)
@@ -124,7 +124,7 @@ def _warnings(now: Effective) -> Iterator[str]:
         yield f"{name}: {why}"
 
 
-def _report(loaded: Loaded, missing: str | None) -> dict[str, Any]:
+def _report(loaded: LoadedConfig, missing: str | None) -> dict[str, Any]:
     """Return it as JSON has it; `missing`: why what requests changed is not in it."""
     report = {} if missing is None else {"missing": missing}
     return {

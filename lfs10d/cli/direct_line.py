@@ -12,7 +12,7 @@ from lfs10d.errors import PortBusyError, PortLostError
 from lfs10d.line.device import DeviceSpec, PollRules
 from lfs10d.line.jobs.job import Job
 from lfs10d.line.poller import Poller
-from lfs10d.line.scheduler import Schedule
+from lfs10d.line.scheduler import Scheduler
 from lfs10d.line.thread import LineThread
 from lfs10d.modbus.bus import Bus, LineRules
 from lfs10d.modbus.port import SerialPort
@@ -28,7 +28,7 @@ STOPS_WITHIN = 1.0
 _Told: TypeAlias = "list[Event] | BaseException"
 
 
-class OwnLine:
+class DirectLine:
     """Opens the port on entering, frees it on leaving. `uart` is what the driver counted meanwhile, if it counts."""
 
     def __init__(self, settings: PortSettings) -> None:
@@ -37,7 +37,7 @@ class OwnLine:
         self._told: SimpleQueue[_Told] = SimpleQueue()
         self._first: UartCounters | None = None
         self._bus = Bus(SerialPort(settings), LineRules(), time.monotonic)
-        schedule = Schedule(self._bus.line_timing, time.monotonic())
+        schedule = Scheduler(self._bus.line_timing, time.monotonic())
         self._poller = Poller(self._bus, schedule, self._take, time.monotonic)
         self._thread = LineThread(self._poller, prepare=_prepare, failed=self._told.put)
 

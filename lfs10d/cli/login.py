@@ -12,7 +12,7 @@ from typing import Any, Final
 import click
 
 from lfs10d.config.credentials import UnreadableError, password_in, service_password
-from lfs10d.config.loader import Loaded, load
+from lfs10d.config.loader import LoadedConfig, load
 from lfs10d.config.models import Config
 from lfs10d.daemon.state_directory import service_unit
 from lfs10d.errors import ConfigError
@@ -78,7 +78,7 @@ def login(file: Path, verb: str, *, username: str | None, password_file: Path | 
     return Login(loaded.config, settings, Topics.of(mqtt.base_topic, loaded.config.line.name), lacking)
 
 
-def _loaded(file: Path, *, own: bool, needed: bool) -> tuple[Loaded, str]:
+def _loaded(file: Path, *, own: bool, needed: bool) -> tuple[LoadedConfig, str]:
     """Return the configuration, and why its password file is done without; ConfigError where it cannot be."""
     try:
         return load(file, files=not own), ""

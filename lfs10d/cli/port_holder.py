@@ -18,7 +18,7 @@ SERVICE_FILE = "/etc/lfs10d/lfs10d.yaml"
 
 
 @dataclass(frozen=True, slots=True)
-class Daemon:
+class HoldingDaemon:
     """A running `lfs10d run`; `config` is the file as it was told, "" for the usual one."""
 
     pid: int
@@ -30,7 +30,7 @@ class Daemon:
         return f" -c {shlex.quote(self.config)}" if self.config else ""
 
 
-def daemon_behind(found: Holder, *, proc: Path = PROC) -> Daemon | None:
+def daemon_behind(found: Holder, *, proc: Path = PROC) -> HoldingDaemon | None:
     """Return the daemon that a holder is; None for every other program and verb."""
     if found.program != DAEMON:
         return None
@@ -38,7 +38,7 @@ def daemon_behind(found: Holder, *, proc: Path = PROC) -> Daemon | None:
         argv = (proc / str(found.pid) / "cmdline").read_text("utf-8", "replace").split("\0")
     except OSError:
         return None
-    return Daemon(found.pid, config_of(argv)) if "run" in argv else None
+    return HoldingDaemon(found.pid, config_of(argv)) if "run" in argv else None
 
 
 def config_of(argv: list[str]) -> str:
@@ -55,7 +55,7 @@ def config_of(argv: list[str]) -> str:
     return "" if config == SERVICE_FILE else escape(config)
 
 
-def device_name(daemon: Daemon, slave: int) -> str:
+def device_name(daemon: HoldingDaemon, slave: int) -> str:
     """Return the name the daemon's configuration gives a slave id; the usual one where it cannot be read."""
     try:
         slaves = load(Path(daemon.config or SERVICE_FILE)).config.slaves

@@ -13,7 +13,7 @@ from typing import Any
 import click
 
 from lfs10d.cli import EXIT_FAILED, EXIT_UNAVAILABLE, json_option
-from lfs10d.cli.direct_line import OwnLine
+from lfs10d.cli.direct_line import DirectLine
 from lfs10d.cli.local_time import clock_text, stamp
 from lfs10d.cli.options import PORT, LineOptions, SlaveId, baudrate_of, line_options, profile_names, take
 from lfs10d.cli.port_holder import instead
@@ -90,7 +90,7 @@ def command(**options: Any) -> int:  # noqa: ANN401  # eleven options; `_Wanted`
     profile = load_profile(options.pop("profile_name"), relative_to=Path())
     if line.framing.value not in profile.framings:
         raise click.UsageError(f"profile {profile.name} does not speak {line.framing.value}")
-    wanted = _Wanted(line=line, profile=profile, **options)
+    wanted = _ReadOptions(line=line, profile=profile, **options)
     first, last = profile.ids
     if not first <= wanted.slave <= last:
         raise click.UsageError(f"profile {profile.name} has ids {first} to {last}, not {wanted.slave}")
@@ -104,7 +104,7 @@ def command(**options: Any) -> int:  # noqa: ANN401  # eleven options; `_Wanted`
 
 
 @dataclass(frozen=True, slots=True)
-class _Wanted:
+class _ReadOptions:
     """What is to be read, and how it is to be shown; `interval` in s."""
 
     line: LineOptions
@@ -144,11 +144,11 @@ class _Course:
     explained: bool = False
 
 
-def _read(wanted: _Wanted) -> int:
+def _read(wanted: _ReadOptions) -> int:
     course = _Course()
     rules = PollRules(retries=int(wanted.watch), offline_after=ATTEMPTS, probe_interval_max=max(1.0, wanted.interval))
     try:
-        with OwnLine(wanted.line.settings(wanted.baudrate)) as line:
+        with DirectLine(wanted.line.settings(wanted.baudrate)) as line:
             line.poll([wanted.spec], rules)
             while True:
                 for event in line.events(LOOK_EVERY):
@@ -162,7 +162,7 @@ def _read(wanted: _Wanted) -> int:
         return 0 if wanted.watch else EXIT_FAILED
 
 
-def _take(wanted: _Wanted, course: _Course, reading: Reading, line: OwnLine) -> int | None:
+def _take(wanted: _ReadOptions, course: _Course, reading: Reading, line: DirectLine) -> int | None:
     """Show one reading if it is to be shown; return the exit code when all is done."""
     fault = reading.fault
     course.failures = 0 if fault is None else course.failures + 1
@@ -188,7 +188,7 @@ def _take(wanted: _Wanted, course: _Course, reading: Reading, line: OwnLine) -> 
 # -- in words
 
 
-def _numbers(wanted: _Wanted, reading: Reading) -> Iterator[tuple[str, str]]:
+def _numbers(wanted: _ReadOptions, reading: Reading) -> Iterator[tuple[str, str]]:
     units = wanted.profile.units
     for name, number in (reading.values or {}).items():
         unit = units[name]
@@ -204,7 +204,7 @@ def _milliseconds(reading: Reading) -> str:
     return "" if reading.rtt is None else f"{reading.rtt * 1e3:.1f} ms"
 
 
-def _shown(wanted: _Wanted, reading: Reading) -> Iterator[str]:
+def _shown(wanted: _ReadOptions, reading: Reading) -> Iterator[str]:
     yield click.style(f"Slave {wanted.slave} answers: {wanted.profile.title}", bold=True)
     rows = [*_numbers(wanted, reading), ("answered in", _milliseconds(reading))]
     width = max(len(name) for name, _ in rows)
@@ -212,7 +212,7 @@ def _shown(wanted: _Wanted, reading: Reading) -> Iterator[str]:
         yield f"  {name.ljust(width)}  {text}"
 
 
-def _watched(wanted: _Wanted, reading: Reading) -> str:
+def _watched(wanted: _ReadOptions, reading: Reading) -> str:
     """Return a reading as one line."""
     terminal = sys.stdout.isatty()
     ts = _wall(reading) * 1000
@@ -224,14 +224,14 @@ def _watched(wanted: _Wanted, reading: Reading) -> str:
     return f"{when}  {text:<24}  {_milliseconds(reading):>8}  {bar}".rstrip()
 
 
-def _bar(wanted: _Wanted, reading: Reading) -> str:
+def _bar(wanted: _ReadOptions, reading: Reading) -> str:
     if "wind_speed" not in wanted.profile.value_names or reading.values is None:
         return ""
     block = "\N{BOX DRAWINGS HEAVY HORIZONTAL}" if (sys.stdout.encoding or "").lower().startswith("utf") else "#"
     return click.style(block * min(BAR_MOST, round(reading.values["wind_speed"] / BAR_UNIT)), fg="cyan")
 
 
-def _explained(wanted: _Wanted, course: _Course, fault: Fault, uart: UartCounters | None) -> Iterator[str]:
+def _explained(wanted: _ReadOptions, course: _Course, fault: Fault, uart: UartCounters | None) -> Iterator[str]:
     """Yield what was asked and heard, what it means and what to check."""
     how = f"{wanted.baudrate} baud {wanted.line.character}"
     attempts = f"{course.failures} attempt{'s' * (course.failures > 1)}"
@@ -251,18 +251,18 @@ def _explained(wanted: _Wanted, course: _Course, fault: Fault, uart: UartCounter
     )
 
 
-def _meant(frame: bytes, wanted: _Wanted) -> str:
+def _meant(frame: bytes, wanted: _ReadOptions) -> str:
     return describe(frame, wanted.codec) if frame else ""
 
 
-def _own_advice(wanted: _Wanted, fault: Fault) -> Iterator[str]:
+def _own_advice(wanted: _ReadOptions, fault: Fault) -> Iterator[str]:
     if fault.code not in (FaultCode.TIMEOUT, FaultCode.MALFORMED, FaultCode.WRONG_SLAVE):
         return
     other = 19200 if wanted.baudrate != 19200 else 9600  # noqa: PLR2004  # the two rates of an LFS10
     yield f"Is it this id and this rate? `lfs10d scan {wanted.line.port}` tries them all; or try --baudrate {other}."
 
 
-def _plain(wanted: _Wanted, reading: Reading) -> dict[str, Any]:
+def _plain(wanted: _ReadOptions, reading: Reading) -> dict[str, Any]:
     """Return a reading for JSON: a sample of the contract, as far as there is one without a daemon."""
     fault = reading.fault
     names, units = wanted.profile.value_names, wanted.profile.units

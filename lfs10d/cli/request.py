@@ -16,9 +16,9 @@ from click.shell_completion import CompletionItem
 from pydantic import ValidationError
 
 from lfs10d.cli import EXIT_FAILED, config_option, event_loop, json_option, request_words
-from lfs10d.cli.adopt_loop import Mounting
+from lfs10d.cli.adopt_loop import AdoptLoop
 from lfs10d.cli.adopt_repeat import ADOPT, mount
-from lfs10d.cli.client import RETAINED_WITHIN, Visitor, parsed
+from lfs10d.cli.client import RETAINED_WITHIN, CommandClient, parsed
 from lfs10d.cli.json_text import json_text
 from lfs10d.cli.login import Login, login, login_options
 from lfs10d.cli.render.live_lines import health
@@ -149,7 +149,7 @@ def command(**options: Any) -> int:  # noqa: ANN401  # nine options; `_Wanted` n
     request wants it: text, a number, true, a duration, or JSON; a device may be given by its slave id. Exit code 0 if
     it was carried out, 1 if not or if nothing was answered in time, 69 if the broker or the daemon is away.
     """
-    wanted = _Wanted(**options)
+    wanted = _RequestOptions(**options)
     if wanted.repeat:
         mounting = wanted.mounting
         visited = login(wanted.config, "adopt", username=wanted.username, password_file=wanted.password_file)
@@ -174,7 +174,7 @@ def command(**options: Any) -> int:  # noqa: ANN401  # nine options; `_Wanted` n
 
 
 @dataclass(frozen=True, slots=True)
-class _Wanted:
+class _RequestOptions:
     """The options as given; `timeout` in s."""
 
     name: str
@@ -187,7 +187,7 @@ class _Wanted:
     repeat: bool
 
     @property
-    def mounting(self) -> Mounting:
+    def mounting(self) -> AdoptLoop:
         """What is adopted with `--repeat`."""
         if self.name != ADOPT:
             raise click.UsageError(f"--repeat goes with {ADOPT} alone")
@@ -208,7 +208,7 @@ class _Wanted:
             raise click.UsageError(f"name: {wrong!r} is not {Name().words}")
         if len(set(names)) < len(names):
             raise click.UsageError("a name is given twice; each sensor needs its own")
-        return Mounting(names, self._parsed(others))
+        return AdoptLoop(names, self._parsed(others))
 
     @property
     def patience(self) -> float | None:
@@ -235,11 +235,11 @@ class _Wanted:
             raise click.UsageError(str(error)) from None
 
 
-async def _ask(wanted: _Wanted, visited: Login, content: dict[str, Any]) -> dict[str, Any] | None:
+async def _ask(wanted: _RequestOptions, visited: Login, content: dict[str, Any]) -> dict[str, Any] | None:
     told: list[object] = []
     by_id = request_words.is_slave_id(content.get("device"))
     filters = [Filter(visited.topics.full(DEVICES), qos=0, retain_as_published=False)] if by_id else []
-    visitor = Visitor(visited, filters, lambda message: told.append(parsed(message.payload)))
+    visitor = CommandClient(visited, filters, lambda message: told.append(parsed(message.payload)))
     try:
         async with spinning(f"{wanted.name} ..."):
             await visitor.enter()

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Final, get_args, get_origin
 from pydantic.fields import FieldInfo
 
 from lfs10d.commands.handlers.registry import REQUESTS
-from lfs10d.schema.fields import Choice, Duration, Flag, Kind
+from lfs10d.schema.fields import Choice, Duration, FieldKind, Flag
 from lfs10d.schema.quantities import duration_text
 
 WIDTH: Final = 79
@@ -46,9 +46,9 @@ def parameters(name: str) -> tuple[Parameter, ...]:
 
 
 def _parameter(key: str, field: FieldInfo, *, keeping: bool) -> Parameter:
-    kinds = [each for each in field.metadata if isinstance(each, Kind)] or list(_kinds_within(field.annotation))
+    kinds = [each for each in field.metadata if isinstance(each, FieldKind)] or list(_kinds_within(field.annotation))
     words = kinds[0].words if kinds else "text"
-    if not any(isinstance(each, Kind) for each in field.metadata):
+    if not any(isinstance(each, FieldKind) for each in field.metadata):
         words += ", or null"
     values: tuple[str, ...] = ()
     match kinds:
@@ -60,15 +60,15 @@ def _parameter(key: str, field: FieldInfo, *, keeping: bool) -> Parameter:
     return Parameter(key, words, usual, field.description or "", values)
 
 
-def _kinds_within(annotation: Any) -> Iterator[Kind]:  # noqa: ANN401  # any annotation
+def _kinds_within(annotation: Any) -> Iterator[FieldKind]:  # noqa: ANN401  # any annotation
     """Yield what single values within an annotation may be: `Annotated[int, Whole(1, 255)] | None`."""
     if get_origin(annotation) is Annotated:
-        yield from (each for each in get_args(annotation)[1:] if isinstance(each, Kind))
+        yield from (each for each in get_args(annotation)[1:] if isinstance(each, FieldKind))
     for inner in get_args(annotation):
         yield from _kinds_within(inner)
 
 
-def _usual(value: object, kinds: Sequence[Kind]) -> str:
+def _usual(value: object, kinds: Sequence[FieldKind]) -> str:
     if isinstance(value, float) and any(isinstance(kind, Duration) for kind in kinds):
         return duration_text(value)
     return value if isinstance(value, str) else json.dumps(value)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 import click
 
 from lfs10d.cli import EXIT_FAILED
-from lfs10d.cli.client import Visitor, parsed
+from lfs10d.cli.client import CommandClient, parsed
 from lfs10d.cli.json_text import json_text
 from lfs10d.cli.login import Login
 from lfs10d.cli.render import scan_findings
@@ -45,7 +45,7 @@ async def scan(visited: Login, content: dict[str, Any], patience: float | None, 
             if isinstance(event, dict) and event.get("type") == "scan_progress":
                 shown.heard(event)
 
-        visitor = Visitor(visited, [Filter(visited.topics.full(EVENT))], arrived)
+        visitor = CommandClient(visited, [Filter(visited.topics.full(EVENT))], arrived)
         cancelled = False
         try:
             await visitor.enter()

@@ -12,7 +12,7 @@ from typing import Any
 import click
 
 from lfs10d.cli import EXIT_FAILED, EXIT_UNAVAILABLE, json_option
-from lfs10d.cli.direct_line import OwnLine
+from lfs10d.cli.direct_line import DirectLine
 from lfs10d.cli.options import PORT, LineOptions, baudrate_of, line_options, take
 from lfs10d.cli.port_holder import instead
 from lfs10d.cli.render import scan_findings, troubleshooting
@@ -20,7 +20,7 @@ from lfs10d.cli.render.scan_progress import view
 from lfs10d.cli.render.table import columns
 from lfs10d.errors import PortBusyError, PortError
 from lfs10d.line.jobs.scan import Scan
-from lfs10d.line.jobs.scan_plan import FIRST_TIMEOUT, Search, ids_of
+from lfs10d.line.jobs.scan_plan import FIRST_TIMEOUT, ScanPlan, ids_of
 from lfs10d.modbus.frames import Checksum, Codec, Framing
 from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.reading import FaultCode
@@ -78,7 +78,7 @@ def command(ids: tuple[int, ...], rates: tuple[int, ...], profiles: tuple[str, .
         raise click.UsageError("ascii frames always carry an LRC; leave --checksum out")
     own = {file: load_profile(file, relative_to=Path()) for file in profiles}
     known = (*own.values(), *(load_profile(name, relative_to=Path()) for name in builtin_names()))
-    search = Search(
+    search = ScanPlan(
         ids,
         tuple(line.timing(rate) for rate in rates),
         Codec(line.framing, Checksum(checksum)),
@@ -87,7 +87,7 @@ def command(ids: tuple[int, ...], rates: tuple[int, ...], profiles: tuple[str, .
     )
     if not search.profiles:
         raise click.UsageError(f"none of these profiles speaks {line.framing.value}")
-    asked = scan_findings.Asked(checksum, {profile.name: file for file, profile in own.items()})
+    asked = scan_findings.ScanRequest(checksum, {profile.name: file for file, profile in own.items()})
     result = _Result(Scan(search), line, asked)
     code = _scan(result, as_json=as_json)
     if not result.opened:
@@ -103,7 +103,7 @@ def command(ids: tuple[int, ...], rates: tuple[int, ...], profiles: tuple[str, .
 class _Result:
     scan: Scan
     line: LineOptions
-    asked: scan_findings.Asked
+    asked: scan_findings.ScanRequest
     framing_errors: int | None = None
     opened: bool = False
 
@@ -155,7 +155,7 @@ def _scan(result: _Result, *, as_json: bool) -> int:
     scan, port = result.scan, result.line.port
     first_rate = scan.search.timings[0].baudrate
     try:
-        with OwnLine(result.line.settings(first_rate)) as line:
+        with DirectLine(result.line.settings(first_rate)) as line:
             while not line.events(LOOK_EVERY):
                 pass  # until the port is open
             result.opened = True

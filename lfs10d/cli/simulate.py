@@ -16,7 +16,7 @@ from lfs10d.cli import json_option
 from lfs10d.cli.options import profile_names
 from lfs10d.profiles.library import load_profile
 from lfs10d.schema.quantities import seconds
-from lfs10d.simulator.builder import Plan, build, slave_ids
+from lfs10d.simulator.builder import LinePlan, build, slave_ids
 from lfs10d.simulator.fault_file import BAUDRATES, FaultFile, load_faults
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
@@ -79,10 +79,10 @@ class Wanted:
     as_json: bool
 
     @property
-    def plan(self) -> Plan:
+    def plan(self) -> LinePlan:
         """The line as asked for; raises ConfigError for a profile that cannot be read."""
         profile = None if self.profile is None else load_profile(self.profile, relative_to=Path())
-        return Plan(
+        return LinePlan(
             self.slaves,
             Format(int(self.baudrate), 7 if self.framing == "ascii" else 8, self.parity, int(self.stopbits)),
             self.framing,

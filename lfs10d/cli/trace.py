@@ -17,7 +17,7 @@ from typing import Any, Final
 import click
 
 from lfs10d.cli import EXIT_FAILED, config_option, event_loop, json_option
-from lfs10d.cli.client import Visitor, parsed
+from lfs10d.cli.client import CommandClient, parsed
 from lfs10d.cli.json_text import json_text
 from lfs10d.cli.local_time import NO_CLOCK, clock_text
 from lfs10d.cli.login import Login, login, login_options
@@ -93,14 +93,14 @@ async def _trace(visited: Login, duration: float, *, as_json: bool) -> int:
         if message.topic == topic:
             frames.append(parsed(message.payload))
 
-    visitor = Visitor(visited, [Filter(topic, qos=0)], arrived)
+    visitor = CommandClient(visited, [Filter(topic, qos=0)], arrived)
     try:
         return await _show(visitor, frames, duration, as_json=as_json)
     finally:
         await visitor.leave()
 
 
-async def _show(visitor: Visitor, frames: deque[Any], duration: float, *, as_json: bool) -> int:
+async def _show(visitor: CommandClient, frames: deque[Any], duration: float, *, as_json: bool) -> int:
     response = await _begin(visitor, duration)
     if response.get("status") != "ok":
         click.echo(verdict(response), err=True)
@@ -120,7 +120,7 @@ async def _show(visitor: Visitor, frames: deque[Any], duration: float, *, as_jso
     return 0
 
 
-async def _begin(visitor: Visitor, duration: float) -> Mapping[str, Any]:
+async def _begin(visitor: CommandClient, duration: float) -> Mapping[str, Any]:
     async with spinning("line/trace ..."):
         await visitor.enter()
         await visitor.find_daemon()

@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from lfs10d.cli import config_option, event_loop, json_option
-from lfs10d.cli.client import RETAINED_WITHIN, Visitor, parsed
+from lfs10d.cli.client import RETAINED_WITHIN, CommandClient, parsed
 from lfs10d.cli.json_text import json_text
 from lfs10d.cli.login import Login, login, login_options
 from lfs10d.cli.render.live_lines import LiveLines
-from lfs10d.cli.render.live_state import Live
-from lfs10d.cli.render.live_table import Source, age_text, screen
+from lfs10d.cli.render.live_state import LiveState
+from lfs10d.cli.render.live_table import DataSource, age_text, screen
 from lfs10d.cli.render.spinner import spinning
 from lfs10d.daemon.state_directory import status_places
 from lfs10d.errors import BrokerError, FailedError
@@ -69,9 +69,9 @@ def command(config: Path, username: str | None, password_file: Path | None, *, a
     return 0
 
 
-def _output(*, as_json: bool) -> Callable[[], _Lines | _Screen]:
+def _output(*, as_json: bool) -> Callable[[], _WatchLines | _Screen]:
     terminal = sys.stdout.isatty() and os.environ.get("TERM") not in {None, "dumb"}
-    return _Screen if terminal and not as_json else lambda: _Lines(as_json=as_json)
+    return _Screen if terminal and not as_json else lambda: _WatchLines(as_json=as_json)
 
 
 @dataclass(slots=True)
@@ -79,7 +79,7 @@ class _Status:
     """The daemon's status file as it was read last."""
 
     path: Path
-    live: Live
+    live: LiveState
     ts: float
     """When it was written, epoch s."""
 
@@ -90,7 +90,7 @@ class _Watch:
     def __init__(self, visited: Login, files: tuple[Path, ...]) -> None:
         self._line = visited.config.line.name
         self._files = files
-        self._live = Live(self._line)
+        self._live = LiveState(self._line)
         self._why = ""
         """What was wrong with the broker, or the daemon there, at the beginning."""
         self._heard_at = 0.0
@@ -106,11 +106,11 @@ class _Watch:
             publication.ERROR,
         )
         filters = [*once, *(publication.device_topic("+", leaf) for leaf in leaves)]
-        self._visitor = Visitor(
+        self._visitor = CommandClient(
             visited, [Filter(topics.full(each), qos=0, retain_as_published=False) for each in filters], self._arrived
         )
 
-    async def run(self, output: Callable[[], _Lines | _Screen]) -> None:
+    async def run(self, output: Callable[[], _WatchLines | _Screen]) -> None:
         """Show until cancelled; raises BrokerError where there is nothing to show."""
         try:
             await self._begin()
@@ -134,7 +134,7 @@ class _Watch:
         places = " or ".join(str(path) for path in self._files)
         raise BrokerError(f"{self._why}; and no daemon on this machine has written its status to {places}")
 
-    async def _show(self, output: _Lines | _Screen) -> None:
+    async def _show(self, output: _WatchLines | _Screen) -> None:
         with output:
             while True:
                 self._read()
@@ -142,11 +142,11 @@ class _Watch:
                 output.draw(live, source, now=time.monotonic(), wall=time.time())
                 await asyncio.sleep(EVERY)
 
-    def _best(self) -> tuple[Live, Source]:
+    def _best(self) -> tuple[LiveState, DataSource]:
         """Return the better source: the broker where the daemon is online there, else a file that is being written."""
         visitor, status = self._visitor, self._status
         if visitor.daemon_online and self._live.known:
-            return self._live, Source(f"live from {visitor.place}", alive=True)
+            return self._live, DataSource(f"live from {visitor.place}", alive=True)
         if not visitor.connected:
             why = visitor.ended_by or self._why
         else:
@@ -154,11 +154,11 @@ class _Watch:
         if status is not None:
             age = time.time() - status.ts
             if abs(age) <= FRESH:
-                return status.live, Source(f"live from {status.path} ({why})", alive=True)
+                return status.live, DataSource(f"live from {status.path} ({why})", alive=True)
             if not self._live.known or status.ts > self._heard_at:
                 words = f"NOT LIVE: the daemon wrote {status.path} {age_text(max(0.0, age))} ago and no more ({why})"
-                return status.live, Source(words, alive=False)
-        return self._live, Source(f"NOT LIVE: these are the last values heard ({why})", alive=False)
+                return status.live, DataSource(words, alive=False)
+        return self._live, DataSource(f"NOT LIVE: these are the last values heard ({why})", alive=False)
 
     def _arrived(self, message: Incoming) -> None:
         relative = self._visitor.topics.relative(message.topic)
@@ -180,14 +180,14 @@ class _Watch:
             line = status.get("line") if isinstance(status, dict) else None
             if not isinstance(line, dict) or line.get("name") != self._line:
                 continue
-            live = Live(self._line) if self._status is None else self._status.live
+            live = LiveState(self._line) if self._status is None else self._status.live
             live.read(status, now=time.monotonic())
             ts = status.get("ts")
             self._status = _Status(path, live, ts / 1000 if isinstance(ts, int) else 0.0)
             return
 
 
-class _Lines:
+class _WatchLines:
     """For a pipe: each new value is one line, plain or JSON."""
 
     def __init__(self, *, as_json: bool) -> None:
@@ -200,7 +200,7 @@ class _Lines:
     def __exit__(self, *_: object) -> None:
         """End."""
 
-    def draw(self, live: Live, source: Source, *, now: float, wall: float) -> None:
+    def draw(self, live: LiveState, source: DataSource, *, now: float, wall: float) -> None:
         """Print what is new."""
         for plain, data in self._lines.news(live, source, now=now, wall=wall):
             if self._as_json and data is not None:
@@ -229,7 +229,7 @@ class _Screen:
         self._screen.stop()
         self._console.print(last)
 
-    def draw(self, live: Live, source: Source, *, now: float, wall: float) -> None:
+    def draw(self, live: LiveState, source: DataSource, *, now: float, wall: float) -> None:
         """Draw it anew."""
         from rich.text import Text  # noqa: PLC0415 - for a terminal only
 

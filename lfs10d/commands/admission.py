@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import Generic, TypeVar
 
-from lfs10d.command import Answer, Call, Identifier, RequestClass, rejected
+from lfs10d.command import Command, Identifier, RequestClass, Result, rejected
 from lfs10d.commands.message import LARGEST, LARGEST_CORRELATION, NoParameters, Parameters, parameters_of, read
 
 RATE = 20.0
@@ -38,7 +38,7 @@ W = TypeVar("W")
 
 
 @dataclass(frozen=True, slots=True)
-class Form:
+class CommandSpec:
     """What is known of a request before it is performed: its class, its parameters, how long repeats are told."""
 
     klass: RequestClass
@@ -58,8 +58,8 @@ class Answered:
     `flood`: it came beyond the rate.
     """
 
-    call: Call
-    answer: Answer
+    call: Command
+    answer: Result
     took: float = 0.0
     clear: bool = False
     flood: bool = False
@@ -70,18 +70,18 @@ class _Memory(Generic[W]):
     """What is remembered of a request by its id; `repeats` wait for its end."""
 
     fingerprint: str
-    answer: Answer | None = None
+    answer: Result | None = None
     took: float = 0.0
     forget_at: float = inf
-    repeats: list[tuple[Call, W]] = field(default_factory=list)
+    repeats: list[tuple[Command, W]] = field(default_factory=list)
 
 
 @dataclass(frozen=True, slots=True)
-class Ticket(Generic[W]):
+class Admitted(Generic[W]):
     """An admitted request, since monotonic `since`: perform it and tell `Admission.done`, once."""
 
     name: str
-    call: Call
+    call: Command
     parameters: Parameters
     since: float
     memory: _Memory[W]
@@ -95,7 +95,7 @@ class Waiting:
 class Admission(Generic[W]):
     """`forms` are the requests known, by name; `allowed` the classes obeyed besides `always`."""
 
-    def __init__(self, forms: Mapping[str, Form], allowed: frozenset[str]) -> None:
+    def __init__(self, forms: Mapping[str, CommandSpec], allowed: frozenset[str]) -> None:
         self.allowed = allowed
         self._forms = forms
         self._tokens = float(BURST)
@@ -104,7 +104,7 @@ class Admission(Generic[W]):
 
     def admit(
         self, name: str, payload: bytes, *, retained: bool, whence: W, now: float, correlation: int = 0
-    ) -> Ignored | Answered | Ticket[W] | Waiting:
+    ) -> Ignored | Answered | Admitted[W] | Waiting:
         """Judge a request; `whence` is kept for `done` if it repeats one that still runs.
 
         `correlation` is how many bytes its Correlation Data has.
@@ -113,10 +113,10 @@ class Admission(Generic[W]):
             return Ignored()
         flood = not self._within_rate(now)
         if retained:
-            call = read(payload)[0] if len(payload) <= LARGEST else Call()
+            call = read(payload)[0] if len(payload) <= LARGEST else Command()
             message = "a retained request is never executed; publish it without the retain flag"
             return Answered(call, rejected("retained", message), clear=True, flood=flood)
-        call, problem = read(payload) if len(payload) <= LARGEST else (Call(), None)
+        call, problem = read(payload) if len(payload) <= LARGEST else (Command(), None)
         if (excess := _too_large(len(payload), correlation)) is not None:
             return Answered(call, rejected("too_large", excess), flood=flood)
         if flood:
@@ -127,7 +127,7 @@ class Admission(Generic[W]):
             return Answered(call, refusal)
         return self._repeated(name, call, whence, now) or self._new(name, call, problem, now)
 
-    def _refusal(self, name: str, problem: Answer | None) -> Answer | None:
+    def _refusal(self, name: str, problem: Result | None) -> Result | None:
         """Return why the request is not obeyed, whoever asks it with whatever parameters."""
         if problem is not None and problem.code == "invalid_json":
             return problem
@@ -147,7 +147,7 @@ class Admission(Generic[W]):
         self._tokens -= 1
         return True
 
-    def _repeated(self, name: str, call: Call, whence: W, now: float) -> Answered | Waiting | None:
+    def _repeated(self, name: str, call: Command, whence: W, now: float) -> Answered | Waiting | None:
         if call.key is None:
             return None
         first = self._seen.get((name, call.key))
@@ -164,17 +164,17 @@ class Admission(Generic[W]):
             return Waiting()
         return Answered(call, first.answer, first.took)
 
-    def _new(self, name: str, call: Call, problem: Answer | None, now: float) -> Answered | Ticket[W]:
+    def _new(self, name: str, call: Command, problem: Result | None, now: float) -> Answered | Admitted[W]:
         form = self._forms[name]
         memory = _Memory[W](call.fingerprint)
         self._remember(name, call, memory)
         parameters = problem or parameters_of(form.parameters, call)
-        if isinstance(parameters, Answer):
+        if isinstance(parameters, Result):
             memory.answer, memory.forget_at = parameters, now + form.remembered_for
             return Answered(call, parameters)
-        return Ticket(name, call, parameters, now, memory)
+        return Admitted(name, call, parameters, now, memory)
 
-    def _remember(self, name: str, call: Call, memory: _Memory[W]) -> None:
+    def _remember(self, name: str, call: Command, memory: _Memory[W]) -> None:
         """Keep the ids that are to be kept longest; one whose request still runs is never forgotten."""
         if call.key is None:
             return
@@ -185,7 +185,7 @@ class Admission(Generic[W]):
             del self._seen[key]
         self._seen[name, call.key] = memory
 
-    def recall(self, name: str, call: Call, answer: Answer | None, forget_at: float) -> list[tuple[Call, W]]:
+    def recall(self, name: str, call: Command, answer: Result | None, forget_at: float) -> list[tuple[Command, W]]:
         """Remember a request of an earlier life of the daemon, None while its answer is still to come.
 
         Returns the repeats that waited for the answer, with their `whence`.
@@ -200,7 +200,7 @@ class Admission(Generic[W]):
         repeats, memory.repeats = memory.repeats, []
         return repeats
 
-    def done(self, ticket: Ticket[W], answer: Answer, now: float) -> list[tuple[Call, W]]:
+    def done(self, ticket: Admitted[W], answer: Result, now: float) -> list[tuple[Command, W]]:
         """Note how it ended; return the repeats that wait for it, with their `whence`."""
         memory = ticket.memory
         memory.answer, memory.took = answer, now - ticket.since

@@ -6,19 +6,19 @@ from collections.abc import Callable, Coroutine, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeAlias
 
-from lfs10d.command import Answer, Call
-from lfs10d.commands.admission import Form
-from lfs10d.commands.reads import Inquiry
+from lfs10d.command import Command, Result
+from lfs10d.commands.admission import CommandSpec
+from lfs10d.commands.reads import ReadResult
 from lfs10d.config.effective import Edit, Effective
 from lfs10d.config.models import SlaveConfig
-from lfs10d.line.jobs.ping import Knock
+from lfs10d.line.jobs.ping import Ping
 from lfs10d.line.jobs.register_access import Access
 from lfs10d.line.jobs.scan import Scan
 from lfs10d.modbus.frames import Request as RegisterRequest
 from lfs10d.profiles.profile import Profile
 
 
-class Powers(Protocol):
+class Context(Protocol):
     """What the daemon lets requests do. Called in the thread of the asyncio loop."""
 
     def health(self) -> dict[str, object]:
@@ -29,7 +29,7 @@ class Powers(Protocol):
         """Return the names of the configured devices, disabled ones too."""
         ...
 
-    async def read(self, device: str) -> Inquiry | None:
+    async def read(self, device: str) -> ReadResult | None:
         """Poll a configured device now; None if it was removed or became another one before it was asked."""
         ...
 
@@ -74,11 +74,11 @@ class Powers(Protocol):
         """
         ...
 
-    def applied(self, request: str, call: Call, **facts: object) -> None:
+    def applied(self, request: str, call: Command, **facts: object) -> None:
         """Tell everybody what a request changed."""
         ...
 
-    async def knock(self, slave: int, profile: Profile) -> Knock:
+    async def knock(self, slave: int, profile: Profile) -> Ping:
         """Ask a slave id that nobody polls whether anybody is there; return the job that is over."""
         ...
 
@@ -90,17 +90,17 @@ class Powers(Protocol):
         """Return the slave ids that no device may be given now, with the reason: `is reserved by ...`."""
         ...
 
-    async def readdress(self, device: str, to: int, *, dry_run: bool, call: Call) -> Answer:
+    async def readdress(self, device: str, to: int, *, dry_run: bool, call: Command) -> Result:
         """Give a sensor another slave id, verified on the line; with `dry_run` only find out whether it could be."""
         ...
 
-    async def baudrate(self, to: int, *, power_cycle: bool, dry_run: bool, call: Call) -> Answer:
+    async def baudrate(self, to: int, *, power_cycle: bool, dry_run: bool, call: Command) -> Result:
         """Move every sensor and the port to another rate, verified, or back."""
         ...
 
     async def adopt(
-        self, *, name: str | None, label: str | None, profile: str, factory: int | None, to: int | None, call: Call
-    ) -> Answer:
+        self, *, name: str | None, label: str | None, profile: str, factory: int | None, to: int | None, call: Command
+    ) -> Result:
         """Give a factory-new sensor of a `profile` at id `factory` the id `to` and the line's rate, and poll it.
 
         None is the profile's factory id, and the next free id. `profile` is a word that can be loaded.
@@ -115,13 +115,13 @@ class Powers(Protocol):
         ...
 
 
-Perform: TypeAlias = "Callable[[Any, Powers, Call], Coroutine[Any, Any, Answer]]"
+Perform: TypeAlias = "Callable[[Any, Context, Command], Coroutine[Any, Any, Result]]"
 """Takes the parameters in their form, the powers, and the call they came with."""
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class Handler:
     """A request: what admission must know, and what it does with its parameters and the daemon's powers."""
 
-    form: Form
+    form: CommandSpec
     perform: Perform

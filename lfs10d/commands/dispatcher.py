@@ -8,10 +8,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
-from lfs10d.command import Answer, Call, failed, rejected
-from lfs10d.commands.admission import Admission, Answered, Ignored, Ticket, Waiting
-from lfs10d.commands.context import Powers, Request
-from lfs10d.commands.message import LARGEST_CORRELATION
+from lfs10d.command import Command, Result, failed, rejected
+from lfs10d.commands.admission import Admission, Admitted, Answered, Ignored, Waiting
+from lfs10d.commands.context import Context, Handler
+from lfs10d.commands.message import LARGEST_CORRELATION, response
 from lfs10d.mqtt.topics import InboundRequest
 from lfs10d.system.logs import escape
 from lfs10d.telemetry import command_log
@@ -25,7 +25,7 @@ FLOOD_TOLD_EVERY = 60.0
 
 
 @dataclass(frozen=True, slots=True)
-class _Whence:
+class ReplyTo:
     """Where the answer to one request goes: a topic under B, with the request's Correlation Data."""
 
     topic: str
@@ -33,7 +33,7 @@ class _Whence:
     name: str
 
 
-class Service:
+class Dispatcher:
     """The requests of one line.
 
     `respond(topic under B, payload, correlation)` publishes a response, `clear(topic under B)` a retained request's
@@ -42,8 +42,8 @@ class Service:
 
     def __init__(
         self,
-        requests: Mapping[str, Request],
-        powers: Powers,
+        requests: Mapping[str, Handler],
+        powers: Context,
         *,
         allowed: frozenset[str],
         respond: Callable[[str, dict[str, object], bytes | None], None],
@@ -53,8 +53,8 @@ class Service:
         self._powers = powers
         self._respond = respond
         self._clear = clear
-        self._admission = Admission[_Whence]({name: request.form for name, request in requests.items()}, allowed)
-        self._running: set[asyncio.Task[Answer]] = set()
+        self._admission = Admission[ReplyTo]({name: request.form for name, request in requests.items()}, allowed)
+        self._running: set[asyncio.Task[Result]] = set()
         self._ending = False
         self._flood_told_until = 0.0
 
@@ -70,7 +70,7 @@ class Service:
         size = len(request.correlation or b"")
         # What is too large is not returned either: a slow broker would have us keep it.
         correlation = request.correlation if size <= LARGEST_CORRELATION else None
-        whence = _Whence(request.response_topic or own, correlation, name[:LONGEST_NAME])
+        whence = ReplyTo(request.response_topic or own, correlation, name[:LONGEST_NAME])
         verdict = self._admission.admit(
             name, request.payload, retained=request.retained, whence=whence, now=now, correlation=size
         )
@@ -84,10 +84,10 @@ class Service:
                 self._tell(whence, call, answer, took)
             case Waiting():
                 log.debug("request %s repeats one that still runs", escape(whence.name))
-            case Ticket():
+            case Admitted():
                 self._begin(verdict, whence)
 
-    def _begin(self, ticket: Ticket[_Whence], whence: _Whence) -> None:
+    def _begin(self, ticket: Admitted[ReplyTo], whence: ReplyTo) -> None:
         if self._ending:
             self._end(ticket, whence, rejected("cancelled", "the daemon is ending"))
             return
@@ -97,7 +97,7 @@ class Service:
         self._running.add(task)
         task.add_done_callback(partial(self._performed, ticket, whence))
 
-    def _performed(self, ticket: Ticket[_Whence], whence: _Whence, task: asyncio.Task[Answer]) -> None:
+    def _performed(self, ticket: Admitted[ReplyTo], whence: ReplyTo, task: asyncio.Task[Result]) -> None:
         """Answer a request whose task is over, however it ended, begun or not."""
         self._running.discard(task)
         if task.cancelled():
@@ -109,7 +109,7 @@ class Service:
             answer = task.result()
         self._end(ticket, whence, answer)
 
-    def _end(self, ticket: Ticket[_Whence], whence: _Whence, answer: Answer) -> None:
+    def _end(self, ticket: Admitted[ReplyTo], whence: ReplyTo, answer: Result) -> None:
         repeats = self._admission.done(ticket, answer, asyncio.get_running_loop().time())
         quiet = self._requests[ticket.name].form.klass == "always" and answer.status == "ok"
         level = logging.DEBUG if quiet else logging.INFO
@@ -117,7 +117,7 @@ class Service:
         for call, where in ((ticket.call, whence), *repeats):
             self._tell(where, call, answer, ticket.memory.took)
 
-    def recall(self, name: str, call: Call, answer: Answer | None, *, forget_in: float, tell: bool = False) -> None:
+    def recall(self, name: str, call: Command, answer: Result | None, *, forget_in: float, tell: bool = False) -> None:
         """Remember a request of an earlier life of the daemon for its repeats, for `forget_in` s.
 
         Without an answer they wait for it. `tell`: the request itself is answered too, where `call` says.
@@ -128,7 +128,7 @@ class Service:
         if tell:
             log.info("%s", command_log.line(name, call, answer))
             topic = call.topic or f"response/{name}"
-            self._tell(_Whence(topic, call.correlation, name), call, answer, 0.0)
+            self._tell(ReplyTo(topic, call.correlation, name), call, answer, 0.0)
         for again, where in repeats:
             self._tell(where, again, answer, 0.0)
 
@@ -140,8 +140,8 @@ class Service:
             self._flood_told_until = now + FLOOD_TOLD_EVERY
             log.warning("more requests come in than are obeyed; those beyond are rejected")
 
-    def _tell(self, whence: _Whence, call: Call, answer: Answer, took: float) -> None:
-        self._respond(whence.topic, call.response(whence.name, answer, took * 1000), whence.correlation)
+    def _tell(self, whence: ReplyTo, call: Command, answer: Result, took: float) -> None:
+        self._respond(whence.topic, response(call, whence.name, answer, took * 1000), whence.correlation)
 
     async def stop(self) -> None:
         """Answer what still runs as cancelled, and what comes from now on."""
@@ -151,5 +151,5 @@ class Service:
         await asyncio.gather(*self._running, return_exceptions=True)
 
 
-def _in_short(answer: Answer) -> str:
+def _in_short(answer: Result) -> str:
     return f"{answer.status} ({answer.code})" if answer.code else answer.status

@@ -9,18 +9,18 @@ from collections.abc import Awaitable, Callable, Iterable, Mapping
 from functools import partial
 from typing import TypeVar
 
-from lfs10d.command import Answer, Call, RefusedError, rejected
-from lfs10d.commands.pause import Pausing
-from lfs10d.commands.reads import Inquiries, Inquiry, altered
-from lfs10d.commands.scanner import Scanning
-from lfs10d.commands.trace import Trace, TracedDevice
+from lfs10d.command import Command, RefusedError, Result, rejected
+from lfs10d.commands.pause import LinePause
+from lfs10d.commands.reads import PendingReads, ReadResult, altered
+from lfs10d.commands.scanner import Scanner
+from lfs10d.commands.trace import FrameTrace, TracedDevice
 from lfs10d.config.effective import Effective
-from lfs10d.config.live_config import Edit, Running
+from lfs10d.config.live_config import Edit, LiveConfig
 from lfs10d.config.models import Config, SlaveConfig
-from lfs10d.config.reload import Plan
+from lfs10d.config.reload import ReloadPlan
 from lfs10d.line import settings
 from lfs10d.line.jobs.job import Job
-from lfs10d.line.jobs.ping import Knock
+from lfs10d.line.jobs.ping import Ping
 from lfs10d.line.jobs.register_access import Access
 from lfs10d.line.jobs.scan import Scan
 from lfs10d.line.line import Line
@@ -29,17 +29,17 @@ from lfs10d.modbus.frames import Request as RegisterRequest
 from lfs10d.mqtt.uplink import Uplink
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Event, Exchanged, Reading
-from lfs10d.reconfiguration.adopt import Newcomer
-from lfs10d.reconfiguration.reconfiguration import Physical
+from lfs10d.reconfiguration.adopt import AdoptRequest
+from lfs10d.reconfiguration.reconfiguration import Reconfiguration
 from lfs10d.system.clock import Instant
-from lfs10d.system.threads import aside
+from lfs10d.system.threads import run_in_thread
 from lfs10d.telemetry.publication import Publication, event
 from lfs10d.telemetry.station import PAUSED, POLLING, Station
 
 J = TypeVar("J", bound=Job)
 
 
-class DaemonPowers:
+class LineAccess:
     """`Powers` of `lfs10d.commands.context` on a running daemon.
 
     `now` gives the moment, `running` has the configuration that holds, `reload` takes up the files as they are,
@@ -52,8 +52,8 @@ class DaemonPowers:
         uplink: Uplink,
         *,
         now: Callable[[], Instant],
-        running: Running,
-        reload: Callable[[], Awaitable[Plan]],
+        running: LiveConfig,
+        reload: Callable[[], Awaitable[ReloadPlan]],
         change: Callable[[Edit], Awaitable[tuple[Effective, Effective]]],
         line: Callable[[], Line],
         publish: Callable[[list[Publication]], None],
@@ -66,13 +66,13 @@ class DaemonPowers:
         self._change = change
         self._line = line
         self._publish = publish
-        self.physical: Physical | None = None
+        self.physical: Reconfiguration | None = None
         """What changes sensors; given later, for it needs us."""
-        self._inquiries = Inquiries(lambda device, request: line().read(device, request))
-        self._trace: Trace | None = None
+        self._inquiries = PendingReads(lambda device, request: line().read(device, request))
+        self._trace: FrameTrace | None = None
         self._accesses: defaultdict[int, asyncio.Lock] = defaultdict(asyncio.Lock)
-        self._scanning = Scanning(submit=lambda job: line().submit(job), act=self.act, tell=self.tell)
-        self._pausing = Pausing(pause=lambda: line().pause(), resume=lambda: line().resume(), act=self.act)
+        self._scanning = Scanner(submit=lambda job: line().submit(job), act=self.act, tell=self.tell)
+        self._pausing = LinePause(pause=lambda: line().pause(), resume=lambda: line().resume(), act=self.act)
 
     def health(self) -> dict[str, object]:
         """Return how the daemon, the line and the devices are."""
@@ -102,7 +102,7 @@ class DaemonPowers:
         """Return the names of the configured devices."""
         return tuple(slave.name for slave in self._running.now.config.slaves)
 
-    async def read(self, device: str) -> Inquiry | None:
+    async def read(self, device: str) -> ReadResult | None:
         """Poll a device now."""
         return await self._inquiries.read(device)
 
@@ -112,7 +112,7 @@ class DaemonPowers:
         specs = settings.device_specs(loaded.config, loaded.profiles)
         devices = {spec.slave: TracedDevice(spec.name, spec.codec, spec.profile) for spec in specs}
         until = self._now().mono + duration
-        self._trace = Trace(until, devices, settings.usual_codec(loaded.config.line))
+        self._trace = FrameTrace(until, devices, settings.usual_codec(loaded.config.line))
 
     async def scan(self, ids: tuple[int, ...], rates: tuple[int, ...], share: float) -> Scan:
         """Find out who is on the line."""
@@ -120,7 +120,7 @@ class DaemonPowers:
             raise RefusedError(rejected("line_error", "the port is freed for another program; see line/cancel"))
         with self._place("line/scan"):
             loaded = self._running.loaded
-            search = await aside(partial(settings.search, loaded, ids, rates, share=share), "profiles")
+            search = await run_in_thread(partial(settings.search, loaded, ids, rates, share=share), "profiles")
             return await self._scanning.scan(search)
 
     async def pause(self, duration: float) -> None:
@@ -150,7 +150,7 @@ class DaemonPowers:
         """Change what holds."""
         return await self._change(edit)
 
-    def applied(self, request: str, call: Call, **facts: object) -> None:
+    def applied(self, request: str, call: Command, **facts: object) -> None:
         """Tell on `event` what a request changed."""
         self._publish([event("change_applied", self._now().ts(), request=request, id=call.key, **facts)])
 
@@ -164,7 +164,7 @@ class DaemonPowers:
             return
         self._publish(self._station.acting(activity or POLLING, self._now()))
 
-    async def baudrate(self, to: int, *, power_cycle: bool, dry_run: bool, call: Call) -> Answer:
+    async def baudrate(self, to: int, *, power_cycle: bool, dry_run: bool, call: Command) -> Result:
         """Move every sensor and the port to another rate."""
         if self._pausing.paused:
             return rejected("line_error", "the port is freed for another program; see line/cancel")
@@ -173,17 +173,17 @@ class DaemonPowers:
         return await self.physical.baudrate(to, power_cycle=power_cycle, dry_run=dry_run, call=call)
 
     async def adopt(
-        self, *, name: str | None, label: str | None, profile: str, factory: int | None, to: int | None, call: Call
-    ) -> Answer:
+        self, *, name: str | None, label: str | None, profile: str, factory: int | None, to: int | None, call: Command
+    ) -> Result:
         """Take in a factory-new sensor."""
         if self.physical is None:
             return rejected("busy", "the daemon is starting")
-        return await self.physical.adopt(Newcomer(name, label, factory, to, profile), call)
+        return await self.physical.adopt(AdoptRequest(name, label, factory, to, profile), call)
 
-    async def knock(self, slave: int, profile: Profile) -> Knock:
+    async def knock(self, slave: int, profile: Profile) -> Ping:
         """Ask one slave id whether anybody is there."""
         codec = settings.profile_codec(self._running.now.config.line, profile)
-        return await self._carry_out(lambda over: Knock(slave, profile, codec, over))
+        return await self._carry_out(lambda over: Ping(slave, profile, codec, over))
 
     async def access(self, what: RegisterRequest, device: SlaveConfig | None) -> Access:
         """Read or write registers."""
@@ -220,7 +220,7 @@ class DaemonPowers:
         """Return the slave ids that no device may be given now, with the reason."""
         return {} if self.physical is None else self.physical.reserved()
 
-    async def readdress(self, device: str, to: int, *, dry_run: bool, call: Call) -> Answer:
+    async def readdress(self, device: str, to: int, *, dry_run: bool, call: Command) -> Result:
         """Give a sensor another slave id."""
         if self.physical is None:
             return rejected("busy", "the daemon is starting")

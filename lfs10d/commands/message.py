@@ -11,9 +11,10 @@ import json
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails, from_json
 
-from lfs10d.command import Answer, Call, Identifier, rejected
+from lfs10d.command import Command, Identifier, Result, rejected
 from lfs10d.schema.fields import quoted
 from lfs10d.schema.messages import in_words
+from lfs10d.telemetry.publication import VERSION
 
 LARGEST = 4096
 """Bytes of a request's payload."""
@@ -33,7 +34,7 @@ class NoParameters(Parameters):
     """A request that takes none."""
 
 
-def read(payload: bytes) -> tuple[Call, Answer | None]:
+def read(payload: bytes) -> tuple[Command, Result | None]:
     """Read a payload of at most `LARGEST` bytes; the answer is the rejection of one that is wrong as a whole.
 
     It is `invalid_json`, or `invalid_param` for an id that is none.
@@ -41,14 +42,14 @@ def read(payload: bytes) -> tuple[Call, Answer | None]:
     try:
         content = from_json(payload, allow_inf_nan=False)
     except ValueError:
-        return Call(), rejected("invalid_json", "the payload is no JSON in UTF-8")
+        return Command(), rejected("invalid_json", "the payload is no JSON in UTF-8")
     try:
         # The parser above takes the last of two; this one is asked second, for it minds neither depth nor NaN.
         json.loads(payload, object_pairs_hook=_once)
     except _TwiceError as error:
-        return Call(), rejected("invalid_json", f"{quoted(str(error))} is given twice; which is meant?")
+        return Command(), rejected("invalid_json", f"{quoted(str(error))} is given twice; which is meant?")
     if not isinstance(content, dict):
-        return Call(), rejected("invalid_json", 'the payload must be a JSON object, {"id": "a1"} for example')
+        return Command(), rejected("invalid_json", 'the payload must be a JSON object, {"id": "a1"} for example')
     ids: dict[str, Identifier | None] = {}
     problem = None
     for key in ("id", "transaction"):
@@ -61,8 +62,8 @@ def read(payload: bytes) -> tuple[Call, Answer | None]:
         fingerprint = json.dumps(content, sort_keys=True, allow_nan=False)
     except ValueError:  # 1e999 is read as infinity
         problem = rejected("invalid_json", "the payload holds a number that is too large")
-        return Call(ids["id"], ids["transaction"]), problem
-    return Call(ids["id"], ids["transaction"], content, fingerprint), problem
+        return Command(ids["id"], ids["transaction"]), problem
+    return Command(ids["id"], ids["transaction"], content, fingerprint), problem
 
 
 class _TwiceError(Exception):
@@ -84,7 +85,7 @@ def _is_identifier(value: object) -> bool:
     return isinstance(value, int) and not isinstance(value, bool)
 
 
-def parameters_of(form: type[Parameters], call: Call) -> Parameters | Answer:
+def parameters_of(form: type[Parameters], call: Command) -> Parameters | Result:
     """Return the parameters in their form, or the rejection that names the first wrong one."""
     try:
         return form.model_validate(call.parameters)
@@ -94,7 +95,7 @@ def parameters_of(form: type[Parameters], call: Call) -> Parameters | Answer:
         return _refused(form, next(unknown, details[0]))  # the slip of a key explains why another is missing
 
 
-def _refused(form: type[Parameters], detail: ErrorDetails) -> Answer:
+def _refused(form: type[Parameters], detail: ErrorDetails) -> Result:
     param = str(detail["loc"][0]) if detail["loc"] else None
     if param is not None and len(param) > LONGEST_ID:
         param = f"{param[: LONGEST_ID - 3]}..."
@@ -107,3 +108,18 @@ def _refused(form: type[Parameters], detail: ErrorDetails) -> Answer:
         case _:
             words = in_words(detail)
     return rejected("invalid_param", words if param is None else f"{param}: {words}", param=param)
+
+
+def response(command: Command, name: str, result: Result, took_ms: float) -> dict[str, object]:
+    """Return the response to a command under the request's `name`."""
+    payload: dict[str, object] = {"v": VERSION, "id": command.id}
+    if command.transaction is not None:
+        payload["transaction"] = command.transaction
+    return {
+        **payload,
+        "request": name,
+        "status": result.status,
+        "data": result.data,
+        "error": result.error(),
+        "took_ms": round(took_ms, 1),
+    }

@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable
 from lfs10d.telemetry.station import PAUSED
 
 
-class Pausing:
+class LinePause:
     """`pause` gives the port back and returns when it is free, `resume` opens it again.
 
     `act` tells what the line is busy with (None: as usual).

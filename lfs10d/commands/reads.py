@@ -8,29 +8,29 @@ from dataclasses import dataclass
 from itertools import count
 
 from lfs10d.reading import Fault, Reading
-from lfs10d.telemetry.publication import Kind, Payload, Publication
+from lfs10d.telemetry.publication import Payload, Publication, PublicationKind
 
 
 @dataclass(frozen=True, slots=True)
-class Inquiry:
+class ReadResult:
     """What came of one: the sample as it was published, and why there is no value."""
 
     sample: Payload
     fault: Fault | None
 
 
-class Inquiries:
+class PendingReads:
     """Those under way. Used in the thread of the asyncio loop; `submit(device, number)` begins one on the line."""
 
     def __init__(self, submit: Callable[[str, int], None]) -> None:
         self._submit = submit
         self._numbers = count(1)
-        self._waiting: dict[int, tuple[str, asyncio.Future[Inquiry | None]]] = {}
+        self._waiting: dict[int, tuple[str, asyncio.Future[ReadResult | None]]] = {}
 
-    async def read(self, device: str) -> Inquiry | None:
+    async def read(self, device: str) -> ReadResult | None:
         """Have a device polled and wait for its sample; None if `abandon` came first."""
         number = next(self._numbers)
-        future: asyncio.Future[Inquiry | None] = asyncio.get_running_loop().create_future()
+        future: asyncio.Future[ReadResult | None] = asyncio.get_running_loop().create_future()
         self._waiting[number] = device, future
         try:
             self._submit(device, number)
@@ -42,9 +42,9 @@ class Inquiries:
         """Tell those who wait for this reading; `published` is what the station made of it."""
         if not reading.requests:
             return
-        sample = next((each.payload for each in published if each.kind is Kind.SAMPLE), None)
+        sample = next((each.payload for each in published if each.kind is PublicationKind.SAMPLE), None)
         for number in reading.requests:
-            self._tell(number, Inquiry(sample, reading.fault))
+            self._tell(number, ReadResult(sample, reading.fault))
 
     def abandon(self, devices: Collection[str]) -> None:
         """Tell those who wait for one of these devices that no reading will come."""
@@ -52,7 +52,7 @@ class Inquiries:
             if device in devices:
                 self._tell(number, None)
 
-    def _tell(self, number: int, inquiry: Inquiry | None) -> None:
+    def _tell(self, number: int, inquiry: ReadResult | None) -> None:
         if number in self._waiting:
             _, future = self._waiting[number]
             if not future.done():

@@ -12,7 +12,7 @@ from typing import Final
 
 from lfs10d.line.jobs.job import Job
 from lfs10d.line.jobs.scan import Scan
-from lfs10d.line.jobs.scan_plan import Search
+from lfs10d.line.jobs.scan_plan import ScanPlan
 
 SCANNING: Final = "scanning"
 """The activity of the line while it lasts."""
@@ -24,7 +24,7 @@ LAST_STEP = 99.0
 """Percent that are told at most before the end: at the end of each round some ids are asked again."""
 
 
-class Scanning:
+class Scanner:
     """`submit` has a job done on the line, `act` tells what the line is busy with (None: as usual), `tell` an event."""
 
     def __init__(
@@ -40,7 +40,7 @@ class Scanning:
         self._scan: Scan | None = None
         self._over: asyncio.Future[None] | None = None
 
-    async def scan(self, search: Search) -> Scan:
+    async def scan(self, search: ScanPlan) -> Scan:
         """Scan, one at a time; return the scan when it is over, however it ended. Cancelling it ends it early."""
         loop = asyncio.get_running_loop()
         over: asyncio.Future[None] = loop.create_future()

@@ -9,7 +9,7 @@ from lfs10d.modbus.frames import READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS, C
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Exchanged, Fault
 from lfs10d.system.clock import Instant
-from lfs10d.telemetry.publication import TRACE, VERSION, Kind, Publication
+from lfs10d.telemetry.publication import TRACE, VERSION, Publication, PublicationKind
 
 LONGEST = 600
 """Bytes of one piece that are told; the longest frame, in ASCII, has 513 (Modbus over Serial Line V1.02, 2.5.2)."""
@@ -28,7 +28,7 @@ class TracedDevice:
     profile: Profile
 
 
-class Trace:
+class FrameTrace:
     """Tells exchanges until `until` (monotonic s). `devices` by slave id; other slaves are read by `usual`."""
 
     def __init__(self, until: float, devices: Mapping[int, TracedDevice], usual: Codec) -> None:
@@ -108,4 +108,4 @@ def _frame(direction: str, ts: int, data: bytes, text: str, gap_us: float | None
         "hex": shown.hex(" ").upper(),
         "text": text,
     }
-    return Publication(TRACE, payload, Kind.TRACE, retain=False, qos=0)
+    return Publication(TRACE, payload, PublicationKind.TRACE, retain=False, qos=0)

@@ -13,16 +13,16 @@ from typing import Any, TypeAlias
 OPTIONS = ("interval", "enabled", "label", "response_timeout")
 """What a request may change of a device, in the order of the file."""
 
-Saying: TypeAlias = Mapping[str, Any]
+Values: TypeAlias = Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
+class FileValues:
     """What the file says: each slave by its name, in order; `usual` are the values of keys it says nothing of."""
 
-    slaves: Mapping[str, Saying]
+    slaves: Mapping[str, Values]
     baudrate: int = 9600
-    usual: Saying = field(default_factory=dict)
+    usual: Values = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,11 +59,11 @@ class DeviceChange:
     device of the file, removed or not.
     """
 
-    removed: Saying | None = None
-    added: Saying | None = None
+    removed: Values | None = None
+    added: Values | None = None
     added_at: Place | None = None
-    options: Saying = field(default_factory=dict)
-    instead_of: Saying = field(default_factory=dict)
+    options: Values = field(default_factory=dict)
+    instead_of: Values = field(default_factory=dict)
     verified: Verified | None = None
 
     def __bool__(self) -> bool:
@@ -106,15 +106,15 @@ class Changes:
 
     # -- what requests do
 
-    def adding(self, name: str, entry: Saying, verified: Place | None = None) -> Changes:
+    def adding(self, name: str, entry: Values, verified: Place | None = None) -> Changes:
         """Return the changes with one more device; nobody has this name now."""
         return self.with_device(name, replace(self.of(name), added=entry, added_at=verified))
 
-    def removing(self, name: str, said: Said) -> Changes:
+    def removing(self, name: str, said: FileValues) -> Changes:
         """Return the changes without this device, be it the file's or one that was added."""
         return self.with_device(name, DeviceChange(removed=said.slaves.get(name), verified=self.of(name).verified))
 
-    def moving(self, name: str, place: Place, said: Said) -> Changes:
+    def moving(self, name: str, place: Place, said: FileValues) -> Changes:
         """Return the changes with another place for a device that is there now: there it was verified."""
         change = self.of(name)
         if change.added is not None:
@@ -124,7 +124,7 @@ class Changes:
         verified = None if place == Place(filed) else Verified(place, file=filed)
         return self.with_device(name, replace(change, verified=verified))
 
-    def setting(self, name: str, options: Saying, said: Said) -> Changes:
+    def setting(self, name: str, options: Values, said: FileValues) -> Changes:
         """Return the changes with other options of a device that is there now.
 
         An option that is set to what the file gives anyway is no change any more.
@@ -163,6 +163,6 @@ def keys(changes: Changes) -> Iterator[str]:
             yield f"slaves.{name}.id"
 
 
-def value_of(entry: Saying, key: str, said: Said) -> Any:  # noqa: ANN401  # any value of the configuration
+def value_of(entry: Values, key: str, said: FileValues) -> Any:  # noqa: ANN401  # any value of the configuration
     """Return what the file gives for a key of a slave, said there or not."""
     return entry.get(key, said.usual.get(key))

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
-from lfs10d.config.changes import OPTIONS, Changes, DeviceChange, Place, Rate, Saying, Verified
+from lfs10d.config.changes import OPTIONS, Changes, DeviceChange, Place, Rate, Values, Verified
 from lfs10d.config.credentials import reason
 from lfs10d.config.models import LineConfig, Section, SlaveConfig
 from lfs10d.errors import ConfigError, StateError
@@ -40,7 +40,7 @@ HEADING = """\
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class FoundChanges:
     """What was in the file; `missing` if there is none, `trouble` in words if it cannot be used."""
 
     changes: Changes
@@ -48,7 +48,7 @@ class Found:
     trouble: str | None = None
 
 
-class ChangeFile:
+class ChangesFile:
     """The file in one state directory."""
 
     def __init__(self, directory: Path, disk: Disk) -> None:
@@ -56,15 +56,15 @@ class ChangeFile:
         self._disk = disk
         self._unread: str | None = None
 
-    def read(self) -> Found:
+    def read(self) -> FoundChanges:
         """Read it; it stays as it is. Raises StateError if it is there and cannot be read."""
         content = self._content()
         if content is None:
-            return Found(Changes(), missing=True)
+            return FoundChanges(Changes(), missing=True)
         try:
-            return Found(understood(content, str(self.path)))
+            return FoundChanges(understood(content, str(self.path)))
         except ConfigError as error:
-            return Found(Changes(), trouble=str(error.problems[0]))
+            return FoundChanges(Changes(), trouble=str(error.problems[0]))
 
     def _content(self) -> bytes | None:
         try:
@@ -74,19 +74,21 @@ class ChangeFile:
         except OSError as error:
             raise StateError(f"{self.path} cannot be read: {reason(error)}") from None
 
-    def take(self) -> Found:
+    def take(self) -> FoundChanges:
         """Read it for good: one that cannot be understood is put aside. Never fails."""
         try:
             found = self.read()
         except StateError as error:
             self._unread = str(error)
-            return Found(Changes(), trouble=f"{error}; what requests changed is not known")
+            return FoundChanges(Changes(), trouble=f"{error}; what requests changed is not known")
         if found.trouble is None:
             return found
         aside = self.path.with_name(ASIDE)
         with contextlib.suppress(OSError):
             self._disk.put_aside(self.path, aside)
-            return Found(Changes(), trouble=f"{found.trouble}; the file is now {aside}, and nothing is changed by it")
+            return FoundChanges(
+                Changes(), trouble=f"{found.trouble}; the file is now {aside}, and nothing is changed by it"
+            )
         self._unread = found.trouble
         return found
 
@@ -122,7 +124,7 @@ _Baudrate = Annotated[
 ]
 
 
-def _saying(value: object, *, keys: tuple[str, ...], whole: bool) -> Saying:
+def _saying(value: object, *, keys: tuple[str, ...], whole: bool) -> Values:
     """Take what is said of a device in the words of the configuration."""
     if not isinstance(value, dict) or not set(value) <= set(keys) or ("id" in value) is not whole:
         message = f"must be a mapping of {', '.join(keys)}" + (" with an id" if whole else "")
@@ -176,7 +178,7 @@ class _Line(Section):
     baudrate: _Rate | None = None
 
 
-class _Content(Section):
+class _ChangesContent(Section):
     version: Annotated[int, Whole(VERSION, VERSION)]
     line: _Line = _Line()
     devices: dict[Annotated[str, Name()], _Device] = Field(default_factory=dict)
@@ -191,7 +193,7 @@ def understood(content: bytes, file: str) -> Changes:
     if isinstance(version, int) and version > VERSION:
         raise ConfigError((document.problem(("version",), f"is {version}: a newer lfs10d wrote this file"),))
     try:
-        known = _Content.model_validate(document.data)
+        known = _ChangesContent.model_validate(document.data)
     except ValidationError as error:
         raise ConfigError(document.problems_of(error)) from None
     rate = known.line.baudrate
@@ -229,7 +231,7 @@ def _place(place: Place) -> dict[str, int]:
     return {"id": place.id} if place.baudrate is None else {"id": place.id, "baudrate": place.baudrate}
 
 
-def in_words(saying: Saying) -> dict[str, Any]:
+def in_words(saying: Values) -> dict[str, Any]:
     """Return what is said of a device as one writes it into the file: durations with their unit, auto for None."""
     return {key: _word(key, value) for key, value in saying.items()}
 

@@ -15,7 +15,7 @@ from lfs10d.config.models import (
     default_line_name,
     device_name,
 )
-from lfs10d.schema.fields import BaseTopic, Kind, RefusedError, Text, quoted
+from lfs10d.schema.fields import BaseTopic, FieldError, FieldKind, Text, quoted
 from lfs10d.schema.messages import KeyPath
 
 
@@ -36,14 +36,14 @@ def resolved(config: Config, *, stem: str, host: str) -> Config:
 
 def unfit(config: Config, complete: Config) -> Iterator[tuple[KeyPath, str]]:
     """Yield what the host's name makes of %H where that is not allowed; `complete` is `config` resolved."""
-    kinds: tuple[tuple[str, Kind], ...] = (("base_topic", BaseTopic()), ("client_id", Text(LONGEST_CLIENT_ID)))
+    kinds: tuple[tuple[str, FieldKind], ...] = (("base_topic", BaseTopic()), ("client_id", Text(LONGEST_CLIENT_ID)))
     for key, kind in kinds:
         written, value = getattr(config.mqtt, key), getattr(complete.mqtt, key)
         if written is not None and "%H" not in written:
             continue
         try:
             kind.accept(value)
-        except RefusedError:
+        except FieldError:
             yield (
                 ("mqtt", key),
                 f"is {quoted(value)} with the name of this host, and must be {kind.words}; write one without %H",

@@ -11,11 +11,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
-from lfs10d.config.changes import Changes, Place, Said
+from lfs10d.config.changes import Changes, FileValues, Place
 from lfs10d.config.changes_file import in_words
 from lfs10d.config.defaults import inherited
-from lfs10d.config.loader import DEFAULT, Loaded, Origin, leaves
-from lfs10d.config.merge import Dropped, Merged, merge
+from lfs10d.config.loader import DEFAULT, LoadedConfig, Origin, leaves
+from lfs10d.config.merge import DroppedChange, Merged, merge
 from lfs10d.config.models import Config, SlaveConfig
 from lfs10d.config.validation import contradictions
 from lfs10d.errors import ConfigError
@@ -40,11 +40,11 @@ class Effective:
     at their id, and why; `suspended` the devices of which not every change can hold, and why.
     """
 
-    file: Loaded
-    loaded: Loaded
-    said: Said
+    file: LoadedConfig
+    loaded: LoadedConfig
+    said: FileValues
     changes: Changes
-    dropped: tuple[Dropped, ...]
+    dropped: tuple[DroppedChange, ...]
     places: Mapping[str, tuple[Place, ...]]
     conflicts: Mapping[str, str]
     suspended: Mapping[str, str]
@@ -65,7 +65,7 @@ class Effective:
         return next((slave for slave in self.config.slaves if slave.name == name), None)
 
 
-def said(file: Loaded) -> Said:
+def said(file: LoadedConfig) -> FileValues:
     """Return what a file says itself, key by key."""
     config, document = file.config, file.document
     slaves: dict[str, dict[str, Any]] = {}
@@ -74,10 +74,10 @@ def said(file: Loaded) -> Said:
         slaves[slave.name] = {"id": slave.id, **{key: getattr(slave, key) for key in keys}}
     usual = {key: getattr(_STANDARD, key) for key in ("enabled", "label", "profile", "checksum")}
     usual |= {key: getattr(config.poll, key) for key in ("interval", "response_timeout")}
-    return Said(slaves, config.line.baudrate, usual)
+    return FileValues(slaves, config.line.baudrate, usual)
 
 
-def effective(file: Loaded, changes: Changes) -> Effective:
+def effective(file: LoadedConfig, changes: Changes) -> Effective:
     """Return what holds of a valid file and the changes."""
     sayings = said(file)
     merged = merge(sayings, changes)
@@ -106,7 +106,7 @@ def effective(file: Loaded, changes: Changes) -> Effective:
 class _Builder:
     """Makes models of what was merged; a change that cannot hold is left out."""
 
-    def __init__(self, file: Loaded, merged: Merged) -> None:
+    def __init__(self, file: LoadedConfig, merged: Merged) -> None:
         self._file = file
         self._merged = merged
         self._filed = {slave.name: slave for slave in file.config.slaves}
@@ -148,7 +148,7 @@ class _Builder:
         return None if found is None else f"{found.path[-1]}: {found.message}"
 
 
-def _conflicts(config: Config, sayings: Said, changes: Changes) -> dict[str, str]:
+def _conflicts(config: Config, sayings: FileValues, changes: Changes) -> dict[str, str]:
     """Return who must yield where two have one id: the one last verified there keeps it, or else the file's."""
     holders: dict[int, str] = {}
     yielding: dict[str, str] = {}
@@ -164,7 +164,7 @@ def _conflicts(config: Config, sayings: Said, changes: Changes) -> dict[str, str
     return yielding
 
 
-def _origins(file: Loaded, config: Config, merged: Merged) -> dict[str, Origin]:
+def _origins(file: LoadedConfig, config: Config, merged: Merged) -> dict[str, Origin]:
     """Return the origins of all values; those of the file's slaves follow them to their new places."""
     places = {slave.name: index for index, slave in enumerate(file.config.slaves)}
     origins: dict[str, Origin] = {}
@@ -187,7 +187,7 @@ def _origins(file: Loaded, config: Config, merged: Merged) -> dict[str, Origin]:
     return origins
 
 
-def _inherited_origin(file: Loaded, key: str) -> Origin:
+def _inherited_origin(file: LoadedConfig, key: str) -> Origin:
     """Return where a value comes from that a device does not have itself."""
     if key not in {"interval", "response_timeout"}:
         return DEFAULT

@@ -12,13 +12,13 @@ from functools import partial
 from typing import TypeAlias
 
 from lfs10d.config.changes import Changes
-from lfs10d.config.changes_file import FILE_NAME, ChangeFile
+from lfs10d.config.changes_file import FILE_NAME, ChangesFile
 from lfs10d.config.effective import Effective, effective
-from lfs10d.config.loader import Loaded
-from lfs10d.config.merge import Dropped
-from lfs10d.config.reload import Files, Plan, imprint, plan, read
+from lfs10d.config.loader import LoadedConfig
+from lfs10d.config.merge import DroppedChange
+from lfs10d.config.reload import ConfigFiles, ReloadPlan, imprint, plan, read
 from lfs10d.errors import StateError
-from lfs10d.system.threads import aside
+from lfs10d.system.threads import run_in_thread
 from lfs10d.telemetry.publication import Publication, event
 
 Edit: TypeAlias = "Callable[[Effective], Changes]"
@@ -29,7 +29,7 @@ Edit: TypeAlias = "Callable[[Effective], Changes]"
 class News:
     """What a person should know: changes that were `dropped`, other `warnings`, and why the disk fails, if it does."""
 
-    dropped: list[Dropped] = field(default_factory=list)
+    dropped: list[DroppedChange] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     storage: str | None = None
 
@@ -47,13 +47,15 @@ class News:
         ]
 
 
-class Running:
+class LiveConfig:
     """`take(plan, before)` puts another configuration into force; `now` holds it already then.
 
     Built before the loop runs: the file of changes is read at once, and one that cannot be understood put aside.
     """
 
-    def __init__(self, file: Loaded, changes: ChangeFile, take: Callable[[Plan, Effective], Awaitable[None]]) -> None:
+    def __init__(
+        self, file: LoadedConfig, changes: ChangesFile, take: Callable[[ReloadPlan, Effective], Awaitable[None]]
+    ) -> None:
         self._file = changes
         self._take = take
         self._lock = asyncio.Lock()
@@ -63,7 +65,7 @@ class Running:
         self.missing = found.missing or found.trouble is not None
         """No changes were known when the daemon began: there never were any, or their file is gone or damaged."""
         if found.trouble is not None:
-            self._news.dropped.append(Dropped(FILE_NAME, None, None, found.trouble))
+            self._news.dropped.append(DroppedChange(FILE_NAME, None, None, found.trouble))
         self.now = effective(file, found.changes)
         self._news.dropped += self.now.dropped
         self._note(self.now, {})
@@ -71,7 +73,7 @@ class Running:
             self._save(self.now.changes)
 
     @property
-    def loaded(self) -> Loaded:
+    def loaded(self) -> LoadedConfig:
         """What holds, as one configuration."""
         return self.now.loaded
 
@@ -80,14 +82,14 @@ class Running:
         news, self._news = self._news, News()
         return news
 
-    async def reload(self) -> Plan:
+    async def reload(self) -> ReloadPlan:
         """Read the file again and apply what changed; raises ConfigError and changes nothing if it is wrong."""
         async with self._lock:
             before = self.now.changes
-            found = await aside(partial(read, self.now.file.path), "reload")
-            now = await aside(partial(effective, found.loaded, before), "reload")
+            found = await run_in_thread(partial(read, self.now.file.path), "reload")
+            now = await run_in_thread(partial(effective, found.loaded, before), "reload")
             if now.changes != before:
-                await aside(partial(self._save, now.changes), "changes")
+                await run_in_thread(partial(self._save, now.changes), "changes")
             self._news.dropped += now.dropped
             return await self._hold(now, found.login)
 
@@ -105,11 +107,11 @@ class Running:
     async def _change(self, edit: Edit, save: Callable[[Changes], None]) -> tuple[Effective, Effective]:
         async with self._lock:
             before = self.now
-            changes = await aside(partial(edit, before), "changes")
+            changes = await run_in_thread(partial(edit, before), "changes")
             if changes == before.changes:
                 return before, before
-            now = await aside(partial(effective, before.file, changes), "changes")
-            await aside(partial(save, now.changes), "changes")
+            now = await run_in_thread(partial(effective, before.file, changes), "changes")
+            await run_in_thread(partial(save, now.changes), "changes")
             await self._hold(now, self._login)
             return before, self.now
 
@@ -126,10 +128,10 @@ class Running:
             f"{name}: {why}" for name, why in {**now.suspended, **now.conflicts}.items() if told.get(name) != why
         )
 
-    async def _hold(self, now: Effective, login: Mapping[str, bytes]) -> Plan:
+    async def _hold(self, now: Effective, login: Mapping[str, bytes]) -> ReloadPlan:
         before = self.now
         self._note(now, {**before.suspended, **before.conflicts})
-        found = plan(Files(before.loaded, self._login), Files(now.loaded, login))
+        found = plan(ConfigFiles(before.loaded, self._login), ConfigFiles(now.loaded, login))
         self.now, self._login = replace(now, loaded=found.loaded), login
         await self._take(found, before)
         return found

@@ -50,7 +50,7 @@ DEFAULT = Origin("default")
 
 
 @dataclass(frozen=True)
-class Loaded:
+class LoadedConfig:
     """A valid file: `config` without gaps, `profiles` by `SlaveConfig.profile`, `origins` by path in words."""
 
     path: Path
@@ -87,7 +87,7 @@ def load(
     files: bool = True,
     environment: Mapping[str, str] | None = None,
     host: str | None = None,
-) -> Loaded:
+) -> LoadedConfig:
     """Return the configuration in a file; raises ConfigError with all its problems, in order of place.
 
     With `files`, password and certificate files must be readable (a verb that logs in with credentials of its own
@@ -122,7 +122,7 @@ def load(
     if problems:
         # The file itself first, profile files after it.
         raise ConfigError(tuple(sorted(set(problems), key=lambda found: (found.file != document.file, found))))
-    loaded = Loaded(path, document, complete, profiles, _origins(document, complete, credential), credential)
+    loaded = LoadedConfig(path, document, complete, profiles, _origins(document, complete, credential), credential)
     if files:
         loaded.password()
     return loaded

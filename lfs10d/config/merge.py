@@ -17,14 +17,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from lfs10d.config.changes import OPTIONS, Changes, DeviceChange, Place, Rate, Said, Saying, Verified, value_of
+from lfs10d.config.changes import OPTIONS, Changes, DeviceChange, FileValues, Place, Rate, Values, Verified, value_of
 
-_NOTHING: Saying = {}
+_NOTHING: Values = {}
 _UNSAID = object()
 
 
 @dataclass(frozen=True, slots=True)
-class Dropped:
+class DroppedChange:
     """A change that holds no more because a person edited the file: the value `lost`, and why.
 
     `key` is as in `lfs10d.config.diff`: `slaves.mast-top.interval`, or `slaves.mast-top` for all of it. The file of
@@ -45,21 +45,21 @@ class Merged:
     what was verified differ: the file's first. `baudrate` is the line's.
     """
 
-    devices: Mapping[str, Saying]
+    devices: Mapping[str, Values]
     changed: Mapping[str, frozenset[str]]
     baudrate: int
     changes: Changes
-    dropped: tuple[Dropped, ...]
+    dropped: tuple[DroppedChange, ...]
     contested: Mapping[str, tuple[Place, ...]]
 
 
-def merge(said: Said, changes: Changes) -> Merged:
+def merge(said: FileValues, changes: Changes) -> Merged:
     """Return what the file and the changes give together, by the rules above."""
     names = [*said.slaves, *(name for name in changes.devices if name not in said.slaves)]
-    devices: dict[str, Saying] = {}
+    devices: dict[str, Values] = {}
     changed: dict[str, frozenset[str]] = {}
     left: dict[str, DeviceChange] = {}
-    dropped: list[Dropped] = []
+    dropped: list[DroppedChange] = []
     contested: dict[str, tuple[Place, ...]] = {}
     rate, baudrate, rates = _merge_rate(said, changes.baudrate)
     for name in names:
@@ -77,7 +77,7 @@ def merge(said: Said, changes: Changes) -> Merged:
     return Merged(devices, changed, baudrate, Changes(left, rate), tuple(dropped), contested)
 
 
-def _merge_rate(said: Said, rate: Rate | None) -> tuple[Rate | None, int, tuple[int, ...]]:
+def _merge_rate(said: FileValues, rate: Rate | None) -> tuple[Rate | None, int, tuple[int, ...]]:
     """Return what is left of the change, the rate to begin with, and all that come into question."""
     if rate is None or said.baudrate == rate.now:
         return None, said.baudrate, (said.baudrate,)
@@ -98,7 +98,7 @@ def _places(slave: int, change: DeviceChange, rates: tuple[int, ...]) -> tuple[P
     return (first,) if first == last else (first, last)
 
 
-def _entry(entry: Saying | None, change: DeviceChange) -> tuple[Saying | None, frozenset[str]]:
+def _entry(entry: Values | None, change: DeviceChange) -> tuple[Values | None, frozenset[str]]:
     """Return what holds of a device, None for no device, and which keys of it changes say."""
     if change.added is not None:
         return change.added, frozenset(change.added)
@@ -113,7 +113,7 @@ def _entry(entry: Saying | None, change: DeviceChange) -> tuple[Saying | None, f
 # -- one device, three ways
 
 
-def _settle(name: str, said: Said, change: DeviceChange) -> tuple[DeviceChange, list[Dropped]]:
+def _settle(name: str, said: FileValues, change: DeviceChange) -> tuple[DeviceChange, list[DroppedChange]]:
     """Return what is left of the changes of one device, and what of it a person should know is lost."""
     entry = said.slaves.get(name)
     if change.removed is not None:
@@ -131,16 +131,20 @@ def _settle(name: str, said: Said, change: DeviceChange) -> tuple[DeviceChange, 
     return _kept(name, entry, said, change)
 
 
-def _unremoved(name: str, entry: Saying, said: Said, change: DeviceChange) -> tuple[DeviceChange, list[Dropped]]:
+def _unremoved(
+    name: str, entry: Values, said: FileValues, change: DeviceChange
+) -> tuple[DeviceChange, list[DroppedChange]]:
     """Give a device that was removed by request back to the file, where a person edited it."""
     kept, lost = _kept(name, entry, said, DeviceChange(verified=change.verified))
     if entry != change.added:
         what = {"removed": True} if change.added is None else dict(change.added)
-        lost.append(Dropped(f"slaves.{name}", name, what, "the file's entry of this device was edited"))
+        lost.append(DroppedChange(f"slaves.{name}", name, what, "the file's entry of this device was edited"))
     return kept, lost
 
 
-def _adopted(name: str, entry: Saying, said: Said, change: DeviceChange) -> tuple[DeviceChange, list[Dropped]]:
+def _adopted(
+    name: str, entry: Values, said: FileValues, change: DeviceChange
+) -> tuple[DeviceChange, list[DroppedChange]]:
     """Take a device that was added by request for one of the file, where a person put it (rule 4)."""
     added = change.added or _NOTHING
     options = {key: added[key] for key in OPTIONS if key in added}
@@ -152,10 +156,10 @@ def _adopted(name: str, entry: Saying, said: Said, change: DeviceChange) -> tupl
     return kept, lost
 
 
-def _kept(name: str, entry: Saying, said: Said, change: DeviceChange) -> tuple[DeviceChange, list[Dropped]]:
+def _kept(name: str, entry: Values, said: FileValues, change: DeviceChange) -> tuple[DeviceChange, list[DroppedChange]]:
     """Compare what was changed of a device of the file, key by key."""
     options: dict[str, Any] = {}
-    lost: list[Dropped] = []
+    lost: list[DroppedChange] = []
     for key, value in change.options.items():
         if entry.get(key, _UNSAID) == change.instead_of.get(key, _UNSAID):
             options[key] = value
@@ -169,9 +173,9 @@ def _kept(name: str, entry: Saying, said: Said, change: DeviceChange) -> tuple[D
     return replace(change, options=options, instead_of=base, verified=verified), lost
 
 
-def _says(entry: Saying, key: str) -> str:
+def _says(entry: Values, key: str) -> str:
     return "the file says something else now" if key in entry else "the file's own was taken out"
 
 
-def _dropped(name: str, key: str, lost: object, message: str) -> Dropped:
-    return Dropped(f"slaves.{name}.{key}", name, lost, message)
+def _dropped(name: str, key: str, lost: object, message: str) -> DroppedChange:
+    return DroppedChange(f"slaves.{name}.{key}", name, lost, message)

@@ -1,7 +1,8 @@
 """The configuration as frozen, strict models: every key with its default, its range and its meaning.
 
 The names are the keys of the file. Durations are float seconds, sizes bytes. `Config` as read from a file still has
-gaps (a slave without a name, a broker without a client id); `lfs10d.config.defaults` fills them. Nothing here reads a file.
+gaps (a slave without a name, a broker without a client id); `lfs10d.config.defaults` fills them. Nothing here reads a
+file.
 `docs/configuration.md` is generated from these models.
 """
 

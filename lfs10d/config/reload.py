@@ -8,24 +8,24 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lfs10d.config.diff import difference
-from lfs10d.config.loader import Loaded, load
+from lfs10d.config.loader import LoadedConfig, load
 from lfs10d.config.models import MqttConfig
 from lfs10d.system.regular_file import read_regular
 
 
 @dataclass(frozen=True, slots=True)
-class Files:
+class ConfigFiles:
     """A valid configuration, and by key a digest of each file of the login beside it."""
 
-    loaded: Loaded
+    loaded: LoadedConfig
     login: Mapping[str, bytes]
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class ReloadPlan:
     """What changes. `loaded` runs from now on: what needs a restart is in it as it was."""
 
-    loaded: Loaded
+    loaded: LoadedConfig
     applied: tuple[str, ...]
     restart_required: tuple[str, ...]
     line: bool
@@ -40,13 +40,13 @@ class Plan:
     log: bool
 
 
-def read(path: Path) -> Files:
+def read(path: Path) -> ConfigFiles:
     """Read everything anew; raises ConfigError with all that is wrong."""
     loaded = load(path)
-    return Files(loaded, imprint(loaded))
+    return ConfigFiles(loaded, imprint(loaded))
 
 
-def imprint(loaded: Loaded) -> dict[str, bytes]:
+def imprint(loaded: LoadedConfig) -> dict[str, bytes]:
     """Return a digest of the password and of the certificates, by key; unreadable ones are left out."""
     mqtt = loaded.config.mqtt
     digests: dict[str, bytes] = {}
@@ -66,7 +66,7 @@ def _digest(file: Path) -> bytes:
         return b""
 
 
-def plan(running: Files, found: Files) -> Plan:
+def plan(running: ConfigFiles, found: ConfigFiles) -> ReloadPlan:
     """Return what leads from one to the other."""
     before, after = running.loaded, found.loaded
     changes = difference(before.config, after.config)
@@ -82,7 +82,7 @@ def plan(running: Files, found: Files) -> Plan:
     keys.update(dict.fromkeys([*profiles, *sorted(login)]))
     silent = {"realtime": before.config.line.realtime}
     line = before.config.line != target.line.model_copy(update=silent)
-    return Plan(
+    return ReloadPlan(
         loaded=replace(after, config=target),
         applied=tuple(keys),
         restart_required=changes.restart_required,

@@ -17,15 +17,15 @@ from math import inf
 from pathlib import Path
 
 from lfs10d import __version__
-from lfs10d.commands.dispatcher import Service
+from lfs10d.commands.dispatcher import Dispatcher
 from lfs10d.commands.handlers.registry import REQUESTS
-from lfs10d.commands.line_access import DaemonPowers
-from lfs10d.config.changes_file import ChangeFile
+from lfs10d.commands.line_access import LineAccess
+from lfs10d.config.changes_file import ChangesFile
 from lfs10d.config.effective import Effective
-from lfs10d.config.live_config import Edit, Running
-from lfs10d.config.loader import Loaded
+from lfs10d.config.live_config import Edit, LiveConfig
+from lfs10d.config.loader import LoadedConfig
 from lfs10d.config.models import Config
-from lfs10d.config.reload import Plan
+from lfs10d.config.reload import ReloadPlan
 from lfs10d.daemon import signals
 from lfs10d.daemon.boot import Boot, keep
 from lfs10d.daemon.settings import config_hash, conflict_readings, device_facts, line_facts, store_limits
@@ -40,19 +40,19 @@ from lfs10d.mqtt.settings import BrokerSettings
 from lfs10d.mqtt.uplink import Uplink
 from lfs10d.outbox.store.store import Store
 from lfs10d.reading import Event, Exchanged, FaultCode, PortChanged, Reading
-from lfs10d.reconfiguration.baudrate_watch import Losing
+from lfs10d.reconfiguration.baudrate_watch import BaudrateWatch
 from lfs10d.reconfiguration.journal import Journal
-from lfs10d.reconfiguration.reconfiguration import Physical
-from lfs10d.reconfiguration.restore import Recalling
+from lfs10d.reconfiguration.reconfiguration import Reconfiguration
+from lfs10d.reconfiguration.restore import Restore
 from lfs10d.system import logs
-from lfs10d.system.clock import Moments
+from lfs10d.system.clock import Clock
 from lfs10d.system.disk import Disk
 from lfs10d.system.secret import Secret
 from lfs10d.system.systemd import Notifier
 from lfs10d.system.tasks import BackgroundTasks
-from lfs10d.telemetry.event_log import Entry, Logbook
+from lfs10d.telemetry.event_log import EventLog, LogEntry
 from lfs10d.telemetry.first_burst import FirstBurst
-from lfs10d.telemetry.info import DaemonFacts
+from lfs10d.telemetry.info import DaemonInfo
 from lfs10d.telemetry.publication import Publication
 from lfs10d.telemetry.start_report import WITHIN, StartReport
 from lfs10d.telemetry.station import Station
@@ -75,15 +75,15 @@ def _features(config: Config) -> tuple[str, ...]:
 class Daemon:
     """One line, from the port to the broker. Built and run inside an asyncio loop."""
 
-    def __init__(self, loaded: Loaded, boot: Boot, state_directory: Path, notifier: Notifier) -> None:
-        self._running = Running(loaded, ChangeFile(state_directory, Disk()), self._hold)
+    def __init__(self, loaded: LoadedConfig, boot: Boot, state_directory: Path, notifier: Notifier) -> None:
+        self._running = LiveConfig(loaded, ChangesFile(state_directory, Disk()), self._hold)
         loaded, config = self._running.loaded, self._running.now.config
         self._notifier = notifier
         self._loop = asyncio.get_running_loop()
         self._over = asyncio.Event()
         self._failed = False
         self._tasks = BackgroundTasks(on_failure=self._failed_inside)
-        self._moments = Moments(
+        self._moments = Clock(
             synchronised=lambda: self._uplink.synchronised(),  # noqa: PLW0108 - built below
             stepped=lambda: self._uplink.stepped(),  # noqa: PLW0108 - built below
         )
@@ -93,9 +93,9 @@ class Daemon:
         self._storage = Storage(state_directory, self._storage_told)
         self._signals = Signals(notifier, end=self._over.set, reload=self._reload, summary=self._summary)
         self._ticking: asyncio.TimerHandle | None = None
-        self._logbook = Logbook()
+        self._logbook = EventLog()
         self._start_report = StartReport()
-        self._facts = DaemonFacts(
+        self._facts = DaemonInfo(
             version=__version__,
             host=socket.gethostname(),
             boot=boot.id,
@@ -126,7 +126,7 @@ class Daemon:
         self._uplink.keep_in(store, self._storage.backlog_failed)
         self._uplink.send_samples(telemetry=config.mqtt.telemetry)
         self._first_burst = FirstBurst(self._station.burst(self._now()))
-        self._powers = DaemonPowers(
+        self._powers = LineAccess(
             self._station,
             self._uplink,
             now=self._now,
@@ -136,14 +136,14 @@ class Daemon:
             line=lambda: self._line,
             publish=self._publish,
         )
-        self._service = Service(
+        self._service = Dispatcher(
             REQUESTS,
             self._powers,
             allowed=frozenset(config.commands),
             respond=self._uplink.respond,
             clear=self._uplink.clear_retained,
         )
-        self._powers.physical = self._physical = Physical(
+        self._powers.physical = self._physical = Reconfiguration(
             Journal(state_directory, Disk()),
             running=lambda: self._running.now,
             change=self._change,
@@ -155,7 +155,7 @@ class Daemon:
             repoll=self._repoll,
             now=self._now,
         )
-        self._losing = Losing(
+        self._losing = BaudrateWatch(
             running=lambda: self._running.now,
             talk=self._physical.talk,
             devices=lambda: tuple(self._line.poller.schedule.devices.values()),
@@ -163,7 +163,7 @@ class Daemon:
         )
         self._line = Line(self._physical.polled(), loaded.profiles, heard=self._heard, failed=self._line_failed)
         if self._running.missing:
-            recalling = Recalling(
+            recalling = Restore(
                 running=lambda: self._running.now,
                 learn=self._learn,
                 devices=lambda: tuple(self._line.poller.schedule.devices.values()),
@@ -265,7 +265,7 @@ class Daemon:
         if self._ticking is not None and self._station.due() + TICK_SLACK < self._ticking.when():
             self._set_tick()
 
-    def _enter(self, entries: Iterable[Entry]) -> None:
+    def _enter(self, entries: Iterable[LogEntry]) -> None:
         for entry in entries:
             log.log(entry.level, "%s", entry.text)
 
@@ -300,7 +300,7 @@ class Daemon:
 
     # -- the files
 
-    async def _reload(self) -> Plan:
+    async def _reload(self) -> ReloadPlan:
         """Read the files again and apply what changed; raises ConfigError and changes nothing if one is wrong."""
         plan = await self._running.reload()
         self._tell_news()
@@ -340,7 +340,7 @@ class Daemon:
         else:
             self._publish(self._station.line_failed(FaultCode.STORAGE_FULL, trouble, self._now()))
 
-    async def _hold(self, plan: Plan, before: Effective) -> None:
+    async def _hold(self, plan: ReloadPlan, before: Effective) -> None:
         """Put into force what holds from now on."""
         now = self._running.now
         config = now.config
@@ -405,7 +405,7 @@ class Daemon:
             self._publish(self._station.line_recovered(FaultCode.DUPLICATE_CLIENT, now))
 
 
-async def run(loaded: Loaded, boot: Boot, state_directory: Path) -> int:
+async def run(loaded: LoadedConfig, boot: Boot, state_directory: Path) -> int:
     """Run the daemon of one configuration until it is told to end; return the exit code."""
     notifier = Notifier()
     try:

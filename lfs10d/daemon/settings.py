@@ -12,12 +12,12 @@ from lfs10d.line.device import FIRST_TIMEOUTS
 from lfs10d.outbox.store.database import Limits
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Fault, FaultCode, Reading
-from lfs10d.telemetry.info import DeviceFacts, LineFacts
+from lfs10d.telemetry.info import DeviceInfo, LineInfo
 
 
-def line_facts(line: LineConfig) -> LineFacts:
+def line_facts(line: LineConfig) -> LineInfo:
     """Return what the broker is told about the line."""
-    return LineFacts(
+    return LineInfo(
         name=line.name,
         port=line.port,
         baudrate=line.baudrate,
@@ -29,10 +29,10 @@ def line_facts(line: LineConfig) -> LineFacts:
     )
 
 
-def device_facts(config: Config, profiles: Mapping[str, Profile]) -> tuple[DeviceFacts, ...]:
+def device_facts(config: Config, profiles: Mapping[str, Profile]) -> tuple[DeviceInfo, ...]:
     """Return what the broker is told about each device."""
     return tuple(
-        DeviceFacts(
+        DeviceInfo(
             name=slave.name,
             slave=slave.id,
             label=slave.label,

@@ -7,7 +7,7 @@ import logging
 import signal
 from collections.abc import Awaitable, Callable
 
-from lfs10d.config.reload import Plan
+from lfs10d.config.reload import ReloadPlan
 from lfs10d.errors import ConfigError
 from lfs10d.system.systemd import Notifier
 from lfs10d.system.tasks import BackgroundTasks
@@ -25,7 +25,7 @@ class Signals:
         notifier: Notifier,
         *,
         end: Callable[[], None],
-        reload: Callable[[], Awaitable[Plan]],
+        reload: Callable[[], Awaitable[ReloadPlan]],
         summary: Callable[[], str],
     ) -> None:
         self._notifier = notifier

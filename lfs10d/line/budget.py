@@ -18,7 +18,7 @@ LONGEST_LEARNED_TIMEOUT = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Share:
+class LoadShare:
     """What one device takes of the line. `wire` is the time of one poll without turnaround, in seconds.
 
     `exchanges` make one poll, with `rest` s in all in which the device must be left in peace, and others are polled.
@@ -44,7 +44,7 @@ class Budget:
     """The shares of all enabled devices, and their sums."""
 
     gap: float
-    shares: tuple[Share, ...]
+    shares: tuple[LoadShare, ...]
 
     @property
     def load(self) -> float:
@@ -112,14 +112,14 @@ def budget(config: Config, profiles: Mapping[str, Profile]) -> Budget:
     )
 
 
-def _share(slave: SlaveConfig, profile: Profile, timing: LineTiming, framing: Framing) -> Share:
+def _share(slave: SlaveConfig, profile: Profile, timing: LineTiming, framing: Framing) -> LoadShare:
     codec = Codec(framing, Checksum(slave.checksum or profile.checksum))
     requests = [ReadRegisters(slave.id, read.address, read.count, read.function) for read in profile.reads()]
     wire = sum(timing.exchange(len(codec.encode(request)), codec.answer_size(request)) for request in requests)
     timeout = LONGEST_LEARNED_TIMEOUT if slave.response_timeout is None else slave.response_timeout
     waited = wire + len(requests) * ASSUMED_TURNAROUND
     rest = len(requests) * max(0.0, request_gap(slave, profile) - timing.gap)
-    return Share(
+    return LoadShare(
         device=slave.name,
         slave=slave.id,
         profile=slave.profile,

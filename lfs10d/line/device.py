@@ -99,7 +99,7 @@ class PollRules:
     probe_interval_max: float = 15.0
 
 
-class Turnarounds:
+class ResponseTimes:
     """The last answers' turnarounds in s (last bit of the request to first byte of the answer) and their p99."""
 
     def __init__(self) -> None:
@@ -145,7 +145,7 @@ class Device:
     probe_exempt: bool = False
     queued: bool = False
     polling: bool = False
-    turnarounds: Turnarounds = field(default_factory=Turnarounds)
+    turnarounds: ResponseTimes = field(default_factory=ResponseTimes)
     gap: RequestGap = field(default_factory=RequestGap)
     polled_at: float = float("-inf")
     silent: bool = False

@@ -10,7 +10,7 @@ from math import inf
 
 from lfs10d.line.jobs.job import Account, Hold, Job
 from lfs10d.line.jobs.poll import Poll
-from lfs10d.line.quota import Share
+from lfs10d.line.quota import Quota
 
 JOB_CREDIT = 0.1
 """Line time in s that a job may take ahead of its share: what it could not use while another spoke is not lost."""
@@ -32,7 +32,7 @@ class JobQueue:
         if account is not None:
             self._shares[job] = account
         elif job.share < 1:
-            self._shares[job] = Share(job.share, credit=JOB_CREDIT, now=now)
+            self._shares[job] = Quota(job.share, credit=JOB_CREDIT, now=now)
         if job.excludes:
             self._excluding.append(job)
             self.excluded |= job.excludes

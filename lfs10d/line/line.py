@@ -15,14 +15,14 @@ from collections.abc import Callable, Mapping
 from lfs10d.config.models import Config
 from lfs10d.line.budget import timing_of
 from lfs10d.line.jobs.job import Job
-from lfs10d.line.jobs.procedure import Course
+from lfs10d.line.jobs.procedure import Procedure
 from lfs10d.line.poller import Poller
-from lfs10d.line.scheduler import Schedule
+from lfs10d.line.scheduler import Scheduler
 from lfs10d.line.settings import device_specs, line_rules, poll_rules, port_settings
 from lfs10d.line.thread import WAKING, WAKING_REALTIME, LineThread
 from lfs10d.modbus.bus import Bus
 from lfs10d.modbus.exchange import Echo
-from lfs10d.modbus.pending import Unanswered
+from lfs10d.modbus.pending import PendingRequests
 from lfs10d.modbus.port import SerialPort
 from lfs10d.modbus.realtime import sharpen_timers, take_precedence, yield_precedence
 from lfs10d.profiles.profile import Profile
@@ -48,7 +48,7 @@ class Line:
         line = config.line
         self.port = SerialPort(port_settings(line))
         bus = Bus(self.port, line_rules(line), time.monotonic)
-        schedule = Schedule(timing_of(line), time.monotonic())
+        schedule = Scheduler(timing_of(line), time.monotonic())
         schedule.replace(
             device_specs(config, profiles), poll_rules(config.poll), time.monotonic()
         )  # fmt: skip
@@ -88,7 +88,7 @@ class Line:
         self.poller.submit(job)
         self.wake()
 
-    def go_on(self, course: Course, answer: object) -> None:
+    def go_on(self, course: Procedure, answer: object) -> None:
         """Tell a course what came of what it had done aside."""
 
         def tell(now: float) -> None:
@@ -120,7 +120,7 @@ class Line:
         self.wake()
 
     @property
-    def unanswered(self) -> Unanswered:
+    def unanswered(self) -> PendingRequests:
         """Which requests may still be answered; for jobs, in the line's thread."""
         return self.poller.schedule.unanswered
 

@@ -15,8 +15,8 @@ from math import floor, inf
 
 from lfs10d.line.device import Device
 from lfs10d.line.jobs.poll import Poll
-from lfs10d.modbus.pending import Unanswered
-from lfs10d.reading import Errand
+from lfs10d.modbus.pending import PendingRequests
+from lfs10d.reading import Purpose
 
 FLAT_OUT_PATIENCE = 5.0
 """A device with interval 0 goes as one that became due so many s after it was asked last."""
@@ -40,7 +40,7 @@ def spread(devices: Iterable[Device], *, polled: int, wire_time: float, now: flo
 class PollQueue:
     """The devices waiting for their poll and the polls waiting for their next exchange."""
 
-    def __init__(self, unanswered: Unanswered) -> None:
+    def __init__(self, unanswered: PendingRequests) -> None:
         self._unanswered = unanswered
         self._due: list[tuple[float, int, Device | Poll]] = []
         self._flat: deque[Device] = deque()
@@ -123,7 +123,7 @@ class PollQueue:
             device.due = due + (missed + 1) * interval
         device.polling = True
         device.last_asked = now
-        return Poll(device, self._unanswered, due=due, errand=Errand.POLL)
+        return Poll(device, self._unanswered, due=due, errand=Purpose.POLL)
 
     def _push(self, key: float, entry: Device | Poll) -> None:
         self._turn += 1

@@ -15,11 +15,11 @@ from typing import TypeAlias
 from lfs10d.line.device import DeviceSpec, PollRules
 from lfs10d.line.jobs.job import Ask, Job
 from lfs10d.line.jobs.poll import Poll
-from lfs10d.line.scheduler import Rest, Schedule
+from lfs10d.line.scheduler import Rest, Scheduler
 from lfs10d.modbus.bus import Bus, LineRules, Order, Wait
 from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.port import PortSettings
-from lfs10d.reading import Errand, Event, Exchanged, Fault, FaultCode, PortChanged, UartCounted, UartCounters
+from lfs10d.reading import Event, Exchanged, Fault, FaultCode, PortChanged, Purpose, UartCounted, UartCounters
 
 COUNTERS_EVERY = 10.0
 """How often the driver's counters are read, in s."""
@@ -33,14 +33,14 @@ Sink: TypeAlias = "Callable[[list[Event]], None]"
 class Poller:
     """One line. `sink` takes what was heard, at most once per exchange; `clock` is the bus's."""
 
-    def __init__(self, bus: Bus, schedule: Schedule, sink: Sink, clock: Callable[[], float]) -> None:
+    def __init__(self, bus: Bus, schedule: Scheduler, sink: Sink, clock: Callable[[], float]) -> None:
         self.bus = bus
         self.schedule = schedule
         self._sink = sink
         self._clock = clock
         self._posted: deque[Callable[[float], None]] = deque()
         self._events: list[Event] = []
-        self._errand = Errand.POLL
+        self._errand = Purpose.POLL
         self._paused = False
         self._count_at = clock()
         self._first_counters: UartCounters | None = None
@@ -67,7 +67,7 @@ class Poller:
     def _read(self, name: str, request: int, now: float) -> None:
         device = self.schedule.devices.get(name)
         if device is not None:
-            poll = Poll(device, self.schedule.unanswered, due=now, errand=Errand.REQUEST, request=request)
+            poll = Poll(device, self.schedule.unanswered, due=now, errand=Purpose.REQUEST, request=request)
             self._events += self.schedule.submit(poll, now)
 
     def replace(self, specs: Iterable[DeviceSpec], rules: PollRules) -> None:

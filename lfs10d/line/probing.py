@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from math import inf
 
 from lfs10d.line.device import Device
-from lfs10d.line.quota import Share
+from lfs10d.line.quota import Quota
 
 PROBE_SHARE = 0.04
 """The part of the line that probes are given while any device answers: what one of them takes beyond that, and the
@@ -25,7 +25,7 @@ PROBE_SPACING = 1.0
 class ProbeAccount:
     """The share that all probes have together; it binds only while any device answers."""
 
-    def __init__(self, probing: Probing, share: Share) -> None:
+    def __init__(self, probing: Probing, share: Quota) -> None:
         self._probing = probing
         self._share = share
 
@@ -47,7 +47,7 @@ class Probing:
     """The offline devices of one line; `now` is the line's clock at the beginning."""
 
     def __init__(self, now: float) -> None:
-        self._share = Share(PROBE_SHARE, credit=PROBE_CREDIT, now=now)
+        self._share = Quota(PROBE_SHARE, credit=PROBE_CREDIT, now=now)
         self._offline: list[Device] = []
         self.anyone_online = False
         self.next_at = inf

@@ -6,7 +6,7 @@ ROUNDING = 1e-9
 """What floating point may lose, in s: at `ready_at` the line is free."""
 
 
-class Share:
+class Quota:
     """At most `rate` (0 < rate <= 1) of the line's time, with up to `credit` s taken ahead of it."""
 
     def __init__(self, rate: float, *, credit: float, now: float) -> None:

@@ -9,7 +9,7 @@ Rules
    device is due at once.
 4. A device that is never heard, or probed in turn with others, and is silent right after another was silent, is asked
    once more at once: some sensors ignore the request after one to a dead neighbour.
-5. A slave is given its rest before each request, whatever it is for (`lfs10d.line.slave_rests`): a job that wants to ask
+5. A slave is given its rest before each request, whatever it is for (see `slave_rests`): a job that wants to ask
    it sooner is held, while others have the line.
 6. One poll, one reading; none if its device is no longer configured, or no longer enabled and nobody requested it.
 """
@@ -22,19 +22,19 @@ from typing import TypeAlias
 
 from lfs10d.line.device import LEARNED_MOST, Device, DeviceSpec, Health, PollRules
 from lfs10d.line.job_queue import JobQueue
-from lfs10d.line.jobs.job import Again, Ask, Hold, Job, Later
+from lfs10d.line.jobs.job import Ask, Continue, Hold, Job, Requeue
 from lfs10d.line.jobs.poll import Poll, tell, tell_lost
 from lfs10d.line.poll_queue import PollQueue, back_on_grid, spread
 from lfs10d.line.probing import Probing
 from lfs10d.line.slave_rests import SlaveRests
-from lfs10d.line.surcharge import Toll
+from lfs10d.line.surcharge import Surcharge
 from lfs10d.modbus import diagnosis
 from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import EXCEPTION_FLAG, ReadRegisters
 from lfs10d.modbus.overhearing import Overhearing
-from lfs10d.modbus.pending import Unanswered
+from lfs10d.modbus.pending import PendingRequests
 from lfs10d.modbus.timing import LineTiming
-from lfs10d.reading import AnsweredTwice, Errand, Fault, FaultCode, Reading
+from lfs10d.reading import AnsweredTwice, Fault, FaultCode, Purpose, Reading
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ START_PATIENT = 8
 Decision: TypeAlias = Ask | Rest
 
 
-class Schedule:
+class Scheduler:
     """The devices of one line and the jobs on it; `now` is the line's clock at the beginning.
 
     `timing` is that of the line's own rate. The port counts as open until `port_lost`.
@@ -58,14 +58,14 @@ class Schedule:
 
     def __init__(self, timing: LineTiming, now: float) -> None:
         self.timing = timing
-        self.unanswered = Unanswered()
+        self.unanswered = PendingRequests()
         self.devices: dict[str, Device] = {}
         self._by_slave: dict[int, Device] = {}
         self._overhearing = Overhearing()
         self._polls = PollQueue(self.unanswered)
         self._probing = Probing(now)
         self._jobs = JobQueue()
-        self._toll = Toll()
+        self._toll = Surcharge()
         self._current: tuple[Job, Ask] | None = None
         self._silent: int | None = None
         self._lost: Fault | None = None
@@ -121,7 +121,7 @@ class Schedule:
     def _wanted(self, poll: Poll) -> bool:
         """Whether the reading of this poll is of any use (rule 5)."""
         device = poll.device
-        useful = device.spec.enabled or poll.errand is Errand.REQUEST
+        useful = device.spec.enabled or poll.errand is Purpose.REQUEST
         return useful and self.devices.get(device.name) is device
 
     # -- jobs
@@ -131,7 +131,7 @@ class Schedule:
         wanted = not isinstance(job, Poll) or self._wanted(job)
         lost = self._lost
         if wanted and lost is None:
-            probes = job.errand is Errand.PROBE
+            probes = job.errand is Purpose.PROBE
             self._jobs.submit(job, now, self._probing.account if probes else None)
             return []
         job.cut_off(now)
@@ -170,7 +170,7 @@ class Schedule:
         for device in self.devices.values():
             device.cut_off()
         polls = [job for job in jobs if isinstance(job, Poll) and self._wanted(job)]
-        wanted = {poll.device.name for poll in polls if poll.errand is Errand.REQUEST}
+        wanted = {poll.device.name for poll in polls if poll.errand is Purpose.REQUEST}
         told = [device for device in self.devices.values() if device.spec.enabled or device.name in wanted]
         return [tell_lost(device, fault, now, polls) for device in told]
 
@@ -229,18 +229,18 @@ class Schedule:
             return None
         device.polling = True
         device.last_asked = now
-        return Poll(device, self.unanswered, due=now, errand=Errand.PROBE)
+        return Poll(device, self.unanswered, due=now, errand=Purpose.PROBE)
 
     def _resume(self, job: Job, key: float) -> None:
-        if isinstance(job, Poll) and job.errand is Errand.POLL:
+        if isinstance(job, Poll) and job.errand is Purpose.POLL:
             self._polls.resume(job, key)
         else:
             self._jobs.resume(job)
 
     @property
-    def errand(self) -> Errand:
+    def errand(self) -> Purpose:
         """What the exchange on the line is for."""
-        return self._current[0].errand if self._current else Errand.POLL
+        return self._current[0].errand if self._current else Purpose.POLL
 
     # -- what came of it
 
@@ -258,15 +258,15 @@ class Schedule:
             self._jobs.resume(job)
             return []
         following = job.heard(outcome, now)
-        if not isinstance(following, Again):
+        if not isinstance(following, Continue):
             self._toll.released()
         if isinstance(job, Poll) and not self._wanted(job):
             job.cut_off(now)
             return []
-        if isinstance(following, Later):
+        if isinstance(following, Requeue):
             self._resume(job, following.key)
             return []
-        if isinstance(following, Again):
+        if isinstance(following, Continue):
             self._jobs.go_on(job)
             return []
         self._jobs.over(job)
@@ -334,9 +334,9 @@ class Schedule:
 
     def _spend(self, job: Job, outcome: Outcome, now: float) -> None:
         taken = outcome.ended - outcome.asked + self.timing.gap
-        if isinstance(job, Poll) and job.errand is Errand.PROBE:
+        if isinstance(job, Poll) and job.errand is Purpose.PROBE:
             self._probing.spend(job.device, taken, now)
-        elif job.errand is Errand.CHANGE:
+        elif job.errand is Purpose.CHANGE:
             self._jobs.spend(job, self._charge(job, outcome), now)
         else:
             self._jobs.spend(job, taken, now)
@@ -356,7 +356,7 @@ class Schedule:
             device.answered()
         else:
             device.failed(poll.fault, now)
-        if poll.errand is not Errand.REQUEST:
+        if poll.errand is not Purpose.REQUEST:
             device.polling = False
         if (before is not Health.ONLINE and device.online) or (doubtful and not device.doubtful):
             back_on_grid(device, now)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from lfs10d.config.loader import Loaded
+from lfs10d.config.loader import LoadedConfig
 from lfs10d.config.models import Config, LineConfig, PollConfig, SlaveConfig
 from lfs10d.line.budget import request_gap, timing_of
 from lfs10d.line.device import DeviceSpec, PollRules
 from lfs10d.line.jobs.register_access import Target
-from lfs10d.line.jobs.scan_plan import Search
+from lfs10d.line.jobs.scan_plan import ScanPlan
 from lfs10d.modbus.bus import LineRules
 from lfs10d.modbus.frames import Checksum, Codec, Framing
 from lfs10d.modbus.port_settings import PortSettings, Rs485
@@ -19,8 +19,6 @@ from lfs10d.profiles.profile import Profile
 
 GREATEST_SHARE = 0.95
 """A scan takes at most this share of the line, whatever is asked for, so that polling goes on."""
-
-
 DEFAULT_PROFILE = builtin_names()[0]
 
 
@@ -75,7 +73,7 @@ def _device_spec(slave: SlaveConfig, line: LineConfig, profile: Profile) -> Devi
     )
 
 
-def search(loaded: Loaded, ids: tuple[int, ...], rates: tuple[int, ...], *, share: float) -> Search:
+def search(loaded: LoadedConfig, ids: tuple[int, ...], rates: tuple[int, ...], *, share: float) -> ScanPlan:
     """Return what to look for on the line; without `rates` its own, and those an LFS10 can have.
 
     Everybody is asked with the check that all configured devices share, or CRC. May read the built-in profiles.
@@ -91,7 +89,7 @@ def search(loaded: Loaded, ids: tuple[int, ...], rates: tuple[int, ...], *, shar
         if line.framing in each.framings and (ascii_line or codec.checksum.value in each.checksums)
     )  # fmt: skip
     usual = next((each.baudrate.codes for each in profiles if each.name == DEFAULT_PROFILE and each.baudrate), ())
-    return Search(
+    return ScanPlan(
         ids,
         tuple(
             timing_of(line.model_copy(update={"baudrate": rate}))
@@ -104,7 +102,7 @@ def search(loaded: Loaded, ids: tuple[int, ...], rates: tuple[int, ...], *, shar
     )
 
 
-def access_target(loaded: Loaded, slave: int, device: SlaveConfig | None) -> Target:
+def access_target(loaded: LoadedConfig, slave: int, device: SlaveConfig | None) -> Target:
     """Return how the registers of a configured device are accessed, or of a slave id where none is."""
     config = loaded.config
     if device is None:

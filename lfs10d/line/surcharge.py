@@ -23,7 +23,7 @@ TURNAROUND = 0.005
 """s between request and answer of a usual sensor, for the estimate of how busy the line is."""
 
 
-class Toll:
+class Surcharge:
     """Follows how long a change has had the line, exchange after exchange. One for each line."""
 
     def __init__(self) -> None:

@@ -22,7 +22,7 @@ _REQUEST_BODY = 6
 """Slave, function, address and count: what a master sends, and no answer of a read can be."""
 
 
-class Verdict(NamedTuple):
+class Diagnosis(NamedTuple):
     """A fault's code and message."""
 
     code: FaultCode
@@ -34,7 +34,7 @@ def milliseconds(seconds: float) -> str:
     return f"{seconds * 1000:.1f}".removesuffix(".0") + " ms"
 
 
-def judge(attempt: Attempt, reception: Reception) -> Verdict | None:
+def judge(attempt: Attempt, reception: Reception) -> Diagnosis | None:
     """Name what went wrong when nothing more is to be expected; None where nothing did: a broadcast.
 
     The nearest thing to an answer counts: a frame with a right check, then a late answer, then broken bytes.
@@ -60,37 +60,37 @@ def stranger_spoke(attempt: Attempt, reception: Reception) -> bool:
     return stranger(attempt.request, attempt.codec, reception.leftover()) is not None
 
 
-def silent(timeout: float, *, own: bool = False) -> Verdict:
+def silent(timeout: float, *, own: bool = False) -> Diagnosis:
     """Judge that nobody answered; `own`: our request came back though no echo was expected."""
     hint = " but our own request came back: does the adapter echo?" if own else ""
-    return Verdict(FaultCode.TIMEOUT, f"no answer in {milliseconds(timeout)}{hint}")
+    return Diagnosis(FaultCode.TIMEOUT, f"no answer in {milliseconds(timeout)}{hint}")
 
 
-def late(latency: float) -> Verdict:
+def late(latency: float) -> Diagnosis:
     """Judge that only the answer to an earlier request came, `latency` s after that."""
     since = milliseconds(latency)
-    return Verdict(FaultCode.LATE, f"only the answer to an earlier request came, {since} after it was asked")
+    return Diagnosis(FaultCode.LATE, f"only the answer to an earlier request came, {since} after it was asked")
 
 
-def babble(turn: float) -> Verdict:
+def babble(turn: float) -> Diagnosis:
     """Judge that the line never fell silent for us."""
     waited = milliseconds(turn)
-    return Verdict(
+    return Diagnosis(
         FaultCode.COLLISION,
         f"the line did not fall silent in {waited}, nothing was sent: a second master, a babbling device or noise",
     )
 
 
-def changed_echo() -> Verdict:
+def changed_echo() -> Diagnosis:
     """Judge that our own bytes came back otherwise than we sent them."""
     message = "our own request came back changed: another device sent at the same time, or noise"
-    return Verdict(FaultCode.COLLISION, message)
+    return Diagnosis(FaultCode.COLLISION, message)
 
 
-def displaced(slave: int) -> Verdict:
+def displaced(slave: int) -> Diagnosis:
     """Judge that an answer came which may be another master's."""
     message = f"another master asked slave {slave} at the same time: no answer tells which of the two it is for"
-    return Verdict(FaultCode.COLLISION, message)
+    return Diagnosis(FaultCode.COLLISION, message)
 
 
 def twice(found: Twice) -> str:
@@ -101,10 +101,10 @@ def twice(found: Twice) -> str:
     )
 
 
-def refusal(code: int, request: Request) -> Verdict:
+def refusal(code: int, request: Request) -> Diagnosis:
     """Judge an exception answer; the message names the registers that were asked."""
     name = EXCEPTION_NAMES.get(code, "of the device's own")
-    return Verdict(FaultCode.EXCEPTION, f"exception {code:02X} {name}, {_asking(request)}")
+    return Diagnosis(FaultCode.EXCEPTION, f"exception {code:02X} {name}, {_asking(request)}")
 
 
 def _asking(request: Request) -> str:
@@ -115,54 +115,54 @@ def _asking(request: Request) -> str:
     return f"writing 0x{request.value:04X} to 0x{request.address:04X}"
 
 
-def stranger(request: Request, codec: Codec, heard: bytes) -> Verdict | None:
+def stranger(request: Request, codec: Codec, heard: bytes) -> Diagnosis | None:
     """Judge the nearest frame in `heard` that has a right check and is no answer to `request`; None without one."""
     size = codec.answer_size(request)
     verdicts = [_judge(request, body) for _, _, body in codec.frames(heard, request.slave, size)]
     return max(verdicts, key=_closeness, default=None)
 
 
-def broken(heard: bytes, size: int, *, begun: bool) -> Verdict:
+def broken(heard: bytes, size: int, *, begun: bool) -> Diagnosis:
     """Judge bytes that hold no right frame at all in place of an answer of `size`; `begun`: they begin as one.
 
     `heard` is what is left when echo, earlier answers and what came too early are taken out, at least one byte.
     """
     count = len(heard)
     if count >= size:
-        return Verdict(
+        return Diagnosis(
             FaultCode.CRC, f"check failed ({count} bytes): noise, two devices with one id, or a wrong baud rate"
         )
     if begun:
-        return Verdict(FaultCode.MALFORMED, f"answer cut short: {count} of {size} bytes")
+        return Diagnosis(FaultCode.MALFORMED, f"answer cut short: {count} of {size} bytes")
     plural = "s" * (count > 1)
-    return Verdict(FaultCode.MALFORMED, f"{count} byte{plural} in place of an answer of {size}: noise")
+    return Diagnosis(FaultCode.MALFORMED, f"{count} byte{plural} in place of an answer of {size}: noise")
 
 
 _CLOSENESS = {FaultCode.COLLISION: 4, FaultCode.MALFORMED: 3, FaultCode.WRONG_FUNCTION: 2, FaultCode.WRONG_SLAVE: 1}
 """Which of several frames tells most: the asked slave's own, nearest to what was asked."""
 
 
-def _closeness(verdict: Verdict) -> int:
+def _closeness(verdict: Diagnosis) -> int:
     return _CLOSENESS[verdict.code]
 
 
-def _judge(request: Request, body: bytes) -> Verdict:
+def _judge(request: Request, body: bytes) -> Diagnosis:
     """Judge a frame with a right check that is no answer to `request`."""
     slave, function, data = body[0], body[1] & ~EXCEPTION_FLAG, body[2:]
     asked = len(body) == _REQUEST_BODY and function in (3, 4)
     if slave != request.slave:
         if asked:
-            return Verdict(FaultCode.WRONG_SLAVE, f"a request to slave {slave} was heard: is there a second master?")
-        return Verdict(FaultCode.WRONG_SLAVE, f"slave {slave} answered in place of slave {request.slave}")
+            return Diagnosis(FaultCode.WRONG_SLAVE, f"a request to slave {slave} was heard: is there a second master?")
+        return Diagnosis(FaultCode.WRONG_SLAVE, f"slave {slave} answered in place of slave {request.slave}")
     if function != request.function:
         wrong = f"slave {slave} answered function {function:02X} in place of {request.function:02X}"
-        return Verdict(FaultCode.WRONG_FUNCTION, wrong)
+        return Diagnosis(FaultCode.WRONG_FUNCTION, wrong)
     if not isinstance(request, ReadRegisters):
         told = f"slave {slave} confirmed another write: {data.hex(' ').upper()}"
     elif asked:
         told = f"a request to slave {slave} was heard in place of its answer: an echo, or a second master"
-        return Verdict(FaultCode.COLLISION, told)
+        return Diagnosis(FaultCode.COLLISION, told)
     else:
         came, announced = max(0, len(data) - 1), sum(data[:1])
         told = f"slave {slave} sent {came} data bytes, announced as {announced}, in place of {2 * request.count}"
-    return Verdict(FaultCode.MALFORMED, told)
+    return Diagnosis(FaultCode.MALFORMED, told)

@@ -56,8 +56,8 @@ from lfs10d.modbus.attempt import (
     Send,
     Settled,
 )
-from lfs10d.modbus.diagnosis import Verdict
-from lfs10d.modbus.frame_search import Catch
+from lfs10d.modbus.diagnosis import Diagnosis
+from lfs10d.modbus.frame_search import FoundFrame
 from lfs10d.modbus.frames import BROADCAST, EXCEPTION_FLAG, Framing
 from lfs10d.modbus.reception import HEARD_KEPT, Reception
 from lfs10d.reading import Fault
@@ -259,7 +259,7 @@ class Exchange:
 
     # -- the end
 
-    def _settle(self, ended: float, catch: Catch | None, found: Verdict | None) -> Settled:
+    def _settle(self, ended: float, catch: FoundFrame | None, found: Diagnosis | None) -> Settled:
         attempt, reception = self._attempt, self._reception
         sent, unsolicited = reception.sent_yet, reception.unsolicited
         answer: tuple[int, ...] | None = ()

@@ -1,6 +1,6 @@
 """Finding frames in what the line gave, through noise, at every offset.
 
-A `Quarry` is one right answer looked for. Its head (slave id, function, count) is found by a plain search, its
+A `ExpectedFrame` is one right answer looked for. Its head (slave id, function, count) is found by a plain search, its
 length is known from its shape, so each byte is looked at a fixed number of times however long the garbage is.
 Positions count characters from the beginning of the exchange.
 """
@@ -18,7 +18,7 @@ KEPT = 1024
 
 
 @dataclass(slots=True)
-class Quarry:
+class ExpectedFrame:
     """One answer looked for, from position `start` on; `begun` once its whole head was seen."""
 
     codec: Codec
@@ -35,7 +35,7 @@ class Quarry:
 
 
 @dataclass(frozen=True, slots=True)
-class Catch:
+class FoundFrame:
     """A frame found right: its body without check, its place, and when its first and last byte were heard."""
 
     body: bytes
@@ -45,7 +45,7 @@ class Catch:
     last_at: float
 
 
-class Hunt:
+class FrameSearch:
     """The stream of one exchange."""
 
     __slots__ = ("_base", "_claims", "_mark_ends", "_mark_times", "_stream")
@@ -76,7 +76,7 @@ class Hunt:
         gone = bisect_right(self._mark_ends, self._base)
         del self._mark_ends[:gone], self._mark_times[:gone]
 
-    def seek(self, quarry: Quarry) -> Catch | None:
+    def seek(self, quarry: ExpectedFrame) -> FoundFrame | None:
         """Return the next right frame of this shape, or None; goes on behind it at the next call."""
         head, size = quarry.shape.head, quarry.shape.size
         quarry.partial = False
@@ -93,17 +93,17 @@ class Hunt:
             body = quarry.codec.unwrap(bytes(self._stream[at : at + size]))
             if body is not None:
                 quarry.start = end = begin + size
-                return Catch(body, begin, end, self._heard_at(begin), self._heard_at(end - 1))
+                return FoundFrame(body, begin, end, self._heard_at(begin), self._heard_at(end - 1))
             quarry.start = begin + 1
 
     def _heard_at(self, position: int) -> float:
         return self._mark_times[bisect_right(self._mark_ends, position)]
 
-    def claim(self, catch: Catch) -> None:
+    def claim(self, catch: FoundFrame) -> None:
         """Take a frame out of what is left to explain."""
         self._claims.append((catch.begin, catch.end))
 
-    def claimed(self, catch: Catch) -> bool:
+    def claimed(self, catch: FoundFrame) -> bool:
         """Whether a byte of this frame belongs to a claimed one."""
         return any(catch.begin < end and begin < catch.end for begin, end in self._claims)
 
@@ -143,11 +143,11 @@ class Hunt:
         claimed = sum(max(0, end - max(begin, start)) for begin, end in self._claims)
         return self.end - start - claimed
 
-    def begins(self, quarry: Quarry) -> bool:
+    def begins(self, quarry: ExpectedFrame) -> bool:
         """Whether bytes came that begin as this answer: its head, or enough of it at the very end."""
         return quarry.begun or self._tail(quarry) >= quarry.shape.sign
 
-    def _tail(self, quarry: Quarry) -> int:
+    def _tail(self, quarry: ExpectedFrame) -> int:
         """Return how many characters at the very end are the beginning of this answer's head."""
         head = quarry.shape.head
         for length in range(min(len(head), self.end - max(quarry.start, self._base)), 0, -1):
@@ -155,7 +155,7 @@ class Hunt:
                 return length
         return 0
 
-    def missing(self, quarries: Iterable[Quarry]) -> int:
+    def missing(self, quarries: Iterable[ExpectedFrame]) -> int:
         """Return how many characters must still come before any of these can be whole; 0 if none has begun.
 
         Where one character fits several, the first of them is taken: an answer is likelier than a refusal, and

@@ -41,7 +41,7 @@ EQUALS_KEPT = 16
 forgotten too soon would count as that of the next, and whatever was asked between the two as answered."""
 
 
-class Unanswered:
+class PendingRequests:
     """The unanswered requests of one line, by slave id."""
 
     def __init__(self) -> None:

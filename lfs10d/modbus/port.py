@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Protocol
 
 from lfs10d.errors import PortError, PortLostError
-from lfs10d.modbus.port_errors import Facts, hung_up, look, number_of, refusal
+from lfs10d.modbus.port_errors import PortErrorFacts, hung_up, look, number_of, refusal
 from lfs10d.modbus.port_lock import claim, holder, is_pty, release
 from lfs10d.modbus.port_settings import PortSettings, Rs485
 from lfs10d.modbus.serial_driver import USB_LATENCY, lower_latency, read_counters, switch_rs485
@@ -97,7 +97,7 @@ class SerialPort:
         self.notices: tuple[str, ...] = ()
         self._fd = -1
         self._hangup = select.poll()
-        self._busy: tuple[str, Facts] | None = None
+        self._busy: tuple[str, PortErrorFacts] | None = None
 
     def open(self) -> None:
         """Open by path, lock, set, and discard what was received before."""
@@ -226,7 +226,7 @@ class SerialPort:
         # Who holds it is looked for once per refusal in a row: the search goes through all of /proc.
         if self._busy is None or self._busy[0] != path:
             owner = holder(path)
-            self._busy = path, Facts(holder=str(owner) if owner else "")
+            self._busy = path, PortErrorFacts(holder=str(owner) if owner else "")
         return refusal(path, code, self._busy[1])
 
     def _lost(self, error: OSError | termios.error | ValueError) -> PortError:

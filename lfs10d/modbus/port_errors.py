@@ -52,7 +52,7 @@ _USED_ELSEWHERE = frozenset({errno.EBUSY, errno.EWOULDBLOCK})
 
 
 @dataclass(frozen=True, slots=True)
-class Facts:
+class PortErrorFacts:
     """What is known of a port that cannot be opened.
 
     `target` is where a symbolic link ends, `group` the group whose members may use the device ("" for both where
@@ -65,16 +65,16 @@ class Facts:
     holder: str = ""
 
 
-def look(path: str) -> Facts:
+def look(path: str) -> PortErrorFacts:
     """Gather the facts about a path; never fails."""
     try:
         target = escape(os.path.realpath(path)) if Path(path).is_symlink() else ""
     except (OSError, ValueError):
         target = ""
-    return Facts(target=target, group=_group(path), user=_user())
+    return PortErrorFacts(target=target, group=_group(path), user=_user())
 
 
-def refusal(path: str, code: int, facts: Facts) -> PortError:
+def refusal(path: str, code: int, facts: PortErrorFacts) -> PortError:
     """Return the error for an errno met while opening or setting a port."""
     if code in _USED_ELSEWHERE:
         return PortBusyError(path, f"in use by {facts.holder or 'another program'}: end that, or free the port there")
@@ -93,7 +93,7 @@ def number_of(error: OSError | termios.error) -> int:
     return number if isinstance(number, int) else errno.EIO
 
 
-def _words(code: int, facts: Facts) -> str:
+def _words(code: int, facts: PortErrorFacts) -> str:
     if code in _MISSING and facts.target:
         return f"the link leads to {facts.target}, which is not there: is the adapter plugged in? {_SEE}"
     if code == errno.EACCES and not facts.group:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from math import inf
 
 from lfs10d.modbus.attempt import Attempt, Echo, LateAnswer, Pending
-from lfs10d.modbus.frame_search import Catch, Hunt, Quarry
+from lfs10d.modbus.frame_search import ExpectedFrame, FoundFrame, FrameSearch
 from lfs10d.modbus.frames import BROADCAST, EXCEPTION_FLAG, ReadRegisters, Shape, WriteRegister
 
 HEARD_KEPT = 1024
@@ -35,9 +35,9 @@ class Reception:
         normal, exception = attempt.codec.shapes(attempt.request)
         self._attempt = attempt
         self._frame = frame
-        self._hunt = Hunt()
-        self._normal = Quarry(attempt.codec, normal)
-        self._exception = Quarry(attempt.codec, exception)
+        self._hunt = FrameSearch()
+        self._normal = ExpectedFrame(attempt.codec, normal)
+        self._exception = ExpectedFrame(attempt.codec, exception)
         self._older = [older for pending in attempt.earlier for older in self._quarries_of(pending)]
         self._pending = list(attempt.earlier)
         self._held: list[tuple[bytes, float]] = []
@@ -50,18 +50,18 @@ class Reception:
         )
         self.sent_yet = False
         self.heard = bytearray()
-        self.answer: Catch | None = None
-        self.spare: Catch | None = None
-        self.displaced: Catch | None = None
+        self.answer: FoundFrame | None = None
+        self.spare: FoundFrame | None = None
+        self.displaced: FoundFrame | None = None
         self.late: list[LateAnswer] = []
         self.late_at = self.whole_at = -inf
 
-    def _quarries_of(self, pending: Pending) -> Iterator[tuple[Pending, Quarry]]:
+    def _quarries_of(self, pending: Pending) -> Iterator[tuple[Pending, ExpectedFrame]]:
         """Yield the answers to an earlier request that cannot be taken for ours."""
         ours = {self._normal.shape, self._exception.shape}
         for shape in pending.codec.shapes(pending.request):
             if shape not in ours:
-                yield pending, Quarry(pending.codec, shape)
+                yield pending, ExpectedFrame(pending.codec, shape)
 
     def sent(self, begun: float) -> None:
         """Tell when the request was begun: from now on its echo and its answer may come."""
@@ -157,7 +157,7 @@ class Reception:
             start = 0
             for each in pending:
                 shapes = [shape for shape in each.codec.shapes(each.request) if shape.head in rest]
-                catches = [self._hunt.seek(Quarry(each.codec, shape, start)) for shape in shapes]
+                catches = [self._hunt.seek(ExpectedFrame(each.codec, shape, start)) for shape in shapes]
                 catch = min((catch for catch in catches if catch), key=lambda catch: catch.begin, default=None)
                 if catch is not None and not self._hunt.claimed(catch):
                     self._hunt.claim(catch)
@@ -227,7 +227,7 @@ class Reception:
         """What belongs to no echo and to no answer, in pieces, with the times at which they were read."""
         if self._echo_possible:
             own = Shape(self._frame, len(self._frame), len(self._frame))
-            echo = self._hunt.seek(Quarry(self._attempt.codec, own, self._sent_at))
+            echo = self._hunt.seek(ExpectedFrame(self._attempt.codec, own, self._sent_at))
             if echo is not None:
                 self._hunt.claim(echo)
         return tuple(self._hunt.pieces(0))

@@ -13,14 +13,14 @@ from collections.abc import Callable
 from lfs10d.errors import BrokerError
 from lfs10d.mqtt.connection import Connection
 from lfs10d.mqtt.messages import Accepted, Events, Incoming, Will
-from lfs10d.mqtt.reasons import Ended, Ending
+from lfs10d.mqtt.reasons import Disconnect, DisconnectReason
 from lfs10d.mqtt.reconnect import Reconnect
 from lfs10d.mqtt.settings import BrokerSettings, Version
 
 log = logging.getLogger(__name__)
 
 
-class Link:
+class BrokerClient:
     """`events.accepted` and `events.ended` come in turn, once for each connection that stood.
 
     `explained()` tells whether a message of ours may be why the broker ends the connection that stands. `connect`
@@ -114,7 +114,7 @@ class Link:
         """End the connection that stands without a word, as lost."""
         if self._connection is not None:
             self._connection.abandon()
-            self.ended(Ended(Ending.LOST, f"{self.settings.place}: {why}"))
+            self.ended(Disconnect(DisconnectReason.LOST, f"{self.settings.place}: {why}"))
 
     def missed(self) -> None:
         """Note that the broker had published our will before we came back."""
@@ -152,7 +152,7 @@ class Link:
         self._answer_waiters(accepted)
         self._events.accepted(accepted)
 
-    def ended(self, ended: Ended) -> None:
+    def ended(self, ended: Disconnect) -> None:
         """Tell that it is over, and try again when `Reconnect` says."""
         stood, self._accepted = self._accepted is not None, None
         self._connection = None
@@ -165,7 +165,7 @@ class Link:
         if stood:
             self._events.ended(ended)
 
-    def _tell(self, ended: Ended, place: str, delay: float) -> None:
+    def _tell(self, ended: Disconnect, place: str, delay: float) -> None:
         if self._reconnect.version is not self._settings.version:
             log.debug("%s; trying MQTT %s", ended.message, self._reconnect.version)
             return

@@ -1,4 +1,4 @@
-"""Retained topics of devices that are gone: looked for at the broker, and cleared. A thin shell around `Sweep`."""
+"""Retained topics of devices that are gone: looked for at the broker, and cleared. A shell around `OrphanSearch`."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from collections.abc import Set as AbstractSet
 
 from lfs10d.mqtt.connection import Connection
 from lfs10d.mqtt.messages import Filter, Incoming
-from lfs10d.mqtt.orphans import Sweep
+from lfs10d.mqtt.orphans import OrphanSearch
 from lfs10d.mqtt.topics import Topics
 
 log = logging.getLogger(__name__)
 
 
-class Clearing:
+class Cleanup:
     """`stands_behind()` returns the retained topics that are ours; `clear` is given those that nobody's are."""
 
     def __init__(
@@ -31,7 +31,7 @@ class Clearing:
         self._stands_behind = stands_behind
         self._clear = clear
         self._standing: Connection | None = None
-        self._sweep: Sweep | None = None
+        self._sweep: OrphanSearch | None = None
 
     @property
     def under_way(self) -> bool:
@@ -44,7 +44,7 @@ class Clearing:
         if standing is None or self._sweep is not None:
             return
         loop = asyncio.get_running_loop()
-        self._standing, self._sweep = standing, Sweep(self._topics, loop.time())
+        self._standing, self._sweep = standing, OrphanSearch(self._topics, loop.time())
         standing.subscribe(
             [
                 Filter(topic, qos=0, retain_as_published=False, no_local=True)
@@ -63,7 +63,7 @@ class Clearing:
             return False
         return self._sweep.heard(message.topic, message.payload, asyncio.get_running_loop().time())
 
-    def _end(self, sweep: Sweep) -> None:
+    def _end(self, sweep: OrphanSearch) -> None:
         standing = self._standing
         if standing is None or sweep is not self._sweep:
             return

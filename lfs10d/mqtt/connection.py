@@ -31,8 +31,8 @@ from lfs10d.mqtt.reasons import (
     KEEP_ALIVE_TIMEOUT,
     REFUSED_FROM,
     UNSUPPORTED_VERSION,
-    Ended,
-    Ending,
+    Disconnect,
+    DisconnectReason,
     failed,
     gone,
     reason_in_words,
@@ -282,7 +282,7 @@ class Connection:
         self.abandon()
         if events is not None:
             message = f"{self._settings.place}: connected, but says nothing: is mqtt.port that of an MQTT broker?"
-            events.ended(Ended(Ending.WRONG_VERSION, message))
+            events.ended(Disconnect(DisconnectReason.WRONG_VERSION, message))
 
     def _cancel_connack(self) -> None:
         if self._connack is not None:
@@ -294,8 +294,8 @@ class Connection:
             return
         self._cancel_connack()
         if reason >= REFUSED_FROM:
-            ending = Ending.WRONG_VERSION if reason == UNSUPPORTED_VERSION else Ending.REFUSED
-            self._end(Ended(ending, f"{self._settings.place}: {reason_in_words(reason)}", reason))
+            ending = DisconnectReason.WRONG_VERSION if reason == UNSUPPORTED_VERSION else DisconnectReason.REFUSED
+            self._end(Disconnect(ending, f"{self._settings.place}: {reason_in_words(reason)}", reason))
             return
         self._accepted = True
         self._events.accepted(
@@ -318,7 +318,7 @@ class Connection:
         else:
             self._end(failed(caught, self._settings))
 
-    def _end(self, ended: Ended) -> None:
+    def _end(self, ended: Disconnect) -> None:
         events, self._events = self._events, None
         self._cancel_connack()
         self._forget()

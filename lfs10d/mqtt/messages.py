@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from lfs10d.mqtt.reasons import Ended
+from lfs10d.mqtt.reasons import Disconnect
 from lfs10d.mqtt.settings import Version
 
 RECEIVE_MAXIMUM_UNSAID = 65_535
@@ -56,7 +56,7 @@ class Events(Protocol):
     def accepted(self, accepted: Accepted) -> None:
         """Note that the connection stands."""
 
-    def ended(self, ended: Ended) -> None:
+    def ended(self, ended: Disconnect) -> None:
         """Note that it is over, or never came to be; nothing follows."""
 
     def acknowledged(self, mid: int, reason: int) -> None:

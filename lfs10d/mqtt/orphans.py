@@ -15,7 +15,7 @@ LONGEST = 120.0
 
 
 @dataclass(slots=True)
-class Sweep:
+class OrphanSearch:
     """Collects what is retained under the devices' topics from `begun` on (monotonic seconds)."""
 
     topics: Topics

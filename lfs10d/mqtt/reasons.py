@@ -58,7 +58,7 @@ _REASONS = {
 """What a reason code means for the person who must act (MQTT 5.0, section 2.4)."""
 
 
-class Ending(StrEnum):
+class DisconnectReason(StrEnum):
     """What happened, as far as the next attempt depends on it."""
 
     UNREACHABLE = "unreachable"
@@ -78,10 +78,10 @@ class Ending(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Ended:
+class Disconnect:
     """One end; `message` is for a person and names the broker."""
 
-    ending: Ending
+    ending: DisconnectReason
     message: str
     reason: int | None = None
     by_message: bool = False
@@ -95,28 +95,30 @@ def reason_in_words(reason: int) -> str:
 
 def gone(
     place: str, *, left: bool, accepted: bool, reason: int | None = None, cause: BaseException | str | None = None
-) -> Ended:
+) -> Disconnect:
     """Return what the end of a connection to the broker at `place` means.
 
     `left`: we said so; `accepted`: the broker had accepted us; `reason` is that of its DISCONNECT, None without one;
     `cause` is why we ended it or could not go on, None: the broker closed it without a word.
     """
     if left:
-        return Ended(Ending.LEFT, f"{place}: disconnected")
+        return Disconnect(DisconnectReason.LEFT, f"{place}: disconnected")
     refused = _refused_certificate(cause)
     if refused is not None:
-        return Ended(Ending.REFUSED, f"{place}: {refused}")
+        return Disconnect(DisconnectReason.REFUSED, f"{place}: {refused}")
     if not accepted:
         message = f"{place}: closed the connection without an answer: check mqtt.port and mqtt.tls"
         if cause is not None and not isinstance(cause, ConnectionResetError):
             message += f" ({_words_of_loss(cause)})"
-        return Ended(Ending.WRONG_VERSION, message)
+        return Disconnect(DisconnectReason.WRONG_VERSION, message)
     if reason is None:
         by_broker = cause is None or isinstance(cause, ConnectionResetError | BrokenPipeError | ssl.SSLError)
-        return Ended(Ending.LOST, f"{place}: the connection is lost: {_words_of_loss(cause)}", by_message=by_broker)
-    ending = Ending.TAKEN_OVER if reason == SESSION_TAKEN_OVER else Ending.LOST
+        return Disconnect(
+            DisconnectReason.LOST, f"{place}: the connection is lost: {_words_of_loss(cause)}", by_message=by_broker
+        )
+    ending = DisconnectReason.TAKEN_OVER if reason == SESSION_TAKEN_OVER else DisconnectReason.LOST
     by_message = reason not in NOT_FOR_A_MESSAGE
-    return Ended(ending, f"{place}: {reason_in_words(reason)}", reason, by_message=by_message)
+    return Disconnect(ending, f"{place}: {reason_in_words(reason)}", reason, by_message=by_message)
 
 
 def _words_of_loss(cause: BaseException | str | None) -> str:
@@ -133,19 +135,19 @@ def _words_of_loss(cause: BaseException | str | None) -> str:
             return cause
 
 
-def failed(error: BaseException, settings: BrokerSettings) -> Ended:
+def failed(error: BaseException, settings: BrokerSettings) -> Disconnect:
     """Return why no connection could be made."""
-    return Ended(_ending(error), f"{settings.place}: {_words(error, settings)}")
+    return Disconnect(_ending(error), f"{settings.place}: {_words(error, settings)}")
 
 
-def _ending(error: BaseException) -> Ending:
+def _ending(error: BaseException) -> DisconnectReason:
     match error:
         case ssl.SSLEOFError() | ssl.SSLZeroReturnError() | ConnectionResetError() | BrokenPipeError():
-            return Ending.CLOSED
+            return DisconnectReason.CLOSED
         case OSError() if not isinstance(error, ssl.SSLError):
-            return Ending.UNREACHABLE
+            return DisconnectReason.UNREACHABLE
         case _:
-            return Ending.REFUSED
+            return DisconnectReason.REFUSED
 
 
 def _words(error: BaseException, settings: BrokerSettings) -> str:

@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from lfs10d.mqtt.reasons import Ended, Ending
+from lfs10d.mqtt.reasons import Disconnect, DisconnectReason
 from lfs10d.mqtt.settings import Version
 
 AWAY_EVERY = 1.0
@@ -52,7 +52,7 @@ SILENT_FOR = 600.0
 """Seconds for which a node that has accepted us may say nothing before it is taken for another broker."""
 
 
-_WORDLESS = frozenset({Ending.WRONG_VERSION, Ending.CLOSED})
+_WORDLESS = frozenset({DisconnectReason.WRONG_VERSION, DisconnectReason.CLOSED})
 """The connection was made, and ended without a reason code."""
 
 
@@ -121,7 +121,7 @@ class Reconnect:
         if self._since is not None and now - self._since >= self._takeover:
             self.duplicate = False
 
-    def ended(self, ended: Ended, now: float, *, explained: bool = False) -> None:
+    def ended(self, ended: Disconnect, now: float, *, explained: bool = False) -> None:
         """Note how the connection or the attempt ended, and decide on the next.
 
         `explained`: a message of ours may be why the broker ended it.
@@ -134,9 +134,13 @@ class Reconnect:
         else:
             self._failed(ended, version, now)
 
-    def _failed(self, ended: Ended, version: Version, now: float) -> None:
+    def _failed(self, ended: Disconnect, version: Version, now: float) -> None:
         absent = self._absent(ended, now)
-        if version is Version.V5 and ended.ending is Ending.WRONG_VERSION and not (absent and self._current.spoke_five):
+        if (
+            version is Version.V5
+            and ended.ending is DisconnectReason.WRONG_VERSION
+            and not (absent and self._current.spoke_five)
+        ):
             self._current.spoke_five = False
             self.version = Version.V311
             self.due = now
@@ -150,24 +154,24 @@ class Reconnect:
             self._back_off(now)
         self._choose(now)
 
-    def _absent(self, ended: Ended, now: float) -> bool:
+    def _absent(self, ended: Disconnect, now: float) -> bool:
         """Tell whether the node is away, rather than refusing us."""
         node = self._current
         if ended.ending not in _WORDLESS or ended.reason is not None:
             node.silent_since = None
-            return ended.ending is Ending.UNREACHABLE
+            return ended.ending is DisconnectReason.UNREACHABLE
         if node.silent_since is None:
             node.silent_since = now
         return node.accepted and now - node.silent_since <= SILENT_FOR
 
-    def _lost(self, ended: Ended, life: float, now: float, *, explained: bool) -> None:
+    def _lost(self, ended: Disconnect, life: float, now: float, *, explained: bool) -> None:
         if life >= TAKEN_OVER_FORGOTTEN:
             self._takeover = TAKEN_OVER_FIRST
         self._unproved = life < HELD and not explained
         if not self._unproved:
             self._short = 0
         suspect = self._unproved and self._short >= SHORT_MOST - 1
-        if ended.ending is Ending.TAKEN_OVER or suspect:
+        if ended.ending is DisconnectReason.TAKEN_OVER or suspect:
             self.duplicate = True
             self.due = now + self._takeover
             self._takeover = min(2 * self._takeover, TAKEN_OVER_LONGEST)

@@ -17,7 +17,7 @@ from lfs10d.mqtt.topics import Topics
 log = logging.getLogger(__name__)
 
 
-class EarlierLife:
+class RetainedReader:
     """Used in the thread of the asyncio loop; `told` is given what was found, by topic under `B`, once."""
 
     def __init__(

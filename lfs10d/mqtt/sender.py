@@ -15,10 +15,10 @@ from itertools import islice
 from lfs10d.mqtt.connection import Connection
 from lfs10d.mqtt.encoding import array, encode, packet_size
 from lfs10d.mqtt.messages import Accepted
-from lfs10d.mqtt.reasons import NO_MATCHING_SUBSCRIBERS, REFUSED_FROM, Ended, reason_in_words
+from lfs10d.mqtt.reasons import NO_MATCHING_SUBSCRIBERS, REFUSED_FROM, Disconnect, reason_in_words
 from lfs10d.mqtt.topics import Topics
 from lfs10d.outbox.backlog import ARRAY_BYTES
-from lfs10d.outbox.items import Array, Declaration, Letter, Live, Message, Retained
+from lfs10d.outbox.items import HistoryBatch, LiveSample, LossNotice, Message, OutboxItem, Retained
 from lfs10d.outbox.outbox import IN_FLIGHT_MOST, Outbox
 from lfs10d.outbox.refusals import Refusal, refusal_of
 from lfs10d.outbox.suspects import Culprit
@@ -47,7 +47,7 @@ NOT_AUTHORIZED = 0x87
 class _Sent:
     """One message on its way, the `number`th of this connection: `size` bytes of payload, sent `at` (monotonic s)."""
 
-    letter: Letter
+    letter: OutboxItem
     at: float
     size: int
     qos: int
@@ -58,13 +58,13 @@ class _Sent:
 class _Assembly:
     """A history array that is being serialised; `size` is its bytes so far, `most` its greatest."""
 
-    letter: Array
+    letter: HistoryBatch
     most: int
     parts: list[bytes] = field(default_factory=list)
     size: int = 1
 
 
-class Dispatch:
+class Sender:
     """`epoch_ms()` is the wall clock; `stuck()` is called when the connection is of no use."""
 
     def __init__(
@@ -100,7 +100,7 @@ class Dispatch:
         self._accepted = accepted
         self._outbox.connected(self._now(), window=min(IN_FLIGHT_MOST, accepted.receive_maximum))
 
-    def lost(self, ended: Ended) -> None:
+    def lost(self, ended: Disconnect) -> None:
         """Put back what is not acknowledged, and stop."""
         outbox, sent = self._outbox, self._swallowed or self.under_way
         culprit = None
@@ -132,7 +132,7 @@ class Dispatch:
         """Something is under way that was so when the connection before ended: it may be why this one does."""
         return self._outbox.suspects.explain(self.under_way)
 
-    def _report(self, culprit: Culprit, ended: Ended) -> None:
+    def _report(self, culprit: Culprit, ended: Disconnect) -> None:
         topic = self._topics.full(culprit.topic)
         if self._outbox.passes_over(culprit.topic):
             log.warning("%s; again with a message of %d bytes to %s under way: nothing is sent there for an hour",
@@ -216,15 +216,15 @@ class Dispatch:
             letter = self._outbox.next(self._now(), past=self._assembly is None)
             if letter is None:
                 return True
-            if isinstance(letter, Array):
+            if isinstance(letter, HistoryBatch):
                 self._assembly = _Assembly(letter, self._room(letter))
                 asyncio.get_running_loop().call_soon(self._assemble, letter)
             else:
                 self._send_encoded(letter)
         return False
 
-    def _send_encoded(self, letter: Retained | Message | Live | Declaration) -> None:
-        if isinstance(letter, Declaration):
+    def _send_encoded(self, letter: Retained | Message | LiveSample | LossNotice) -> None:
+        if isinstance(letter, LossNotice):
             loss = letter.loss
             payload = publication.dropped(
                 loss.device, loss.boot, loss.from_seq, loss.to_seq, count=loss.count, ts=self._epoch_ms()
@@ -244,7 +244,7 @@ class Dispatch:
             self._encoded = payload, encode(payload)
         return self._encoded[1]
 
-    def _room(self, letter: Array) -> int:
+    def _room(self, letter: HistoryBatch) -> int:
         """Return how many bytes the payload of an array may have."""
         accepted = self._accepted
         if accepted is None or accepted.maximum_packet_size is None:
@@ -253,7 +253,7 @@ class Dispatch:
         # The remaining length may take three bytes more than that of an empty payload.
         return min(ARRAY_BYTES, accepted.maximum_packet_size - around - 3)
 
-    def _assemble(self, letter: Array) -> None:
+    def _assemble(self, letter: HistoryBatch) -> None:
         assembly = self._assembly
         if assembly is None or assembly.letter is not letter:
             return  # the connection is another one now, and the samples wait again
@@ -271,12 +271,12 @@ class Dispatch:
             self._assembly = None
             self._send(letter, array(parts))
 
-    def _send(self, letter: Letter, payload: bytes) -> None:
+    def _send(self, letter: OutboxItem, payload: bytes) -> None:
         if self._connection is None or self._accepted is None:
             return
         topic = self._topics.full(letter.topic)
         retain, qos, correlation = False, 1, None
-        if not isinstance(letter, Array | Declaration):
+        if not isinstance(letter, HistoryBatch | LossNotice):
             retain, qos = letter.publication.retain, letter.publication.qos
         if isinstance(letter, Message):
             correlation = letter.correlation
@@ -293,7 +293,7 @@ class Dispatch:
             self._number += 1
             self._sent[mid] = _Sent(letter, self._now(), len(payload), qos, self._number)
 
-    def _unfit(self, letter: Letter, why: str) -> None:
+    def _unfit(self, letter: OutboxItem, why: str) -> None:
         if self._outbox.unfit(letter):
             log.warning("not sent to %s: %s", self._topics.full(letter.topic), why)
         self.wake()

@@ -2,7 +2,7 @@
 
 After a connect: subscribe to requests and to our own availability; every retained topic; when the broker has
 them all, availability `online`; then live samples; then clear the retained topics that nobody stands behind any
-more; 10 s later the past. Nothing here blocks. Decisions are made in `Outbox`, `Reconnect` and `Sweep` (in `Clearing`).
+more; 10 s later the past. Nothing here blocks. Decisions are made in `Outbox`, `Reconnect` and `Sweep` (in `Cleanup`).
 """
 
 from __future__ import annotations
@@ -13,23 +13,23 @@ from collections.abc import Awaitable, Callable, Iterable, Mapping
 from collections.abc import Set as AbstractSet
 from functools import partial
 
-from lfs10d.mqtt.broker_client import Link
-from lfs10d.mqtt.cleanup import Clearing
+from lfs10d.mqtt.broker_client import BrokerClient
+from lfs10d.mqtt.cleanup import Cleanup
 from lfs10d.mqtt.connection import Connection
 from lfs10d.mqtt.messages import Accepted, Filter, Incoming, Will
-from lfs10d.mqtt.reasons import REFUSED_FROM, Ended, reason_in_words
-from lfs10d.mqtt.retained_reader import EarlierLife
+from lfs10d.mqtt.reasons import REFUSED_FROM, Disconnect, reason_in_words
+from lfs10d.mqtt.retained_reader import RetainedReader
 from lfs10d.mqtt.retained_requests import RetainedRequests
-from lfs10d.mqtt.sender import Dispatch
+from lfs10d.mqtt.sender import Sender
 from lfs10d.mqtt.settings import BrokerSettings, Version
 from lfs10d.mqtt.topics import OFFLINE, ONLINE, InboundRequest, Topics, inbound
 from lfs10d.outbox.outbox import Outbox
-from lfs10d.outbox.spooler import Stowage
+from lfs10d.outbox.spooler import Spooler
 from lfs10d.outbox.store.database import Limits
 from lfs10d.outbox.store.store import Store
-from lfs10d.system.clock import ClockState
+from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry import publication as telemetry
-from lfs10d.telemetry.publication import Kind, Publication
+from lfs10d.telemetry.publication import Publication, PublicationKind
 
 log = logging.getLogger(__name__)
 
@@ -49,7 +49,7 @@ class Uplink:
     `base` is `B`, whose last level is the line's name. `burst()` returns every retained topic but `availability`;
     `stands_behind()` the retained topics under `B` that are ours; `requested` takes each request; `changed` is told
     of every connect, loss, takeover and subscription, whose state is then in the properties; `announced` of every
-    burst after a connect that the broker has whole; `epoch_ms()` is the wall clock; `connect` is as in `Link`.
+    burst after a connect that the broker has whole; `epoch_ms()` is the wall clock; `connect` is as in `BrokerClient`.
     """
 
     def __init__(  # noqa: PLR0913 - each is one side of the uplink, named where it is called
@@ -67,13 +67,13 @@ class Uplink:
     ) -> None:
         self._topics = Topics(base)
         self._burst = burst
-        self._clearing = Clearing(self._topics, stands_behind=stands_behind, clear=self._clear_orphans)
+        self._clearing = Cleanup(self._topics, stands_behind=stands_behind, clear=self._clear_orphans)
         self._requested = requested
         self._retained_requests = RetainedRequests(self._ask_for_retained_requests)
         self._changed = changed
         self._announced = announced
         self._announcing = False
-        self._link = Link(
+        self._link = BrokerClient(
             settings,
             self,
             will=Will(self._topics.availability, OFFLINE.encode()),
@@ -82,15 +82,15 @@ class Uplink:
         )
         self._outbox = Outbox(detection=2.0 * settings.keepalive)
         line = base.rpartition("/")[2]
-        self._dispatch = Dispatch(self._outbox, self._topics, line, epoch_ms=epoch_ms, stuck=self._acknowledges_nothing)
+        self._dispatch = Sender(self._outbox, self._topics, line, epoch_ms=epoch_ms, stuck=self._acknowledges_nothing)
         self._subscription: int | None = None
         self._farewell: int | None = None
         self._leaving = False
         self._progress = asyncio.Event()
         self._drop_told = False
         self._epoch_ms = epoch_ms
-        self._stowage: Stowage | None = None
-        self._earlier: EarlierLife | None = None
+        self._stowage: Spooler | None = None
+        self._earlier: RetainedReader | None = None
         self.requests_denied = False
         """The broker refused the subscription to requests: none will come over this connection."""
 
@@ -115,7 +115,7 @@ class Uplink:
         return self._link.duplicate
 
     @property
-    def backlog(self) -> telemetry.Backlog:
+    def backlog(self) -> telemetry.BacklogStats:
         """What waits, for `line/stats`."""
         return self._outbox.backlog
 
@@ -130,7 +130,7 @@ class Uplink:
 
         `troubled` is told why that is not possible, and None when it is again.
         """
-        self._stowage = Stowage(
+        self._stowage = Spooler(
             self._outbox,
             store,
             epoch_ms=self._epoch_ms,
@@ -144,7 +144,7 @@ class Uplink:
 
         `told` is given what was found, and the burst waits for it; at most 5 s for what the broker says.
         """
-        self._earlier = EarlierLife(self._topics, wanted, told)
+        self._earlier = RetainedReader(self._topics, wanted, told)
 
     def send_samples(self, *, telemetry: bool) -> None:
         """Take whether samples are sent: `telemetry`, and as `history` what waits; the rest is sent in any case."""
@@ -223,7 +223,7 @@ class Uplink:
 
     def respond(self, topic: str, payload: telemetry.Payload, correlation: bytes | None = None) -> None:
         """Answer a request on `topic` (under `B`), by MQTT 5 with its Correlation Data."""
-        response = Publication(topic, payload, Kind.RESPONSE, retain=False, qos=1)
+        response = Publication(topic, payload, PublicationKind.RESPONSE, retain=False, qos=1)
         self._outbox.add(response, asyncio.get_running_loop().time(), correlation=correlation)
         self._dispatch.wake()
 
@@ -277,7 +277,7 @@ class Uplink:
         self._poke()
         self._changed()
 
-    def ended(self, ended: Ended) -> None:
+    def ended(self, ended: Disconnect) -> None:
         """Keep what is not acknowledged."""
         log.debug("%s", ended.message)
         self._dispatch.lost(ended)

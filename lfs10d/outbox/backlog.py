@@ -25,11 +25,11 @@ from collections.abc import Set as AbstractSet
 from dataclasses import replace
 
 from lfs10d.outbox.drain import Drain
-from lfs10d.outbox.history import History, Kept
-from lfs10d.outbox.items import Array, Declaration, Letter, samples_of
+from lfs10d.outbox.history import History, QueuedSample
+from lfs10d.outbox.items import HistoryBatch, LossNotice, OutboxItem, samples_of
 from lfs10d.outbox.losses import Loss, Losses
-from lfs10d.outbox.spool import AGAIN_WITHIN, Stored
-from lfs10d.system.clock import ClockState
+from lfs10d.outbox.spool import AGAIN_WITHIN, Spool
+from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry import publication
 
 ARRAY_MOST = 100
@@ -60,7 +60,7 @@ SPILL_MOST = 1000
 """Samples in one commit: about 30 ms of the store's thread."""
 
 
-class Past:
+class Backlog:
     """The rules above. `detection`: seconds in which a dead connection is noticed at the latest."""
 
     def __init__(self, *, capacity: int, detection: float) -> None:
@@ -74,15 +74,15 @@ class Past:
         self._limit, self._limit_until = ARRAY_MOST, float("-inf")
         self._window = 1
         self._turn_at = 0.0
-        self._under_way: dict[Array | Declaration, None] = {}
-        self._acknowledged: deque[tuple[float, Kept]] = deque(maxlen=capacity)
-        self._unheard: deque[tuple[float, Kept]] = deque(maxlen=capacity)
+        self._under_way: dict[HistoryBatch | LossNotice, None] = {}
+        self._acknowledged: deque[tuple[float, QueuedSample]] = deque(maxlen=capacity)
+        self._unheard: deque[tuple[float, QueuedSample]] = deque(maxlen=capacity)
         self._repeat = False
-        self._spilling: list[Kept] = []
+        self._spilling: list[QueuedSample] = []
         self._spill_at = float("-inf")
         self.history = History()
         """What waits in memory."""
-        self.stored = Stored()
+        self.stored = Spool()
         """What waits in the store."""
         self.losses = Losses()
         """What will never come."""
@@ -123,14 +123,14 @@ class Past:
 
     # What goes
 
-    def next(self, now: float, refused: AbstractSet[str]) -> Array | Declaration | None:
+    def next(self, now: float, refused: AbstractSet[str]) -> HistoryBatch | LossNotice | None:
         """Take what goes next, after `repeat`; None: nothing. Topics that are `refused` are passed over."""
         if now < self._open_from:
             return None
         if publication.EVENT not in refused and not self._declaring:
             loss = self.losses.take(now)
             if loss is not None:
-                declaration = Declaration(loss)
+                declaration = LossNotice(loss)
                 self._under_way[declaration] = None
                 return declaration
         if now < max(self._array_at, self._free_at):
@@ -141,7 +141,7 @@ class Past:
         at_once = AT_ONCE if self.drain.level > 1 else 0.0
         self._array_at = max(self._array_at, now - at_once) + SAMPLE_EVERY * len(samples)
         self._turn_at = now + TURN_EVERY
-        array = Array(samples)
+        array = HistoryBatch(samples)
         self._under_way[array] = None
         waiting = self.history if samples[0].row is None else self.stored.page
         self.drain.taken(full=self.stored.more or array.samples[0].key in waiting)
@@ -149,14 +149,14 @@ class Past:
 
     @property
     def _declaring(self) -> bool:
-        return any(isinstance(each, Declaration) for each in self._under_way)
+        return any(isinstance(each, LossNotice) for each in self._under_way)
 
     @property
     def _free_at(self) -> float:
         """When the next array may go for what is under way."""
         return float("-inf") if len(self._under_way) < self.drain.arrays(self._window) else self._turn_at
 
-    def _take(self, passed_over: AbstractSet[str]) -> tuple[Kept, ...]:
+    def _take(self, passed_over: AbstractSet[str]) -> tuple[QueuedSample, ...]:
         if self.stored.page:
             samples = self.stored.page.take(self._array_most, passed_over)
             if samples:
@@ -178,7 +178,7 @@ class Past:
         self._take_again(again)
         return True
 
-    def _take_again(self, again: deque[tuple[float, Kept]]) -> None:
+    def _take_again(self, again: deque[tuple[float, QueuedSample]]) -> None:
         self.history.extend(replace(kept, repeated=True) for _, kept in again)
         again.clear()
 
@@ -194,16 +194,16 @@ class Past:
 
     # What became of it
 
-    def over(self, letter: Letter) -> None:
+    def over(self, letter: OutboxItem) -> None:
         """Note that a letter is no longer under way."""
-        if isinstance(letter, Array | Declaration):
+        if isinstance(letter, HistoryBatch | LossNotice):
             self._under_way.pop(letter, None)
 
-    def settled(self, letter: Letter, now: float, *, heard: bool = True) -> None:
+    def settled(self, letter: OutboxItem, now: float, *, heard: bool = True) -> None:
         """Note that the broker has it; `heard`: it did not say that nobody listens."""
         if not self._repeat:
             self._forget(now - AGAIN_WITHIN)
-        if isinstance(letter, Array) and self.drain.settled(now):
+        if isinstance(letter, HistoryBatch) and self.drain.settled(now):
             self.drain.look(now, len(self) + self.stored.depth)
         rows = [kept.row for kept in samples_of(letter) if kept.row is not None]
         if rows:
@@ -212,9 +212,9 @@ class Past:
             late = not (heard or self._repeat) and now < self._open_from
             (self._unheard if late else self._acknowledged).extend((now, kept) for kept in samples_of(letter))
 
-    def dead(self, letter: Letter) -> None:
+    def dead(self, letter: OutboxItem) -> None:
         """Note that it will never be delivered."""
-        if isinstance(letter, Declaration):
+        if isinstance(letter, LossNotice):
             self.losses.restore(letter.loss)
         for kept in samples_of(letter):
             if not kept.repeated:
@@ -222,13 +222,13 @@ class Past:
             if kept.row is not None:
                 self.stored.release([kept.row])
 
-    def cut(self, array: Array) -> None:
+    def cut(self, array: HistoryBatch) -> None:
         """Let an array that is too large wait again, to go in halves, and so those after it on this connection."""
         self._array_most = len(array.samples) // 2
         self._array_at = 0.0
         self.refused(array)
 
-    def cut_for(self, array: Array, until: float) -> None:
+    def cut_for(self, array: HistoryBatch, until: float) -> None:
         """Let the arrays after this one, which ended its connection, have half as many samples `until` then."""
         self._limit, self._limit_until = len(array.samples) // 2, until
 
@@ -236,25 +236,25 @@ class Past:
         """Try arrays of any length again."""
         self._limit_until = float("-inf")
 
-    def shorten(self, array: Array, count: int) -> Array:
+    def shorten(self, array: HistoryBatch, count: int) -> HistoryBatch:
         """Return an array of its first samples to be under way in its place; the others wait again."""
         self._wait(array.samples[count:])
-        shorter = Array(array.samples[:count])
+        shorter = HistoryBatch(array.samples[:count])
         self._under_way = {shorter if each is array else each: None for each in self._under_way}
         self._array_at -= SAMPLE_EVERY * (len(array.samples) - count)
         self.drain.taken(full=True)
         return shorter
 
-    def refused(self, array: Array) -> None:
+    def refused(self, array: HistoryBatch) -> None:
         """Let an array that the broker refused wait again."""
         self._wait(array.samples)
 
-    def _wait(self, samples: tuple[Kept, ...]) -> None:
+    def _wait(self, samples: tuple[QueuedSample, ...]) -> None:
         (self.history if samples[0].row is None else self.stored.page).put_back(samples)
 
-    def put_back(self, letter: Array | Declaration) -> None:
+    def put_back(self, letter: HistoryBatch | LossNotice) -> None:
         """Let what was under way wait again; what is in the store does so anyway."""
-        if isinstance(letter, Declaration):
+        if isinstance(letter, LossNotice):
             self.losses.restore(letter.loss)
         else:
             self.history.extend(kept for kept in letter.samples if kept.row is None)
@@ -284,7 +284,7 @@ class Past:
             return None
         return max(self._away_since + AWAY_AFTER, self._spill_at)
 
-    def spill(self) -> list[Kept]:
+    def spill(self) -> list[QueuedSample]:
         """Take what the store shall keep; `spilled` or `not_spilled` is to follow."""
         if not self._connected and self._repeat:
             self._take_again(self._acknowledged)
@@ -308,7 +308,7 @@ class Past:
     @property
     def beyond(self) -> int:
         """The id of the last row that the store may not evict: it is in the page or under way, or one before it is."""
-        under_way = any(isinstance(each, Array) and each.samples[0].row is not None for each in self._under_way)
+        under_way = any(isinstance(each, HistoryBatch) and each.samples[0].row is not None for each in self._under_way)
         return 0 if self.stored.left and not (self.stored.page or under_way) else self.stored.after
 
     def page_due(self) -> float | None:
@@ -318,11 +318,11 @@ class Past:
 
     def undeclared(self) -> list[Loss]:
         """Return the losses that are not declared, one under way included."""
-        under_way = [each.loss for each in self._under_way if isinstance(each, Declaration)]
+        under_way = [each.loss for each in self._under_way if isinstance(each, LossNotice)]
         return under_way + self.losses.waiting()
 
     def correct(self, shift: int, clock: ClockState = "synced") -> None:
-        """Give what waits the time that the clock tells now, as `Kept.at` does."""
+        """Give what waits the time that the clock tells now, as `QueuedSample.at` does."""
         self.history.correct(shift, clock)
         self.stored.page.correct(shift, clock)
         self._spilling = [kept.at(shift, clock) for kept in self._spilling]
@@ -333,7 +333,7 @@ class Past:
         """Count the samples that wait in memory alone."""
         return len(self.history) + len(self._spilling)
 
-    def waiting(self) -> Iterator[Kept]:
+    def waiting(self) -> Iterator[QueuedSample]:
         """Return the oldest of what waits in memory."""
         yield from self._spilling[:1]
         oldest = self.history.oldest()

@@ -13,13 +13,12 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 
 from lfs10d.outbox.losses import Key
-from lfs10d.system.clock import ClockState
-from lfs10d.system.clock_step import corrects
+from lfs10d.system.clock_step import ClockState, corrects
 from lfs10d.telemetry.publication import Sample
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class QueuedSample:
     """One sample that waits since `since` (monotonic s); `repeated`: the broker acknowledged it before.
 
     `shift` is the wall clock less the monotonic one when it was measured, in ms; None: of an earlier boot.
@@ -37,7 +36,7 @@ class Kept:
         """Device and boot: one history array holds samples of one key."""
         return self.sample.device, self.sample.boot
 
-    def at(self, shift: int, clock: ClockState = "synced") -> Kept:
+    def at(self, shift: int, clock: ClockState = "synced") -> QueuedSample:
         """Return it with the time that the clock tells now, whose word is `clock`.
 
         Unchanged if its own was synchronised; and where nobody vouches for the clock now, unless it was stepped since.
@@ -51,7 +50,7 @@ class Kept:
 NONE: AbstractSet[str] = frozenset()
 
 
-def _seq(kept: Kept) -> int:
+def _seq(kept: QueuedSample) -> int:
     return kept.sample.seq
 
 
@@ -59,7 +58,7 @@ def _seq(kept: Kept) -> int:
 class History:
     """What waits; `len()` counts the samples. No sample is put here while it stands here already."""
 
-    _shelves: dict[Key, list[Kept]] = field(default_factory=dict)
+    _shelves: dict[Key, list[QueuedSample]] = field(default_factory=dict)
     _count: int = 0
     _repeated: int = 0
 
@@ -70,7 +69,7 @@ class History:
         """Tell whether a sample of this device and boot waits."""
         return key in self._shelves
 
-    def add(self, kept: Kept) -> None:
+    def add(self, kept: QueuedSample) -> None:
         """Put one sample in its place."""
         shelf = self._shelves.setdefault(kept.key, [])
         if shelf and _seq(shelf[-1]) > _seq(kept):
@@ -80,12 +79,12 @@ class History:
         self._count += 1
         self._repeated += kept.repeated
 
-    def extend(self, many: Iterable[Kept]) -> None:
+    def extend(self, many: Iterable[QueuedSample]) -> None:
         """Put several in their places."""
         for kept in many:
             self.add(kept)
 
-    def put_back(self, taken: tuple[Kept, ...]) -> None:
+    def put_back(self, taken: tuple[QueuedSample, ...]) -> None:
         """Put back samples of one key that were taken last: before all others of it, if that is their place."""
         shelf = self._shelves.get(taken[0].key)
         if shelf is None or _seq(taken[-1]) > _seq(shelf[0]):
@@ -99,7 +98,7 @@ class History:
         """Tell whether a sample waits of a device that is not `passed_over`."""
         return any(device not in passed_over for device, _ in self._shelves)
 
-    def take(self, most: int, passed_over: AbstractSet[str] = NONE) -> tuple[Kept, ...]:
+    def take(self, most: int, passed_over: AbstractSet[str] = NONE) -> tuple[QueuedSample, ...]:
         """Take up to `most` samples of the key that holds the oldest, in order of seq; () where none waits.
 
         Those of devices that are `passed_over` stay.
@@ -117,7 +116,7 @@ class History:
         self._repeated -= sum(kept.repeated for kept in taken)
         return taken
 
-    def evict(self) -> Kept | None:
+    def evict(self) -> QueuedSample | None:
         """Make room: drop all that were acknowledged before (None), else take the oldest (None: none waits)."""
         if not self._repeated:
             return next(iter(self.take(1)), None)
@@ -128,7 +127,7 @@ class History:
         return None
 
     def correct(self, shift: int, clock: ClockState = "synced") -> None:
-        """Give all the time that the clock tells now, as `Kept.at` does."""
+        """Give all the time that the clock tells now, as `QueuedSample.at` does."""
         for shelf in self._shelves.values():
             shelf[:] = [kept.at(shift, clock) for kept in shelf]
 
@@ -137,6 +136,6 @@ class History:
         self._shelves.clear()
         self._count = self._repeated = 0
 
-    def oldest(self) -> Kept | None:
+    def oldest(self) -> QueuedSample | None:
         """Return the one that waits longest, None where none waits."""
         return min((shelf[0] for shelf in self._shelves.values()), key=lambda kept: kept.since, default=None)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from lfs10d.outbox.history import Kept
+from lfs10d.outbox.history import QueuedSample
 from lfs10d.outbox.losses import Loss
 from lfs10d.telemetry.publication import EVENT, HISTORY, Publication, device_topic
 
@@ -39,11 +39,11 @@ class Message:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Live:
+class LiveSample:
     """A sample while it is young."""
 
     publication: Publication
-    kept: Kept
+    kept: QueuedSample
 
     @property
     def topic(self) -> str:
@@ -52,10 +52,10 @@ class Live:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Array:
+class HistoryBatch:
     """1..100 samples of one device and boot in order of seq, for `history`."""
 
-    samples: tuple[Kept, ...]
+    samples: tuple[QueuedSample, ...]
 
     @property
     def topic(self) -> str:
@@ -64,7 +64,7 @@ class Array:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Declaration:
+class LossNotice:
     """Samples that will never come, for event `dropped`."""
 
     loss: Loss
@@ -75,15 +75,15 @@ class Declaration:
         return EVENT
 
 
-Letter: TypeAlias = Retained | Message | Live | Array | Declaration
+OutboxItem: TypeAlias = Retained | Message | LiveSample | HistoryBatch | LossNotice
 
 
-def samples_of(letter: Letter) -> tuple[Kept, ...]:
+def samples_of(letter: OutboxItem) -> tuple[QueuedSample, ...]:
     """Return the samples a letter carries."""
     match letter:
-        case Live(kept=kept):
+        case LiveSample(kept=kept):
             return (kept,)
-        case Array(samples=samples):
+        case HistoryBatch(samples=samples):
             return samples
         case _:
             return ()

@@ -8,30 +8,30 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 
-from lfs10d.outbox.items import Live
+from lfs10d.outbox.items import LiveSample
 
 
 class LiveQueue:
     """What waits; `len()` counts the samples."""
 
     def __init__(self) -> None:
-        self._waiting: dict[Live, None] = {}  # the oldest first
-        self._devices: dict[str, deque[Live]] = {}  # in the order of their turns; none is empty
+        self._waiting: dict[LiveSample, None] = {}  # the oldest first
+        self._devices: dict[str, deque[LiveSample]] = {}  # in the order of their turns; none is empty
 
     def __len__(self) -> int:
         return len(self._waiting)
 
-    def add(self, live: Live) -> None:
+    def add(self, live: LiveSample) -> None:
         """Put a new sample behind those of its device."""
         self._waiting[live] = None
         self._devices.setdefault(live.kept.sample.device, deque()).append(live)
 
-    def put_back(self, live: Live) -> None:
+    def put_back(self, live: LiveSample) -> None:
         """Put a sample that did not arrive before all others."""
         self._waiting = {live: None, **self._waiting}
         self._devices.setdefault(live.kept.sample.device, deque()).appendleft(live)
 
-    def take(self) -> Live | None:
+    def take(self) -> LiveSample | None:
         """Take the sample whose turn it is, None where none waits."""
         if not self._devices:
             return None
@@ -43,7 +43,7 @@ class LiveQueue:
         del self._waiting[live]
         return live
 
-    def take_oldest(self) -> Live | None:
+    def take_oldest(self) -> LiveSample | None:
         """Take the sample that waits longest, None where none waits."""
         live = self.oldest()
         if live is not None:
@@ -54,11 +54,11 @@ class LiveQueue:
                 del self._devices[device]
         return live
 
-    def oldest(self) -> Live | None:
+    def oldest(self) -> LiveSample | None:
         """Return the sample that waits longest, None where none waits."""
         return next(iter(self._waiting), None)
 
-    def change(self, changed: Callable[[Live], Live]) -> None:
+    def change(self, changed: Callable[[LiveSample], LiveSample]) -> None:
         """Replace each sample by what `changed` makes of it; the turns stay."""
         replaced = {live: changed(live) for live in self._waiting}
         self._waiting = dict.fromkeys(replaced.values())

@@ -25,10 +25,10 @@ letter                settled                    connection lost               r
 `Retained`            gone                       gone (the burst renews it),   the newest waits      gone
                                                  a clearing one waits again
 `Message`             gone                       waits again (QoS 0: gone)     waits (trace: gone)   gone
-`Live`                kept 10 s for a second     waits again                   waits with the past   declared
+`LiveSample`                kept 10 s for a second     waits again                   waits with the past   declared
                       sending
-`Array`               as `Live`                  waits again                   waits again           cut or declared
-`Declaration`         gone                       waits again                   waits again           waits again
+`HistoryBatch`               as `LiveSample`        waits again                   waits again           cut or declared
+`LossNotice`         gone                       waits again                   waits again           waits again
 ====================  =========================  ============================  ====================  ===============
 """
 
@@ -40,17 +40,17 @@ from collections.abc import Set as AbstractSet
 from dataclasses import replace
 from itertools import chain
 
-from lfs10d.outbox.backlog import Past
+from lfs10d.outbox.backlog import Backlog
 from lfs10d.outbox.congestion import Congested, Congestion
-from lfs10d.outbox.history import Kept
-from lfs10d.outbox.items import Array, Declaration, Letter, Live, Message, Retained, samples_of
+from lfs10d.outbox.history import QueuedSample
+from lfs10d.outbox.items import HistoryBatch, LiveSample, LossNotice, Message, OutboxItem, Retained, samples_of
 from lfs10d.outbox.live_queue import LiveQueue
 from lfs10d.outbox.refusals import BANNED_FOR, Refusals
-from lfs10d.outbox.retained import Retention
+from lfs10d.outbox.retained import RetainedQueue
 from lfs10d.outbox.suspects import Culprit, Suspects
 from lfs10d.outbox.turns import Turns
-from lfs10d.system.clock import ClockState
-from lfs10d.telemetry.publication import Backlog, Kind, Publication, iso_time
+from lfs10d.system.clock_step import ClockState
+from lfs10d.telemetry.publication import BacklogStats, Publication, PublicationKind, iso_time
 
 CAPACITY = 10_000
 """Samples that wait in memory (contract, section 3)."""
@@ -85,8 +85,8 @@ class Outbox:
     def __init__(self, *, capacity: int = CAPACITY, detection: float = 40.0) -> None:
         self._capacity = capacity
         self._window = 0  # 0: not connected
-        self._under_way: dict[Letter, float] = {}  # since when
-        self._retention = Retention()
+        self._under_way: dict[OutboxItem, float] = {}  # since when
+        self._retention = RetainedQueue()
         self._messages: deque[Message] = deque(maxlen=MESSAGES_MOST)
         self._live = LiveQueue()
         self._traces: deque[Message] = deque(maxlen=MESSAGES_MOST)
@@ -96,15 +96,15 @@ class Outbox:
         self._refused = self._refusals.topics
         self._passed_over: deque[Message] = deque(maxlen=MESSAGES_MOST)
         self._unfit: set[str] = set()
-        self._alone: Letter | None = None
+        self._alone: OutboxItem | None = None
         self._alone_went = False
         self.suspects = Suspects()
         """What may have ended the last connection."""
         self.telemetry = True
         """False: samples are not taken, and what waits of the past stays where it is."""
-        self.past = Past(capacity=capacity, detection=detection)
+        self.past = Backlog(capacity=capacity, detection=detection)
         """What is no longer live."""
-        self._classes: dict[int, Callable[[float], Letter | None]] = {
+        self._classes: dict[int, Callable[[float], OutboxItem | None]] = {
             CHANGES: lambda _now: self._retention.next_change(self._refused),
             MESSAGES: lambda _now: self._next_message(self._messages),
             LIVE: lambda _now: self._next_live(),
@@ -129,13 +129,13 @@ class Outbox:
         if publication.sample is not None:
             if not self.telemetry:
                 return
-            self._live.add(Live(publication, Kept(publication.sample, now, shift=shift)))
+            self._live.add(LiveSample(publication, QueuedSample(publication.sample, now, shift=shift)))
             self.age(now)
             self._make_room()
-        elif publication.kind is Kind.RETAINED:
+        elif publication.kind is PublicationKind.RETAINED:
             if (self._window or publication.payload is None) and self._retention.add(publication):
                 self._displaced(now)
-        elif publication.kind is Kind.TRACE:
+        elif publication.kind is PublicationKind.TRACE:
             if self._window:
                 self._traces.append(Message(publication))
         else:
@@ -177,39 +177,39 @@ class Outbox:
             self._put_back(letter)
         self._make_room()
 
-    def _condemn(self, culprit: Culprit, under_way: list[Letter], now: float, *, denied: bool) -> list[Letter]:
+    def _condemn(self, culprit: Culprit, under_way: list[OutboxItem], now: float, *, denied: bool) -> list[OutboxItem]:
         """Do away with what ended the connection; return what else was under way."""
         guilty = [letter for letter in under_way if letter.topic == culprit.topic]
-        arrays = [letter for letter in guilty if isinstance(letter, Array) and len(letter.samples) > 1]
+        arrays = [letter for letter in guilty if isinstance(letter, HistoryBatch) and len(letter.samples) > 1]
         if arrays and not denied:
             self.past.cut_for(arrays[0], now + BANNED_FOR)
             self.suspects.cut(culprit)
             return under_way
         self._refusals.ban(culprit.topic, now)
         for letter in guilty:
-            if isinstance(letter, Live):
+            if isinstance(letter, LiveSample):
                 self.past.history.add(letter.kept)
-            elif isinstance(letter, Array) and not denied:
+            elif isinstance(letter, HistoryBatch) and not denied:
                 self.past.dead(letter)
-            elif isinstance(letter, Array | Declaration):
+            elif isinstance(letter, HistoryBatch | LossNotice):
                 self.past.put_back(letter)
         return [letter for letter in under_way if letter.topic != culprit.topic]
 
-    def _put_back(self, letter: Letter) -> None:
+    def _put_back(self, letter: OutboxItem) -> None:
         match letter:
             case Retained():
                 self._retention.put_back(letter)
             case Message(publication=publication):
                 if publication.qos and len(self._messages) < MESSAGES_MOST:
                     self._messages.appendleft(letter)
-            case Live():
+            case LiveSample():
                 self._live.put_back(letter)
             case _:
                 self.past.put_back(letter)
 
     # What goes out
 
-    def next(self, now: float, *, past: bool = True) -> Letter | None:
+    def next(self, now: float, *, past: bool = True) -> OutboxItem | None:
         """Take what goes next; it is under way until settled, refused, unfit or lost. None: nothing goes now.
 
         `past`: the array before is on its way, so that another may follow.
@@ -229,14 +229,14 @@ class Outbox:
         self._alone, self._alone_went = letter, False
         return self._next_alone()
 
-    def _next_alone(self) -> Letter | None:
+    def _next_alone(self) -> OutboxItem | None:
         """Return what goes alone as soon as nothing else is under way, once."""
         if self._alone_went or len(self._under_way) > 1:
             return None
         self._alone_went = True
         return self._alone
 
-    def _next(self, now: float) -> Letter | None:
+    def _next(self, now: float) -> OutboxItem | None:
         self._lift_due(now)
         if self._keeps_back(now):
             retained = self._retention.next_change(self._refused)
@@ -273,7 +273,7 @@ class Outbox:
             return WEIGHT
         return REFRESH_WEIGHT if number == REFRESHES else LEAST_WEIGHT
 
-    def _next_message(self, queue: deque[Message]) -> Letter | None:
+    def _next_message(self, queue: deque[Message]) -> OutboxItem | None:
         while queue:
             letter = queue.popleft()
             if letter.topic not in self._refused:
@@ -281,22 +281,22 @@ class Outbox:
             self._wait_for_topic(letter)
         return None
 
-    def _next_live(self) -> Letter | None:
+    def _next_live(self) -> OutboxItem | None:
         while (letter := self._live.take()) is not None:
             if letter.topic not in self._refused:
                 return letter
             self._wait_for_topic(letter)
         return None
 
-    def _next_past(self, now: float) -> Letter | None:
+    def _next_past(self, now: float) -> OutboxItem | None:
         self._repeat(now)
         return self.past.next(now, self._refused) if self._past_may_go and self.telemetry else None
 
-    def _wait_for_topic(self, letter: Message | Live) -> None:
+    def _wait_for_topic(self, letter: Message | LiveSample) -> None:
         """Let a letter wait until its topic is passed over no longer; a sample may go with the past."""
-        if isinstance(letter, Live):
+        if isinstance(letter, LiveSample):
             self.past.history.add(letter.kept)
-        elif letter.publication.kind is not Kind.TRACE:
+        elif letter.publication.kind is not PublicationKind.TRACE:
             self._passed_over.append(letter)
 
     def _lift_due(self, now: float) -> None:
@@ -330,9 +330,9 @@ class Outbox:
 
     # What became of it
 
-    def settled(self, letter: Letter, now: float, *, heard: bool = True) -> None:
+    def settled(self, letter: OutboxItem, now: float, *, heard: bool = True) -> None:
         """Note that the broker has it; `heard`: it did not say that nobody listens."""
-        if isinstance(letter, Live | Array):
+        if isinstance(letter, LiveSample | HistoryBatch):
             self._congestion.answered(now - self._under_way[letter])
         self._over(letter)
         self._refusals.accepted(letter.topic)
@@ -343,29 +343,29 @@ class Outbox:
         """Return once what the window carries, where that is less than what is published."""
         return self._congestion.report(now, self._window)
 
-    def refused(self, letter: Letter, reason: int, now: float) -> bool:
+    def refused(self, letter: OutboxItem, reason: int, now: float) -> bool:
         """Note that the broker refused it, not as `UNFIT` (`refusals`); return True if its topic is to be reported."""
         self._over(letter)
         told = self._refusals.refused(letter.topic, reason, now)
         match letter:
             case Retained():
                 self._retention.refused(letter)
-            case Message() | Live():
+            case Message() | LiveSample():
                 self._wait_for_topic(letter)
-            case Array():
+            case HistoryBatch():
                 self.past.refused(letter)
             case _:
                 self.past.put_back(letter)
         self._make_room()
         return told
 
-    def unfit(self, letter: Letter) -> bool:
+    def unfit(self, letter: OutboxItem) -> bool:
         """Note that it can never be sent as it is; return True if its topic is to be reported.
 
         An array is cut in two and waits again, and so do the arrays after it on this connection.
         """
         self._over(letter)
-        if isinstance(letter, Array) and len(letter.samples) > 1:
+        if isinstance(letter, HistoryBatch) and len(letter.samples) > 1:
             self.past.cut(letter)
             return False
         self.past.dead(letter)
@@ -378,7 +378,7 @@ class Outbox:
         """Tell whether nothing is sent to a topic now, because the broker refuses it."""
         return topic in self._refused
 
-    def shorten(self, array: Array, count: int) -> Array:
+    def shorten(self, array: HistoryBatch, count: int) -> HistoryBatch:
         """Return an array of its first `count` samples, under way in its place; the others wait again."""
         shorter = self.past.shorten(array, count)
         self._under_way = {shorter if letter is array else letter: at for letter, at in self._under_way.items()}
@@ -394,7 +394,7 @@ class Outbox:
         self._lift(lifted)
         return bool(lifted)
 
-    def _over(self, letter: Letter) -> None:
+    def _over(self, letter: OutboxItem) -> None:
         del self._under_way[letter]
         if letter is self._alone:
             self._alone = None
@@ -425,7 +425,7 @@ class Outbox:
         return not (self._under_way or self._retention or self._messages or self._live)
 
     @property
-    def under_way(self) -> tuple[Letter, ...]:
+    def under_way(self) -> tuple[OutboxItem, ...]:
         """What is under way, in the order in which it was taken."""
         return tuple(self._under_way)
 
@@ -440,7 +440,7 @@ class Outbox:
         return self.past.losses.total
 
     @property
-    def backlog(self) -> Backlog:
+    def backlog(self) -> BacklogStats:
         """What `line/stats` says of it."""
         oldest_ts = self.past.stored.oldest()
         if oldest_ts is None:
@@ -448,20 +448,20 @@ class Outbox:
             waiting = [*under_way, *self.past.waiting(), *self._oldest_live()]
             first = min(waiting, key=lambda kept: kept.since, default=None)
             oldest_ts = first.sample.ts if first else None
-        return Backlog(self.depth, oldest_ts, self.dropped)
+        return BacklogStats(self.depth, oldest_ts, self.dropped)
 
     def _in_memory(self) -> int:
         """Return how many samples are in memory alone."""
         return len(self._live) + len(self.past) + sum(len(samples) for samples in self._under_way_alone())
 
-    def _under_way_alone(self) -> Iterator[tuple[Kept, ...]]:
+    def _under_way_alone(self) -> Iterator[tuple[QueuedSample, ...]]:
         """Return the samples under way that are not in the store, letter by letter: all of one are, or none is."""
         for letter in self._under_way:
             samples = samples_of(letter)
             if samples and samples[0].row is None:
                 yield samples
 
-    def _oldest_live(self) -> list[Kept]:
+    def _oldest_live(self) -> list[QueuedSample]:
         first = self._live.oldest()
         return [] if first is None else [first.kept]
 
@@ -493,16 +493,16 @@ class Outbox:
     # The clock
 
     def correct(self, shift: int, clock: ClockState = "synced") -> None:
-        """Give what waits the time that the clock tells now, as `Kept.at` does; `shift` as in `add`."""
+        """Give what waits the time that the clock tells now, as `QueuedSample.at` does; `shift` as in `add`."""
         self._live.change(lambda live: _corrected(live, shift, clock))
         self.past.correct(shift, clock)
 
 
-def _corrected(live: Live, shift: int, clock: ClockState) -> Live:
+def _corrected(live: LiveSample, shift: int, clock: ClockState) -> LiveSample:
     kept = live.kept.at(shift, clock)
     payload = live.publication.payload
     if kept is live.kept or not isinstance(payload, dict):
         return live
     sample = kept.sample
     told = {**payload, "ts": sample.ts, "time": iso_time(sample.ts), "clock": sample.clock}
-    return Live(replace(live.publication, payload=told, sample=sample), kept)
+    return LiveSample(replace(live.publication, payload=told, sample=sample), kept)

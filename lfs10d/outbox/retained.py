@@ -15,7 +15,7 @@ from lfs10d.outbox.items import Retained
 from lfs10d.telemetry.publication import Publication
 
 
-class Retention:
+class RetainedQueue:
     """Of each topic one version waits and one is under way at most."""
 
     def __init__(self) -> None:

@@ -12,8 +12,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 
-from lfs10d.outbox.history import History, Kept
-from lfs10d.outbox.store.sample_file import Row
+from lfs10d.outbox.history import History, QueuedSample
+from lfs10d.outbox.store.sample_file import StoredRow
 
 PAGE_ROWS = 3200
 """Samples of a page: for up to 32 devices its arrays are full."""
@@ -29,7 +29,7 @@ RELEASE_MOST = 2000
 
 
 @dataclass(slots=True)
-class Stored:
+class Spool:
     """`rows` and `oldest_ts` are as the store last told; `page` is what was taken from it and waits."""
 
     rows: int = 0
@@ -74,14 +74,14 @@ class Stored:
 
     # In
 
-    def take_page(self, rows: Sequence[Row], most: int) -> None:
+    def take_page(self, rows: Sequence[StoredRow], most: int) -> None:
         """Take the rows that follow the page before; fewer than `most` are the last."""
         self.more = len(rows) >= most
         for row in rows:
             self.after = row.id
             if row.id not in self._released and row.id not in self._taken:
                 repeated = row.repeated or row.id in self._again
-                self.page.add(Kept(row.sample, 0.0, repeated, row.shift, row.id))
+                self.page.add(QueuedSample(row.sample, 0.0, repeated, row.shift, row.id))
 
     def rewind(self) -> None:
         """Forget the page, and begin with the oldest row again: the connection is lost."""

@@ -1,4 +1,4 @@
-"""Carries samples between the outbox and the store, one operation at a time: the shell around `Past`'s decisions.
+"""Carries samples between the outbox and the store, one operation at a time: the shell around `Backlog`'s decisions.
 
 The store works in a thread of its own; nothing here blocks. What the store cannot do is tried again every 5 s.
 """
@@ -9,14 +9,14 @@ import asyncio
 import logging
 from collections.abc import Awaitable, Callable
 
-from lfs10d.outbox.backlog import SPILL_EVERY, Past
+from lfs10d.outbox.backlog import SPILL_EVERY, Backlog
 from lfs10d.outbox.outbox import Outbox
 from lfs10d.outbox.spool import PAGE_ROWS
 from lfs10d.outbox.store.database import Limits
-from lfs10d.outbox.store.sample_file import Entry
+from lfs10d.outbox.store.sample_file import StoreEntry
 from lfs10d.outbox.store.store import Store, StoreError
-from lfs10d.system.clock import ClockState
-from lfs10d.system.threads import OwnThread
+from lfs10d.system.clock_step import ClockState
+from lfs10d.system.threads import WorkerThread
 from lfs10d.telemetry import publication
 from lfs10d.telemetry.publication import Publication
 
@@ -28,7 +28,7 @@ NOTICED = 0.02
 FULL_DISK = "samples that the broker does not take wait in memory, where 10 000 have room"
 
 
-class Stowage:
+class Spooler:
     """`epoch_ms()` is the wall clock; `wake()` is called when there is more to send.
 
     `troubled` is told why the store cannot keep anything, and None when it can again; `tell` takes events.
@@ -50,7 +50,7 @@ class Stowage:
         self._wake = wake
         self._troubled = troubled
         self._tell = tell
-        self._thread = OwnThread("store")
+        self._thread = WorkerThread("store")
         self._poked = asyncio.Event()
         self._task: asyncio.Task[None] | None = None
         self._ending = False
@@ -63,7 +63,7 @@ class Stowage:
         self._first_opening = True
 
     @property
-    def _past(self) -> Past:
+    def _past(self) -> Backlog:
         return self._outbox.past
 
     def start(self) -> None:
@@ -228,7 +228,7 @@ class Stowage:
 
     async def _spill(self) -> None:
         stored = self._past.stored
-        entries = [Entry(kept.sample, kept.shift or 0, kept.repeated) for kept in self._past.spill()]
+        entries = [StoreEntry(kept.sample, kept.shift or 0, kept.repeated) for kept in self._past.spill()]
         try:
             evicted = await self._thread.call(
                 self._store.append,

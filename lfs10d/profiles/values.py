@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from lfs10d.profiles.registers import WORDS, ByteOrder, Cell, Linear, RegisterType, WordOrder, span, spell
-from lfs10d.schema.fields import PLAIN_ERROR, Kind, RefusedError, Text, Whole
+from lfs10d.schema.fields import PLAIN_ERROR, FieldError, FieldKind, Text, Whole
 
 Place: TypeAlias = tuple[str | int, ...]
 ReadFunction: TypeAlias = Literal[3, 4]
@@ -60,7 +60,7 @@ def refuse(problems: list[tuple[Place, str]]) -> None:
 
 
 @dataclass(frozen=True)
-class Word(Kind):
+class Word(FieldKind):
     """A name in snake_case that is not among the `reserved` ones."""
 
     reserved: frozenset[str] = frozenset()
@@ -76,12 +76,12 @@ class Word(Kind):
         if not isinstance(value, str) or self.pattern.fullmatch(value) is None:
             raise self.refusal(value)
         if value in self.reserved:
-            raise RefusedError(f"is a key of every sample already; choose another, such as raw_{value}")
+            raise FieldError(f"is a key of every sample already; choose another, such as raw_{value}")
         return value
 
 
 @dataclass(frozen=True)
-class Factor(Kind):
+class Factor(FieldKind):
     """A scale: not zero, and of a size that keeps every result finite."""
 
     @property

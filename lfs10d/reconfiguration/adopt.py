@@ -8,19 +8,19 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from lfs10d.command import Answer, ErrorCode, failed, ok, rejected
+from lfs10d.command import ErrorCode, Result, failed, ok, rejected
 from lfs10d.config.effective import Effective
 from lfs10d.config.models import LineConfig, SlaveConfig, default_device_name
 from lfs10d.errors import StateError
-from lfs10d.line.jobs.procedure import Now
+from lfs10d.line.jobs.procedure import ProcedureClock
 from lfs10d.line.settings import DEFAULT_PROFILE
 from lfs10d.profiles.profile import Profile
-from lfs10d.reconfiguration.journal import Asked, Move, OpenChange, Spot
+from lfs10d.reconfiguration.journal import CommandRecord, Endpoint, Move, OpenChange
 from lfs10d.reconfiguration.procedures import adopt
-from lfs10d.reconfiguration.procedures.readdress import NOTHING_WRITTEN, Ending, Verdict, Write
+from lfs10d.reconfiguration.procedures.readdress import NOTHING_WRITTEN, IdWrite, ReaddressEnding, ReaddressReport
 
 if TYPE_CHECKING:
-    from lfs10d.reconfiguration.reconfiguration import Physical
+    from lfs10d.reconfiguration.reconfiguration import Reconfiguration
 
 log = logging.getLogger(__name__)
 
@@ -32,44 +32,56 @@ LAST_ID = 247
 CANDIDATES = 8
 """So many ids are looked at before it is told that somebody who is not configured has them all."""
 
-_WORDS: Mapping[Ending, tuple[ErrorCode, str]] = {
-    Ending.TAKEN: ("address_in_use", "somebody is heard at slave id {to}, who is not configured; see line/scan"),
-    Ending.ABSENT: ("timeout", "nobody answers at slave id {old}{refusal}; is the new sensor connected and powered?"),
-    Ending.DEAF: (
+_WORDS: Mapping[ReaddressEnding, tuple[ErrorCode, str]] = {
+    ReaddressEnding.TAKEN: (
+        "address_in_use",
+        "somebody is heard at slave id {to}, who is not configured; see line/scan",
+    ),
+    ReaddressEnding.ABSENT: (
+        "timeout",
+        "nobody answers at slave id {old}{refusal}; is the new sensor connected and powered?",
+    ),
+    ReaddressEnding.DEAF: (
         "line_error",
         "whether the adapter returns our own bytes is not clear yet; try again, or set line.echo to on or off",
     ),
-    Ending.LOST_BEFORE: ("line_error", "the port was lost; nothing was written"),
-    Ending.UNWRITTEN: ("storage_full", "{why}; nothing was written"),
-    Ending.UNRECOGNISED: (
+    ReaddressEnding.LOST_BEFORE: ("line_error", "the port was lost; nothing was written"),
+    ReaddressEnding.UNWRITTEN: ("storage_full", "{why}; nothing was written"),
+    ReaddressEnding.UNRECOGNISED: (
         "not_recognised",
         (
             "at slave id {old}, at {at} baud, a device answers that is not recognised as {title}: {why}. Nothing was "
             "written. If it is another kind of sensor, name its profile; else take it off the line"
         ),
     ),
-    Ending.TWINS: (
+    ReaddressEnding.TWINS: (
         "duplicate_id",
         "two sensors seem to have slave id {old}: {why}; nothing was written. Connect one at a time",
     ),
-    Ending.BOTH: ("duplicate_id", "more than one sensor is heard at slave id {old}; connect one at a time"),
-    Ending.GARBAGE: ("duplicate_id", "at slave id {to} several answer at once since the write; take the other off"),
-    Ending.REFUSED: ("refused", "the sensor at {old} refused the write{refusal}; perhaps its {lock} overrules it"),
-    Ending.LOCKED: (
+    ReaddressEnding.BOTH: ("duplicate_id", "more than one sensor is heard at slave id {old}; connect one at a time"),
+    ReaddressEnding.GARBAGE: (
+        "duplicate_id",
+        "at slave id {to} several answer at once since the write; take the other off",
+    ),
+    ReaddressEnding.REFUSED: (
+        "refused",
+        "the sensor at {old} refused the write{refusal}; perhaps its {lock} overrules it",
+    ),
+    ReaddressEnding.LOCKED: (
         "dip_switch",
         (
             "the sensor stays at slave id {old}: its {lock} overrules the write; set that to 0 and try again. "
             "Or it wants its power switched off and on before it obeys"
         ),
     ),
-    Ending.PENDING: (
+    ReaddressEnding.PENDING: (
         "power_cycle_needed",
         (
             "the sensor took what was written but is still at slave id {old}: switch its power off and on, and ask "
             "again if it does not appear. If that does not help, its {lock} overrules the write"
         ),
     ),
-    Ending.NOWHERE: (
+    ReaddressEnding.NOWHERE: (
         "not_verified",
         "since the write the sensor answers neither at slave id {old} nor at {to}; it is looked for until it is found",
     ),
@@ -77,7 +89,7 @@ _WORDS: Mapping[Ending, tuple[ErrorCode, str]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Newcomer:
+class AdoptRequest:
     """What a request wants: the sensor at `factory` (None: as the profile says) at id `to` (None: the next free).
 
     `profile` is the configuration's word for its profile.
@@ -95,35 +107,35 @@ class Newcomer:
         return frozenset(slave for slave in (self.factory, self.to) if slave is not None)
 
 
-class Adoption:
-    """Newcomers; a part of `Physical`."""
+class Adopt:
+    """Newcomers; a part of `Reconfiguration`."""
 
-    def __init__(self, physical: Physical) -> None:
+    def __init__(self, physical: Reconfiguration) -> None:
         self._physical = physical
 
-    async def perform(self, wanted: Newcomer, asked: Asked) -> Answer:
+    async def perform(self, wanted: AdoptRequest, asked: CommandRecord) -> Result:
         """Take in a factory-new sensor; see `lfs10d.reconfiguration.procedures.adopt`."""
         physical = self._physical
         profile = await physical.profile(wanted.profile)
         now = physical.running()
         wish = self._wish(wanted, profile, now)
-        if isinstance(wish, Answer):
+        if isinstance(wish, Result):
             return await physical.refused(asked, wish)
         slave = SlaveConfig(id=wish.factory, profile=wanted.profile)
-        clock = Now()
+        clock = ProcedureClock()
         talk = physical.talk()
         asking = physical.asking(slave, clock, line_rate=0, profile=profile)
         steps = adopt.adopt(wish, asking, physical.wire().echo_known)
         ids = frozenset({wish.factory, *wish.candidates})
         talk.begin(steps, clock, line_rate=now.config.line.baudrate, excludes=ids)
 
-        async def conclude(result: Any, change: OpenChange | None) -> Answer:  # noqa: ANN401 - a course's
-            found = result or adopt.Adopted(Verdict(Ending.LOST_BEFORE))
+        async def conclude(result: Any, change: OpenChange | None) -> Result:  # noqa: ANN401 - a course's
+            found = result or adopt.AdoptReport(ReaddressReport(ReaddressEnding.LOST_BEFORE))
             return await self._conclude(wanted, wish, profile, found, change, asked)
 
         return await physical.carried_out(talk, asked, lambda write: self._intend(wanted, write, asked), conclude)
 
-    def _wish(self, wanted: Newcomer, profile: Profile, now: Effective) -> adopt.Newcomer | Answer:
+    def _wish(self, wanted: AdoptRequest, profile: Profile, now: Effective) -> adopt.AdoptWish | Result:
         """Return what the line is asked, or why it need not be."""
         line_rate = now.config.line.baudrate
         if profile.factory is None or (unfit := _unfit(profile, now.config.line)) is not None:
@@ -155,9 +167,9 @@ class Adoption:
             return rejected("invalid_param", message, param="name")
         codes = profile.baudrate.codes if profile.baudrate else ()
         rates = tuple(dict.fromkeys((line_rate, profile.factory.baudrate, *codes)))
-        return adopt.Newcomer(factory, tuple(candidates), line_rate, rates)
+        return adopt.AdoptWish(factory, tuple(candidates), line_rate, rates)
 
-    def _intend(self, wanted: Newcomer, write: Write, asked: Asked) -> OpenChange:
+    def _intend(self, wanted: AdoptRequest, write: IdWrite, asked: CommandRecord) -> OpenChange:
         name = wanted.name or default_device_name(write.new.slave)
         move = Move(device=name, old=write.old, new=write.new, register_before=write.register_before)
         moment = self._physical.now().ts()
@@ -166,38 +178,38 @@ class Adoption:
 
     async def _conclude(
         self,
-        wanted: Newcomer,
-        wish: adopt.Newcomer,
+        wanted: AdoptRequest,
+        wish: adopt.AdoptWish,
         profile: Profile,
-        found: adopt.Adopted,
+        found: adopt.AdoptReport,
         change: OpenChange | None,
-        asked: Asked,
-    ) -> Answer:
+        asked: CommandRecord,
+    ) -> Result:
         physical, verdict = self._physical, found.verdict
         old, to = wish.factory, found.to or 0
         name = wanted.name or default_device_name(to)
         answer = _answer(name, old, to, verdict, profile, written=change is not None)
-        if verdict.ending is Ending.TWINS:
+        if verdict.ending is ReaddressEnding.TWINS:
             physical.tell("duplicate_id", {"slave": old, "baudrate": found.old.baudrate if found.old else None})
         if change is None or verdict.ending in NOTHING_WRITTEN:
             return await physical.refused(asked, answer)
         told = physical.told(asked, answer)
         numbers = frozenset({change.number})
         try:
-            if verdict.ending is Ending.MOVED:
+            if verdict.ending is ReaddressEnding.MOVED:
                 (move,) = change.moves
                 await physical.record(name, move.new, newcomer=entry(change))
                 await physical.put(partial(physical.journal.close, numbers, told))
                 facts = {"request": NAME, "id": asked.key, "device": name, "from": None, "to": {"slave": to}}
                 physical.tell("change_applied", facts)
             elif verdict.stays_open:
-                if verdict.ending is not Ending.NOWHERE and found.at_rate:
+                if verdict.ending is not ReaddressEnding.NOWHERE and found.at_rate:
                     await physical.put(partial(physical.journal.amend, change.number, (_at_rate(change),)))
                 await physical.put(partial(physical.journal.keep, change.number, told))
             else:
                 await physical.put(partial(physical.journal.close, numbers, told))
         except StateError as error:
-            if verdict.ending is Ending.MOVED:
+            if verdict.ending is ReaddressEnding.MOVED:
                 return failed("storage_full", f"the sensor is at slave id {to} now, but that cannot be kept: {error}")
             log.warning("%s", error)
         return answer
@@ -206,7 +218,7 @@ class Adoption:
 def _at_rate(change: OpenChange) -> Move:
     """Return where the newcomer is since it speaks at the line's rate: where it was before another one may be now."""
     (move,) = change.moves
-    return move.model_copy(update={"old": Spot(slave=move.old.slave, baudrate=move.new.baudrate)})
+    return move.model_copy(update={"old": Endpoint(slave=move.old.slave, baudrate=move.new.baudrate)})
 
 
 def entry(change: OpenChange) -> dict[str, Any] | None:
@@ -246,8 +258,8 @@ def _unfit(profile: Profile, line: LineConfig) -> str | None:
     return None
 
 
-def _answer(name: str, old: int, to: int, verdict: Verdict, profile: Profile, *, written: bool) -> Answer:
-    if verdict.ending is Ending.MOVED:
+def _answer(name: str, old: int, to: int, verdict: ReaddressReport, profile: Profile, *, written: bool) -> Result:
+    if verdict.ending is ReaddressEnding.MOVED:
         return ok({"device": name, "slave": to, "from": old})
     code, text = _WORDS[verdict.ending]
     refusal = "" if verdict.exception is None else f" (exception {verdict.exception:02X})"

@@ -9,22 +9,22 @@ from functools import partial
 from math import inf
 from typing import TYPE_CHECKING, Any
 
-from lfs10d.command import Answer, ErrorCode, failed, ok, rejected
+from lfs10d.command import ErrorCode, Result, failed, ok, rejected
 from lfs10d.config.changes import Changes, Rate
 from lfs10d.config.effective import Effective
 from lfs10d.errors import StateError
-from lfs10d.line.jobs.procedure import Now, Over
-from lfs10d.reading import Errand
-from lfs10d.reconfiguration.journal import Asked, Move, OpenChange
-from lfs10d.reconfiguration.procedure_run import Talk
+from lfs10d.line.jobs.procedure import Finished, ProcedureClock
+from lfs10d.reading import Purpose
+from lfs10d.reconfiguration.journal import CommandRecord, Move, OpenChange
+from lfs10d.reconfiguration.procedure_run import ProcedureRun
 from lfs10d.reconfiguration.procedures.baudrate import (
     FIRST_PAUSE,
     ROLL_BACK,
     UNTOUCHED,
-    Ended,
-    RateVerdict,
+    BaudrateEnding,
+    BaudrateReport,
+    RateSensor,
     RateWish,
-    Sensor,
     WriteRates,
     change_rate,
 )
@@ -38,26 +38,29 @@ from lfs10d.reconfiguration.procedures.recover_baudrate import (
 )
 
 if TYPE_CHECKING:
-    from lfs10d.reconfiguration.reconfiguration import Physical
+    from lfs10d.reconfiguration.reconfiguration import Reconfiguration
 
 log = logging.getLogger(__name__)
 
 NAME = "line/baudrate"
 ACTIVITY = "changing_baudrate"
 
-_WORDS: Mapping[Ended, tuple[ErrorCode, str]] = {
-    Ended.ABSENT: ("timeout", "nothing was written, for {names} does not answer; every sensor must, or would be lost"),
-    Ended.DEAF: (
+_WORDS: Mapping[BaudrateEnding, tuple[ErrorCode, str]] = {
+    BaudrateEnding.ABSENT: (
+        "timeout",
+        "nothing was written, for {names} does not answer; every sensor must, or would be lost",
+    ),
+    BaudrateEnding.DEAF: (
         "line_error",
         (
             "whether the adapter returns our own bytes is not clear yet, and nothing was written; "
             "try again later, or set line.echo to on or off"
         ),
     ),
-    Ended.LOST_BEFORE: ("line_error", "the port was lost; nothing was written"),
-    Ended.UNWRITTEN: ("storage_full", "{why}; nothing was written"),
-    Ended.REFUSED: ("refused", "{names} refused the write{refusal}; everything is as it was, at {old} baud"),
-    Ended.CANARY: (
+    BaudrateEnding.LOST_BEFORE: ("line_error", "the port was lost; nothing was written"),
+    BaudrateEnding.UNWRITTEN: ("storage_full", "{why}; nothing was written"),
+    BaudrateEnding.REFUSED: ("refused", "{names} refused the write{refusal}; everything is as it was, at {old} baud"),
+    BaudrateEnding.CANARY: (
         "power_cycle_needed",
         (
             "{names} took the rate but still answers at {old} baud, so the write was taken back and no other sensor "
@@ -65,28 +68,28 @@ _WORDS: Mapping[Ended, tuple[ErrorCode, str]] = {
             "locked by a switch"
         ),
     ),
-    Ended.TWINS: (
+    BaudrateEnding.TWINS: (
         "duplicate_id",
         (
             "since the write {names} answers at {old} and at {to} baud: two sensors have its slave id; take one of "
             "them off the line. All are at {old} again"
         ),
     ),
-    Ended.ROLLED_BACK: ("rolled_back", "not every sensor followed to {to} baud; all are at {old} again"),
-    Ended.UNVERIFIED: (
+    BaudrateEnding.ROLLED_BACK: ("rolled_back", "not every sensor followed to {to} baud; all are at {old} again"),
+    BaudrateEnding.UNVERIFIED: (
         "not_verified",
         "{names} is not found again; it was at {old} baud last, and is asked at {old} and {to} until it is",
     ),
 }
 
 
-class RateChange:
-    """Changes of the line's rate; a part of `Physical`."""
+class BaudrateChange:
+    """Changes of the line's rate; a part of `Reconfiguration`."""
 
-    def __init__(self, physical: Physical) -> None:
+    def __init__(self, physical: Reconfiguration) -> None:
         self._physical = physical
 
-    async def perform(self, to: int, *, power_cycle: bool, dry_run: bool, asked: Asked) -> Answer:
+    async def perform(self, to: int, *, power_cycle: bool, dry_run: bool, asked: CommandRecord) -> Result:
         """Move every sensor and the port to another rate; see `lfs10d.reconfiguration.procedures.baudrate`."""
         physical = self._physical
         now = physical.running()
@@ -100,7 +103,7 @@ class RateChange:
             return await physical.refused(asked, refusal)
         earlier = frozenset(change.number for change in physical.journal.open)
         physical.leave(earlier)
-        clock = Now()
+        clock = ProcedureClock()
         sensors = self._sensors([slave.name for slave in now.config.slaves], clock)
         wish = RateWish(sensors, old, to, power_cycle, dry_run, self._stored(to))
         talk = physical.talk()
@@ -110,8 +113,10 @@ class RateChange:
         def intend(_: WriteRates) -> OpenChange:
             return self._intend(wish, asked)
 
-        async def conclude(result: Any, change: OpenChange | None) -> Answer:  # noqa: ANN401 - a course's
-            return await self._conclude(wish, result or RateVerdict(Ended.LOST_BEFORE), change, earlier, asked)
+        async def conclude(result: Any, change: OpenChange | None) -> Result:  # noqa: ANN401 - a course's
+            return await self._conclude(
+                wish, result or BaudrateReport(BaudrateEnding.LOST_BEFORE), change, earlier, asked
+            )
 
         return await physical.carried_out(talk, asked, intend, conclude)
 
@@ -127,7 +132,7 @@ class RateChange:
         """Return the number of the newest open change of the rate, 0 if there is none: older ones end with it."""
         return max((change.number for change in self._changes()), default=0)
 
-    def unsettled(self, device: str | None = None) -> Answer | None:
+    def unsettled(self, device: str | None = None) -> Result | None:
         """Return the rejection of what must wait until the rate of a device, or of all, is settled."""
         for change in self._changes():
             missing = change.facts.get("pending", sorted(change.devices))
@@ -136,7 +141,7 @@ class RateChange:
                 return rejected("busy", f"the change to {to} baud is not over: {names} is still to be found there")
         return None
 
-    def _unfit(self, to: int, now: Effective) -> Answer | None:
+    def _unfit(self, to: int, now: Effective) -> Result | None:
         """Return why the line need not even be asked; None if it must be."""
         config, profiles = now.config, now.loaded.profiles
         able = [slave for slave in config.slaves if to in _rates(profiles[slave.profile].baudrate)]
@@ -155,16 +160,16 @@ class RateChange:
             return rejected("busy", f"{names} is being looked for after an earlier change; it must be found first")
         return None
 
-    def _sensors(self, names: Iterable[str], clock: Now) -> tuple[Sensor, ...]:
+    def _sensors(self, names: Iterable[str], clock: ProcedureClock) -> tuple[RateSensor, ...]:
         """Return the sensors of these names that are configured, each as it is asked."""
         slaves = (self._physical.running().slave(name) for name in names)
         return tuple(
-            Sensor(slave.name, slave.id, self._physical.asking(slave, clock, line_rate=0))
+            RateSensor(slave.name, slave.id, self._physical.asking(slave, clock, line_rate=0))
             for slave in slaves
             if slave is not None
         )
 
-    def _intend(self, wish: RateWish, asked: Asked) -> OpenChange:
+    def _intend(self, wish: RateWish, asked: CommandRecord) -> OpenChange:
         moves = tuple(
             Move(device=sensor.name, old=sensor.at(wish.old), new=sensor.at(wish.to)) for sensor in wish.sensors
         )
@@ -172,33 +177,40 @@ class RateChange:
         return self._physical.journal.intend("baudrate", moves, self._physical.now().ts(), asked, **facts)
 
     async def _conclude(
-        self, wish: RateWish, verdict: RateVerdict, change: OpenChange | None, earlier: frozenset[int], asked: Asked
-    ) -> Answer:
+        self,
+        wish: RateWish,
+        verdict: BaudrateReport,
+        change: OpenChange | None,
+        earlier: frozenset[int],
+        asked: CommandRecord,
+    ) -> Result:
         physical = self._physical
         answer = _answer(wish.old, wish.to, verdict, dry_run=wish.dry_run)
         if change is None or verdict.ended in UNTOUCHED:
             return await physical.refused(asked, answer)
         told = physical.told(asked, answer)
-        for name in verdict.names if verdict.ended is Ended.TWINS else ():
+        for name in verdict.names if verdict.ended is BaudrateEnding.TWINS else ():
             self._tell_twins(name, wish.sensors)
         try:
-            if verdict.ended is Ended.MOVED or (wish.to in verdict.where.values() and verdict.ended is Ended.PENDING):
+            if verdict.ended is BaudrateEnding.MOVED or (
+                wish.to in verdict.where.values() and verdict.ended is BaudrateEnding.PENDING
+            ):
                 await self._record(wish.old, wish.to)
-            if verdict.ended is Ended.PENDING:
+            if verdict.ended is BaudrateEnding.PENDING:
                 await physical.put(partial(physical.journal.close, earlier, None))
                 await physical.put(partial(physical.journal.amend, change.number, change.moves, pending=verdict.names))
                 await physical.put(partial(physical.journal.keep, change.number, told))
-            elif verdict.ended is Ended.UNVERIFIED:
+            elif verdict.ended is BaudrateEnding.UNVERIFIED:
                 await physical.put(partial(physical.journal.keep, change.number, told))
             else:
                 await physical.put(partial(physical.journal.close, earlier | {change.number}, told))
         except StateError as error:
-            if verdict.ended is Ended.MOVED:
+            if verdict.ended is BaudrateEnding.MOVED:
                 return failed("storage_full", f"all sensors are at {wish.to} baud, but that cannot be kept: {error}")
             log.warning("%s", error)
         return answer
 
-    def _tell_twins(self, device: str, sensors: Iterable[Sensor]) -> None:
+    def _tell_twins(self, device: str, sensors: Iterable[RateSensor]) -> None:
         """Tell that two sensors have one slave id."""
         for slave in (sensor.slave for sensor in sensors if sensor.name == device):
             self._physical.tell("duplicate_id", {"device": device, "slave": slave, "from": slave})
@@ -216,7 +228,7 @@ class RateChange:
 
     # -- changes that are open
 
-    async def follow(self, change: OpenChange, talk: Talk) -> None:
+    async def follow(self, change: OpenChange, talk: ProcedureRun) -> None:
         """Look for the sensors of an open change; finish it, or undo what the daemon did not live to finish."""
         old, to = int(change.facts["from"]), int(change.facts["to"])
         if change.answered and "pending" in change.facts:
@@ -224,15 +236,15 @@ class RateChange:
         else:
             await self._undo(change, talk, old, to)
 
-    async def _await_power(self, change: OpenChange, talk: Talk, old: int, to: int) -> None:
+    async def _await_power(self, change: OpenChange, talk: ProcedureRun, old: int, to: int) -> None:
         """Follow sensors that have stored the new rate until each comes up there."""
         physical = self._physical
-        clock = Now()
+        clock = ProcedureClock()
         pending = list(change.facts["pending"])
         sensors = self._sensors(pending, clock)
         steps = await_power(sensors, old, to, longest_pause=physical.running().config.poll.probe_interval_max)
-        talk.begin(steps, clock, line_rate=0, share=1.0, errand=Errand.PROBE)
-        while not isinstance(what := await talk.wanted(), Over):
+        talk.begin(steps, clock, line_rate=0, share=1.0, errand=Purpose.PROBE)
+        while not isinstance(what := await talk.wanted(), Finished):
             if isinstance(what, CameUp):
                 if physical.running().config.line.baudrate != to:
                     await self._record(old, to)
@@ -244,11 +256,11 @@ class RateChange:
         if what.result is not None:
             await self._settle(change, old, to, what.result)
 
-    async def _undo(self, change: OpenChange, talk: Talk, old: int, to: int) -> None:
+    async def _undo(self, change: OpenChange, talk: ProcedureRun, old: int, to: int) -> None:
         """Put back at once what answers, and what is lost when it is found, within the share of probes."""
         physical = self._physical
         longest = physical.running().config.poll.probe_interval_max
-        clock = Now()
+        clock = ProcedureClock()
         everybody = found = self._sensors([move.device for move in change.moves], clock)
         where: dict[str, int | None] = {}
         twins: set[str] = set()
@@ -260,7 +272,7 @@ class RateChange:
             if await self._over(talk, found, twins) is None:
                 return
             if finish and all(at == to for at in where.values()):
-                await self._settle(change, old, to, RateVerdict(Ended.MOVED, where))
+                await self._settle(change, old, to, BaudrateReport(BaudrateEnding.MOVED, where))
                 return
             tell_at = clock.now + ROLL_BACK if finish else tell_at
             away = tuple(sensor for sensor in found if where[sensor.name] != old)
@@ -277,7 +289,7 @@ class RateChange:
             verdict = await self._over(talk, found, twins)
             if verdict is None:
                 return
-            if verdict.ended is not Ended.UNVERIFIED:
+            if verdict.ended is not BaudrateEnding.UNVERIFIED:
                 await self._settle(change, old, to, verdict)
                 return
             if old in where.values() and own != old:
@@ -290,9 +302,9 @@ class RateChange:
                     lost, old, to, where, own=physical.running().config.line.baudrate,
                     pause=pause, longest_pause=longest, tell_at=inf if change.answered else tell_at,
                 ),
-                clock, line_rate=0, share=1.0, errand=Errand.PROBE,
+                clock, line_rate=0, share=1.0, errand=Purpose.PROBE,
             )  # fmt: skip
-            while not isinstance(what := await talk.wanted(), Over):
+            while not isinstance(what := await talk.wanted(), Finished):
                 change = await physical.answered(change, _answer(old, to, verdict))
                 talk.go_on()
             if what.result is None:
@@ -300,25 +312,25 @@ class RateChange:
             talk.go_on()
             found, pause = what.result, min(2 * pause, longest)
 
-    async def _over(self, talk: Talk, sensors: Iterable[Sensor], twins: set[str]) -> Any:  # noqa: ANN401 - a course's
+    async def _over(self, talk: ProcedureRun, sensors: Iterable[RateSensor], twins: set[str]) -> Any:  # noqa: ANN401 - a course's
         """Return the result of a course, None where the port was lost; tell of `twins` that were not told of yet."""
-        while not isinstance(what := await talk.wanted(), Over):
+        while not isinstance(what := await talk.wanted(), Finished):
             if isinstance(what, Twins) and what.name not in twins:
                 twins.add(what.name)
                 self._tell_twins(what.name, sensors)
             talk.go_on()
         return what.result
 
-    async def _settle(self, change: OpenChange, old: int, to: int, verdict: RateVerdict) -> None:
+    async def _settle(self, change: OpenChange, old: int, to: int, verdict: BaudrateReport) -> None:
         physical = self._physical
-        if verdict.ended is Ended.MOVED:
+        if verdict.ended is BaudrateEnding.MOVED:
             if physical.running().config.line.baudrate != to:
                 await self._record(old, to)
         elif physical.running().config.line.baudrate != old:
             await self._record(to, old)
         older = frozenset(each.number for each in self._changes() if each.number <= change.number)
         await physical.finish(older, change, _answer(old, to, verdict))
-        if verdict.ended is not Ended.MOVED:
+        if verdict.ended is not BaudrateEnding.MOVED:
             message = f"every sensor is at {old} baud: the change to {to} is dropped"
             log.warning("%s", message)
             physical.tell("change_dropped", {"key": "line.baudrate", "from": old, "to": to, "message": message})
@@ -328,10 +340,10 @@ def _rates(register: Any) -> Iterable[int]:  # noqa: ANN401 - a profile's, or No
     return () if register is None else register.codes
 
 
-def _answer(old: int, to: int, verdict: RateVerdict, *, dry_run: bool = False) -> Answer:
-    if verdict.ended in (Ended.MOVED, Ended.PENDING):
+def _answer(old: int, to: int, verdict: BaudrateReport, *, dry_run: bool = False) -> Result:
+    if verdict.ended in (BaudrateEnding.MOVED, BaudrateEnding.PENDING):
         return ok({"from": old, "to": to, "pending": list(verdict.names)})
-    if verdict.ended is Ended.FREE:
+    if verdict.ended is BaudrateEnding.FREE:
         return ok({"from": old, "to": to, "dry_run": dry_run})
     code, text = _WORDS[verdict.ended]
     refusal = "" if verdict.exception is None else f" (exception {verdict.exception:02X})"

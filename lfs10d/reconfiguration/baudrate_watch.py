@@ -8,23 +8,23 @@ from collections.abc import Callable, Iterable
 
 from lfs10d.config.effective import Effective
 from lfs10d.line.device import Device
-from lfs10d.line.jobs.procedure import Now, Over
-from lfs10d.reading import Errand
-from lfs10d.reconfiguration.procedure_run import Talk
+from lfs10d.line.jobs.procedure import Finished, ProcedureClock
+from lfs10d.reading import Purpose
+from lfs10d.reconfiguration.procedure_run import ProcedureRun
 from lfs10d.reconfiguration.procedures.find_baudrate import in_words, seek
 from lfs10d.system.tasks import BackgroundTasks
 
 log = logging.getLogger(__name__)
 
 
-class Losing:
+class BaudrateWatch:
     """`tell(words)` raises the line's error, `tell(None)` clears it; `devices()` are those of the line's thread."""
 
     def __init__(
         self,
         *,
         running: Callable[[], Effective],
-        talk: Callable[[], Talk],
+        talk: Callable[[], ProcedureRun],
         devices: Callable[[], Iterable[Device]],
         tell: Callable[[str | None], None],
     ) -> None:
@@ -34,7 +34,7 @@ class Losing:
         self._tell = tell
         self._tasks = BackgroundTasks()
         self._told: str | None = None
-        self._task: tuple[int, Talk, asyncio.Task[None]] | None = None
+        self._task: tuple[int, ProcedureRun, asyncio.Task[None]] | None = None
 
     def begin(self) -> None:
         """Look out from now on, at the line's rate as it is; the port is open."""
@@ -55,10 +55,10 @@ class Losing:
             task.cancel()
             self._task = None
 
-    async def _look_out(self, rate: int, talk: Talk) -> None:
-        clock = Now()
-        talk.begin(seek(self._devices, clock, rate), clock, line_rate=rate, share=1.0, errand=Errand.PROBE)
-        while not isinstance(found := await talk.wanted(), Over):
+    async def _look_out(self, rate: int, talk: ProcedureRun) -> None:
+        clock = ProcedureClock()
+        talk.begin(seek(self._devices, clock, rate), clock, line_rate=rate, share=1.0, errand=Purpose.PROBE)
+        while not isinstance(found := await talk.wanted(), Finished):
             if isinstance(found, dict):
                 now = self._running()
                 polled = sum(slave.enabled for slave in now.config.slaves)

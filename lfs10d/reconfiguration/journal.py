@@ -16,7 +16,7 @@ from typing import Any, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from lfs10d.command import Answer, Call
+from lfs10d.command import Command, Result
 from lfs10d.errors import StateError
 from lfs10d.system.disk import Disk
 
@@ -36,7 +36,7 @@ class _Record(BaseModel):
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
 
 
-class Spot(_Record):
+class Endpoint(_Record):
     """Where a sensor answers: by this slave id, at this rate in baud."""
 
     slave: int
@@ -47,12 +47,12 @@ class Move(_Record):
     """One sensor that is to answer elsewhere; `register` is what its id register said before (None: not asked)."""
 
     device: str
-    old: Spot
-    new: Spot
+    old: Endpoint
+    new: Endpoint
     register_before: int | None = None
 
 
-class Asked(_Record):
+class CommandRecord(_Record):
     """The request a change was asked by: its name, id and content, and where its answer goes (correlation in hex)."""
 
     name: str
@@ -68,7 +68,7 @@ class Asked(_Record):
         return self.transaction if self.id is None else self.id
 
     @property
-    def finished(self) -> Asked:
+    def finished(self) -> CommandRecord:
         """The same once it has its answer: a repeat says itself where the answer goes."""
         return self.model_copy(update={"topic": None, "correlation": None})
 
@@ -84,7 +84,7 @@ class OpenChange(_Record):
     kind: Kind
     moves: tuple[Move, ...]
     begun: int
-    asked: Asked | None = None
+    asked: CommandRecord | None = None
     answered: bool = False
     facts: dict[str, Any] = {}
 
@@ -99,10 +99,10 @@ class OpenChange(_Record):
         return frozenset(move.device for move in self.moves)
 
 
-class Told(_Record):
+class ResultRecord(_Record):
     """An answer that was given: `status`, `data` and `error` as in the response, at `at` in epoch milliseconds."""
 
-    asked: Asked
+    asked: CommandRecord
     status: Literal["ok", "rejected", "failed"]
     data: Any = None
     error: dict[str, Any] | None = None
@@ -110,11 +110,11 @@ class Told(_Record):
     took_ms: float = 0.0
 
 
-class _Content(_Record):
+class _JournalContent(_Record):
     version: Literal[1] = VERSION
     last_number: int = 0
     changes: tuple[OpenChange, ...] = ()
-    answers: tuple[Told, ...] = ()
+    answers: tuple[ResultRecord, ...] = ()
 
 
 class Journal:
@@ -126,7 +126,7 @@ class Journal:
     def __init__(self, directory: Path, disk: Disk) -> None:
         self.path = directory / FILE_NAME
         self._disk = disk
-        self._content = _Content()
+        self._content = _JournalContent()
         self._unsaved = False
         self._unread: str | None = None
 
@@ -140,7 +140,7 @@ class Journal:
             self._unread = f"{self.path} cannot be read: {error.strerror}"
             return f"{self._unread}; whether a sensor was being moved is not known"
         try:
-            kept = _Content.model_validate_json(content)
+            kept = _JournalContent.model_validate_json(content)
         except ValidationError:
             aside = self.path.with_name(ASIDE)
             trouble = f"{self.path} is damaged, or a newer lfs10d wrote it"
@@ -159,7 +159,7 @@ class Journal:
         return self._content.changes
 
     @property
-    def answers(self) -> tuple[Told, ...]:
+    def answers(self) -> tuple[ResultRecord, ...]:
         """The answers that were given, the oldest first."""
         return self._content.answers
 
@@ -168,7 +168,7 @@ class Journal:
         return frozenset().union(*(change.slaves for change in self.open))
 
     def intend(
-        self, kind: Kind, moves: tuple[Move, ...], begun: int, asked: Asked | None, **facts: object
+        self, kind: Kind, moves: tuple[Move, ...], begun: int, asked: CommandRecord | None, **facts: object
     ) -> OpenChange:
         """Note that these sensors are about to be moved; when this returns the first byte may be sent."""
         number = self._content.last_number + 1
@@ -184,7 +184,7 @@ class Journal:
 
         self._save(changes=self._with(number, amended))
 
-    def keep(self, number: int, told: Told | None) -> None:
+    def keep(self, number: int, told: ResultRecord | None) -> None:
         """Note that a change stays open, and the answer its request was given."""
 
         def answered(change: OpenChange) -> OpenChange:
@@ -193,14 +193,14 @@ class Journal:
 
         self._save(changes=self._with(number, answered), answers=self._answers(told))
 
-    def close(self, numbers: frozenset[int], *told: Told | None) -> None:
+    def close(self, numbers: frozenset[int], *told: ResultRecord | None) -> None:
         """Note that these changes are finished or undone, and the answers that are given with that."""
         changes = tuple(change for change in self.open if change.number not in numbers)
         answers = self._answers(*told)
         if (changes, answers) != (self.open, self.answers):
             self._save(changes=changes, answers=answers)
 
-    def note(self, told: Told | None) -> None:
+    def note(self, told: ResultRecord | None) -> None:
         """Remember an answer to a request of which nothing was written; it comes on the disk with the next `save`.
 
         Lost before that, a repeat of the request is judged anew.
@@ -218,7 +218,7 @@ class Journal:
     def _with(self, number: int, amended: Callable[[OpenChange], OpenChange]) -> tuple[OpenChange, ...]:
         return tuple(amended(change) if change.number == number else change for change in self.open)
 
-    def _answers(self, *told: Told | None) -> tuple[Told, ...]:
+    def _answers(self, *told: ResultRecord | None) -> tuple[ResultRecord, ...]:
         answers = self.answers
         for each in told:
             if each is not None and each.asked.key is not None:
@@ -237,16 +237,16 @@ class Journal:
             raise StateError(f"{self.path} cannot be written: {error.strerror}") from None
         self._content, self._unsaved = content, False
 
-    def _restore(self, refused: _Content) -> None:
+    def _restore(self, refused: _JournalContent) -> None:
         """Take back what was written but, for all we know, not synced: an intent must not outlive its refusal."""
         with contextlib.suppress(OSError):
             if self._disk.read(self.path) == refused.model_dump_json(indent=1).encode():
                 self._disk.replace(self.path, self._content.model_dump_json(indent=1).encode())
 
 
-def asked_by(name: str, call: Call) -> Asked:
+def asked_by(name: str, call: Command) -> CommandRecord:
     """Return a request as the journal keeps it."""
-    return Asked(
+    return CommandRecord(
         name=name,
         id=call.id,
         transaction=call.transaction,
@@ -256,21 +256,23 @@ def asked_by(name: str, call: Call) -> Asked:
     )
 
 
-def call_of(asked: Asked) -> Call:
+def call_of(asked: CommandRecord) -> Command:
     """Return a request as the service knows it."""
     correlation = None if asked.correlation is None else bytes.fromhex(asked.correlation)
-    return Call(asked.id, asked.transaction, fingerprint=asked.fingerprint, topic=asked.topic, correlation=correlation)
+    return Command(
+        asked.id, asked.transaction, fingerprint=asked.fingerprint, topic=asked.topic, correlation=correlation
+    )
 
 
-def told(asked: Asked | None, answer: Answer, ts: int) -> Told | None:
+def told(asked: CommandRecord | None, answer: Result, ts: int) -> ResultRecord | None:
     """Return an answer given at `ts` (epoch ms) as the journal keeps it; None if nobody asked."""
     if asked is None:
         return None
-    return Told(asked=asked, status=answer.status, data=answer.data, error=answer.error(), at=ts)
+    return ResultRecord(asked=asked, status=answer.status, data=answer.data, error=answer.error(), at=ts)
 
 
-def answer_of(told: Told) -> Answer:
+def answer_of(told: ResultRecord) -> Result:
     """Return an answer as the service gives it."""
     error = dict(told.error or {})
     code, message = error.pop("code", None), error.pop("message", "")
-    return Answer(told.status, told.data, code, message, error)
+    return Result(told.status, told.data, code, message, error)

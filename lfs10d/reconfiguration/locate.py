@@ -11,29 +11,29 @@ from typing import TYPE_CHECKING
 
 from lfs10d.config.changes import Changes, Place, Rate
 from lfs10d.config.effective import Effective
-from lfs10d.line.jobs.procedure import Now, Over
-from lfs10d.reading import Errand
-from lfs10d.reconfiguration.journal import Spot
-from lfs10d.reconfiguration.procedure_run import Talk
+from lfs10d.line.jobs.procedure import Finished, ProcedureClock
+from lfs10d.reading import Purpose
+from lfs10d.reconfiguration.journal import Endpoint
+from lfs10d.reconfiguration.procedure_run import ProcedureRun
 from lfs10d.reconfiguration.procedures.locate import locate
 from lfs10d.system.tasks import BackgroundTasks
 
 if TYPE_CHECKING:
-    from lfs10d.reconfiguration.reconfiguration import Physical
+    from lfs10d.reconfiguration.reconfiguration import Reconfiguration
 
 log = logging.getLogger(__name__)
 
 
-class Locating:
-    """A part of `Physical`; `repoll()` has the devices polled that are no longer `withheld`."""
+class Locator:
+    """A part of `Reconfiguration`; `repoll()` has the devices polled that are no longer `withheld`."""
 
-    def __init__(self, physical: Physical, repoll: Callable[[], None]) -> None:
+    def __init__(self, physical: Reconfiguration, repoll: Callable[[], None]) -> None:
         self._physical = physical
         self._repoll = repoll
         self._asked: dict[str, tuple[Place, ...]] = {}
         """Devices that answered nowhere when they were asked, with where that was."""
         self._tasks = BackgroundTasks()
-        self._searches: dict[str, tuple[tuple[Place, ...], Talk, asyncio.Task[None]]] = {}
+        self._searches: dict[str, tuple[tuple[Place, ...], ProcedureRun, asyncio.Task[None]]] = {}
 
     def contested(self) -> dict[str, tuple[Place, ...]]:
         """Return the devices that may be at one of several places; less the id that another one was verified at."""
@@ -89,7 +89,7 @@ class Locating:
         if name in self._searches and self._searches[name][-1] is task:
             del self._searches[name]
 
-    async def _locate(self, name: str, places: tuple[Place, ...], talk: Talk) -> None:
+    async def _locate(self, name: str, places: tuple[Place, ...], talk: ProcedureRun) -> None:
         physical = self._physical
         now = physical.running()
         slave = now.slave(name)
@@ -97,15 +97,15 @@ class Locating:
             return
         rate = now.config.line.baudrate
         known, spots = (
-            [Spot(slave=place.id, baudrate=place.baudrate or rate) for place in each]
+            [Endpoint(slave=place.id, baudrate=place.baudrate or rate) for place in each]
             for each in (now.places[name], places)
         )
-        clock = Now()
+        clock = ProcedureClock()
         asking = physical.asking(slave, clock, line_rate=0)
-        errand = Errand.PROBE if self._asked.get(name) == places else Errand.CHANGE
+        errand = Purpose.PROBE if self._asked.get(name) == places else Purpose.CHANGE
         steps = locate(spots, asking, longest_pause=now.config.poll.probe_interval_max)
         talk.begin(steps, clock, line_rate=rate, errand=errand)
-        while not isinstance(what := await talk.wanted(), Over):
+        while not isinstance(what := await talk.wanted(), Finished):
             if self._asked.get(name) != places:
                 self._asked[name] = places
                 self._tell(name, known, None)
@@ -113,10 +113,10 @@ class Locating:
                 self.begin()
             talk.go_on()
         talk.go_on()
-        if isinstance(what.result, Spot):
+        if isinstance(what.result, Endpoint):
             await self._found(name, known, what.result)
 
-    async def _found(self, name: str, known: list[Spot], spot: Spot) -> None:
+    async def _found(self, name: str, known: list[Endpoint], spot: Endpoint) -> None:
         def edit(now: Effective) -> Changes:
             if now.slave(name) is None:
                 return now.changes
@@ -132,7 +132,7 @@ class Locating:
         self._repoll()
         self.begin()
 
-    def _tell(self, name: str, known: list[Spot], used: Spot | None) -> None:
+    def _tell(self, name: str, known: list[Endpoint], used: Endpoint | None) -> None:
         first, last = known[0], known[-1]
         facts = {"device": name, "file": first.model_dump(), "last": last.model_dump()}
         self._physical.tell("change_conflict", {**facts, "used": None if used is None else used.model_dump()})

@@ -7,15 +7,15 @@ import contextlib
 from typing import Any, Protocol
 
 from lfs10d.line.jobs.job import Job
-from lfs10d.line.jobs.procedure import Course, Now, Steps
-from lfs10d.modbus.pending import Unanswered
+from lfs10d.line.jobs.procedure import Procedure, ProcedureClock, Steps
+from lfs10d.modbus.pending import PendingRequests
 
 
 class Wire(Protocol):
     """What physical changes need of the line; see `lfs10d.line.line.Line`."""
 
     @property
-    def unanswered(self) -> Unanswered:
+    def unanswered(self) -> PendingRequests:
         """Which requests may still be answered."""
         ...
 
@@ -27,26 +27,26 @@ class Wire(Protocol):
         """Have a job done; what it calls, it calls in the line's thread."""
         ...
 
-    def go_on(self, course: Course, answer: object) -> None:
+    def go_on(self, course: Procedure, answer: object) -> None:
         """Tell a course what came of what it had done aside."""
         ...
 
 
-class Talk:
+class ProcedureRun:
     """One course as seen from the asyncio loop: what it wants done aside, in turn."""
 
     def __init__(self, wire: Wire) -> None:
         self.wire = wire
         self._loop = asyncio.get_running_loop()
         self._wanted: asyncio.Queue[object] = asyncio.Queue()
-        self._course: Course | None = None
+        self._course: Procedure | None = None
 
-    def begin(self, steps: Steps, clock: Now, **sides: Any) -> None:  # noqa: ANN401 - the sides of a course
+    def begin(self, steps: Steps, clock: ProcedureClock, **sides: Any) -> None:  # noqa: ANN401 - the sides of a course
         """Have a course done on the line."""
-        self._course = Course(steps, clock, self._aside, **sides)
+        self._course = Procedure(steps, clock, self._aside, **sides)
         self.wire.submit(self._course)
 
-    def _aside(self, _: Course, what: object) -> None:
+    def _aside(self, _: Procedure, what: object) -> None:
         """Take over what is wanted, from the line's thread."""
         with contextlib.suppress(RuntimeError):  # the loop is closed: we are ending
             self._loop.call_soon_threadsafe(self._wanted.put_nowait, what)

@@ -6,31 +6,38 @@ import logging
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from lfs10d.command import Answer, failed, rejected
+from lfs10d.command import Result, failed, rejected
 from lfs10d.config.effective import Effective
 from lfs10d.config.models import SlaveConfig
 from lfs10d.errors import StateError
-from lfs10d.line.jobs.procedure import Now
+from lfs10d.line.jobs.procedure import ProcedureClock
 from lfs10d.profiles.profile import Profile
 from lfs10d.reconfiguration import readdress_answers
-from lfs10d.reconfiguration.journal import Asked, Move, OpenChange, Spot
-from lfs10d.reconfiguration.procedures.readdress import NOTHING_WRITTEN, Ending, Verdict, Wish, Write, readdress
+from lfs10d.reconfiguration.journal import CommandRecord, Endpoint, Move, OpenChange
+from lfs10d.reconfiguration.procedures.readdress import (
+    NOTHING_WRITTEN,
+    IdWrite,
+    ReaddressEnding,
+    ReaddressReport,
+    ReaddressWish,
+    readdress,
+)
 
 if TYPE_CHECKING:
-    from lfs10d.reconfiguration.reconfiguration import Physical
+    from lfs10d.reconfiguration.reconfiguration import Reconfiguration
 
 log = logging.getLogger(__name__)
 
 NAME = "device/readdress"
 
 
-class Readdressing:
-    """Sensors that get another slave id; a part of `Physical`."""
+class Readdress:
+    """Sensors that get another slave id; a part of `Reconfiguration`."""
 
-    def __init__(self, physical: Physical) -> None:
+    def __init__(self, physical: Reconfiguration) -> None:
         self._physical = physical
 
-    def fit(self, device: str, to: int) -> SlaveConfig | Answer:
+    def fit(self, device: str, to: int) -> SlaveConfig | Result:
         """Return the device that may be moved as far as is known here, or why the line need not even be asked."""
         physical = self._physical
         now = physical.running()
@@ -48,7 +55,7 @@ class Readdressing:
             return rejected("not_allowed", f"{device}: {now.conflicts[device]}")
         return self._taken(device, to, now) or slave
 
-    def _taken(self, device: str, to: int, now: Effective) -> Answer | None:
+    def _taken(self, device: str, to: int, now: Effective) -> Result | None:
         physical = self._physical
         for other in now.config.slaves:
             if to in {other.id, *(place.id for place in now.places[other.name])}:
@@ -60,65 +67,71 @@ class Readdressing:
             return rejected("address_in_use", f"slave id {to} {reserved[to]}", param="to")
         return None
 
-    async def perform(self, slave: SlaveConfig, to: int, asked: Asked, *, dry_run: bool) -> Answer:
+    async def perform(self, slave: SlaveConfig, to: int, asked: CommandRecord, *, dry_run: bool) -> Result:
         """Give a sensor another slave id, verified; see `lfs10d.reconfiguration.procedures.readdress`."""
         physical = self._physical
         now = physical.running()
         profile, rate = now.loaded.profiles[slave.profile], now.config.line.baudrate
         rates = tuple(profile.baudrate.codes) if profile.baudrate else ()
-        wish = Wish(Spot(slave=slave.id, baudrate=rate), to, rates, dry_run)
+        wish = ReaddressWish(Endpoint(slave=slave.id, baudrate=rate), to, rates, dry_run)
         physical.leave(physical.changes_of(slave.name))
-        clock = Now()
+        clock = ProcedureClock()
         talk = physical.talk()
         steps = readdress(wish, physical.asking(slave, clock), physical.wire().echo_known)
         talk.begin(steps, clock, line_rate=rate, excludes=frozenset({slave.id, to}))
 
-        def intend(write: Write) -> OpenChange:
+        def intend(write: IdWrite) -> OpenChange:
             move = Move(device=slave.name, old=write.old, new=write.new, register_before=write.register_before)
             return physical.journal.intend("readdress", (move,), physical.now().ts(), asked)
 
-        async def conclude(result: Any, change: OpenChange | None) -> Answer:  # noqa: ANN401 - a course's
-            verdict = result or Verdict(Ending.LOST_BEFORE)
+        async def conclude(result: Any, change: OpenChange | None) -> Result:  # noqa: ANN401 - a course's
+            verdict = result or ReaddressReport(ReaddressEnding.LOST_BEFORE)
             return await self._conclude(slave.name, wish, verdict, change, asked, profile)
 
         return await physical.carried_out(talk, asked, intend, conclude)
 
     async def _conclude(
-        self, device: str, wish: Wish, verdict: Verdict, change: OpenChange | None, asked: Asked, profile: Profile
-    ) -> Answer:
+        self,
+        device: str,
+        wish: ReaddressWish,
+        verdict: ReaddressReport,
+        change: OpenChange | None,
+        asked: CommandRecord,
+        profile: Profile,
+    ) -> Result:
         """Put on the disk what came of it; return the answer."""
         physical = self._physical
         journal = physical.journal
         answer = readdress_answers.readdressed(device, wish, verdict, profile)
-        if verdict.ending is Ending.TWINS:
+        if verdict.ending is ReaddressEnding.TWINS:
             self.tell_duplicate(device, wish.old, wish.old)
         if change is None or verdict.ending in NOTHING_WRITTEN:
             return await physical.refused(asked, answer)
         told = physical.told(asked, answer)
         try:
-            if verdict.ending is Ending.MOVED:
+            if verdict.ending is ReaddressEnding.MOVED:
                 await physical.record(device, wish.new)
                 await physical.close(physical.changes_of(device), change, told)
                 self.tell_moved(device, wish.old, wish.new)
             elif verdict.stays_open:
-                if verdict.ending is Ending.PENDING:
+                if verdict.ending is ReaddressEnding.PENDING:
                     await physical.close(physical.changes_of(device) - {change.number}, change, None)
                 await physical.put(partial(journal.keep, change.number, told))
             else:
                 await physical.put(partial(journal.close, frozenset({change.number}), told))
         except StateError as error:
-            if verdict.ending is Ending.MOVED:
+            if verdict.ending is ReaddressEnding.MOVED:
                 message = f"{device} answers at slave id {wish.to} now, but that cannot be kept: {error}"
                 return failed("storage_full", message, data=answer.data)
             log.warning("%s", error)
-        if verdict.ending in (Ending.BOTH, Ending.GARBAGE):
+        if verdict.ending in (ReaddressEnding.BOTH, ReaddressEnding.GARBAGE):
             self.tell_duplicate(device, wish.old, wish.new)
         return answer
 
-    def tell_moved(self, device: str, old: Spot, new: Spot) -> None:
+    def tell_moved(self, device: str, old: Endpoint, new: Endpoint) -> None:
         """Tell that a sensor has another slave id now."""
         self._physical.tell("readdressed", {"device": device, "from": old.slave, "to": new.slave})
 
-    def tell_duplicate(self, device: str, old: Spot, new: Spot) -> None:
+    def tell_duplicate(self, device: str, old: Endpoint, new: Endpoint) -> None:
         """Tell that two sensors have one slave id, or had."""
         self._physical.tell("duplicate_id", {"device": device, "slave": new.slave, "from": old.slave})

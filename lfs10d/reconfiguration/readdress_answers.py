@@ -8,72 +8,72 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from lfs10d.command import Answer, ErrorCode, failed, ok, rejected
+from lfs10d.command import ErrorCode, Result, failed, ok, rejected
 from lfs10d.profiles.profile import Profile
-from lfs10d.reconfiguration.procedures.readdress import NOTHING_WRITTEN, Ending, Verdict, Wish
+from lfs10d.reconfiguration.procedures.readdress import NOTHING_WRITTEN, ReaddressEnding, ReaddressReport, ReaddressWish
 
-_READDRESSED: Mapping[Ending, tuple[ErrorCode, str]] = {
-    Ending.TAKEN: (
+_READDRESSED: Mapping[ReaddressEnding, tuple[ErrorCode, str]] = {
+    ReaddressEnding.TAKEN: (
         "address_in_use",
         (
             "somebody is heard at slave id {to}, at {at} baud; choose another id, or see who it is: "
             "lfs10d request line/scan ids={to}"
         ),
     ),
-    Ending.ABSENT: ("timeout", "{device} does not answer at slave id {old}{refusal}; nothing was written"),
-    Ending.DEAF: (
+    ReaddressEnding.ABSENT: ("timeout", "{device} does not answer at slave id {old}{refusal}; nothing was written"),
+    ReaddressEnding.DEAF: (
         "line_error",
         (
             "whether the adapter returns our own bytes is not clear yet, and nothing was written; "
             "try again later, or set line.echo to on or off"
         ),
     ),
-    Ending.LOST_BEFORE: ("line_error", "the port was lost; nothing was written"),
-    Ending.UNWRITTEN: ("storage_full", "{why}; nothing was written"),
-    Ending.TWINS: (
+    ReaddressEnding.LOST_BEFORE: ("line_error", "the port was lost; nothing was written"),
+    ReaddressEnding.UNWRITTEN: ("storage_full", "{why}; nothing was written"),
+    ReaddressEnding.TWINS: (
         "duplicate_id",
         (
             "two sensors seem to have slave id {old}: {why}; nothing was written, for both would move. Take one of "
             "them off the line. A repeater or noise looks alike; try again"
         ),
     ),
-    Ending.UNRECOGNISED: (
+    ReaddressEnding.UNRECOGNISED: (
         "not_recognised",
         "what answers at slave id {old} is not recognised as {device}: {why}; nothing was written",
     ),
-    Ending.BOTH: (
+    ReaddressEnding.BOTH: (
         "duplicate_id",
         (
             "slave ids {old} and {to} both answer since the write: two sensors had id {old}, or another one came up at "
             "{to}. Take one of them off the line"
         ),
     ),
-    Ending.GARBAGE: (
+    ReaddressEnding.GARBAGE: (
         "duplicate_id",
         (
             "at slave id {to} several answer at once since the write, or there is noise, and {old} is silent; take the "
             "other sensor off the line. {device} was at {old} last"
         ),
     ),
-    Ending.REFUSED: (
+    ReaddressEnding.REFUSED: (
         "refused",
         "{device} refused the write{refusal} and stays at slave id {old}; perhaps its {lock} overrules it",
     ),
-    Ending.LOCKED: (
+    ReaddressEnding.LOCKED: (
         "dip_switch",
         (
             "{device} stays at slave id {old}: its {lock} overrules the write; set that to 0 and try again. "
             "Or it wants its power switched off and on before it obeys"
         ),
     ),
-    Ending.PENDING: (
+    ReaddressEnding.PENDING: (
         "power_cycle_needed",
         (
             "{device} took slave id {to} but still answers at {old}: switch its power off and on. "
             "If it stays at {old} then, its {lock} overrules the write"
         ),
     ),
-    Ending.NOWHERE: (
+    ReaddressEnding.NOWHERE: (
         "not_verified",
         (
             "since the write {device} answers neither at slave id {old}, where it was last, nor at {to}; "
@@ -83,12 +83,12 @@ _READDRESSED: Mapping[Ending, tuple[ErrorCode, str]] = {
 }
 
 
-def readdressed(device: str, wish: Wish, verdict: Verdict, profile: Profile) -> Answer:
+def readdressed(device: str, wish: ReaddressWish, verdict: ReaddressReport, profile: Profile) -> Result:
     """Return the answer to `device/readdress`."""
     data: dict[str, Any] = {"device": device, "from": wish.old.slave, "to": wish.to}
-    if verdict.ending is Ending.MOVED:
+    if verdict.ending is ReaddressEnding.MOVED:
         return ok(data)
-    if verdict.ending is Ending.FREE:
+    if verdict.ending is ReaddressEnding.FREE:
         return ok({**data, "dry_run": True})
     code, text = _READDRESSED[verdict.ending]
     message = text.format(

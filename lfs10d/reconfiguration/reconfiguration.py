@@ -10,32 +10,32 @@ from functools import partial
 from math import inf
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
-from lfs10d.command import Answer, Call, failed, rejected
-from lfs10d.config.changes import Changes, Place, Saying
+from lfs10d.command import Command, Result, failed, rejected
+from lfs10d.config.changes import Changes, Place, Values
 from lfs10d.config.effective import Edit, Effective
 from lfs10d.config.models import Config, SlaveConfig
 from lfs10d.errors import StateError
-from lfs10d.line.jobs.procedure import Now, Over
+from lfs10d.line.jobs.procedure import Finished, ProcedureClock
 from lfs10d.line.settings import device_specs
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.reconfiguration import adopt, baudrate, readdress
 from lfs10d.reconfiguration import journal as asked
-from lfs10d.reconfiguration.adopt import Adoption
-from lfs10d.reconfiguration.baudrate import RateChange
-from lfs10d.reconfiguration.journal import REMEMBERED_FOR_MS, Asked, Journal, OpenChange, Spot, Told
-from lfs10d.reconfiguration.locate import Locating
-from lfs10d.reconfiguration.procedure_run import Talk, Wire
-from lfs10d.reconfiguration.procedures.identity_query import Asking
-from lfs10d.reconfiguration.readdress import Readdressing
-from lfs10d.reconfiguration.recovery import Following
-from lfs10d.reconfiguration.reservations import Reserving
+from lfs10d.reconfiguration.adopt import Adopt
+from lfs10d.reconfiguration.baudrate import BaudrateChange
+from lfs10d.reconfiguration.journal import REMEMBERED_FOR_MS, CommandRecord, Endpoint, Journal, OpenChange, ResultRecord
+from lfs10d.reconfiguration.locate import Locator
+from lfs10d.reconfiguration.procedure_run import ProcedureRun, Wire
+from lfs10d.reconfiguration.procedures.identity_query import IdentityQuery
+from lfs10d.reconfiguration.readdress import Readdress
+from lfs10d.reconfiguration.recovery import Recovery
+from lfs10d.reconfiguration.reservations import Reservations
 from lfs10d.system.clock import Instant
 from lfs10d.system.tasks import BackgroundTasks
-from lfs10d.system.threads import aside
+from lfs10d.system.threads import run_in_thread
 
 if TYPE_CHECKING:
-    from lfs10d.reconfiguration.adopt import Newcomer
+    from lfs10d.reconfiguration.adopt import AdoptRequest
 
 log = logging.getLogger(__name__)
 T = TypeVar("T")
@@ -45,13 +45,15 @@ REFUSALS_SAVED_AFTER = 10.0
 
 
 class Recall(Protocol):
-    """Remembers a request of an earlier life; see `lfs10d.commands.dispatcher.Service.recall`."""
+    """Remembers a request of an earlier life; see `lfs10d.commands.dispatcher.Dispatcher.recall`."""
 
-    def __call__(self, name: str, call: Call, answer: Answer | None, *, forget_in: float, tell: bool = False) -> None:
+    def __call__(
+        self, name: str, call: Command, answer: Result | None, *, forget_in: float, tell: bool = False
+    ) -> None:
         """Remember it for `forget_in` s; with `tell` answer it too."""
 
 
-class Physical:
+class Reconfiguration:
     """Physical changes of one line. Used in the thread of the asyncio loop.
 
     `running()` is the configuration that holds, `change` puts another into force, `learn` too, whether or not the disk
@@ -83,19 +85,19 @@ class Physical:
         self._recall = recall
         self.now = now
         self.ending = False
-        self._reserving = Reserving(lambda: journal.open)
+        self._reserving = Reservations(lambda: journal.open)
         self._writing: asyncio.Future[Any] | None = None
-        self._underway: Asked | None = None
+        self._underway: CommandRecord | None = None
         self._tasks = BackgroundTasks()
         self._saving: asyncio.Task[None] | None = None
         self._act = act
-        self._moves = Readdressing(self)
-        self._rates = RateChange(self)
-        self._adoption = Adoption(self)
-        self._following = Following(self, self._moves, self._rates)
+        self._moves = Readdress(self)
+        self._rates = BaudrateChange(self)
+        self._adoption = Adopt(self)
+        self._following = Recovery(self, self._moves, self._rates)
         self.drop, self.answered = self._following.drop, self._following.answered
         self.close, self.finish = self._following.close, self._following.finish
-        self._locating = Locating(self, repoll)
+        self._locating = Locator(self, repoll)
         trouble = journal.take()
         if trouble is not None:
             log.error("%s", trouble)
@@ -110,7 +112,7 @@ class Physical:
             if change.asked is not None and not change.answered:
                 self._recall(change.asked.name, asked.call_of(change.asked), None, forget_in=inf)
 
-    def respond(self, told: Told, forget_in: float = REMEMBERED_FOR_MS / 1000, *, tell: bool = True) -> None:
+    def respond(self, told: ResultRecord, forget_in: float = REMEMBERED_FOR_MS / 1000, *, tell: bool = True) -> None:
         """Answer a request of an earlier life, with `tell`, and its repeats."""
         call = asked.call_of(told.asked)
         self._recall(told.asked.name, call, asked.answer_of(told), forget_in=forget_in, tell=tell)
@@ -128,7 +130,7 @@ class Physical:
         return frozenset(change.number for change in moves if device in change.devices)
 
     @property
-    def busy(self) -> Answer | None:
+    def busy(self) -> Result | None:
         """The rejection of whatever must wait until a scan or a physical change is over, None if nothing must."""
         return self._reserving.busy
 
@@ -153,7 +155,7 @@ class Physical:
 
     # -- the requests
 
-    async def baudrate(self, to: int, *, power_cycle: bool, dry_run: bool, call: Call) -> Answer:
+    async def baudrate(self, to: int, *, power_cycle: bool, dry_run: bool, call: Command) -> Result:
         """Move every sensor and the port to another rate, verified, or back."""
         who = asked.asked_by(baudrate.NAME, call)
         if (busy := self.busy) is not None:
@@ -165,7 +167,7 @@ class Physical:
             finally:
                 self._act(None)
 
-    async def adopt(self, wanted: Newcomer, call: Call) -> Answer:
+    async def adopt(self, wanted: AdoptRequest, call: Command) -> Result:
         """Take in a factory-new sensor: a free id, the line's rate, and it is polled."""
         who = asked.asked_by(adopt.NAME, call)
         if (busy := self.busy or self._rates.unsettled()) is not None:
@@ -173,18 +175,18 @@ class Physical:
         with self.place(adopt.NAME, wanted.slaves):
             return await self._adoption.perform(wanted, who)
 
-    async def readdress(self, device: str, to: int, *, dry_run: bool, call: Call) -> Answer:
+    async def readdress(self, device: str, to: int, *, dry_run: bool, call: Command) -> Result:
         """Give a sensor another slave id, verified."""
         who = asked.asked_by(readdress.NAME, call)
         slave = self._moves.fit(device, to)
-        if isinstance(slave, Answer):
+        if isinstance(slave, Result):
             return await self.refused(who, slave)
         if (busy := self.busy or self._rates.unsettled(device)) is not None:
             return await self.refused(who, busy)
         with self.place(readdress.NAME, frozenset({slave.id, to})):
             return await self._moves.perform(slave, to, who, dry_run=dry_run)
 
-    async def refused(self, who: Asked, answer: Answer) -> Answer:
+    async def refused(self, who: CommandRecord, answer: Result) -> Result:
         """Return the answer to a request of which nothing was written, kept for its repeats.
 
         It is not waited for that the disk has it: a flood of such requests must not wear the disk out.
@@ -204,9 +206,9 @@ class Physical:
 
     # -- what the kinds of change have in common
 
-    def talk(self) -> Talk:
+    def talk(self) -> ProcedureRun:
         """Return what a course on the line is talked with by."""
-        return Talk(self.wire())
+        return ProcedureRun(self.wire())
 
     async def profile(self, word: str) -> Profile:
         """Return a profile by the configuration's word for it; raises ConfigError where it cannot be read.
@@ -218,11 +220,11 @@ class Physical:
         if known is not None:
             return known
         folder = now.file.path.parent.absolute()
-        return await aside(partial(load_profile, word, relative_to=folder), "profile")
+        return await run_in_thread(partial(load_profile, word, relative_to=folder), "profile")
 
     def asking(
-        self, slave: SlaveConfig, clock: Now, line_rate: int | None = None, profile: Profile | None = None
-    ) -> Asking:
+        self, slave: SlaveConfig, clock: ProcedureClock, line_rate: int | None = None, profile: Profile | None = None
+    ) -> IdentityQuery:
         """Return how a device is asked; with a `line_rate` that no line has, its rate is told each time.
 
         `profile` is a newcomer's; a configured device has its own.
@@ -232,15 +234,15 @@ class Physical:
         alone = now.config.model_copy(update={"slaves": (slave,)})
         (spec,) = device_specs(alone, profiles)
         rate = now.config.line.baudrate if line_rate is None else line_rate
-        return Asking(spec.profile, spec.codec, self.wire().unanswered, clock, line_rate=rate)
+        return IdentityQuery(spec.profile, spec.codec, self.wire().unanswered, clock, line_rate=rate)
 
     async def carried_out(
         self,
-        talk: Talk,
-        asked: Asked,
+        talk: ProcedureRun,
+        asked: CommandRecord,
         intend: Callable[[Any], OpenChange],
-        conclude: Callable[[Any, OpenChange | None], Coroutine[Any, Any, Answer]],
-    ) -> Answer:
+        conclude: Callable[[Any, OpenChange | None], Coroutine[Any, Any, Result]],
+    ) -> Result:
         """Hear what a course wants, its intent put on the disk, until it is over; return what is concluded of it.
 
         The end of the daemon cuts short what is under way on the line, but not the conclusion.
@@ -248,7 +250,7 @@ class Physical:
         change: OpenChange | None = None
         self._underway = asked
         try:
-            while not isinstance(what := await talk.wanted(), Over):
+            while not isinstance(what := await talk.wanted(), Finished):
                 why = None
                 try:
                     change = await self.put(partial(intend, what))
@@ -269,7 +271,7 @@ class Physical:
             self._underway = None
             talk.go_on()
 
-    async def _cut_short(self, asked: Asked) -> Answer:
+    async def _cut_short(self, asked: CommandRecord) -> Result:
         """Answer a request that the daemon's end cuts short; what it began is settled at the next start."""
         if self._writing is not None:
             await asyncio.wait([self._writing])
@@ -281,7 +283,7 @@ class Physical:
             await self.put(partial(self.journal.keep, mine.number, self.told(asked, answer)))
         return answer
 
-    def told(self, who: Asked | None, answer: Answer) -> Told | None:
+    def told(self, who: CommandRecord | None, answer: Result) -> ResultRecord | None:
         """Return an answer as the journal keeps it; None if nobody asked."""
         return asked.told(who, answer, self.now().ts())
 
@@ -289,13 +291,13 @@ class Physical:
         """Have a step of the journal done aside, after the one before it; it is not cut short."""
         if self._writing is not None:
             await asyncio.wait([self._writing])
-        self._writing = asyncio.ensure_future(aside(step, "journal"))
+        self._writing = asyncio.ensure_future(run_in_thread(step, "journal"))
         try:
             return await asyncio.shield(self._writing)
         finally:
             self._reserving.update()
 
-    async def record(self, device: str, spot: Spot, newcomer: Saying | None = None) -> None:
+    async def record(self, device: str, spot: Endpoint, newcomer: Values | None = None) -> None:
         """Have the device polled where it was found, on the disk first; a `newcomer` is what is said of a new one."""
 
         def edit(now: Effective) -> Changes:

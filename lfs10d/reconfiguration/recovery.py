@@ -7,23 +7,23 @@ import logging
 from functools import partial
 from typing import TYPE_CHECKING
 
-from lfs10d.command import Answer, failed
+from lfs10d.command import Result, failed
 from lfs10d.errors import ConfigError, StateError
-from lfs10d.line.jobs.procedure import Now, Over
+from lfs10d.line.jobs.procedure import Finished, ProcedureClock
 from lfs10d.profiles.profile import Profile
-from lfs10d.reading import Errand
+from lfs10d.reading import Purpose
 from lfs10d.reconfiguration import adopt, readdress_answers
-from lfs10d.reconfiguration.journal import Move, OpenChange, Spot, Told, call_of
-from lfs10d.reconfiguration.procedure_run import Talk
+from lfs10d.reconfiguration.journal import Endpoint, Move, OpenChange, ResultRecord, call_of
+from lfs10d.reconfiguration.procedure_run import ProcedureRun
 from lfs10d.reconfiguration.procedures.follow import follow
-from lfs10d.reconfiguration.procedures.readdress import Ending, Verdict, Wish
+from lfs10d.reconfiguration.procedures.readdress import ReaddressEnding, ReaddressReport, ReaddressWish
 from lfs10d.system.tasks import BackgroundTasks
 from lfs10d.telemetry import command_log
 
 if TYPE_CHECKING:
-    from lfs10d.reconfiguration.baudrate import RateChange
-    from lfs10d.reconfiguration.readdress import Readdressing
-    from lfs10d.reconfiguration.reconfiguration import Physical
+    from lfs10d.reconfiguration.baudrate import BaudrateChange
+    from lfs10d.reconfiguration.readdress import Readdress
+    from lfs10d.reconfiguration.reconfiguration import Reconfiguration
 
 log = logging.getLogger(__name__)
 
@@ -32,15 +32,15 @@ KEPT_PAUSE = 30.0
 _OVERTAKEN = "the daemon ended before this was over; {device} has been told another time to move since"
 
 
-class Following:
-    """Looks for the sensors of open changes, one task for each change; a part of `Physical`."""
+class Recovery:
+    """Looks for the sensors of open changes, one task for each change; a part of `Reconfiguration`."""
 
-    def __init__(self, physical: Physical, moves: Readdressing, rates: RateChange) -> None:
+    def __init__(self, physical: Reconfiguration, moves: Readdress, rates: BaudrateChange) -> None:
         self._physical = physical
         self._moves = moves
         self._rates = rates
         self._tasks = BackgroundTasks()
-        self._followed: dict[int, tuple[Talk, asyncio.Task[None]]] = {}
+        self._followed: dict[int, tuple[ProcedureRun, asyncio.Task[None]]] = {}
 
     def begin(self, busy: frozenset[int]) -> None:
         """Look for the sensors of every open change that nobody looks for now and that has none of the `busy` ids."""
@@ -73,7 +73,7 @@ class Following:
             talk.halt()
             task.cancel()
 
-    async def _follow(self, change: OpenChange, talk: Talk) -> None:
+    async def _follow(self, change: OpenChange, talk: ProcedureRun) -> None:
         try:
             await (self._rates.follow if change.kind == "baudrate" else self._follow_move)(change, talk)
         except (StateError, ConfigError) as error:
@@ -84,7 +84,7 @@ class Following:
         finally:
             talk.go_on()
 
-    async def _follow_move(self, change: OpenChange, talk: Talk) -> None:
+    async def _follow_move(self, change: OpenChange, talk: ProcedureRun) -> None:
         physical = self._physical
         (move,) = change.moves
         slave = physical.running().slave(move.device) or adopt.newcomer(change, move)
@@ -93,8 +93,8 @@ class Following:
             return
         profile = await physical.profile(slave.profile)
         now = physical.running()
-        clock = Now()
-        here = Spot(slave=move.old.slave, baudrate=move.new.baudrate)
+        clock = ProcedureClock()
+        here = Endpoint(slave=move.old.slave, baudrate=move.new.baudrate)
         steps = follow(
             here,
             move.new,
@@ -103,11 +103,11 @@ class Following:
             before=None if here == move.old else move.old,
             newcomer=change.kind == "adopt",
         )
-        talk.begin(steps, clock, line_rate=now.config.line.baudrate, share=1.0, errand=Errand.PROBE)
-        ending: Ending | None = None
-        while not isinstance(what := await talk.wanted(), Over):
-            if isinstance(what, Verdict):
-                if what.ending is not ending and what.ending in (Ending.BOTH, Ending.GARBAGE):
+        talk.begin(steps, clock, line_rate=now.config.line.baudrate, share=1.0, errand=Purpose.PROBE)
+        ending: ReaddressEnding | None = None
+        while not isinstance(what := await talk.wanted(), Finished):
+            if isinstance(what, ReaddressReport):
+                if what.ending is not ending and what.ending in (ReaddressEnding.BOTH, ReaddressEnding.GARBAGE):
                     self._moves.tell_duplicate(move.device, move.old, move.new)
                 ending = what.ending
                 change = await self._seen(change, move, what, profile)
@@ -115,13 +115,13 @@ class Following:
         if what.result is not None:
             await self._found(change, move, what.result, profile)
 
-    async def _seen(self, change: OpenChange, move: Move, verdict: Verdict, profile: Profile) -> OpenChange:
+    async def _seen(self, change: OpenChange, move: Move, verdict: ReaddressReport, profile: Profile) -> OpenChange:
         """Answer the request of a change that is not settled by the first look."""
         if change.answered:
             return change
         return await self.answered(change, readdress_answers.readdressed(move.device, _wish(move), verdict, profile))
 
-    async def answered(self, change: OpenChange, answer: Answer) -> OpenChange:
+    async def answered(self, change: OpenChange, answer: Result) -> OpenChange:
         """Answer the request of a change that stays open."""
         physical = self._physical
         told = physical.told(change.asked, answer)
@@ -130,9 +130,9 @@ class Following:
             physical.respond(told)
         return change.model_copy(update={"answered": True})
 
-    async def _found(self, change: OpenChange, move: Move, verdict: Verdict, profile: Profile) -> None:
+    async def _found(self, change: OpenChange, move: Move, verdict: ReaddressReport, profile: Profile) -> None:
         """Finish a change whose sensor was found."""
-        if verdict.ending is Ending.MOVED:
+        if verdict.ending is ReaddressEnding.MOVED:
             self.leave(self._physical.changes_of(move.device) - {change.number})  # they end with this one
             answer = readdress_answers.readdressed(move.device, _wish(move), verdict, profile)
             await self._physical.record(move.device, move.new, newcomer=adopt.entry(change))
@@ -153,14 +153,14 @@ class Following:
             facts = {"device": move.device, "from": move.old.slave, "to": move.new.slave}
             self._physical.tell("change_dropped", {"key": f"slaves.{move.device}.id", **facts, "message": message})
 
-    async def finish(self, numbers: frozenset[int], change: OpenChange, answer: Answer) -> None:
+    async def finish(self, numbers: frozenset[int], change: OpenChange, answer: Result) -> None:
         """Close changes; the request of `change` is answered if it is not yet."""
         told = None if change.answered else self._physical.told(change.asked, answer)
         await self.close(numbers, change, told)
         if told is not None:
             self._physical.respond(told)
 
-    async def close(self, numbers: frozenset[int], change: OpenChange, told: Told | None) -> None:
+    async def close(self, numbers: frozenset[int], change: OpenChange, told: ResultRecord | None) -> None:
         """Close changes, with the answer to `change`; what others of them still owe their requests is told."""
         physical = self._physical
         overtaken = [
@@ -174,5 +174,5 @@ class Following:
                 physical.respond(each)
 
 
-def _wish(move: Move) -> Wish:
-    return Wish(move.old, move.new.slave, ())
+def _wish(move: Move) -> ReaddressWish:
+    return ReaddressWish(move.old, move.new.slave, ())

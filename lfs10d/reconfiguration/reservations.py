@@ -5,11 +5,11 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
-from lfs10d.command import Answer, RefusedError, rejected
+from lfs10d.command import RefusedError, Result, rejected
 from lfs10d.reconfiguration.journal import OpenChange
 
 
-class Reserving:
+class Reservations:
     """`underway` is the name of the request that has the place, None if nobody has it.
 
     `opened()` are the open changes; `update` must be called when they are others.
@@ -24,7 +24,7 @@ class Reserving:
         self._opened = opened
 
     @property
-    def busy(self) -> Answer | None:
+    def busy(self) -> Result | None:
         """The rejection of whatever must wait until a scan or a physical change is over, None if nothing must."""
         if self.underway is None:
             return None

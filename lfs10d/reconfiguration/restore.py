@@ -7,7 +7,8 @@ Rules
 3. One id told of two devices is told of neither of them, unless the file says the same of one: that one keeps it.
 4. A device that answers at the file's place is there, and so is the line's rate; that is told, and nothing is kept.
    Not so where another device is told to have been at that id: then who answers there is not known yet.
-5. The others are kept as verified there once (rule 3 of `lfs10d.config.merge`): the line is asked, the file's place first.
+5. The others are kept as verified there once (rule 3 of `lfs10d.config.merge`): the line is asked, the file's place
+   first.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ class _LineState(_Word):
 
 
 @dataclass(frozen=True, slots=True)
-class Recollection:
+class RetainedState:
     """The slave id of each device by name, and the line's rate, as last published; None where nothing is known."""
 
     slaves: Mapping[str, int]
@@ -61,7 +62,7 @@ class Recollection:
 
 
 @dataclass(frozen=True, slots=True)
-class Settled:
+class ConfirmedPlace:
     """A device that answers at the file's place, though it was last published at another."""
 
     device: str
@@ -74,7 +75,7 @@ def topics(now: Effective) -> frozenset[str]:
     return frozenset((LINE_STATE, *(device_topic(name, CONFIG) for name in now.said.slaves)))
 
 
-def recollect(payloads: Mapping[str, bytes]) -> Recollection:
+def recollect(payloads: Mapping[str, bytes]) -> RetainedState:
     """Return what is said on `topics`; of what is not in our form, nothing."""
     slaves: dict[str, int] = {}
     baudrate = None
@@ -84,7 +85,7 @@ def recollect(payloads: Mapping[str, bytes]) -> Recollection:
             baudrate = None if state is None else state.baudrate
         elif (device := device_of(topic, CONFIG)) is not None and (word := _understood(_Config, payload)) is not None:
             slaves[device] = word.slave
-    return Recollection(slaves, baudrate)
+    return RetainedState(slaves, baudrate)
 
 
 def _understood(form: type[Any], payload: bytes) -> Any:  # noqa: ANN401 - an instance of `form`, or None
@@ -97,8 +98,8 @@ def _understood(form: type[Any], payload: bytes) -> Any:  # noqa: ANN401 - an in
 
 
 def remembering(
-    now: Effective, recalled: Recollection, answering: AbstractSet[str]
-) -> tuple[Changes, tuple[Settled, ...]]:
+    now: Effective, recalled: RetainedState, answering: AbstractSet[str]
+) -> tuple[Changes, tuple[ConfirmedPlace, ...]]:
     """Return the changes with what is to be asked for, and what is settled already.
 
     `answering` are the devices that answer at the file's place now.
@@ -122,12 +123,13 @@ def remembering(
     if last_rate != rate and not known:
         changes = replace(changes, baudrate=Rate(last_rate, last_rate))
     settled = (
-        Settled(name, Place(filed[name], rate), Place(elsewhere.get(name, filed[name]), last_rate)) for name in moved
+        ConfirmedPlace(name, Place(filed[name], rate), Place(elsewhere.get(name, filed[name]), last_rate))
+        for name in moved
     )
     return changes, tuple(settled)
 
 
-def _elsewhere(now: Effective, recalled: Recollection, filed: Mapping[str, int]) -> dict[str, int]:
+def _elsewhere(now: Effective, recalled: RetainedState, filed: Mapping[str, int]) -> dict[str, int]:
     """Return the devices last published at another id than the file's, with that id (rules 1 to 3)."""
     told = {name: recalled.slaves[name] for name in filed if name in recalled.slaves}
     times = Counter(told.values())
@@ -159,7 +161,7 @@ def _settable(now: Effective, name: str, slave: int) -> bool:
 log = logging.getLogger(__name__)
 
 
-class Recalling:
+class Restore:
     """Used in the thread of the asyncio loop.
 
     `learn` puts into force what is to be asked for; `devices()` are those of the line's thread; `tell` publishes an
@@ -188,7 +190,7 @@ class Recalling:
         """Take what is retained on those topics."""
         recalled = recollect(payloads)
         answering = {device.spec.name for device in self._devices() if device.online}
-        settled: tuple[Settled, ...] = ()
+        settled: tuple[ConfirmedPlace, ...] = ()
 
         def edit(now: Effective) -> Changes:
             nonlocal settled

@@ -55,7 +55,7 @@ def _end_of(text: str) -> tuple[int, int]:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class DocumentPlace:
     """Where a value stands and, in a mapping, its key: lines and columns from 1."""
 
     value: tuple[int, int]
@@ -71,7 +71,7 @@ class Document:
 
     file: str
     data: object
-    places: Mapping[KeyPath, Place]
+    places: Mapping[KeyPath, DocumentPlace]
     problems: tuple[Problem, ...] = field(default=())
     unread: frozenset[KeyPath] = frozenset()
 
@@ -196,7 +196,7 @@ class _NodeReader:
 
     def __init__(self, file: str) -> None:
         self.file = file
-        self.places: dict[KeyPath, Place] = {}
+        self.places: dict[KeyPath, DocumentPlace] = {}
         self.problems: list[Problem] = []
         self.unread: list[KeyPath] = []
         self.open: list[int] = []
@@ -216,7 +216,7 @@ class _NodeReader:
                     ),
                 )
             )
-        self.places[path] = Place(place, key)
+        self.places[path] = DocumentPlace(place, key)
         match node:
             case ScalarNode():
                 value = self.scalar(node, path)

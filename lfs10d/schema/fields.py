@@ -52,11 +52,11 @@ def quoted(text: str, longest: int = _SHOWN_CHARACTERS) -> str:
     )
 
 
-class RefusedError(ValueError):
+class FieldError(ValueError):
     """A value is not of the kind; the message says what it must be."""
 
 
-class Kind:
+class FieldKind:
     """One kind of value."""
 
     @property
@@ -68,14 +68,14 @@ class Kind:
     def accept(self, value: object) -> object:
         """Return the value as the program uses it; raise RefusedError with the whole message otherwise."""
 
-    def refusal(self, value: object) -> RefusedError:
+    def refusal(self, value: object) -> FieldError:
         """Return the error for this value."""
-        return RefusedError(f"must be {self.words}, not {shown(value)}")
+        return FieldError(f"must be {self.words}, not {shown(value)}")
 
     def _validated(self, value: object) -> object:
         try:
             return self.accept(value)
-        except RefusedError as error:
+        except FieldError as error:
             # As a value of the context: braces in the message are no placeholders.
             raise PydanticCustomError(PLAIN_ERROR, "{message}", {"message": str(error)}) from None
 
@@ -85,7 +85,7 @@ class Kind:
 
 
 @dataclass(frozen=True)
-class Whole(Kind):
+class Whole(FieldKind):
     """A whole number within a range, both ends included."""
 
     first: int
@@ -104,7 +104,7 @@ class Whole(Kind):
 
 
 @dataclass(frozen=True)
-class Flag(Kind):
+class Flag(FieldKind):
     """True or false, in these words only."""
 
     @property
@@ -120,7 +120,7 @@ class Flag(Kind):
 
 
 @dataclass(frozen=True)
-class Choice(Kind):
+class Choice(FieldKind):
     """One of a few values; `meaning` maps a way of writing one to the value it means, `null` lets it be empty."""
 
     values: tuple[int | str, ...]
@@ -146,7 +146,7 @@ class Choice(Kind):
 
 
 @dataclass(frozen=True)
-class Duration(Kind):
+class Duration(FieldKind):
     """Seconds within a range; `zero` adds 0, `auto` adds the word auto, which means None."""
 
     first: float
@@ -176,7 +176,7 @@ class Duration(Kind):
 
 
 @dataclass(frozen=True)
-class Size(Kind):
+class Size(FieldKind):
     """Bytes within a range."""
 
     first: int
@@ -199,7 +199,7 @@ class Size(Kind):
 
 
 @dataclass(frozen=True)
-class Name(Kind):
+class Name(FieldKind):
     """A part of a topic, stable for life."""
 
     pattern = re.compile(r"[a-z0-9_-]{1,32}")
@@ -217,7 +217,7 @@ class Name(Kind):
 
 
 @dataclass(frozen=True)
-class Text(Kind):
+class Text(FieldKind):
     """Free text on one line: no control characters, not empty; `null` lets it be absent."""
 
     longest: int
@@ -254,12 +254,12 @@ class FilePath(Text):
         """Take text that can be a path, not an address such as tcp://..."""
         path = super().accept(value)
         if path is not None and "://" in path:
-            raise RefusedError("must be a path in the file system; network addresses are not supported")
+            raise FieldError("must be a path in the file system; network addresses are not supported")
         return path
 
 
 @dataclass(frozen=True)
-class Host(Kind):
+class Host(FieldKind):
     """A host name or an address. A wrong one is never shown: it may hold a login."""
 
     pattern = re.compile(r"[\w.-]{1,253}|[0-9A-Fa-f]*:[0-9A-Fa-f:.]*:[0-9A-Fa-f:.]*(%[\w.-]+)?")
@@ -272,7 +272,7 @@ class Host(Kind):
     def accept(self, value: object) -> str:
         """Take text that fits."""
         if not isinstance(value, str) or self.pattern.fullmatch(value) is None:
-            raise RefusedError(f"must be {self.words}")
+            raise FieldError(f"must be {self.words}")
         return value
 
 
@@ -293,7 +293,7 @@ class Node(Host):
             host, port = split_node(value)
             if self.pattern.fullmatch(host) and (port is None or 1 <= port <= LAST_PORT):
                 return value
-        raise RefusedError(f"must be {self.words} (no mqtt://, no login)")
+        raise FieldError(f"must be {self.words} (no mqtt://, no login)")
 
 
 LAST_PORT = 65_535
@@ -318,7 +318,7 @@ def node_text(host: str, port: int) -> str:
 
 
 @dataclass(frozen=True)
-class Hosts(Kind):
+class Hosts(FieldKind):
     """One host, or a list of nodes. A wrong one is never shown: it may hold a login."""
 
     most: int = 16
@@ -334,7 +334,7 @@ class Hosts(Kind):
             return Host().accept(value)
         nodes = tuple(Node().accept(each) for each in value)
         if not 1 <= len(nodes) <= self.most or len({split_node(each) for each in nodes}) < len(nodes):
-            raise RefusedError(f"must be a list of 1 to {self.most} nodes, each once")
+            raise FieldError(f"must be a list of 1 to {self.most} nodes, each once")
         return nodes
 
     def _validated(self, value: object) -> object:
@@ -347,7 +347,7 @@ _NODES: TypeAdapter[tuple[str, ...]] = TypeAdapter(tuple[Annotated[str, Node()],
 
 
 @dataclass(frozen=True)
-class BaseTopic(Kind):
+class BaseTopic(FieldKind):
     """The first levels of every topic (MQTT 5.0, section 4.7: no wildcards, and `$` is the broker's)."""
 
     longest: int = 200

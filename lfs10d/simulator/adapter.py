@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import deque
-from typing import TYPE_CHECKING
 
 from lfs10d.simulator.burst import MASTER, Burst, as_heard
+from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.wire import Format
-
-if TYPE_CHECKING:
-    from lfs10d.simulator.line import SimulatedLine
 
 
 class Adapter:

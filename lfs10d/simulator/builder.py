@@ -18,7 +18,7 @@ LAST_ID = 255
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class LinePlan:
     """What kind of line; times in seconds."""
 
     slaves: Sequence[int]
@@ -32,7 +32,7 @@ class Plan:
     """Values unique in the run, in place of moving wind."""
 
 
-def build(plan: Plan, faults: FaultFile | None = None, *, keep_log: bool = False) -> SimulatedLine:
+def build(plan: LinePlan, faults: FaultFile | None = None, *, keep_log: bool = False) -> SimulatedLine:
     """Return the line with its sensors and everything that ails them and it, but for echo and latency.
 
     Those are the adapter's: hand `faults.line.echo` and `.latency` to the port or the `PtyLine`.
@@ -56,7 +56,7 @@ def build(plan: Plan, faults: FaultFile | None = None, *, keep_log: bool = False
     return line
 
 
-def _sensor(plan: Plan, slave: int, entry: SlaveEntry, seed: int) -> Sensor:
+def _sensor(plan: LinePlan, slave: int, entry: SlaveEntry, seed: int) -> Sensor:
     shape = plan.format if entry.baudrate is None else replace(plan.format, baudrate=entry.baudrate)
     return Sensor(
         slave,

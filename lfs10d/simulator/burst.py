@@ -8,7 +8,7 @@ same cannot be told apart.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, TypeAlias
+from typing import Final, Protocol, TypeAlias
 
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format, misheard
@@ -37,6 +37,14 @@ class Burst:
         kept = sum(end <= now for end in self.ends)
         self.struck = self.struck or kept < len(self.ends)
         del self.data[kept:], self.ends[kept:]
+
+
+class Receiver(Protocol):
+    """What hears the line: an adapter."""
+
+    def offer(self, burst: Burst) -> None:
+        """Take a burst that has just begun."""
+        ...
 
 
 def collide(one: Burst, other: Burst) -> None:

@@ -14,7 +14,7 @@
       4: [nan, {fault: late, delay: 700ms, rate: 0.05}]
       5: {turnaround: 20ms, baudrate: 19200, copies: 2, faults: [{fault: silent, after: 10s, for: 5s}]}
 
-The kinds of faults are those of `lfs10d.simulator.faults.Kind`.
+The kinds of faults are those of `lfs10d.simulator.faults.FaultKind`.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from lfs10d.errors import ConfigError, Problem
 from lfs10d.schema.document import decode, parse
 from lfs10d.schema.fields import Choice, Duration, Flag, Whole
-from lfs10d.simulator.faults import Ailment, Kind, ailment
+from lfs10d.simulator.faults import Ailment, FaultKind, ailment
 
 DAY = 86400
 MOST_COPIES = 8
@@ -66,7 +66,7 @@ class WindowEntry(_Entry):
 class FaultEntry(WindowEntry):
     """One fault of a sensor."""
 
-    fault: Annotated[str, Choice(tuple(kind.value for kind in Kind))] = Field(description="What ails it.")
+    fault: Annotated[str, Choice(tuple(kind.value for kind in FaultKind))] = Field(description="What ails it.")
     rate: Share = Field(1.0, description="In what share of its answers it shows.")
     delay: Time | None = Field(
         None, description="Of late, slow_bytes, slow_flash, needs_rest, sleeps, twin, repeated and gateway."

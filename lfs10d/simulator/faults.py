@@ -15,7 +15,7 @@ from typing import Literal
 from lfs10d.simulator.wire import nanoseconds
 
 
-class Kind(StrEnum):
+class FaultKind(StrEnum):
     """The faults a sensor can have; the words are those of the faults file."""
 
     SILENT = "silent"
@@ -82,10 +82,12 @@ class Kind(StrEnum):
     """Without power during the window; when it comes back, what was stored is obeyed."""
 
 
-STRIKES_VALUES = frozenset({Kind.NAN, Kind.INFINITE, Kind.OUT_OF_RANGE, Kind.SUBNORMAL, Kind.STUCK})
-STRIKES_ANSWERS = frozenset({Kind.WRONG_ID, Kind.WRONG_FUNCTION, Kind.WRONG_COUNT, Kind.WRONG_ECHO})
+STRIKES_VALUES = frozenset(
+    {FaultKind.NAN, FaultKind.INFINITE, FaultKind.OUT_OF_RANGE, FaultKind.SUBNORMAL, FaultKind.STUCK}
+)
+STRIKES_ANSWERS = frozenset({FaultKind.WRONG_ID, FaultKind.WRONG_FUNCTION, FaultKind.WRONG_COUNT, FaultKind.WRONG_ECHO})
 STRIKES_FRAMES = frozenset(
-    {Kind.NOISY, Kind.GARBAGE, Kind.TRUNCATED, Kind.LEADING_NOISE, Kind.TRAILING_NOISE},
+    {FaultKind.NOISY, FaultKind.GARBAGE, FaultKind.TRUNCATED, FaultKind.LEADING_NOISE, FaultKind.TRAILING_NOISE},
 )
 
 
@@ -128,7 +130,7 @@ def window(first: float = 0.0, last: float | None = None, every: float | None = 
 class Ailment:
     """One fault of one sensor: what, in how many of its answers, when, and its particulars."""
 
-    kind: Kind
+    kind: FaultKind
     rate: float = 1.0
     window: Window = ALWAYS
     delay: int = 0
@@ -147,20 +149,20 @@ class Ailment:
 
 
 DEFAULT_DELAYS = {
-    Kind.LATE: 0.6,
-    Kind.SLOW_BYTES: 0.001,
-    Kind.SLOW_FLASH: 5.0,
-    Kind.NEEDS_REST: 0.25,
-    Kind.SLEEPS: 0.5,
-    Kind.TWIN: 0.037,
-    Kind.REPEATED: 0.037,
-    Kind.GATEWAY: 0.1,
+    FaultKind.LATE: 0.6,
+    FaultKind.SLOW_BYTES: 0.001,
+    FaultKind.SLOW_FLASH: 5.0,
+    FaultKind.NEEDS_REST: 0.25,
+    FaultKind.SLEEPS: 0.5,
+    FaultKind.TWIN: 0.037,
+    FaultKind.REPEATED: 0.037,
+    FaultKind.GATEWAY: 0.1,
 }
 """Seconds, where none is given."""
 
 
 def ailment(
-    kind: Kind | str,
+    kind: FaultKind | str,
     rate: float = 1.0,
     *,
     delay: float | None = None,
@@ -173,7 +175,7 @@ def ailment(
 
     Raises ValueError for an unknown kind, TypeError for an unknown particular.
     """
-    kind = Kind(kind)
+    kind = FaultKind(kind)
     seconds = DEFAULT_DELAYS.get(kind, 0.0) if delay is None else delay
     plain = Ailment(kind, rate, window(first, last, every), nanoseconds(seconds))
     return replace(plain, **particulars)  # type: ignore[arg-type]  # replace checks the names, the kinds use them

@@ -28,7 +28,7 @@ EXCESS_EDGES_US: Final = (0, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000, 500
 """Upper edges of the histogram: by how much a gap exceeded what it had to be."""
 
 
-class Verdict(StrEnum):
+class JudgeReport(StrEnum):
     """What became of a request."""
 
     HEARD = "heard"
@@ -54,7 +54,7 @@ class Hearing:
     frame: bytes
     gap: int | None
     """Silence before it; None if nothing was ever sent before."""
-    verdict: Verdict | None = None
+    verdict: JudgeReport | None = None
     """None: nothing against it yet."""
 
 
@@ -98,16 +98,16 @@ class Judge:
                 self._measure(hearing, slower)
         else:
             if self.framing == "rtu" and self._complete(hearing.frame):
-                hearing.verdict = hearing.verdict or Verdict.GAP  # a second request on the heels of the first
+                hearing.verdict = hearing.verdict or JudgeReport.GAP  # a second request on the heels of the first
             elif self.framing == "rtu" and start - hearing.ended > shape.t15 + ROUNDING:
-                hearing.verdict = hearing.verdict or Verdict.TORN
+                hearing.verdict = hearing.verdict or JudgeReport.TORN
             hearing.frame += data
             hearing.ended = ended
         if busy:
-            hearing.verdict = hearing.verdict or Verdict.COLLISION
+            hearing.verdict = hearing.verdict or JudgeReport.COLLISION
         return hearing
 
-    def settle(self, hearing: Hearing, *, struck: bool) -> Verdict | None:
+    def settle(self, hearing: Hearing, *, struck: bool) -> JudgeReport | None:
         """Decide at its end whether a request was heard; None while it is incomplete and may go on.
 
         `struck`: another's bytes fell into it.
@@ -115,24 +115,24 @@ class Judge:
         if hearing is not self._open:
             return None
         if struck:
-            hearing.verdict = hearing.verdict or Verdict.STRUCK
+            hearing.verdict = hearing.verdict or JudgeReport.STRUCK
         if not self._complete(hearing.frame):
             return None
-        return self._count(hearing, hearing.verdict or Verdict.HEARD)
+        return self._count(hearing, hearing.verdict or JudgeReport.HEARD)
 
     def patience(self, hearing: Hearing) -> int:
         """Return until when an incomplete request may still go on."""
         return hearing.ended + self._longest_silence(hearing.format) + 1
 
-    def expire(self, hearing: Hearing, now: int) -> Verdict | None:
+    def expire(self, hearing: Hearing, now: int) -> JudgeReport | None:
         """End a request that was not completed in time; None if it has ended or went on since."""
         if hearing is not self._open or now < self.patience(hearing):
             return None
         return self._close(hearing)
 
-    def _close(self, hearing: Hearing) -> Verdict:
+    def _close(self, hearing: Hearing) -> JudgeReport:
         torn = hearing.verdict is None and self._complete(self._torn_off + hearing.frame)
-        return self._count(hearing, hearing.verdict or (Verdict.TORN if torn else Verdict.MALFORMED))
+        return self._count(hearing, hearing.verdict or (JudgeReport.TORN if torn else JudgeReport.MALFORMED))
 
     @property
     def violations(self) -> int:
@@ -171,21 +171,21 @@ class Judge:
         place = sum(excess >= 1000 * edge for edge in EXCESS_EDGES_US)
         self.histogram[place] += 1
         if excess < 0 and self.framing == "rtu":
-            hearing.verdict = Verdict.GAP
+            hearing.verdict = JudgeReport.GAP
 
     def _complete(self, frame: bytes) -> bool:
         return any(unseal(frame, self.framing, check) is not None for check in ("crc", "sum"))
 
-    def _count(self, hearing: Hearing, verdict: Verdict) -> Verdict:
+    def _count(self, hearing: Hearing, verdict: JudgeReport) -> JudgeReport:
         self._open = None
-        self._torn_off = hearing.frame if verdict is Verdict.MALFORMED else b""
+        self._torn_off = hearing.frame if verdict is JudgeReport.MALFORMED else b""
         hearing.verdict = verdict
         self.requests += 1
-        self.heard += verdict is Verdict.HEARD
-        self.unheard += verdict is not Verdict.HEARD
-        self.gap_violations += verdict is Verdict.GAP
-        self.t15_violations += verdict is Verdict.TORN
-        self.collisions += verdict is Verdict.COLLISION
-        self.struck += verdict is Verdict.STRUCK
-        self.malformed += verdict is Verdict.MALFORMED
+        self.heard += verdict is JudgeReport.HEARD
+        self.unheard += verdict is not JudgeReport.HEARD
+        self.gap_violations += verdict is JudgeReport.GAP
+        self.t15_violations += verdict is JudgeReport.TORN
+        self.collisions += verdict is JudgeReport.COLLISION
+        self.struck += verdict is JudgeReport.STRUCK
+        self.malformed += verdict is JudgeReport.MALFORMED
         return verdict

@@ -10,20 +10,16 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
 from random import Random
-from typing import TYPE_CHECKING
 
-from lfs10d.simulator.burst import MASTER, Burst, Speaker, collide
-from lfs10d.simulator.judge import Hearing, Judge, Verdict
+from lfs10d.simulator.burst import MASTER, Burst, Receiver, Speaker, collide
+from lfs10d.simulator.judge import Hearing, Judge, JudgeReport
 from lfs10d.simulator.sensor import Reply, Sensor
 from lfs10d.simulator.wind import Unique
 from lfs10d.simulator.wire import Format, Framing, nanoseconds, unseal
 
-if TYPE_CHECKING:
-    from lfs10d.simulator.adapter import Adapter
-
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class SensorAnswer:
     """What a sensor sent in answer to a request."""
 
     sensor: Sensor
@@ -41,7 +37,7 @@ class Answer:
 
 
 @dataclass(slots=True)
-class Request:
+class HeardRequest:
     """One request as it was on the line, and what was sent in answer: the oracle of a test."""
 
     speaker: Speaker
@@ -49,10 +45,10 @@ class Request:
     begun: int
     ended: int
     gap: int | None
-    verdict: Verdict
+    verdict: JudgeReport
     body: bytes = b""
     """Without the check; empty if it was not heard."""
-    answers: list[Answer] = field(default_factory=list)
+    answers: list[SensorAnswer] = field(default_factory=list)
 
 
 class SimulatedLine:
@@ -71,14 +67,14 @@ class SimulatedLine:
         """Of noise and of a second master; every sensor and adapter has its own."""
         self.framing: Framing = framing
         self.judge = Judge(framing)
-        self.log: list[Request] = []
+        self.log: list[HeardRequest] = []
         """Every request in order with its answers, while `keep_log`."""
         self.keep_log = keep_log
         self.random = Random(seed)  # noqa: S311  # repeatable noise, no secret
         self.sensors: list[Sensor] = []
         self.now = 0
         self.answered = 0
-        self._adapters: list[Adapter] = []
+        self._receivers: list[Receiver] = []
         self._bursts: list[Burst] = []
         self._events: list[tuple[int, int, Callable[[int], None]]] = []
         self._event_count = 0
@@ -86,7 +82,7 @@ class SimulatedLine:
         self._handed = 0
         self._dead: int | None = None
         self._unique = Unique()
-        self._troubles: list[Callable[[Request], None]] = []
+        self._troubles: list[Callable[[HeardRequest], None]] = []
         for sensor in sensors:
             self.add(sensor)
 
@@ -104,11 +100,11 @@ class SimulatedLine:
                 return sensor
         raise KeyError(slave)
 
-    def attach(self, adapter: Adapter) -> None:
-        """Let an adapter hear what is sent from now on."""
-        self._adapters.append(adapter)
+    def attach(self, receiver: Receiver) -> None:
+        """Let a receiver hear what is sent from now on."""
+        self._receivers.append(receiver)
 
-    def after_each_request(self, trouble: Callable[[Request], None]) -> None:
+    def after_each_request(self, trouble: Callable[[HeardRequest], None]) -> None:
         """Call this with every request that was heard, right after the sensors heard it."""
         self._troubles.append(trouble)
 
@@ -208,8 +204,8 @@ class SimulatedLine:
                     break
         self._bursts = [other for other in (*self._bursts, burst) if other.ends]
         if burst.ends:
-            for adapter in self._adapters:
-                adapter.offer(burst)
+            for receiver in self._receivers:
+                receiver.offer(burst)
 
     def _settle(self, hearing: Hearing, burst: Burst, now: int) -> None:
         """Judge the master's request at the end of its bytes; if it is heard, let the sensors hear it."""
@@ -217,7 +213,7 @@ class SimulatedLine:
         if verdict is None:
             self.at_nanosecond(self.judge.patience(hearing), lambda when: self._give_up(hearing, when))
             return
-        request = Request(MASTER, hearing.frame, hearing.begun, now, hearing.gap, verdict)
+        request = HeardRequest(MASTER, hearing.frame, hearing.begun, now, hearing.gap, verdict)
         self.carry(request, burst, now)
 
     def _give_up(self, hearing: Hearing, now: int) -> None:
@@ -226,16 +222,16 @@ class SimulatedLine:
         if verdict is None:
             return
         if self.keep_log:
-            self.log.append(Request(MASTER, hearing.frame, hearing.begun, hearing.ended, hearing.gap, verdict))
+            self.log.append(HeardRequest(MASTER, hearing.frame, hearing.begun, hearing.ended, hearing.gap, verdict))
         for sensor in self.sensors:
             if sensor.format == hearing.format:
                 sensor.disturb(now)
 
-    def carry(self, request: Request, burst: Burst, now: int) -> None:
+    def carry(self, request: HeardRequest, burst: Burst, now: int) -> None:
         """Bring a request, at its end, to the sensors and their answers onto the line."""
         if self.keep_log:
             self.log.append(request)
-        if request.verdict is not Verdict.HEARD or burst.struck:
+        if request.verdict is not JudgeReport.HEARD or burst.struck:
             return
         replies = self._ask(request, burst.format, now)
         if request.body:
@@ -245,7 +241,7 @@ class SimulatedLine:
         for trouble in self._troubles:
             trouble(request)
 
-    def _ask(self, request: Request, shape: Format, now: int) -> list[Reply]:
+    def _ask(self, request: HeardRequest, shape: Format, now: int) -> list[Reply]:
         bodies: dict[str, bytes | None] = {}
         replies: list[Reply] = []
         for sensor in self.sensors:
@@ -263,7 +259,7 @@ class SimulatedLine:
                     replies += (reply, *reply.following)
         return replies
 
-    def _answer(self, request: Request, reply: Reply) -> None:
+    def _answer(self, request: HeardRequest, reply: Reply) -> None:
         self.answered += 1
         answer = self.speak(reply.sensor, reply.data, reply.start, reply.format, reply.pause)
-        request.answers.append(Answer(reply.sensor, reply.values, answer, reply.whole, reply.second))
+        request.answers.append(SensorAnswer(reply.sensor, reply.values, answer, reply.whole, reply.second))

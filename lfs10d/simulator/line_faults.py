@@ -6,8 +6,8 @@ from typing import Final
 
 from lfs10d.simulator.burst import NOISE, SECOND_MASTER
 from lfs10d.simulator.faults import ALWAYS, Window
-from lfs10d.simulator.judge import Verdict
-from lfs10d.simulator.line import Request, SimulatedLine
+from lfs10d.simulator.judge import JudgeReport
+from lfs10d.simulator.line import HeardRequest, SimulatedLine
 from lfs10d.simulator.wire import SECOND, Check, nanoseconds, seal
 
 BABBLE_PIECE: Final = SECOND // 10
@@ -39,7 +39,7 @@ def stray(
 ) -> None:
     """Put `length` random bytes on the line `delay` after that share of the requests, whoever answers them."""
 
-    def after(request: Request) -> None:
+    def after(request: HeardRequest) -> None:
         if window.covers(request.ended) and line.random.random() < rate:
             line.speak(NOISE, line.random.randbytes(length), request.ended + nanoseconds(delay))
 
@@ -56,7 +56,7 @@ def second_master(
     def ask(now: int) -> None:
         ended = now + line.format.span(len(frame))
         burst = line.speak(SECOND_MASTER, frame, now)
-        request = Request(SECOND_MASTER, frame, now, ended, None, Verdict.HEARD)
+        request = HeardRequest(SECOND_MASTER, frame, now, ended, None, JudgeReport.HEARD)
         line.at_nanosecond(ended, lambda when: line.carry(request, burst, when))
         if end is None or now + nanoseconds(every) < end:
             line.at_nanosecond(now + nanoseconds(every), ask)

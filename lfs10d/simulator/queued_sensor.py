@@ -5,7 +5,7 @@ from __future__ import annotations
 from lfs10d.simulator.sensor import Reply, Sensor
 
 
-class InTurn(Sensor):
+class QueuedSensor(Sensor):
     """Begins an answer no earlier than t3.5 after the end of its answer before."""
 
     _free = 0

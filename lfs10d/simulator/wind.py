@@ -15,7 +15,7 @@ UNIQUE_VALUES: Final = 1_000_000
 _STRIDE: Final = 618_033  # prime to UNIQUE_VALUES: scatters the values, repeats none
 
 
-class Source(Protocol):
+class WindSource(Protocol):
     """Something that yields a sensor's next value at a time in nanoseconds."""
 
     def __call__(self, now: int) -> float:

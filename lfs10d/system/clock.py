@@ -14,12 +14,10 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, TypeAlias
 
 from lfs10d.system import clock_step
-from lfs10d.system.threads import aside
-
-ClockState: TypeAlias = Literal["synced", "unsynced", "unknown"]
+from lfs10d.system.clock_step import ClockState
+from lfs10d.system.threads import run_in_thread
 
 MARK = Path("/run/systemd/timesync/synchronized")
 """Touched by systemd-timesyncd at each synchronisation (systemd-timesyncd.service(8)); /run is empty after a boot."""
@@ -92,7 +90,7 @@ class Instant:
         return round((self.wall if at is None else self.wall - self.mono + at) * 1000)
 
 
-class Moments:
+class Clock:
     """`synchronised()` is called whenever the wall clock has become synchronised.
 
     `stepped()` is called when it was set while it was not known to be synchronised. Built and used in one thread.
@@ -123,7 +121,7 @@ class Moments:
                 self._set.clear()
                 if self._state != "synced":
                     self._stepped()
-            before, self._state = self._state, await aside(look, "clock")
+            before, self._state = self._state, await run_in_thread(look, "clock")
             if self._state == "synced" != before:
                 self._synchronised()
             patience = look_again(self._state, time.monotonic() - self._start)

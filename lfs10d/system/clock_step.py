@@ -6,7 +6,10 @@ person. The monotonic clock goes on evenly, so that the time between a sample an
 
 from __future__ import annotations
 
-from lfs10d.system.clock import ClockState
+from typing import Literal, TypeAlias
+
+ClockState: TypeAlias = Literal["synced", "unsynced", "unknown"]
+"""How far the wall clock can be trusted."""
 
 STEP_MS = 1000
 """A wall clock that moves so far at once against the monotonic one has been set; slewed it moves 0.5 ms in a second."""

@@ -1,6 +1,6 @@
 """Files that survive a power cut: write, fsync, rename, fsync of the folder.
 
-`Disk` holds the order of the steps, `Files` are the steps. `tests.support.volatile_disk` has other `Files` for tests, which
+`Disk` holds the order of the steps, `Files` are the steps. The tests have other `Files`, which
 forget at a cut what was not synced.
 """
 

@@ -16,7 +16,7 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 
-class OwnThread:
+class WorkerThread:
     """Calls functions one after the other in a thread named `name`, which begins with the first call."""
 
     def __init__(self, name: str) -> None:
@@ -58,7 +58,7 @@ class OwnThread:
             perform()
 
 
-async def aside(call: Callable[[], T], name: str) -> T:
+async def run_in_thread(call: Callable[[], T], name: str) -> T:
     """Return what `call()` returns or raise what it raises; it runs in a daemon thread called `name`.
 
     Cancelling abandons the result, not the call.

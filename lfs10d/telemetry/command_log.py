@@ -9,7 +9,7 @@ import json
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from lfs10d.command import Answer, Call
+from lfs10d.command import Command, Result
 from lfs10d.system.logs import escape
 
 LONGEST = 300
@@ -19,7 +19,7 @@ OUTCOME = ("dry_run", "pending", "changed", "dropped", "applied", "restart_requi
 """Further keys of an answer that are logged where they hold something."""
 
 
-def line(name: str, call: Call, answer: Answer) -> str:
+def line(name: str, call: Command, answer: Result) -> str:
     """Return the line of a request that is over: `request device/options (id a1): ok: device mast, from ..., to ...`.
 
     `name` is the request's; what the answer does not say of the device is taken from the request itself.
@@ -31,7 +31,7 @@ def line(name: str, call: Call, answer: Answer) -> str:
     return escape(": ".join(words))
 
 
-def _facts(name: str, parameters: Mapping[str, Any], answer: Answer) -> Iterator[tuple[str, object]]:
+def _facts(name: str, parameters: Mapping[str, Any], answer: Result) -> Iterator[tuple[str, object]]:
     data = answer.data if isinstance(answer.data, dict) else {}
     for key in PLACE:
         value = data.get(key, parameters.get(key))

@@ -17,7 +17,7 @@ from lfs10d.telemetry.payloads import (
     DeviceConfig,
     DeviceEntry,
     DeviceStats,
-    Dropped,
+    DroppedPayload,
     Error,
     Event,
     Info,
@@ -25,7 +25,7 @@ from lfs10d.telemetry.payloads import (
     LineStats,
     Response,
     SamplePayload,
-    Trace,
+    TracePayload,
 )
 
 
@@ -79,10 +79,10 @@ OUTBOUND = (
     Outbound(_device(publication.AVAILABILITY), Availability, retain=True, qos=1, when=CHANGE),
     Outbound(_device(publication.ERROR), Error, retain=True, qos=1, when=RISE),
     Outbound(_device(publication.STATS), DeviceStats, retain=True, qos=0, when="30 s"),
-    Outbound(publication.EVENT, Dropped | Event, retain=False, qos=1, when="as it happens"),
+    Outbound(publication.EVENT, DroppedPayload | Event, retain=False, qos=1, when="as it happens"),
     Outbound("response/+/+", Response, retain=False, qos=1, when="one per request"),
     Outbound("response/+", Response, retain=False, qos=1, when="one per request of one level"),
-    Outbound(publication.TRACE, Trace, retain=False, qos=0, when="while `line/trace` runs"),
+    Outbound(publication.TRACE, TracePayload, retain=False, qos=0, when="while `line/trace` runs"),
 )
 
 

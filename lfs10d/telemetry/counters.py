@@ -11,8 +11,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from math import ceil, floor
 
-from lfs10d.reading import PORT_CODES, Errand, Exchanged, FaultCode, Reading, UartCounters
-from lfs10d.telemetry.publication import VERSION, Backlog
+from lfs10d.reading import PORT_CODES, Exchanged, FaultCode, Purpose, Reading, UartCounters
+from lfs10d.telemetry.publication import VERSION, BacklogStats
 
 WINDOW = 30
 """Rates are of the last so many s."""
@@ -23,7 +23,7 @@ LEAST_SPAN = 1.0
 RECENT_GAPS = 1000
 RECENT_RTTS = 100
 
-OTHER_RATES = frozenset({Errand.SCAN, Errand.CHANGE})
+OTHER_RATES = frozenset({Purpose.SCAN, Purpose.CHANGE})
 """Errands that may use another baud rate: their gaps say nothing about the line's own."""
 
 
@@ -61,7 +61,7 @@ class Rates:
         return {"load_pct": self.load_pct, "polls_per_s": self.polls_per_s, "cycle_s": self.cycle_s}
 
 
-class LineTally:
+class LineCounters:
     """The figures of the line; `started` is when counting began."""
 
     __slots__ = ("_gaps", "_least_gap", "_seconds", "_started", "errors", "exchanges", "uart", "unsolicited")
@@ -126,7 +126,7 @@ class LineTally:
         load = min(100.0, 100 * sum(second.busy for second in seconds) / span)
         return Rates(round(load, 1), round(sum(second.polls for second in seconds) / span, 2), cycle)
 
-    def payload(self, now: float, *, ts: int, gap_required: float, backlog: Backlog) -> dict[str, object]:
+    def payload(self, now: float, *, ts: int, gap_required: float, backlog: BacklogStats) -> dict[str, object]:
         """Return the object for `line/stats`."""
         uart = self.uart
         return {
@@ -173,7 +173,7 @@ class LineTally:
         return seconds[-1]
 
 
-class DeviceTally:
+class DeviceCounters:
     """The figures of one device; `response_timeout` in s, None until it is known, `request_gap` in s."""
 
     __slots__ = ("_last_poll", "_rtts", "errors", "good", "last_good_ts", "polls", "request_gap", "response_timeout")

@@ -21,8 +21,8 @@ from typing import Final
 from lfs10d.reading import PORT_CODES, AnsweredTwice, FaultCode, Reading
 from lfs10d.system.clock import Instant
 from lfs10d.telemetry.alarms import DeviceAlarm
-from lfs10d.telemetry.counters import DeviceTally
-from lfs10d.telemetry.info import DeviceFacts
+from lfs10d.telemetry.counters import DeviceCounters
+from lfs10d.telemetry.info import DeviceInfo
 from lfs10d.telemetry.publication import (
     AVAILABILITY,
     CONFIG,
@@ -31,8 +31,8 @@ from lfs10d.telemetry.publication import (
     STATS,
     TELEMETRY,
     WIND,
-    Kind,
     Publication,
+    PublicationKind,
     Sample,
     device_topic,
     event,
@@ -44,7 +44,7 @@ STATE_EARLY: Final = 0.01
 second would else miss its turn by the jitter of its polls and be shown late each time."""
 
 
-class Standing:
+class DeviceState:
     """One device as the broker knows it; `seq` is its last number used in this boot (0: none)."""
 
     __slots__ = (
@@ -65,7 +65,7 @@ class Standing:
         "tally",
     )
 
-    def __init__(self, facts: DeviceFacts, *, line: str, boot: str, seq: int, now: Instant) -> None:
+    def __init__(self, facts: DeviceInfo, *, line: str, boot: str, seq: int, now: Instant) -> None:
         self.facts = facts
         self.seq = seq
         self.online = False
@@ -77,7 +77,7 @@ class Standing:
         self._telemetry = device_topic(facts.name, TELEMETRY)
         self._alarm = DeviceAlarm(facts.offline_after)
         self._gap = facts.request_gap
-        self.tally = DeviceTally(facts.response_timeout, facts.request_gap)
+        self.tally = DeviceCounters(facts.response_timeout, facts.request_gap)
         self._last_good: float | None = None
         self._state_from = now.mono
         code = FaultCode.STARTING if facts.enabled else FaultCode.DISABLED
@@ -139,7 +139,7 @@ class Standing:
                 published.append(event("duplicate_id", ts, **facts))
         return published
 
-    def reconfigure(self, facts: DeviceFacts, now: Instant) -> list[Publication]:
+    def reconfigure(self, facts: DeviceInfo, now: Instant) -> list[Publication]:
         """Take new facts about the same device on the same profile; return what changed."""
         before, self.facts = self.facts, facts
         self._alarm.rise_after = facts.offline_after
@@ -234,7 +234,7 @@ class Standing:
         return published
 
     def _telling(self, sample: Sample, payload: dict[str, object]) -> Publication:
-        return Publication(self._telemetry, payload, Kind.SAMPLE, retain=False, qos=1, sample=sample)
+        return Publication(self._telemetry, payload, PublicationKind.SAMPLE, retain=False, qos=1, sample=sample)
 
     def _state(self, now: Instant, *, refresh: bool = False) -> Publication:
         """Return the newest state, which is then shown; `refresh`: quality and error are those shown before."""

@@ -15,14 +15,14 @@ from lfs10d.schema.quantities import duration_text
 from lfs10d.telemetry.publication import ERROR, Publication, device_of
 
 
-class Entry(NamedTuple):
+class LogEntry(NamedTuple):
     """One line of the log and its level."""
 
     level: int
     text: str
 
 
-class Logbook:
+class EventLog:
     """Keeps which devices were reported as failing."""
 
     def __init__(self) -> None:
@@ -31,35 +31,35 @@ class Logbook:
         self._rested: set[str] = set()
         """Devices whose learned rest was reported."""
 
-    def happened(self, event: Event, *, port: str, notices: Sequence[str], frames: bool) -> list[Entry]:
+    def happened(self, event: Event, *, port: str, notices: Sequence[str], frames: bool) -> list[LogEntry]:
         """Return what an event of the line thread says by itself; exchanges only where `frames` are wanted.
 
         `port` is the path, `notices` what a person should know of the port that was opened.
         """
         if isinstance(event, PortChanged):
             if event.freed:
-                return [Entry(logging.INFO, f"{port}: freed for another program")]
+                return [LogEntry(logging.INFO, f"{port}: freed for another program")]
             if event.fault is not None:
-                return [Entry(logging.WARNING, f"{event.fault.message}; tried again until it is back")]
+                return [LogEntry(logging.WARNING, f"{event.fault.message}; tried again until it is back")]
             return [
-                Entry(logging.INFO, f"{port}: the port is open"),
-                *(Entry(logging.WARNING, notice) for notice in notices),
+                LogEntry(logging.INFO, f"{port}: the port is open"),
+                *(LogEntry(logging.WARNING, notice) for notice in notices),
             ]
         if isinstance(event, Reading) and event.gap_learned and event.device not in self._rested:
             self._rested.add(event.device)
             gap = duration_text(event.request_gap)
             text = f"{event.device}: ignores a request right behind another, and is now given {gap} of rest before each"
             why = f"more if that is too short, see device/{event.device}/config"
-            return [Entry(logging.WARNING, f"{text} ({why}): set request_gap for it in the configuration")]
+            return [LogEntry(logging.WARNING, f"{text} ({why}): set request_gap for it in the configuration")]
         if frames and isinstance(event, Exchanged):
             heard = event.heard.hex(" ") or "nothing"
             fault = f": {event.fault}" if event.fault else ""
-            return [Entry(logging.DEBUG, f"slave {event.slave}: sent {event.sent.hex(' ')}, heard {heard}{fault}")]
+            return [LogEntry(logging.DEBUG, f"slave {event.slave}: sent {event.sent.hex(' ')}, heard {heard}{fault}")]
         return []
 
-    def published(self, publications: Iterable[Publication]) -> list[Entry]:
+    def published(self, publications: Iterable[Publication]) -> list[LogEntry]:
         """Return what a person should know of what one event made known."""
-        entries: list[Entry] = []
+        entries: list[LogEntry] = []
         good: set[str] = set()
         for publication in publications:
             if publication.sample is not None and publication.sample.quality == "good":
@@ -70,10 +70,10 @@ class Logbook:
             if isinstance(publication.payload, Mapping) and publication.payload["active"]:
                 entries.append(self._failed(device, publication.payload))
             elif (code := self._failing.pop(device, None)) is not None and device in good:
-                entries.append(Entry(logging.INFO, f"{device}: answers well again after {code}"))
+                entries.append(LogEntry(logging.INFO, f"{device}: answers well again after {code}"))
         return entries
 
-    def _failed(self, device: str, error: Mapping[str, object]) -> Entry:
+    def _failed(self, device: str, error: Mapping[str, object]) -> LogEntry:
         known = device in self._failing
         code = self._failing[device] = str(error["code"])
-        return Entry(logging.DEBUG if known else logging.WARNING, f"{device}: {code}: {error['message']}")
+        return LogEntry(logging.DEBUG if known else logging.WARNING, f"{device}: {code}: {error['message']}")

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from lfs10d.system.clock import ClockState
+from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry.publication import VERSION
 
 
 @dataclass(frozen=True, slots=True)
-class DaemonFacts:
+class DaemonInfo:
     """What `info` says; `boot` stays the same for one life of the daemon, `mqtt` is any JSON object."""
 
     version: str
@@ -40,7 +40,7 @@ class DaemonFacts:
 
 
 @dataclass(frozen=True, slots=True)
-class LineFacts:
+class LineInfo:
     """The line as configured; `gap_required` in s is the silence kept before every request."""
 
     name: str
@@ -69,7 +69,7 @@ class LineFacts:
 
 
 @dataclass(frozen=True, slots=True)
-class DeviceFacts:
+class DeviceInfo:
     """A device as configured; durations in s; `response_timeout` is None where it is learned.
 
     `request_gap` is the rest that it is given between two exchanges, where no longer one was learned.

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from lfs10d.reading import FaultCode, Number
-from lfs10d.system.clock import ClockState
+from lfs10d.system.clock_step import ClockState
 
 Milliseconds = Annotated[int, Field(description="epoch milliseconds, UTC")]
 Count = Annotated[int, Field(ge=0, description="since boot")]
@@ -151,7 +151,7 @@ class Uart(Payload):
     break_: int = Field(alias="break", description="line held low for longer than a character")
 
 
-class Store(Payload):
+class StoreStats(Payload):
     """What waits for the broker."""
 
     depth: int = Field(ge=0, description="samples")
@@ -173,7 +173,7 @@ class LineStats(Payload):
     errors: Errors
     unsolicited_bytes: int = Field(ge=0, description="heard and part of no answer, since boot")
     uart: Uart | None = Field(description="errors the driver counted; null where it does not")
-    store: Store = Field(description="what waits for the broker")
+    store: StoreStats = Field(description="what waits for the broker")
 
 
 class DeviceConfig(Payload):
@@ -227,7 +227,7 @@ class Event(Payload):
         return self
 
 
-class Dropped(Payload):
+class DroppedPayload(Payload):
     """Samples of one device that are lost, within `from_seq`..`to_seq` both included."""
 
     v: Version
@@ -264,7 +264,7 @@ class Response(Payload):
     took_ms: float = Field(ge=0, description="from its arrival to this answer")
 
 
-class Trace(Payload):
+class TracePayload(Payload):
     """One frame on the line."""
 
     v: Version

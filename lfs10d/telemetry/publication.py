@@ -13,7 +13,7 @@ from enum import StrEnum
 from typing import Literal, TypeAlias
 
 from lfs10d.reading import Number
-from lfs10d.system.clock import ClockState
+from lfs10d.system.clock_step import ClockState
 
 VERSION = 1
 """`v` of every payload that is an object."""
@@ -49,7 +49,7 @@ def device_of(topic: str, leaf: str) -> str | None:
     return levels[1] if len(levels) == 3 and levels[0] == "device" and levels[2] == leaf else None  # noqa: PLR2004 - device/<name>/<leaf>
 
 
-class Kind(StrEnum):
+class PublicationKind(StrEnum):
     """How a publication is treated while the broker is away."""
 
     RETAINED = "retained"
@@ -126,7 +126,7 @@ class Publication:
 
     topic: str
     payload: Payload
-    kind: Kind
+    kind: PublicationKind
     retain: bool
     qos: int
     sample: Sample | None = None
@@ -134,7 +134,7 @@ class Publication:
 
 
 @dataclass(frozen=True, slots=True)
-class Backlog:
+class BacklogStats:
     """What waits for the broker: samples, epoch ms of the oldest (None: none), samples evicted since boot."""
 
     depth: int = 0
@@ -144,13 +144,13 @@ class Backlog:
 
 def retained(topic: str, payload: Payload, *, qos: int = 1, refresh: bool = False) -> Publication:
     """Return a retained publication; payload None clears the topic."""
-    return Publication(topic, payload, Kind.RETAINED, retain=True, qos=qos, refresh=refresh)
+    return Publication(topic, payload, PublicationKind.RETAINED, retain=True, qos=qos, refresh=refresh)
 
 
 def event(kind: str, ts: int, **facts: object) -> Publication:
     """Return a publication on `event` of type `kind` at `ts` (epoch ms)."""
     payload = {"v": VERSION, "type": kind, "ts": ts, **facts}
-    return Publication(EVENT, payload, Kind.EVENT, retain=False, qos=1)
+    return Publication(EVENT, payload, PublicationKind.EVENT, retain=False, qos=1)
 
 
 def dropped(device: str, boot: str, from_seq: int, to_seq: int, *, count: int, ts: int) -> Publication:

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from math import inf
 
 from lfs10d.reading import PORT_CODES, SILENT_CODES, START_POLLS, Reading
-from lfs10d.telemetry.event_log import Entry
+from lfs10d.telemetry.event_log import LogEntry
 
 WITHIN = 9.5
 """The report comes at the latest so many s after the opening of the port."""
@@ -62,7 +62,7 @@ class StartReport:
         if self._failures[device] >= START_POLLS:
             self._waiting.discard(device)
 
-    def entry(self, now: float) -> Entry | None:
+    def entry(self, now: float) -> LogEntry | None:
         """Return the line of the log if it is time for it; once for each opening."""
         if self.due == inf or (self._waiting and now < self.due):
             return None
@@ -77,4 +77,4 @@ class StartReport:
             parts.append(f"silent: {_some(silent)}")
         if self._bad:
             parts.append(f"answering badly: {_some([f'{name} ({code})' for name, code in self._bad.items()])}")
-        return Entry(logging.WARNING if silent or self._bad else logging.INFO, "; ".join(parts))
+        return LogEntry(logging.WARNING if silent or self._bad else logging.INFO, "; ".join(parts))

@@ -27,9 +27,9 @@ from lfs10d.reading import (
 )
 from lfs10d.system.clock import Instant
 from lfs10d.telemetry.alarms import LineAlarm
-from lfs10d.telemetry.counters import LineTally
-from lfs10d.telemetry.device_state import CLEARED_LEAVES, RETAINED_LEAVES, Standing
-from lfs10d.telemetry.info import DaemonFacts, DeviceFacts, LineFacts
+from lfs10d.telemetry.counters import LineCounters
+from lfs10d.telemetry.device_state import CLEARED_LEAVES, RETAINED_LEAVES, DeviceState
+from lfs10d.telemetry.info import DaemonInfo, DeviceInfo, LineInfo
 from lfs10d.telemetry.publication import (
     DEVICES,
     INFO,
@@ -37,7 +37,7 @@ from lfs10d.telemetry.publication import (
     LINE_STATE,
     LINE_STATS,
     VERSION,
-    Backlog,
+    BacklogStats,
     Publication,
     device_topic,
     event,
@@ -45,7 +45,7 @@ from lfs10d.telemetry.publication import (
     retained,
 )
 
-__all__ = ["PAUSED", "POLLING", "DaemonFacts", "DeviceFacts", "Instant", "LineFacts", "Requests", "Station"]
+__all__ = ["PAUSED", "POLLING", "DaemonInfo", "DeviceInfo", "Instant", "LineInfo", "Requests", "Station"]
 
 STATS_EVERY: Final = 30.0
 """s between two publications of the statistics."""
@@ -66,12 +66,12 @@ class Station:
 
     def __init__(
         self,
-        daemon: DaemonFacts,
-        line: LineFacts,
-        devices: Sequence[DeviceFacts],
+        daemon: DaemonInfo,
+        line: LineInfo,
+        devices: Sequence[DeviceInfo],
         now: Instant,
         *,
-        backlog: Callable[[], Backlog] = Backlog,
+        backlog: Callable[[], BacklogStats] = BacklogStats,
     ) -> None:
         self._daemon = daemon
         self._line = line
@@ -84,7 +84,7 @@ class Station:
         self._requests: Requests = "ok"
         self._port_fault: Fault | None = None
         self._alarm = LineAlarm()
-        self._tally = LineTally(now.mono)
+        self._tally = LineCounters(now.mono)
         self._last_seqs: dict[str, int] = {}
         """Last number used of each device that was removed."""
         self._standings = {facts.name: self._stand(facts, now) for facts in devices}
@@ -159,7 +159,7 @@ class Station:
         leaves = (device_topic(name, leaf) for name in self._standings for leaf in RETAINED_LEAVES)
         return frozenset((*LINE_TOPICS, *leaves))
 
-    def configure(self, line: LineFacts, devices: Sequence[DeviceFacts], now: Instant) -> list[Publication]:
+    def configure(self, line: LineInfo, devices: Sequence[DeviceInfo], now: Instant) -> list[Publication]:
         """Take the facts as they are now; return the difference, topics of what is gone cleared.
 
         A device is the same while its name is; with another profile it starts anew, but for its numbers.
@@ -168,7 +168,7 @@ class Station:
         published = self._watch_clock(now)
         list_before = self._device_list()
         published += self._remove({facts.name for facts in devices}, now)
-        standings: dict[str, Standing] = {}
+        standings: dict[str, DeviceState] = {}
         for facts in devices:
             standing = self._standings.get(facts.name)
             if standing is None or standing.facts.profile != facts.profile:
@@ -193,7 +193,7 @@ class Station:
             published.append(list_now)
         return published
 
-    def introduce(self, daemon: DaemonFacts, now: Instant) -> list[Publication]:
+    def introduce(self, daemon: DaemonInfo, now: Instant) -> list[Publication]:
         """Take new facts about the daemon: protocol in use, count of changes, hash of the configuration."""
         published = self._watch_clock(now)
         before, self._daemon = self._daemon, daemon
@@ -265,9 +265,9 @@ class Station:
         """Failures say nothing about the devices now."""
         return self._port_fault is not None or self._activity == PAUSED
 
-    def _stand(self, facts: DeviceFacts, now: Instant) -> Standing:
+    def _stand(self, facts: DeviceInfo, now: Instant) -> DeviceState:
         seq = self._last_seqs.pop(facts.name, 0)
-        return Standing(facts, line=self._line.name, boot=self._daemon.boot, seq=seq, now=now)
+        return DeviceState(facts, line=self._line.name, boot=self._daemon.boot, seq=seq, now=now)
 
     def _read(self, reading: Reading, now: Instant) -> list[Publication]:
         standing = self._standings.get(reading.device)

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from lfs10d.cli.adopt_loop import AGAIN, FOLLOWED, PATIENCE, Adopted, Mounting, Turn
+from lfs10d.cli.adopt_loop import AGAIN, FOLLOWED, PATIENCE, AdoptedSensor, AdoptLoop, AdoptTurn
 
 
 def ok(device: str, slave: object) -> dict[str, Any]:
@@ -25,23 +25,23 @@ def health(*devices: tuple[str, object], baudrate: object = 19200) -> dict[str, 
     return {"line": {"baudrate": baudrate}, "devices": [{"name": name, "slave": slave} for name, slave in devices]}
 
 
-def begun(*names: str, **wishes: object) -> Mounting:
+def begun(*names: str, **wishes: object) -> AdoptLoop:
     """Return a mounting on a line with one sensor, which is looked at already."""
-    mounting = Mounting(names, wishes)
+    mounting = AdoptLoop(names, wishes)
     steps = [mounting.doubtful, list(mounting.looked(health(("slave-2", 2)))), mounting.doubtful]
     assert steps == [True, [], False]
     return mounting
 
 
 ABSENT = no("timeout")
-NAMED = Adopted("slave-3", 3, 19200)
+NAMED = AdoptedSensor("slave-3", 3, 19200)
 
 
 def test_each_sensor_gets_its_default_name_and_it_never_ends_by_itself() -> None:
     mounting = begun(label="Roof")
     assert mounting.content == {"label": "Roof"}
-    assert mounting.heard(ok("slave-3", 3)) == Turn(NAMED, pause=0.0)
-    assert mounting.heard(ok("slave-4", 4)).adopted == Adopted("slave-4", 4, 19200)
+    assert mounting.heard(ok("slave-3", 3)) == AdoptTurn(NAMED, pause=0.0)
+    assert mounting.heard(ok("slave-4", 4)).adopted == AdoptedSensor("slave-4", 4, 19200)
     assert [each.device for each in mounting.adopted] == ["slave-3", "slave-4"]
     assert not mounting.complete
     assert not mounting.lacking
@@ -62,8 +62,8 @@ def test_names_are_given_in_turn_and_the_last_completes_it() -> None:
 
 def test_while_nobody_is_there_nothing_is_told() -> None:
     mounting = begun()
-    assert [mounting.heard(ABSENT) for _ in range(3)] == [Turn()] * 3
-    assert Turn().pause == AGAIN
+    assert [mounting.heard(ABSENT) for _ in range(3)] == [AdoptTurn()] * 3
+    assert AdoptTurn().pause == AGAIN
 
 
 def test_a_trouble_is_told_once_until_another_comes_or_a_sensor_is_adopted() -> None:
@@ -88,14 +88,14 @@ def test_what_passes_does_not_end_it(code: str) -> None:
 
 @pytest.mark.parametrize("code", ["not_allowed", "invalid_param", "storage_full", "address_in_use", "internal"])
 def test_what_no_plugging_mends_ends_it_and_is_told(code: str) -> None:
-    assert begun().heard(no(code, param="from")) == Turn(trouble=f"{code}: it is {code}", ends=True)
+    assert begun().heard(no(code, param="from")) == AdoptTurn(trouble=f"{code}: it is {code}", ends=True)
 
 
 @pytest.mark.parametrize("code", ["dip_switch", "refused", "duplicate_id"])
 def test_a_sensor_that_does_not_obey_is_left_alone_for_a_while(code: str) -> None:
     mounting = begun()
-    assert mounting.heard(pending(code)) == Turn(trouble=f"{code}: it is {code}", pause=PATIENCE)
-    assert mounting.heard(pending(code)) == Turn(pause=PATIENCE)
+    assert mounting.heard(pending(code)) == AdoptTurn(trouble=f"{code}: it is {code}", pause=PATIENCE)
+    assert mounting.heard(pending(code)) == AdoptTurn(pause=PATIENCE)
     assert not mounting.doubtful
 
 
@@ -108,10 +108,10 @@ def test_a_sensor_that_is_looked_for_counts_once_it_is_polled(code: str) -> None
     mounting = begun("north", "south")
     mounting.heard(pending(code, "north"))
     assert list(mounting.looked(health(("slave-2", 2)))) == []
-    assert mounting.heard(no("address_in_use", param="from")) == Turn(pause=FOLLOWED)
+    assert mounting.heard(no("address_in_use", param="from")) == AdoptTurn(pause=FOLLOWED)
     assert mounting.content["name"] == "north"
     found = list(mounting.looked(health(("slave-2", 2), ("north", 3), ("other", 9))))
-    assert found == [Adopted("north", 3, 19200)]
+    assert found == [AdoptedSensor("north", 3, 19200)]
     assert not mounting.doubtful
     assert mounting.content["name"] == "south"
 
@@ -146,7 +146,7 @@ def test_a_daemon_that_ends_in_the_middle_may_have_adopted() -> None:
 
 def test_an_adopted_sensor_is_told_in_words_and_as_data() -> None:
     assert NAMED.words == "slave-3: slave id 3, 19200 baud"
-    assert Adopted("\x1b[2J", None, None).words == r"\x1b[2J: slave id ?"
+    assert AdoptedSensor("\x1b[2J", None, None).words == r"\x1b[2J: slave id ?"
     assert NAMED.data == {"device": "slave-3", "slave": 3, "baudrate": 19200}
 
 
@@ -154,9 +154,9 @@ def test_an_adopted_sensor_is_told_in_words_and_as_data() -> None:
     "answer", [{}, {"line": [], "devices": {}}, {"line": {"baudrate": "x"}, "devices": [1, {}]}, 5]
 )
 def test_a_health_of_another_form_tells_nothing(answer: object) -> None:
-    mounting = Mounting()
+    mounting = AdoptLoop()
     assert list(mounting.looked(answer)) == []
-    assert mounting.heard(ok("slave-3", "three")).adopted == Adopted("slave-3", None, None)
+    assert mounting.heard(ok("slave-3", "three")).adopted == AdoptedSensor("slave-3", None, None)
 
 
 def test_an_answer_of_another_form_ends_it() -> None:
@@ -172,6 +172,8 @@ def test_an_internal_error_ends_it_for_it_would_come_again() -> None:
 
 def test_a_device_that_is_not_recognised_is_told_once_and_waited_for_to_be_unplugged() -> None:
     mounting = begun()
-    assert mounting.heard(no("not_recognised")) == Turn(trouble="not_recognised: it is not_recognised", pause=AGAIN)
-    assert mounting.heard(no("not_recognised")) == Turn()
+    assert mounting.heard(no("not_recognised")) == AdoptTurn(
+        trouble="not_recognised: it is not_recognised", pause=AGAIN
+    )
+    assert mounting.heard(no("not_recognised")) == AdoptTurn()
     assert mounting.heard(ok("slave-3", 3)).adopted == NAMED

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from lfs10d.cli.config import command
 from lfs10d.config.changes import Changes
-from lfs10d.config.changes_file import FILE_NAME, ChangeFile
+from lfs10d.config.changes_file import FILE_NAME, ChangesFile
 from lfs10d.config.effective import said
 from lfs10d.config.loader import load
 from lfs10d.errors import FailedError, StateError
@@ -90,7 +90,7 @@ def changed(directory: str = "state") -> None:
     file = said(load(Path("lfs10d.yaml")))
     changes = Changes().setting("slave-2", {"interval": 0.25, "response_timeout": 0.1}, file).removing("slave-3", file)
     Path(directory).mkdir()
-    ChangeFile(Path(directory), Disk()).save(changes.adding("roof", {"id": 9, "label": "Roof"}))
+    ChangesFile(Path(directory), Disk()).save(changes.adding("roof", {"id": 9, "label": "Roof"}))
 
 
 def test_what_requests_changed_is_shown_as_such() -> None:

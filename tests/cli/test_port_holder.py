@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from lfs10d.cli.port_holder import Daemon, config_of, daemon_behind, device_name, instead
+from lfs10d.cli.port_holder import HoldingDaemon, config_of, daemon_behind, device_name, instead
 from lfs10d.modbus.port_lock import Holder
 
 
@@ -44,12 +44,12 @@ def test_the_daemons_configuration_is_found_in_its_command_line(words: str, conf
 
 
 def test_a_configuration_of_another_name_is_repeated_for_each_verb() -> None:
-    assert Daemon(7).option == ""
-    assert Daemon(7, "/srv/my site.yaml").option == " -c '/srv/my site.yaml'"
+    assert HoldingDaemon(7).option == ""
+    assert HoldingDaemon(7, "/srv/my site.yaml").option == " -c '/srv/my site.yaml'"
 
 
 def test_only_a_running_daemon_is_one(tmp_path: Path) -> None:
-    assert daemon_behind(process(tmp_path, 7, "lfs10d", "run"), proc=tmp_path) == Daemon(7)
+    assert daemon_behind(process(tmp_path, 7, "lfs10d", "run"), proc=tmp_path) == HoldingDaemon(7)
     assert daemon_behind(process(tmp_path, 8, "lfs10d", "scan", "/dev/x"), proc=tmp_path) is None
     assert daemon_behind(Holder(7, "mbpoll"), proc=tmp_path) is None
     assert daemon_behind(Holder(9, "lfs10d"), proc=tmp_path) is None
@@ -58,9 +58,9 @@ def test_only_a_running_daemon_is_one(tmp_path: Path) -> None:
 def test_a_device_is_called_as_the_daemons_configuration_calls_it(small: Path) -> None:
     text = small.read_text().replace("slaves: [2", "slaves: [{id: 7, name: mast-top}, 2")
     small.write_text(text)
-    assert device_name(Daemon(1, str(small)), 7) == "mast-top"
-    assert device_name(Daemon(1, str(small)), 9) == "slave-9"
-    assert device_name(Daemon(1, str(small / "nothing")), 7) == "slave-7"
+    assert device_name(HoldingDaemon(1, str(small)), 7) == "mast-top"
+    assert device_name(HoldingDaemon(1, str(small)), 9) == "slave-9"
+    assert device_name(HoldingDaemon(1, str(small / "nothing")), 7) == "slave-7"
 
 
 def test_where_nobody_can_tell_who_it_is_the_daemon_is_only_supposed(tmp_path: Path) -> None:

@@ -14,9 +14,9 @@ import pytest
 from click.testing import CliRunner
 
 from lfs10d.cli.options import take
-from lfs10d.cli.read import _Course, _explained, _Wanted, command
+from lfs10d.cli.read import _Course, _explained, _ReadOptions, command
 from lfs10d.profiles.library import load_profile
-from lfs10d.reading import Errand, Exchanged, Fault, FaultCode
+from lfs10d.reading import Exchanged, Fault, FaultCode, Purpose
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.registers import blueprint_of
@@ -117,8 +117,8 @@ def test_a_line_on_which_nothing_could_be_sent_is_told() -> None:
         {**dict.fromkeys(("databits", "timeout")), "port": "/dev/x", "framing": "rtu", "parity": "odd", "stopbits": "2"}
     )
     profile = load_profile("lfs10", relative_to=Path())
-    wanted = _Wanted(line, 9, profile, 9600, checksum=None, watch=False, interval=1.0, as_json=False)
-    babble = Exchanged(0.2, 0.0, None, None, 9, Errand.POLL, FaultCode.COLLISION, b"", bytes(40), 40)
+    wanted = _ReadOptions(line, 9, profile, 9600, checksum=None, watch=False, interval=1.0, as_json=False)
+    babble = Exchanged(0.2, 0.0, None, None, 9, Purpose.POLL, FaultCode.COLLISION, b"", bytes(40), 40)
     told = list(_explained(wanted, _Course([babble], 3), Fault(FaultCode.COLLISION, "no silence"), None))
     assert told[0] == "lfs10d: no value from slave 9 at 9600 baud 8O2 after 3 attempts: no silence"
     assert told[2].split() == ["sent", "nothing"]

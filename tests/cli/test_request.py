@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pydantic import Field
 
 from lfs10d.cli.request import KeyValueError, content_of
-from lfs10d.command import Call
+from lfs10d.command import Command
 from lfs10d.commands.message import Parameters, parameters_of
 from lfs10d.schema.fields import Duration, Flag, Name, Text, Whole
 
@@ -56,7 +56,7 @@ def test_a_value_is_read_as_the_form_of_the_request_wants_it(argument: str, valu
     content = content_of([argument], Everything)
     (read,) = content.values()
     assert (read, type(read)) == (value, type(value))
-    assert isinstance(parameters_of(Everything, Call(parameters=content)), Everything)
+    assert isinstance(parameters_of(Everything, Command(parameters=content)), Everything)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.command import Answer, Call, failed, ok
+from lfs10d.command import Command, Result, failed, ok
 from lfs10d.commands.admission import (
     BURST,
     RATE,
@@ -17,10 +17,10 @@ from lfs10d.commands.admission import (
     REMEMBERED_FOR,
     WAITING,
     Admission,
+    Admitted,
     Answered,
-    Form,
+    CommandSpec,
     Ignored,
-    Ticket,
     Waiting,
 )
 from lfs10d.commands.message import LARGEST, LARGEST_CORRELATION, Parameters
@@ -37,10 +37,10 @@ class To(Parameters):
 
 
 FORMS = {
-    "health": Form("always"),
-    "device/read": Form("polling", To),
-    "device/readdress": Form("sensors", To, remembered_for=DAY),
-    "register/read": Form("registers"),
+    "health": CommandSpec("always"),
+    "device/read": CommandSpec("polling", To),
+    "device/readdress": CommandSpec("sensors", To, remembered_for=DAY),
+    "register/read": CommandSpec("registers"),
 }
 
 
@@ -53,13 +53,13 @@ class Door:
 
     def tell(
         self, name: str, content: object = None, *, retained: bool = False, whence: str = "here"
-    ) -> Ignored | Answered | Ticket[str] | Waiting:
+    ) -> Ignored | Answered | Admitted[str] | Waiting:
         payload = content if isinstance(content, bytes) else json.dumps({} if content is None else content).encode()
         return self.admission.admit(name, payload, retained=retained, whence=whence, now=self.now)
 
-    def ticket(self, name: str, content: object = None) -> Ticket[str]:
+    def ticket(self, name: str, content: object = None) -> Admitted[str]:
         verdict = self.tell(name, content)
-        assert isinstance(verdict, Ticket)
+        assert isinstance(verdict, Admitted)
         return verdict
 
     def answered(self, name: str, content: object = None, *, retained: bool = False) -> Answered:
@@ -72,7 +72,7 @@ class Door:
         assert verdict.answer.status == "rejected"
         return verdict.answer.code
 
-    def done(self, ticket: Ticket[str], answer: Answer | None = None) -> list[tuple[object, str]]:
+    def done(self, ticket: Admitted[str], answer: Result | None = None) -> list[tuple[object, str]]:
         return [(call.id, whence) for call, whence in self.admission.done(ticket, answer or ok(), self.now)]
 
     def flood(self) -> None:
@@ -118,7 +118,7 @@ def test_an_empty_payload_is_ignored_and_costs_nothing(retained: bool) -> None: 
     door = Door()
     for _ in range(2 * BURST):
         assert door.tell("no/request", b"", retained=retained) == Ignored()
-    assert isinstance(door.tell("health", {}), Ticket)
+    assert isinstance(door.tell("health", {}), Admitted)
 
 
 def test_a_retained_request_is_told_by_its_id_if_it_can_be_read() -> None:
@@ -142,7 +142,7 @@ def test_retained_and_oversize_requests_count_towards_the_rate_and_keep_their_co
 def test_a_payload_may_have_4096_bytes_and_no_more() -> None:
     fitting = b'{"id":"a"' + b" " * (LARGEST - 10) + b"}"
     assert len(fitting) == 4096
-    assert isinstance(Door().tell("health", fitting), Ticket)
+    assert isinstance(Door().tell("health", fitting), Admitted)
     assert Door().code("health", fitting + b" ") == "too_large"
 
 
@@ -160,7 +160,7 @@ def test_only_exact_names_are_known(name: str) -> None:
 
 def test_with_no_class_allowed_only_what_is_always_allowed_is_obeyed() -> None:
     door = Door("none")
-    assert isinstance(door.tell("health"), Ticket)
+    assert isinstance(door.tell("health"), Admitted)
     assert [door.code(name) for name in FORMS if name != "health"] == ["not_allowed"] * 3
 
 
@@ -168,7 +168,7 @@ def test_a_class_allowed_later_is_obeyed_from_then_on_even_for_an_id_refused_bef
     door = Door()
     assert door.code("register/read", {"id": "a"}) == "not_allowed"
     door.admission.allowed = frozenset({"registers"})
-    assert isinstance(door.tell("register/read", {"id": "a"}), Ticket)
+    assert isinstance(door.tell("register/read", {"id": "a"}), Admitted)
     assert door.code("device/read", {"to": 1}) == "not_allowed"
 
 
@@ -187,7 +187,7 @@ def test_a_rate_limited_id_is_obeyed_when_it_is_sent_again() -> None:
     door.flood()
     assert door.code("health", {"id": "a"}) == "rate_limited"
     door.now += 1 / RATE + 1e-9
-    assert isinstance(door.tell("health", {"id": "a"}), Ticket)
+    assert isinstance(door.tell("health", {"id": "a"}), Admitted)
 
 
 @given(st.lists(st.floats(0, 10, allow_nan=False), min_size=1, max_size=300))
@@ -196,7 +196,7 @@ def test_in_any_span_at_most_the_burst_and_20_a_second_are_obeyed(pauses: list[f
     obeyed: list[float] = []
     for pause in pauses:
         door.now += pause / 100
-        if isinstance(door.tell("health", {}), Ticket):
+        if isinstance(door.tell("health", {}), Admitted):
             obeyed.append(door.now)
     for first in range(len(obeyed)):
         assert len(obeyed) - first <= BURST + (obeyed[-1] - obeyed[first]) * RATE + 1e-6
@@ -207,7 +207,7 @@ def test_20_a_second_are_obeyed_for_ever() -> None:
     door.flood()
     for _ in range(1000):
         door.now += 1 / RATE + 1e-9
-        assert isinstance(door.tell("health", {}), Ticket)
+        assert isinstance(door.tell("health", {}), Admitted)
 
 
 # Repeats
@@ -262,7 +262,7 @@ def test_correlation_data_may_have_1024_bytes_and_no_more_whatever_the_payload()
     allowed = door.admission.admit(
         "device/read", b'{"id": "a", "to": 1}', retained=False, whence="here", now=NOW, correlation=LARGEST_CORRELATION
     )
-    assert isinstance(allowed, Ticket), "and what was too large was not remembered"
+    assert isinstance(allowed, Admitted), "and what was too large was not remembered"
 
 
 def test_a_repeat_with_other_parameters_is_a_conflict_while_the_first_runs_and_afterwards() -> None:
@@ -278,9 +278,9 @@ def test_a_repeat_with_other_parameters_is_a_conflict_while_the_first_runs_and_a
 def test_an_id_is_one_per_request_and_text_is_no_number() -> None:
     door = Door()
     door.done(door.ticket("device/read", {"id": 1, "to": 1}))
-    assert isinstance(door.tell("device/read", {"id": "1", "to": 2}), Ticket)
-    assert isinstance(door.tell("device/readdress", {"id": 1, "to": 2}), Ticket)
-    assert isinstance(door.tell("health", {"id": 1}), Ticket)
+    assert isinstance(door.tell("device/read", {"id": "1", "to": 2}), Admitted)
+    assert isinstance(door.tell("device/readdress", {"id": 1, "to": 2}), Admitted)
+    assert isinstance(door.tell("health", {"id": 1}), Admitted)
 
 
 def test_requests_without_an_id_are_never_repeats() -> None:
@@ -306,7 +306,7 @@ def test_an_answer_is_remembered_from_the_response_on_for_as_long_as_its_form_sa
     door.now += kept - 0.001
     assert isinstance(door.tell(name, {"id": "a", "to": 1}), Answered)
     door.now += 0.001
-    assert isinstance(door.tell(name, {"id": "a", "to": 2}), Ticket)
+    assert isinstance(door.tell(name, {"id": "a", "to": 2}), Admitted)
 
 
 def fill(door: Door, count: int, first: int = 0) -> None:
@@ -322,7 +322,7 @@ def test_256_ids_are_remembered_and_the_oldest_goes_first() -> None:
     assert isinstance(door.tell("health", {"id": 0}), Answered)
     fill(door, 1, REMEMBERED)
     assert isinstance(door.tell("health", {"id": 1}), Answered)
-    assert isinstance(door.tell("health", {"id": 0}), Ticket)
+    assert isinstance(door.tell("health", {"id": 0}), Admitted)
 
 
 def test_a_flood_of_ids_pushes_out_neither_a_physical_change_nor_what_still_runs() -> None:
@@ -359,7 +359,7 @@ def test_every_request_is_given_back_exactly_once_and_no_id_is_performed_twice_w
 ) -> None:
     """The law of the door: each request comes back by a verdict or by `done`, never by both."""
     door = Door()
-    running: list[Ticket[str]] = []
+    running: list[Admitted[str]] = []
     owed = 0
     given = 0
     performed: dict[int, float] = {}
@@ -369,7 +369,7 @@ def test_every_request_is_given_back_exactly_once_and_no_id_is_performed_twice_w
         verdict = door.tell("device/read", {"id": key, "to": to})
         if isinstance(verdict, Answered):
             given += 1
-        elif isinstance(verdict, Ticket):
+        elif isinstance(verdict, Admitted):
             assert key not in performed or door.now >= performed[key] + REMEMBERED_FOR
             assert all(ticket.call.id != key for ticket in running)
             running.append(verdict)
@@ -384,7 +384,7 @@ def test_every_request_is_given_back_exactly_once_and_no_id_is_performed_twice_w
 
 def test_a_request_of_an_earlier_life_is_not_carried_out_again_and_its_repeats_wait_for_its_answer() -> None:
     door = Door()
-    call = Call("a1", fingerprint=json.dumps({"to": 9}))
+    call = Command("a1", fingerprint=json.dumps({"to": 9}))
     assert door.admission.recall("device/readdress", call, None, NOW + DAY) == []
     waiting = door.tell("device/readdress", {"id": "a1", "to": 9}, whence="again")
     assert isinstance(waiting, Waiting)
@@ -396,4 +396,4 @@ def test_a_request_of_an_earlier_life_is_not_carried_out_again_and_its_repeats_w
 
 
 def test_a_request_of_an_earlier_life_without_an_id_cannot_be_repeated() -> None:
-    assert Door().admission.recall("device/readdress", Call(None), ok({}), NOW + DAY) == []
+    assert Door().admission.recall("device/readdress", Command(None), ok({}), NOW + DAY) == []

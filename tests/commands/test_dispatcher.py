@@ -11,10 +11,10 @@ from typing import Any, cast
 
 import pytest
 
-from lfs10d.command import Answer, Call, ok
-from lfs10d.commands.admission import BURST, Form
-from lfs10d.commands.context import Powers, Request
-from lfs10d.commands.dispatcher import Service
+from lfs10d.command import Command, Result, ok
+from lfs10d.commands.admission import BURST, CommandSpec
+from lfs10d.commands.context import Context, Handler
+from lfs10d.commands.dispatcher import Dispatcher
 from lfs10d.commands.message import LARGEST, LARGEST_CORRELATION, NoParameters, Parameters
 from lfs10d.mqtt.topics import InboundRequest
 
@@ -25,7 +25,7 @@ class Text(Parameters):
     text: str = ""
 
 
-POWERS = cast("Powers", object())
+POWERS = cast("Context", object())
 
 
 @dataclass
@@ -38,12 +38,12 @@ class Bench:
     gate: asyncio.Event = field(default_factory=asyncio.Event)
 
     def __post_init__(self) -> None:
-        self.service = Service(
+        self.service = Dispatcher(
             {
-                "echo": Request(Form("always", Text), self._echo),
-                "device/wait": Request(Form("polling", Text), self._wait),
-                "device/break": Request(Form("polling"), self._break),
-                "register/read": Request(Form("registers"), self._break),
+                "echo": Handler(CommandSpec("always", Text), self._echo),
+                "device/wait": Handler(CommandSpec("polling", Text), self._wait),
+                "device/break": Handler(CommandSpec("polling"), self._break),
+                "register/read": Handler(CommandSpec("registers"), self._break),
             },
             POWERS,
             allowed=frozenset({"polling"}),
@@ -51,18 +51,18 @@ class Bench:
             clear=self.cleared.append,
         )
 
-    async def _echo(self, parameters: Text, powers: Powers, call: Call) -> Answer:
+    async def _echo(self, parameters: Text, powers: Context, call: Command) -> Result:
         assert powers is POWERS
         assert call.parameters.get("text", "") == parameters.text
         self.performed.append("echo")
         return ok({"text": parameters.text})
 
-    async def _wait(self, parameters: Text, _: Powers, __: Call) -> Answer:
+    async def _wait(self, parameters: Text, _: Context, __: Command) -> Result:
         self.performed.append(f"wait {parameters.text}")
         await self.gate.wait()
         return ok({"text": parameters.text})
 
-    async def _break(self, _: NoParameters, powers: Powers, __: Call) -> Answer:
+    async def _break(self, _: NoParameters, powers: Context, __: Command) -> Result:
         raise RuntimeError(f"a mistake with {powers}")
 
     def ask(

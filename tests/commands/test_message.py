@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import Field, model_validator
 
-from lfs10d.command import Answer, Call, failed, ok, rejected
-from lfs10d.commands.message import LARGEST, NoParameters, Parameters, parameters_of, read
+from lfs10d.command import Command, Result, failed, ok, rejected
+from lfs10d.commands.message import LARGEST, NoParameters, Parameters, parameters_of, read, response
 from lfs10d.schema.fields import Duration, Whole
 
 
@@ -31,7 +31,7 @@ class Contradicting(Parameters):
         raise ValueError("neither  device\nnor slave")
 
 
-def refused(payload: bytes) -> tuple[Call, str]:
+def refused(payload: bytes) -> tuple[Command, str]:
     """Return what could be read of a payload that must be refused, and the code."""
     call, problem = read(payload)
     assert problem is not None
@@ -68,7 +68,7 @@ def refused(payload: bytes) -> tuple[Call, str]:
     ],
 )
 def test_anything_but_a_json_object_is_invalid_json_and_has_no_id(payload: bytes) -> None:
-    assert refused(payload) == (Call(), "invalid_json")
+    assert refused(payload) == (Command(), "invalid_json")
 
 
 @pytest.mark.parametrize(
@@ -81,7 +81,7 @@ def test_anything_but_a_json_object_is_invalid_json_and_has_no_id(payload: bytes
 )
 def test_a_key_that_is_given_twice_is_invalid_json_that_names_it(payload: bytes, key: str) -> None:
     call, problem = read(payload)
-    assert call == Call()
+    assert call == Command()
     assert problem == rejected("invalid_json", f"{key} is given twice; which is meant?")
 
 
@@ -163,17 +163,17 @@ def test_the_transaction_stands_in_for_a_missing_id_only() -> None:
 
 
 def test_a_response_has_its_keys_in_the_order_of_the_contract() -> None:
-    response = Call(id="a1").response("device/options", ok({"from": 1, "to": 2}), 41.04)
-    assert json.dumps(response) == (
+    given = response(Command(id="a1"), "device/options", ok({"from": 1, "to": 2}), 41.04)
+    assert json.dumps(given) == (
         '{"v": 1, "id": "a1", "request": "device/options", "status": "ok", '
         '"data": {"from": 1, "to": 2}, "error": null, "took_ms": 41.0}'
     )
 
 
 def test_a_transaction_is_echoed_as_such_and_only_where_there_was_one() -> None:
-    assert Call(transaction=5).response("health", ok(), 0)["transaction"] == 5
-    assert Call(transaction=5).response("health", ok(), 0)["id"] is None
-    assert "transaction" not in Call(id=5).response("health", ok(), 0)
+    assert response(Command(transaction=5), "health", ok(), 0)["transaction"] == 5
+    assert response(Command(transaction=5), "health", ok(), 0)["id"] is None
+    assert "transaction" not in response(Command(id=5), "health", ok(), 0)
 
 
 @pytest.mark.parametrize(
@@ -193,7 +193,7 @@ def test_a_transaction_is_echoed_as_such_and_only_where_there_was_one() -> None:
     ],
 )
 def test_the_error_object_has_code_message_param_and_what_else_is_known(
-    answer: Answer, status: str, error: dict[str, object] | None
+    answer: Result, status: str, error: dict[str, object] | None
 ) -> None:
     assert (answer.status, answer.error()) == (status, error)
 
@@ -225,7 +225,7 @@ def test_parameters_come_back_in_their_form() -> None:
 def test_the_wrong_parameter_is_named_and_what_would_be_right(payload: str, param: str, words: str) -> None:
     call, _ = read(payload.encode())
     answer = parameters_of(Numbered, call)
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Result)
     assert (answer.status, answer.code, answer.facts["param"], answer.message) == (
         "rejected",
         "invalid_param",
@@ -236,18 +236,18 @@ def test_the_wrong_parameter_is_named_and_what_would_be_right(payload: str, para
 
 def test_a_request_without_parameters_says_so() -> None:
     answer = parameters_of(NoParameters, read(b'{"verbose":true}')[0])
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Result)
     assert answer.message == "verbose: is no parameter of this request; it takes none"
 
 
 def test_a_name_of_any_length_is_told_back_in_64_characters() -> None:
     answer = parameters_of(NoParameters, read(json.dumps({"x" * 3000: 1}).encode())[0])
-    assert isinstance(answer, Answer)
+    assert isinstance(answer, Result)
     assert answer.facts["param"] == "x" * 61 + "..."
     assert len(answer.message) < 200
 
 
 def test_what_is_wrong_as_a_whole_names_no_parameter() -> None:
-    answer = parameters_of(Contradicting, Call())
-    assert isinstance(answer, Answer)
+    answer = parameters_of(Contradicting, Command())
+    assert isinstance(answer, Result)
     assert (answer.message, answer.facts["param"]) == ("neither device nor slave", None)

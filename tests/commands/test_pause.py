@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 
-from lfs10d.commands.pause import Pausing
+from lfs10d.commands.pause import LinePause
 
 
 class Bench:
@@ -13,7 +13,7 @@ class Bench:
     def __init__(self) -> None:
         self.done: list[str | None] = []
         self.opened = asyncio.Event()
-        self.pausing = Pausing(pause=self._pause, resume=self._open, act=self.done.append)
+        self.pausing = LinePause(pause=self._pause, resume=self._open, act=self.done.append)
 
     def _open(self) -> None:
         self.done.append("open")

@@ -5,14 +5,14 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Coroutine
 
-from lfs10d.commands.reads import Inquiries, Inquiry, altered
+from lfs10d.commands.reads import PendingReads, ReadResult, altered
 from lfs10d.reading import Fault, FaultCode, Reading
-from lfs10d.telemetry.publication import Kind, Publication, retained
+from lfs10d.telemetry.publication import Publication, PublicationKind, retained
 
 SAMPLE = {"device": "a", "wind_speed": 7.5}
 PUBLISHED = [
     retained("device/a/availability", "online"),
-    Publication("device/a/telemetry", SAMPLE, Kind.SAMPLE, retain=False, qos=1),
+    Publication("device/a/telemetry", SAMPLE, PublicationKind.SAMPLE, retain=False, qos=1),
     retained("device/a/state", {"v": 1}),
 ]
 
@@ -26,9 +26,9 @@ class Line:
 
     def __init__(self) -> None:
         self.submitted: list[tuple[str, int]] = []
-        self.inquiries = Inquiries(lambda device, number: self.submitted.append((device, number)))
+        self.inquiries = PendingReads(lambda device, number: self.submitted.append((device, number)))
 
-    async def begin(self, *devices: str) -> list[asyncio.Task[Inquiry | None]]:
+    async def begin(self, *devices: str) -> list[asyncio.Task[ReadResult | None]]:
         tasks = [asyncio.create_task(self.inquiries.read(device)) for device in devices]
         await asyncio.sleep(0)
         return tasks
@@ -46,7 +46,7 @@ def test_a_reading_tells_the_request_whose_number_it_has_and_no_other() -> None:
         assert first != second
         line.inquiries.heard(reading(), PUBLISHED)
         line.inquiries.heard(reading(second), PUBLISHED)
-        assert await two == Inquiry(SAMPLE, None)
+        assert await two == ReadResult(SAMPLE, None)
         assert not one.done()
         one.cancel()
 
@@ -59,7 +59,7 @@ def test_one_reading_may_answer_several_and_carries_its_fault() -> None:
         tasks = await line.begin("a", "a")
         fault = Fault(FaultCode.PORT_LOST, "absent")
         line.inquiries.heard(reading(*(number for _, number in line.submitted), fault=fault), PUBLISHED)
-        assert await asyncio.gather(*tasks) == [Inquiry(SAMPLE, fault)] * 2
+        assert await asyncio.gather(*tasks) == [ReadResult(SAMPLE, fault)] * 2
 
     run(scene())
 
@@ -82,7 +82,7 @@ def test_what_is_told_twice_counts_once() -> None:
         (task,) = await line.begin("a")
         line.inquiries.heard(reading(line.submitted[0][1]), PUBLISHED)
         line.inquiries.abandon({"a"})
-        assert await task == Inquiry(SAMPLE, None)
+        assert await task == ReadResult(SAMPLE, None)
 
     run(scene())
 
@@ -95,7 +95,7 @@ def test_those_who_wait_for_a_device_that_is_gone_are_told_and_the_others_wait_o
         assert await gone is None
         assert not stays.done()
         line.inquiries.heard(reading(line.submitted[1][1], device="b"), [])
-        assert await stays == Inquiry(None, None)
+        assert await stays == ReadResult(None, None)
 
     run(scene())
 

@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 
 from lfs10d.commands import scanner
-from lfs10d.commands.scanner import Scanning
+from lfs10d.commands.scanner import Scanner
 from lfs10d.config.loader import load
 from lfs10d.line.jobs.scan import Scan
 from lfs10d.line.poller import Poller
-from lfs10d.line.scheduler import Schedule
+from lfs10d.line.scheduler import Scheduler
 from lfs10d.line.settings import search
 from lfs10d.modbus.bus import Bus, LineRules
 from lfs10d.modbus.port_settings import PortSettings
@@ -40,8 +40,8 @@ class Bench:
         )
         bus = Bus(self.port, LineRules(), self.clock)
         events: list[Event] = []
-        self.poller = Poller(bus, Schedule(bus.line_timing, 0.0), events.extend, self.clock)
-        self.scanning = Scanning(submit=self.poller.submit, act=self.acts.append, tell=self._tell)
+        self.poller = Poller(bus, Scheduler(bus.line_timing, 0.0), events.extend, self.clock)
+        self.scanning = Scanner(submit=self.poller.submit, act=self.acts.append, tell=self._tell)
         file = folder / "lfs10d.yaml"
         file.write_text("line: {port: tty}\nslaves: []\nmqtt: {host: localhost}\n")
         self.search = search(load(file), IDS, (9600,), share=0.9)

@@ -8,11 +8,11 @@ from typing import Any, cast
 
 import pytest
 
-from lfs10d.commands.trace import LONGEST, Trace, TracedDevice
+from lfs10d.commands.trace import LONGEST, FrameTrace, TracedDevice
 from lfs10d.modbus.frames import Checksum, Codec, Framing
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
-from lfs10d.reading import Errand, Exchanged, FaultCode
+from lfs10d.reading import Exchanged, FaultCode, Purpose
 from lfs10d.system.clock import Instant
 from lfs10d.telemetry.contract import check
 
@@ -28,12 +28,12 @@ def exchange(
     sent: bytes = READ_WIND, heard: bytes = ANSWER, *, began: float | None = 99.9, gap: float | None = 0.00365
 ) -> Exchanged:
     fault = None if heard else FaultCode.TIMEOUT
-    return Exchanged(99.95, 99.8, began, gap, 1, Errand.POLL, fault, sent, heard)
+    return Exchanged(99.95, 99.8, began, gap, 1, Purpose.POLL, fault, sent, heard)
 
 
 def told(what: Exchanged, device: TracedDevice | None = None) -> list[dict[str, Any]]:
     """Return the payloads; each is as the documentation promises. `device` is that of slave 1."""
-    trace = Trace(200.0, {} if device is None else {1: device}, RTU)
+    trace = FrameTrace(200.0, {} if device is None else {1: device}, RTU)
     published = trace.told(what, NOW)
     for each in published:
         assert (each.topic, each.retain, each.qos) == ("trace", False, 0)
@@ -85,7 +85,7 @@ def test_frames_are_read_by_the_codec_of_their_slave() -> None:
 def texts(sent: str, heard: str, device: TracedDevice, fault: FaultCode | None = None) -> list[str]:
     """Return what is told of an exchange whose frames, their checks left out, are these."""
     asked, answered = (device.codec.wrap(bytes.fromhex(each)) for each in (sent, heard))
-    what = Exchanged(99.95, 99.8, 99.9, None, 1, Errand.POLL, fault, asked, answered)
+    what = Exchanged(99.95, 99.8, 99.9, None, 1, Purpose.POLL, fault, asked, answered)
     return [each["text"] for each in told(what, device)]
 
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from lfs10d.config.changes import Changes, DeviceChange, Place, Rate, Said, Verified, keys, value_of
+from lfs10d.config.changes import Changes, DeviceChange, FileValues, Place, Rate, Verified, keys, value_of
 
-SAID = Said({"a": {"id": 1, "interval": 2.0}, "b": {"id": 2}}, 9600, {"interval": 1.0, "enabled": True, "label": None})
+SAID = FileValues(
+    {"a": {"id": 1, "interval": 2.0}, "b": {"id": 2}}, 9600, {"interval": 1.0, "enabled": True, "label": None}
+)
 
 
 def test_setting_an_option_remembers_what_the_file_said_of_it() -> None:

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lfs10d.config.changes import OPTIONS, Changes, DeviceChange, Place, Rate, Verified
-from lfs10d.config.changes_file import ASIDE, FILE_NAME, ChangeFile, Found, in_words, understood, written
+from lfs10d.config.changes_file import ASIDE, FILE_NAME, ChangesFile, FoundChanges, in_words, understood, written
 from lfs10d.errors import ConfigError, StateError
 from lfs10d.system.disk import Disk, SystemFiles
 from tests.support.volatile_disk import ForgetfulFiles, PowerCutError
@@ -134,29 +134,29 @@ def test_what_is_not_ours_is_told_with_its_place(content: bytes, place: str) -> 
 def test_no_content_whatever_breaks_the_reader(content: bytes) -> None:
     files = ForgetfulFiles()
     Disk(files).replace(FILE, content)
-    found = ChangeFile(STATE, Disk(files)).take()
+    found = ChangesFile(STATE, Disk(files)).take()
     assert (found.trouble is None) is files.exists(FILE)
     assert files.exists(STATE / ASIDE) is not files.exists(FILE)
 
 
-def kept(files: ForgetfulFiles) -> Found:
-    return ChangeFile(STATE, Disk(files)).read()
+def kept(files: ForgetfulFiles) -> FoundChanges:
+    return ChangesFile(STATE, Disk(files)).read()
 
 
 def test_where_there_is_no_file_nothing_was_changed() -> None:
-    assert kept(ForgetfulFiles()) == Found(Changes(), missing=True)
+    assert kept(ForgetfulFiles()) == FoundChanges(Changes(), missing=True)
 
 
 def test_what_was_kept_is_found() -> None:
     files = ForgetfulFiles()
-    ChangeFile(STATE, Disk(files)).save(ONE)
-    assert kept(files) == ChangeFile(STATE, Disk(files)).take() == Found(ONE)
+    ChangesFile(STATE, Disk(files)).save(ONE)
+    assert kept(files) == ChangesFile(STATE, Disk(files)).take() == FoundChanges(ONE)
 
 
 def test_that_nothing_is_changed_any_more_is_not_as_if_there_never_was_a_file() -> None:
     files = ForgetfulFiles()
-    ChangeFile(STATE, Disk(files)).save(Changes())
-    assert kept(files) == Found(Changes(), missing=False)
+    ChangesFile(STATE, Disk(files)).save(Changes())
+    assert kept(files) == FoundChanges(Changes(), missing=False)
 
 
 @pytest.mark.parametrize("before", [None, ONE])
@@ -167,11 +167,11 @@ def test_after_a_power_cut_at_any_step_the_old_or_the_new_is_there_and_what_was_
 ) -> None:
     files = ForgetfulFiles()
     if before is not None:
-        ChangeFile(STATE, Disk(files)).save(before)
+        ChangesFile(STATE, Disk(files)).save(before)
     files.steps_left = files.steps + cut
     answered = True
     try:
-        ChangeFile(STATE, Disk(files)).save(OTHER)
+        ChangesFile(STATE, Disk(files)).save(OTHER)
     except PowerCutError:
         answered = False
     files.power_cut(surviving)
@@ -187,10 +187,10 @@ def test_after_a_power_cut_at_any_step_the_old_or_the_new_is_there_and_what_was_
 def test_on_a_full_disk_nothing_is_changed(before: Changes | None) -> None:
     files = ForgetfulFiles()
     if before is not None:
-        ChangeFile(STATE, Disk(files)).save(before)
+        ChangesFile(STATE, Disk(files)).save(before)
     files.full = 10
     with pytest.raises(StateError, match=r"/state/changes\.yaml cannot be written: no space left on device"):
-        ChangeFile(STATE, Disk(files)).save(OTHER)
+        ChangesFile(STATE, Disk(files)).save(OTHER)
     assert kept(files).changes == (before or Changes())
     files.power_cut(())
     assert kept(files).changes == (before or Changes())
@@ -211,10 +211,10 @@ class FailingFolder(ForgetfulFiles):
 def test_what_could_not_be_synced_is_taken_back_for_it_was_refused(before: Changes | None) -> None:
     files = FailingFolder()
     if before is not None:
-        ChangeFile(STATE, Disk(files)).save(before)
+        ChangesFile(STATE, Disk(files)).save(before)
     files.failing = True
     with pytest.raises(StateError):
-        ChangeFile(STATE, Disk(files)).save(OTHER)
+        ChangesFile(STATE, Disk(files)).save(OTHER)
     assert kept(files).changes == (before or Changes())
 
 
@@ -222,13 +222,13 @@ def test_more_than_can_be_read_again_is_not_written() -> None:
     label = "\N{SNOWMAN}" * 200
     many = {f"d{number}": DeviceChange(added={"id": 1, "label": label}) for number in range(500)}
     with pytest.raises(StateError, match="would be too large"):
-        ChangeFile(STATE, Disk(ForgetfulFiles())).save(Changes(many))
+        ChangesFile(STATE, Disk(ForgetfulFiles())).save(Changes(many))
 
 
 def test_what_cannot_be_understood_is_put_aside_and_a_new_file_begun() -> None:
     files = ForgetfulFiles()
     Disk(files).replace(FILE, b"nonsense")
-    file = ChangeFile(STATE, Disk(files))
+    file = ChangesFile(STATE, Disk(files))
     assert (file.read().trouble is not None, files.exists(FILE)) == (True, True)
     found = file.take()
     assert found.changes == Changes()
@@ -237,7 +237,7 @@ def test_what_cannot_be_understood_is_put_aside_and_a_new_file_begun() -> None:
     file.save(ONE)
     files.power_cut(())
     assert files.read(STATE / ASIDE) == b"nonsense"
-    assert kept(files) == Found(ONE)
+    assert kept(files) == FoundChanges(ONE)
 
 
 class StuckFiles(ForgetfulFiles):
@@ -250,7 +250,7 @@ class StuckFiles(ForgetfulFiles):
 def test_what_cannot_be_put_aside_is_not_overwritten() -> None:
     files = StuckFiles()
     files.write(FILE, b"nonsense", mode=0o600)
-    file = ChangeFile(STATE, Disk(files))
+    file = ChangesFile(STATE, Disk(files))
     assert file.take().trouble is not None
     with pytest.raises(StateError, match="must be a mapping"):
         file.save(ONE)
@@ -259,7 +259,7 @@ def test_what_cannot_be_put_aside_is_not_overwritten() -> None:
 
 def test_what_cannot_be_read_is_reported_and_not_overwritten(tmp_path: Path) -> None:
     (tmp_path / FILE_NAME).mkdir()
-    file = ChangeFile(tmp_path, Disk())
+    file = ChangesFile(tmp_path, Disk())
     with pytest.raises(StateError, match="cannot be read: is a directory"):
         file.read()
     found = file.take()
@@ -272,7 +272,7 @@ def test_what_cannot_be_read_is_reported_and_not_overwritten(tmp_path: Path) -> 
 def test_whoever_may_read_the_folder_may_read_it(tmp_path: Path) -> None:
     before = os.umask(0o022)
     try:
-        ChangeFile(tmp_path, Disk(SystemFiles())).save(ONE)
+        ChangesFile(tmp_path, Disk(SystemFiles())).save(ONE)
     finally:
         os.umask(before)
     assert (tmp_path / FILE_NAME).stat().st_mode & 0o777 == 0o640

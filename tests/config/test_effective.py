@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from lfs10d import profiles
 from lfs10d.config.changes import Changes, DeviceChange, Place, Rate, Verified
 from lfs10d.config.effective import effective, merged_data, said
-from lfs10d.config.loader import Loaded, load
+from lfs10d.config.loader import LoadedConfig, load
 from lfs10d.schema.yaml12 import render
 
 TEXT = """\
@@ -27,19 +27,19 @@ slaves:
 
 
 @pytest.fixture(name="file")
-def _file(tmp_path: Path) -> Callable[[str], Loaded]:
+def _file(tmp_path: Path) -> Callable[[str], LoadedConfig]:
     path = tmp_path / "lfs10d.yaml"
     own = (Path(profiles.__file__).parent / "ld-e.yaml").read_text().replace("name: ld-e", "name: own")
     (tmp_path / "own.yaml").write_text(own + "\nmin_interval: 1s\n")
 
-    def file(text: str = TEXT) -> Loaded:
+    def file(text: str = TEXT) -> LoadedConfig:
         path.write_text(text)
         return load(path, environment={}, host="gateway")
 
     return file
 
 
-def test_what_the_file_says_is_told_key_by_key(file: Callable[[str], Loaded]) -> None:
+def test_what_the_file_says_is_told_key_by_key(file: Callable[[str], LoadedConfig]) -> None:
     sayings = said(file(TEXT))
     assert sayings.slaves == {
         "slave-2": {"id": 2},
@@ -56,7 +56,7 @@ def test_what_the_file_says_is_told_key_by_key(file: Callable[[str], Loaded]) ->
     }
 
 
-def test_without_changes_the_file_holds(file: Callable[[str], Loaded]) -> None:
+def test_without_changes_the_file_holds(file: Callable[[str], LoadedConfig]) -> None:
     loaded = file(TEXT)
     now = effective(loaded, Changes())
     assert (now.config, now.loaded.origins, now.loaded.profiles) == (loaded.config, loaded.origins, loaded.profiles)
@@ -65,7 +65,7 @@ def test_without_changes_the_file_holds(file: Callable[[str], Loaded]) -> None:
     assert now.polled == now.config
 
 
-def test_every_value_has_its_origin_wherever_its_device_stands_now(file: Callable[[str], Loaded]) -> None:
+def test_every_value_has_its_origin_wherever_its_device_stands_now(file: Callable[[str], LoadedConfig]) -> None:
     loaded = file(TEXT)
     changes = (
         Changes(baudrate=Rate(9600, 19200))
@@ -97,20 +97,20 @@ def test_every_value_has_its_origin_wherever_its_device_stands_now(file: Callabl
     assert len(origins) == len(set(origins))
 
 
-def test_a_list_that_becomes_empty_has_an_origin(file: Callable[[str], Loaded]) -> None:
+def test_a_list_that_becomes_empty_has_an_origin(file: Callable[[str], LoadedConfig]) -> None:
     loaded = file("line: {port: x}\nslaves: [2]")
     now = effective(loaded, Changes().removing("slave-2", said(loaded)))
     assert str(now.loaded.origins["slaves"]) == "default"
     assert now.config.slaves == ()
 
 
-def test_a_device_is_found_by_its_name(file: Callable[[str], Loaded]) -> None:
+def test_a_device_is_found_by_its_name(file: Callable[[str], LoadedConfig]) -> None:
     now = effective(file(TEXT), Changes())
     assert now.slave("mast") == now.config.slaves[1]
     assert now.slave("nobody") is None
 
 
-def test_the_profile_of_what_was_added_is_loaded(file: Callable[[str], Loaded]) -> None:
+def test_the_profile_of_what_was_added_is_loaded(file: Callable[[str], LoadedConfig]) -> None:
     now = effective(file(TEXT), Changes().adding("roof", {"id": 9, "profile": "own.yaml"}))
     assert now.loaded.profile_of(now.config.slaves[-1]).name == "own"
 
@@ -123,7 +123,7 @@ def test_the_profile_of_what_was_added_is_loaded(file: Callable[[str], Loaded]) 
     ],
 )
 def test_what_was_added_and_cannot_be_polled_is_kept_but_does_not_hold(
-    file: Callable[[str], Loaded], entry: dict[str, Any], why: str
+    file: Callable[[str], LoadedConfig], entry: dict[str, Any], why: str
 ) -> None:
     changes = Changes().adding("roof", entry)
     now = effective(file(TEXT), changes)
@@ -134,7 +134,7 @@ def test_what_was_added_and_cannot_be_polled_is_kept_but_does_not_hold(
 
 
 def test_options_that_the_profile_does_not_allow_do_not_hold_but_where_it_is_does(
-    file: Callable[[str], Loaded],
+    file: Callable[[str], LoadedConfig],
 ) -> None:
     loaded = file(TEXT.replace("fuling-dzb", "own.yaml"))
     moved = Changes({"slave-4": DeviceChange(verified=Verified(Place(7), 4), options={"interval": 0.5})})
@@ -162,7 +162,7 @@ UNPROVEN = Changes().adding("roof", {"id": 3})
     ],
 )
 def test_of_two_with_one_id_the_one_verified_there_is_polled_and_else_the_file_s(
-    file: Callable[[str], Loaded], changes: Changes, yielding: dict[str, str]
+    file: Callable[[str], LoadedConfig], changes: Changes, yielding: dict[str, str]
 ) -> None:
     now = effective(file(TEXT), changes)
     assert now.conflicts == yielding
@@ -170,14 +170,14 @@ def test_of_two_with_one_id_the_one_verified_there_is_polled_and_else_the_file_s
     assert [slave.name for slave in now.config.slaves if slave not in now.polled.slaves] == list(yielding)
 
 
-def test_where_file_and_fact_differ_both_places_are_told_the_file_s_first(file: Callable[[str], Loaded]) -> None:
+def test_where_file_and_fact_differ_both_places_are_told_the_file_s_first(file: Callable[[str], LoadedConfig]) -> None:
     changes = Changes({"mast": DeviceChange(verified=Verified(Place(7), 2))})
     now = effective(file(TEXT), changes)
     assert now.places["mast"] == (Place(3, 9600), Place(7, 9600))
     assert now.places["slave-2"] == (Place(2, 9600),)
 
 
-def test_a_default_name_is_written_out_when_the_id_is_another(file: Callable[[str], Loaded]) -> None:
+def test_a_default_name_is_written_out_when_the_id_is_another(file: Callable[[str], LoadedConfig]) -> None:
     loaded = file(TEXT)
     changes = Changes({"slave-2": DeviceChange(verified=Verified(Place(7), 2))}, Rate(9600, 19200))
     data = merged_data(effective(loaded, changes))

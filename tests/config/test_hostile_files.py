@@ -8,16 +8,16 @@ from pathlib import Path
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from lfs10d.config.changes_file import ChangeFile
+from lfs10d.config.changes_file import ChangesFile
 from lfs10d.daemon import boot
 from lfs10d.errors import ConfigError, Problem
 from lfs10d.profiles.library import parse_profile
-from lfs10d.reconfiguration.journal import FILE_NAME, Journal, Move, Spot
+from lfs10d.reconfiguration.journal import FILE_NAME, Endpoint, Journal, Move
 from lfs10d.system.disk import Disk
 from tests.support.volatile_disk import ForgetfulFiles
 
 STATE = Path("/state")
-SPOT = Spot(slave=3, baudrate=9600)
+SPOT = Endpoint(slave=3, baudrate=9600)
 
 NUMBERS = st.integers() | st.sampled_from([2**63, 2**64, 10**400, -1, 255, 9600]) | st.floats()
 WORDS = st.sampled_from(["readdress", "ok", "a1", "", "\0", "\x1b[2J", "\ud800", "9" * 400, "mast-top"])
@@ -101,7 +101,7 @@ def test_any_journal_is_read_or_put_aside_and_the_next_intent_is_kept(content: b
 def test_any_file_of_changes_is_understood_or_told(content: bytes) -> None:
     files = ForgetfulFiles()
     Disk(files).replace(STATE / "changes.yaml", content)
-    found = ChangeFile(STATE, Disk(files)).take()
+    found = ChangesFile(STATE, Disk(files)).take()
     assert found.trouble is None or str(found.trouble).isprintable()
 
 

@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 
 from lfs10d.config.changes import Changes, Place
-from lfs10d.config.changes_file import FILE_NAME, ChangeFile
+from lfs10d.config.changes_file import FILE_NAME, ChangesFile
 from lfs10d.config.effective import Edit, Effective
-from lfs10d.config.live_config import News, Running
+from lfs10d.config.live_config import LiveConfig, News
 from lfs10d.config.loader import load
-from lfs10d.config.merge import Dropped
-from lfs10d.config.reload import Plan
+from lfs10d.config.merge import DroppedChange
+from lfs10d.config.reload import ReloadPlan
 from lfs10d.errors import ConfigError, StateError
 from lfs10d.system.disk import Disk
 from tests.support.volatile_disk import ForgetfulFiles, PowerCutError
@@ -36,9 +36,9 @@ class Site:
         self.start()
 
     def start(self) -> None:
-        self.running = Running(load(self.path), ChangeFile(STATE, Disk(self.disk)), self._take)
+        self.running = LiveConfig(load(self.path), ChangesFile(STATE, Disk(self.disk)), self._take)
 
-    async def _take(self, plan: Plan, before: Effective) -> None:
+    async def _take(self, plan: ReloadPlan, before: Effective) -> None:
         self.taken.append(plan.applied)
         assert plan.loaded == self.running.loaded
         assert before is not self.running.now
@@ -49,15 +49,15 @@ class Site:
         """What a daemon would find that is started now, after a power cut."""
         kept = ForgetfulFiles(seen=dict(self.disk.kept), kept=dict(self.disk.kept))
         kept.power_cut()
-        return ChangeFile(STATE, Disk(kept)).read().changes
+        return ChangesFile(STATE, Disk(kept)).read().changes
 
     def change(self, edit: Edit) -> tuple[Effective, Effective]:
         changed: tuple[Effective, Effective] = run(self.running.change(edit))
         return changed
 
-    def reload(self, text: str) -> Plan:
+    def reload(self, text: str) -> ReloadPlan:
         self.path.write_text(text)
-        plan: Plan = run(self.running.reload())
+        plan: ReloadPlan = run(self.running.reload())
         return plan
 
     def interval(self) -> float:
@@ -241,7 +241,9 @@ def test_what_needs_a_restart_waits_for_it_whatever_requests_change(site: Site) 
 
 
 def test_news_is_said_to_people_and_what_was_dropped_to_the_broker() -> None:
-    news = News([Dropped("slaves.a.label", "a", "Top", "the file says something else now")], ["roof: cannot hold"])
+    news = News(
+        [DroppedChange("slaves.a.label", "a", "Top", "the file says something else now")], ["roof: cannot hold"]
+    )
     assert news.sayings == [
         "slaves.a.label: the file says something else now: what a request changed there is dropped",
         "roof: cannot hold",

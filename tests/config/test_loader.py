@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from lfs10d.config.loader import Loaded, load
+from lfs10d.config.loader import LoadedConfig, load
 from lfs10d.errors import ConfigError, Problem
 from lfs10d.schema.document import LARGEST_FILE
 
@@ -23,7 +23,7 @@ def in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.chdir(tmp_path)
 
 
-def loaded(text: str, *, name: str = "lfs10d.yaml", files: bool = True, **environment: str) -> Loaded:
+def loaded(text: str, *, name: str = "lfs10d.yaml", files: bool = True, **environment: str) -> LoadedConfig:
     Path(name).write_bytes(text.encode())
     return load(Path(name), files=files, environment=environment, host="gateway")
 

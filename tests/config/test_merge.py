@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.config.changes import Changes, DeviceChange, Place, Rate, Said, Verified
-from lfs10d.config.merge import Dropped, Merged, merge
+from lfs10d.config.changes import Changes, DeviceChange, FileValues, Place, Rate, Verified
+from lfs10d.config.merge import DroppedChange, Merged, merge
 
 USUAL = {
     "interval": 1.0,
@@ -22,8 +22,8 @@ USUAL = {
 }
 
 
-def file(baudrate: int = 9600, **slaves: dict[str, Any]) -> Said:
-    return Said(slaves, baudrate, USUAL)
+def file(baudrate: int = 9600, **slaves: dict[str, Any]) -> FileValues:
+    return FileValues(slaves, baudrate, USUAL)
 
 
 def lost(merged: Merged) -> list[tuple[str, Any]]:
@@ -252,7 +252,7 @@ VALUES = {
 }
 OPTIONS = st.fixed_dictionaries({}, optional=VALUES)
 ENTRIES = st.builds(lambda number, options: {"id": number, **options}, st.integers(1, 4), OPTIONS)
-FILES = st.dictionaries(st.sampled_from(NAMES), ENTRIES).map(lambda slaves: Said(slaves, 9600, USUAL))
+FILES = st.dictionaries(st.sampled_from(NAMES), ENTRIES).map(lambda slaves: FileValues(slaves, 9600, USUAL))
 STEPS = st.lists(
     st.tuples(st.sampled_from(["set", "add", "remove", "reset", "edit", "restart"]), st.sampled_from(NAMES), ENTRIES),
     max_size=12,
@@ -267,7 +267,7 @@ def held(merged: Merged, name: str) -> dict[str, Any] | None:
 class Life:
     """A file, and what requests and persons do one after the other; each step proves what it alone changes."""
 
-    def __init__(self, said: Said) -> None:
+    def __init__(self, said: FileValues) -> None:
         self.said = said
         self.merged = merge(said, Changes())
 
@@ -308,7 +308,7 @@ class Life:
 
     def edit(self, name: str, entry: dict[str, Any]) -> None:
         previous = self.said.slaves.get(name, {})
-        self.said = Said({**self.said.slaves, name: entry}, 9600, USUAL)
+        self.said = FileValues({**self.said.slaves, name: entry}, 9600, USUAL)
         self._request(self.merged.changes)
         for key, value in entry.items():
             if key not in previous or previous[key] != value:
@@ -322,7 +322,7 @@ class Life:
 
 @given(FILES, STEPS)
 def test_a_person_s_edit_always_wins_and_nothing_else_is_ever_lost(
-    said: Said, steps: list[tuple[str, str, dict[str, Any]]]
+    said: FileValues, steps: list[tuple[str, str, dict[str, Any]]]
 ) -> None:
     life = Life(said)
     for verb, name, entry in steps:
@@ -330,15 +330,17 @@ def test_a_person_s_edit_always_wins_and_nothing_else_is_ever_lost(
 
 
 @given(FILES, STEPS)
-def test_what_is_dropped_did_differ_from_what_holds(said: Said, steps: list[tuple[str, str, dict[str, Any]]]) -> None:
+def test_what_is_dropped_did_differ_from_what_holds(
+    said: FileValues, steps: list[tuple[str, str, dict[str, Any]]]
+) -> None:
     changes = Changes()
     for _, name, entry in steps:
         wishes = {key: value for key, value in entry.items() if key != "id"}
         if name in said.slaves:
             changes = merge(said, changes.setting(name, wishes, said)).changes
-        said = Said({**said.slaves, name: entry}, 9600, USUAL)
+        said = FileValues({**said.slaves, name: entry}, 9600, USUAL)
         merged = merge(said, changes)
         for dropped in merged.dropped:
-            assert isinstance(dropped, Dropped)
+            assert isinstance(dropped, DroppedChange)
             _, device, key = dropped.key.split(".")
             assert (held(merged, device) or {})[key] != dropped.lost

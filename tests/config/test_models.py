@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pydantic import BaseModel, ValidationError
 
 from lfs10d.config.models import Config, MqttConfig, default_line_name, device_name
-from lfs10d.schema.fields import Duration, Kind, Name, RefusedError
+from lfs10d.schema.fields import Duration, FieldError, FieldKind, Name
 
 SMALL: dict[str, Any] = {"line": {"port": "/dev/x"}, "slaves": [2, 3, 4], "mqtt": {"host": "localhost"}}
 
@@ -45,7 +45,7 @@ def test_a_device_without_a_name_is_named_after_its_id() -> None:
 def test_every_file_name_gives_a_name(stem: str) -> None:
     try:
         Name().accept(default_line_name(stem))
-    except RefusedError as refused:
+    except FieldError as refused:
         pytest.fail(str(refused))
 
 
@@ -157,7 +157,7 @@ def test_every_default_is_what_the_kind_of_its_key_would_take(model: type[BaseMo
         name: (field.default, kind)
         for name, field in model.model_fields.items()
         for kind in field.metadata
-        if isinstance(kind, Kind) and not field.is_required() and name != "name"
+        if isinstance(kind, FieldKind) and not field.is_required() and name != "name"
     }
     for name, (default, kind) in kinds.items():
         written = "auto" if default is None and isinstance(kind, Duration) and kind.auto else default

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from lfs10d.config.loader import load
-from lfs10d.config.reload import Files, Plan, imprint, plan, read
+from lfs10d.config.reload import ConfigFiles, ReloadPlan, imprint, plan, read
 from lfs10d.errors import ConfigError
 
 BEFORE = """
@@ -18,21 +18,21 @@ mqtt: {host: localhost}
 
 
 @pytest.fixture
-def running(tmp_path: Path) -> Files:
+def running(tmp_path: Path) -> ConfigFiles:
     """Give what runs: the configuration above."""
     file = tmp_path / "lfs10d.yaml"
     file.write_text(BEFORE)
     return read(file)
 
 
-def planned(running: Files, old: str, new: str) -> Plan:
+def planned(running: ConfigFiles, old: str, new: str) -> ReloadPlan:
     """Return the plan for the file with something in it replaced."""
     assert old in BEFORE
     running.loaded.path.write_text(BEFORE.replace(old, new))
     return plan(running, read(running.loaded.path))
 
 
-def wanted(found: Plan) -> set[str]:
+def wanted(found: ReloadPlan) -> set[str]:
     """Return what there is to do."""
     return {name for name in ("line", "realtime", "polling", "broker", "publishing", "log") if getattr(found, name)}
 
@@ -62,7 +62,7 @@ def wanted(found: Plan) -> set[str]:
     ],
 )
 def test_what_changed_is_taken_up_and_nothing_else(
-    running: Files, old: str, new: str, todo: set[str], applied: tuple[str, ...]
+    running: ConfigFiles, old: str, new: str, todo: set[str], applied: tuple[str, ...]
 ) -> None:
     found = planned(running, old, new)
 
@@ -71,7 +71,7 @@ def test_what_changed_is_taken_up_and_nothing_else(
     assert found.restart_required == ()
 
 
-def test_what_the_topics_hang_on_stays_as_it_was(running: Files) -> None:
+def test_what_the_topics_hang_on_stays_as_it_was(running: ConfigFiles) -> None:
     found = planned(running, "ttyUSB0}", "ttyUSB0, name: other}")
 
     assert found.restart_required == ("line.name",)
@@ -79,11 +79,11 @@ def test_what_the_topics_hang_on_stays_as_it_was(running: Files) -> None:
     assert wanted(found) == set()
 
 
-def test_another_password_is_a_reason_to_connect_anew(tmp_path: Path, running: Files) -> None:
+def test_another_password_is_a_reason_to_connect_anew(tmp_path: Path, running: ConfigFiles) -> None:
     password = tmp_path / "password"
     password.write_text("first")
     named = planned(running, "host:", "username: wind, password_file: password, host:")
-    before = Files(named.loaded, imprint(named.loaded))
+    before = ConfigFiles(named.loaded, imprint(named.loaded))
     assert wanted(named) == {"broker"}
 
     assert wanted(plan(before, read(before.loaded.path))) == set()
@@ -94,23 +94,25 @@ def test_another_password_is_a_reason_to_connect_anew(tmp_path: Path, running: F
     assert found.applied == ("mqtt.password_file",)
 
 
-def test_another_certificate_is_one_too_and_what_cannot_be_read_is_another(tmp_path: Path, running: Files) -> None:
+def test_another_certificate_is_one_too_and_what_cannot_be_read_is_another(
+    tmp_path: Path, running: ConfigFiles
+) -> None:
     running.loaded.path.write_text(BEFORE.replace("host:", "tls: {ca: ca.pem}, host:"))
     ca = tmp_path / "ca.pem"
     ca.write_text("one")
     loaded = load(running.loaded.path, files=False)
-    first = Files(loaded, imprint(loaded))
+    first = ConfigFiles(loaded, imprint(loaded))
     ca.write_text("other")
-    second = Files(loaded, imprint(loaded))
+    second = ConfigFiles(loaded, imprint(loaded))
     ca.unlink()
-    third = Files(loaded, imprint(loaded))
+    third = ConfigFiles(loaded, imprint(loaded))
 
     assert plan(first, second).applied == ("mqtt.tls",)
     assert plan(second, third).broker
     assert not plan(third, third).broker
 
 
-def test_a_profile_file_with_other_content_has_its_devices_polled_by_it(tmp_path: Path, running: Files) -> None:
+def test_a_profile_file_with_other_content_has_its_devices_polled_by_it(tmp_path: Path, running: ConfigFiles) -> None:
     profile = tmp_path / "own.yaml"
     text = (
         "name: own\ntitle: Own\nsources: [a note]\nids: [1, 247]\nframings: [rtu]\nmax_words: 2\n"
@@ -127,7 +129,7 @@ def test_a_profile_file_with_other_content_has_its_devices_polled_by_it(tmp_path
     assert wanted(found) == {"polling"}
 
 
-def test_a_broken_file_is_no_plan(running: Files) -> None:
+def test_a_broken_file_is_no_plan(running: ConfigFiles) -> None:
     running.loaded.path.write_text("line: [")
 
     with pytest.raises(ConfigError):

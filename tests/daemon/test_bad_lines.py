@@ -14,7 +14,7 @@ import pytest
 from lfs10d.simulator.burst import MASTER
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
-from lfs10d.simulator.queued_sensor import InTurn
+from lfs10d.simulator.queued_sensor import QueuedSensor
 from lfs10d.simulator.wire import SECOND, Format
 from soak.attestation import Oracle, epoch_of, parsed
 from soak.troubles import KINDS
@@ -36,7 +36,7 @@ class Recorded:
     """The line of this test on a terminal; `handed` is what its adapter gave the master, with the time."""
 
     def __init__(self, site: Site) -> None:
-        self.line = SimulatedLine([InTurn(slave, format=Format(RATE)) for slave in SLAVES], format=Format(RATE))
+        self.line = SimulatedLine([QueuedSensor(slave, format=Format(RATE)) for slave in SLAVES], format=Format(RATE))
         self.served = PtyLine(self.line, link=site.tty)
         self.handed: list[tuple[float, bytes]] = []
         collect = self.served.adapter.collect

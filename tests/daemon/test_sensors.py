@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from lfs10d.simulator.faults import Kind
+from lfs10d.simulator.faults import FaultKind
 from lfs10d.simulator.line import SimulatedLine
 from tests.support.sites import Site, View, eventually, good, tell
 
@@ -22,7 +22,7 @@ def test_a_sensor_that_dies_fails_three_times_then_is_offline_and_reported_once(
     view.wait("device/slave-2/state", good)
     view.wait_samples("slave-2", 3)
 
-    tell(served, lambda line: line.sensor(2).ail(Kind.SILENT))
+    tell(served, lambda line: line.sensor(2).ail(FaultKind.SILENT))
     error = view.wait("device/slave-2/error", failing)
     view.wait("device/slave-2/availability", "offline".__eq__)
 
@@ -49,10 +49,10 @@ def test_a_sensor_that_dies_fails_three_times_then_is_offline_and_reported_once(
 
 @pytest.mark.parametrize(
     ("kind", "code", "online"),
-    [(Kind.NOISY, "crc", False), (Kind.EXCEPTION, "exception", True), (Kind.NAN, "not_finite", True)],
+    [(FaultKind.NOISY, "crc", False), (FaultKind.EXCEPTION, "exception", True), (FaultKind.NAN, "not_finite", True)],
 )
 def test_what_proves_a_sensor_alive_leaves_it_online(
-    site: Site, view: View, kind: Kind, code: str, *, online: bool
+    site: Site, view: View, kind: FaultKind, code: str, *, online: bool
 ) -> None:
     served = site.line()
     site.write(poll={"interval": "50ms", "retries": 0})
@@ -75,7 +75,7 @@ def test_a_sensor_that_says_it_is_busy_is_neither_failing_nor_offline(site: Site
     site.run()
     view.wait_samples("slave-2", 3, good)
 
-    tell(served, lambda line: line.sensor(2).ail(Kind.EXCEPTION, code=6))
+    tell(served, lambda line: line.sensor(2).ail(FaultKind.EXCEPTION, code=6))
     view.wait_samples("slave-2", 6, lambda one: one["error"] == "exception")
 
     assert not any(failing(each) for each in view.history_of("device/slave-2/error"))

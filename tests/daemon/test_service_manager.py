@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from lfs10d.simulator.faults import Kind
+from lfs10d.simulator.faults import FaultKind
 from tests.support.sites import Run, Site, View, eventually, good
 
 START = "from lfs10d.__main__ import main; main()"
@@ -72,7 +72,7 @@ def fed(run: Run) -> list[float]:
 
 def test_ready_comes_after_the_first_exchange(site: Site) -> None:
     served = site.line((1,))
-    served.line.sensor(1).ail(Kind.SILENT)
+    served.line.sensor(1).ail(FaultKind.SILENT)
     site.write(slaves=[{"id": 1, "response_timeout": "1500ms"}])
     run = site.run()
     eventually(lambda: served.line.judge.requests, "a request")

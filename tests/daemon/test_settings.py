@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from lfs10d import profiles
-from lfs10d.config.loader import Loaded, load
+from lfs10d.config.loader import LoadedConfig, load
 from lfs10d.daemon.settings import config_hash, device_facts, line_facts
 from lfs10d.line.budget import timing_of
 from lfs10d.line.settings import access_target, device_specs, line_rules, poll_rules, port_settings, search, usual_codec
@@ -27,21 +27,21 @@ mqtt: {host: localhost}
 
 
 @pytest.fixture
-def loaded(tmp_path: Path) -> Loaded:
+def loaded(tmp_path: Path) -> LoadedConfig:
     """Give a configuration in which nothing is a default."""
     file = tmp_path / "lfs10d.yaml"
     file.write_text(FILE)
     return load(file)
 
 
-def test_the_port_is_opened_as_configured(loaded: Loaded) -> None:
+def test_the_port_is_opened_as_configured(loaded: LoadedConfig) -> None:
     assert port_settings(loaded.config.line) == PortSettings(
         path="/dev/ttyUSB0", baudrate=19200, parity="even", databits=8, stopbits=2, low_latency=False,
         rs485=Rs485(rts_on_send=False, rts_after_send=True, delay_before_send=0.001, delay_after_send=0.002),
     )  # fmt: skip
 
 
-def test_the_line_is_spoken_on_as_configured(loaded: Loaded) -> None:
+def test_the_line_is_spoken_on_as_configured(loaded: LoadedConfig) -> None:
     rules = line_rules(loaded.config.line)
     timing = timing_of(loaded.config.line)
 
@@ -51,7 +51,7 @@ def test_the_line_is_spoken_on_as_configured(loaded: Loaded) -> None:
     assert line_facts(loaded.config.line).gap_required == timing.gap
 
 
-def test_devices_are_polled_and_described_as_configured(loaded: Loaded) -> None:
+def test_devices_are_polled_and_described_as_configured(loaded: LoadedConfig) -> None:
     mast, other = device_specs(loaded.config, loaded.profiles)
     rules = poll_rules(loaded.config.poll)
 
@@ -71,7 +71,7 @@ def test_devices_are_polled_and_described_as_configured(loaded: Loaded) -> None:
     assert facts[0].offline_after == 5
 
 
-def test_the_hash_tells_configurations_apart(loaded: Loaded, tmp_path: Path) -> None:
+def test_the_hash_tells_configurations_apart(loaded: LoadedConfig, tmp_path: Path) -> None:
     same, other = tmp_path / "same" / "lfs10d.yaml", tmp_path / "other" / "lfs10d.yaml"
     for file, text in ((same, FILE + "# a comment\n"), (other, FILE.replace("250ms", "251ms"))):
         file.parent.mkdir()
@@ -99,7 +99,7 @@ def test_as_fast_as_the_line_allows_is_no_faster_than_the_device_does(
     assert spec.request_gap == device_facts(config.config, config.profiles)[0].request_gap == 0.3
 
 
-def test_registers_are_accessed_as_the_device_is_polled_or_as_the_line_usually_speaks(loaded: Loaded) -> None:
+def test_registers_are_accessed_as_the_device_is_polled_or_as_the_line_usually_speaks(loaded: LoadedConfig) -> None:
     mast, other = loaded.config.slaves
     known = access_target(loaded, 4, other)
     assert (known.slave, known.codec.checksum, known.profile) == (4, Checksum.SUM, loaded.profiles["eh600"])
@@ -108,7 +108,7 @@ def test_registers_are_accessed_as_the_device_is_polled_or_as_the_line_usually_s
     assert (stranger.slave, stranger.codec, stranger.profile) == (9, usual_codec(loaded.config.line), None)
 
 
-def test_a_scan_looks_at_the_lines_own_rate_first_and_at_both_of_an_lfs10(loaded: Loaded) -> None:
+def test_a_scan_looks_at_the_lines_own_rate_first_and_at_both_of_an_lfs10(loaded: LoadedConfig) -> None:
     found = search(loaded, (1, 2), (), share=0.3)
     assert [timing.baudrate for timing in found.timings] == [19200, 9600]
     assert all(timing.bits == timing_of(loaded.config.line).bits for timing in found.timings)

@@ -17,13 +17,13 @@ from docs.generate.examples import HEARD, SENT
 from docs.generate.markdown import WIDTH, example, plain
 from docs.generate.mqtt import _meanings, examples
 from docs.generate.pages import PAGES, filled, stale
-from lfs10d.command import Answer, Call
+from lfs10d.command import Command, Result
 from lfs10d.commands.handlers.registry import REQUESTS
 from lfs10d.commands.message import parameters_of
 from lfs10d.config.diff import RESTART_KEYS
 from lfs10d.config.models import Config
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
-from lfs10d.schema.fields import Kind
+from lfs10d.schema.fields import FieldKind
 from lfs10d.telemetry.contract import OUTBOUND, check
 
 ROOT = Path(__file__).parents[2]
@@ -134,14 +134,14 @@ def test_every_request_has_its_class_and_parameters(name: str) -> None:
     assert f"Class `{form.klass}`." in told
     for key, field in form.parameters.model_fields.items():
         assert f"| `{field.alias or key}` |" in told
-        kind = next((each for each in field.metadata if isinstance(each, Kind)), None)
+        kind = next((each for each in field.metadata if isinstance(each, FieldKind)), None)
         assert kind is None or plain(kind.words) in told
 
 
 def test_every_request_of_the_page_of_examples_is_one_and_its_answer_is_as_promised() -> None:
     for step, response in zip(WALK, recorded(), strict=True):
         assert not isinstance(
-            parameters_of(REQUESTS[step.name].form.parameters, Call(parameters=step.parameters)), Answer
+            parameters_of(REQUESTS[step.name].form.parameters, Command(parameters=step.parameters)), Result
         )
         assert check(f"response/{step.name}", json.dumps(response)) is not None
 

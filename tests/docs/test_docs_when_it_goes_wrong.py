@@ -13,7 +13,7 @@ import pytest
 
 from lfs10d.modbus import diagnosis, port_errors
 from lfs10d.modbus.frames import ReadRegisters
-from lfs10d.modbus.port_errors import Facts
+from lfs10d.modbus.port_errors import PortErrorFacts
 from lfs10d.mqtt.reasons import REFUSED_FROM, failed, reason_in_words
 from lfs10d.mqtt.settings import BrokerSettings
 from lfs10d.reading import FaultCode, UartCounters
@@ -71,7 +71,7 @@ def test_every_counter_of_the_adapter_has_its_section(counter: str) -> None:
     ],
     ids=lambda said: said.message[:30],
 )
-def test_a_failure_is_quoted_in_its_section_as_it_is_logged(said: diagnosis.Verdict) -> None:
+def test_a_failure_is_quoted_in_its_section_as_it_is_logged(said: diagnosis.Diagnosis) -> None:
     assert f"{said.code}: {said.message}\n" in section(said.code.value)
 
 
@@ -82,10 +82,13 @@ def test_an_echo_that_nobody_expected_is_quoted() -> None:
 @pytest.mark.parametrize(
     ("heading", "said"),
     [
-        ("port_busy", port_errors.refusal("/dev/ttyUSB0", errno.EBUSY, Facts(holder="mbpoll (process 4711)"))),
-        ("Not there", port_errors.refusal("/dev/serial/by-id/usb-...", errno.ENOENT, Facts())),
+        ("port_busy", port_errors.refusal("/dev/ttyUSB0", errno.EBUSY, PortErrorFacts(holder="mbpoll (process 4711)"))),
+        ("Not there", port_errors.refusal("/dev/serial/by-id/usb-...", errno.ENOENT, PortErrorFacts())),
         ("Hung up", port_errors.hung_up("/dev/ttyUSB0", 0)),
-        ("Permission denied", port_errors.refusal("/dev/ttyUSB0", errno.EACCES, Facts(group="dialout", user="lfs10d"))),
+        (
+            "Permission denied",
+            port_errors.refusal("/dev/ttyUSB0", errno.EACCES, PortErrorFacts(group="dialout", user="lfs10d")),
+        ),
     ],
 )
 def test_a_port_s_trouble_is_quoted_as_it_is_logged(heading: str, said: Exception) -> None:

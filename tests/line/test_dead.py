@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import pytest
 
-from lfs10d.reading import Errand
+from lfs10d.reading import Purpose
 from tests.support.lines import Rigs
 
 ALL = range(1, 33)
@@ -27,7 +27,7 @@ def test_8_of_32_dead_leave_the_others_94_percent_of_their_rate(rigs: Rigs, *, s
     assert sum(rates) / len(rates) >= 0.94
     # Which of the shy come right behind a probe is chance: one may lose a few polls more than another.
     assert min(rates) >= (0.92 if shy else 0.94)
-    probes = [exchange for exchange in rig.exchanges if exchange.errand is Errand.PROBE and exchange.at > 60.0]
+    probes = [exchange for exchange in rig.exchanges if exchange.errand is Purpose.PROBE and exchange.at > 60.0]
     assert sum(exchange.at - exchange.asked for exchange in probes) <= 0.05 * 60.0 + 1.0
 
 

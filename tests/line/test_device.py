@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from lfs10d.line.device import BAD_ANSWER_PATIENCE, Device, DeviceSpec, Health, PollRules, Turnarounds
+from lfs10d.line.device import BAD_ANSWER_PATIENCE, Device, DeviceSpec, Health, PollRules, ResponseTimes
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.profiles.library import load_profile
 from lfs10d.reading import START_POLLS, Fault, FaultCode
@@ -50,7 +50,7 @@ def test_the_learned_time_out(turnaround: float, answers: int, timeout: float) -
 
 
 def test_the_p99_of_100_answers_leaves_one_out() -> None:
-    turnarounds = Turnarounds()
+    turnarounds = ResponseTimes()
     for _ in range(99):
         turnarounds.learn(0.01)
     turnarounds.learn(0.5)

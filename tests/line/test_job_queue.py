@@ -11,12 +11,12 @@ from lfs10d.line.device import Device, DeviceSpec, PollRules
 from lfs10d.line.job_queue import JOB_CREDIT, JobQueue
 from lfs10d.line.jobs.job import Ask, Done, Hold, Next
 from lfs10d.line.jobs.poll import Poll
-from lfs10d.line.quota import Share
+from lfs10d.line.quota import Quota
 from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import Codec, Framing
-from lfs10d.modbus.pending import Unanswered
+from lfs10d.modbus.pending import PendingRequests
 from lfs10d.profiles.library import load_profile
-from lfs10d.reading import Errand
+from lfs10d.reading import Purpose
 
 NONE: frozenset[int] = frozenset()
 
@@ -24,7 +24,7 @@ NONE: frozenset[int] = frozenset()
 class Task:
     """A job of a class; it is never asked here."""
 
-    errand = Errand.SCAN
+    errand = Purpose.SCAN
 
     def __init__(self, share: float = 1.0, excludes: frozenset[int] = NONE) -> None:
         self.share = share
@@ -43,7 +43,7 @@ class Task:
 def a_poll(slave: int) -> Poll:
     profile = load_profile("lfs10", relative_to=Path())
     spec = DeviceSpec(f"slave-{slave}", slave, profile, Codec(Framing.RTU), 1.0)
-    return Poll(Device(spec, PollRules(), slave), Unanswered(), due=0.0, errand=Errand.REQUEST)
+    return Poll(Device(spec, PollRules(), slave), PendingRequests(), due=0.0, errand=Purpose.REQUEST)
 
 
 @pytest.fixture
@@ -149,7 +149,7 @@ def test_what_is_dropped_is_forgotten_wherever_it_waits(queue: JobQueue) -> None
 
 
 def test_a_job_with_an_account_is_charged_there_and_keeps_to_it(queue: JobQueue) -> None:
-    account = Share(0.5, credit=0.0, now=0.0)
+    account = Quota(0.5, credit=0.0, now=0.0)
     probe = Task(0.9)
     queue.submit(probe, 0.0, account)
     assert queue.choose(0.0) is probe

@@ -10,13 +10,13 @@ import pytest
 from lfs10d.line.device import DeviceSpec, PollRules
 from lfs10d.line.jobs.poll import Poll
 from lfs10d.line.poller import COUNTERS_EVERY, Poller
-from lfs10d.line.scheduler import Schedule
+from lfs10d.line.scheduler import Scheduler
 from lfs10d.modbus.bus import Bus, LineRules, Wait
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.library import load_profile
-from lfs10d.reading import Errand, Event, Exchanged, FaultCode, PortChanged, Reading, UartCounted, UartCounters
+from lfs10d.reading import Event, Exchanged, FaultCode, PortChanged, Purpose, Reading, UartCounted, UartCounters
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.port import SimulatedPort, VirtualClock, run
 from lfs10d.simulator.sensor import Sensor
@@ -40,7 +40,7 @@ class Rig:
     def __post_init__(self) -> None:
         self.line = SimulatedLine([Sensor(slave) for slave in (1, 2, 3)])
         self.port = SimulatedPort(self.line, self.clock, SETTINGS)
-        schedule = Schedule(LineTiming.of(9600), 0.0)
+        schedule = Scheduler(LineTiming.of(9600), 0.0)
         schedule.replace([spec(1), spec(2)], PollRules(), 0.0)
         self.poller = Poller(Bus(self.port, LineRules(), self.clock), schedule, self.told.append, self.clock)
 
@@ -77,7 +77,7 @@ def test_an_exchange_is_told_with_its_reading(rig: Rig) -> None:
     exchanged, reading = rig.told[1][:2]
     assert isinstance(reading, Reading)
     assert isinstance(exchanged, Exchanged)
-    assert (exchanged.slave, exchanged.errand, exchanged.fault) == (1, Errand.POLL, None)
+    assert (exchanged.slave, exchanged.errand, exchanged.fault) == (1, Purpose.POLL, None)
     assert exchanged.sent == bytes.fromhex("01030001000295cb")
     assert exchanged.at == reading.at
 
@@ -101,7 +101,7 @@ def test_a_submitted_job_is_done_between_exchanges(rig: Rig) -> None:
     rig.run(0.01)
     assert not rig.poller.bus.idle
     device = rig.poller.schedule.devices["slave-1"]
-    job = Poll(device, rig.poller.schedule.unanswered, due=0.0, errand=Errand.REQUEST, request=5)
+    job = Poll(device, rig.poller.schedule.unanswered, due=0.0, errand=Purpose.REQUEST, request=5)
     rig.poller.submit(job)
     rig.poller.turn(rig.clock.now)
     assert len(rig.told) == 1

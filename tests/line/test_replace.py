@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from lfs10d.line.device import PollRules
 from lfs10d.line.jobs.poll import Poll
-from lfs10d.reading import Errand
+from lfs10d.reading import Purpose
 from tests.support.lines import Rig, Rigs
 
 RULES = PollRules()
@@ -18,7 +18,7 @@ def requested(rig: Rig, slave: int, number: int) -> Poll:
     """Have a device polled for request `number` now."""
     schedule = rig.poller.schedule
     device = schedule.devices[f"slave-{slave}"]
-    poll = Poll(device, schedule.unanswered, due=rig.clock.now, errand=Errand.REQUEST, request=number)
+    poll = Poll(device, schedule.unanswered, due=rig.clock.now, errand=Purpose.REQUEST, request=number)
     rig.poller.submit(poll)
     return poll
 

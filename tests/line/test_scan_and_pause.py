@@ -8,7 +8,7 @@ import pytest
 
 from lfs10d.line.device import PollRules
 from lfs10d.line.jobs.scan import Scan
-from lfs10d.line.jobs.scan_plan import Search
+from lfs10d.line.jobs.scan_plan import ScanPlan
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.library import builtin_names, load_profile
@@ -24,7 +24,7 @@ WIRE = 0.0314
 
 def a_scan(share: float, rates: tuple[int, ...]) -> Scan:
     timings = tuple(LineTiming.of(rate) for rate in rates)
-    return Scan(Search(tuple(range(1, 256)), timings, Codec(Framing.RTU), PROFILES, line_rate=9600, share=share))
+    return Scan(ScanPlan(tuple(range(1, 256)), timings, Codec(Framing.RTU), PROFILES, line_rate=9600, share=share))
 
 
 @pytest.mark.parametrize("rates", [(9600,), (9600, 19200)])
@@ -62,7 +62,7 @@ def test_wherever_its_slices_fall_a_scan_at_another_rate_costs_the_others_no_ans
         rig.run(2.0 + phase * 0.017)
         timings = LineTiming.of(19200), LineTiming.of(9600)
         ids = tuple(range(1, 13))
-        scan = Scan(Search(ids, timings, Codec(Framing.RTU), PROFILES, line_rate=19200, share=0.6))
+        scan = Scan(ScanPlan(ids, timings, Codec(Framing.RTU), PROFILES, line_rate=19200, share=0.6))
         rig.poller.submit(scan)
         while not scan.over:
             rig.run(rig.clock.now + 0.5)

@@ -9,12 +9,12 @@ from math import inf
 import pytest
 
 from lfs10d.line.device import LEARNED_MOST, Health, PollRules
-from lfs10d.line.jobs.job import Again, Hold, Later
-from lfs10d.line.scheduler import START_PATIENT, Rest, Schedule
+from lfs10d.line.jobs.job import Continue, Hold, Requeue
+from lfs10d.line.scheduler import START_PATIENT, Rest, Scheduler
 from lfs10d.modbus.exchange import LateAnswer
 from lfs10d.modbus.frames import ReadRegisters
 from lfs10d.modbus.timing import LineTiming
-from lfs10d.reading import Errand, Fault, FaultCode
+from lfs10d.reading import Fault, FaultCode, Purpose
 from tests.support.schedules import GONE, RTU, T9600, TAKES, Rig, Task, asking, spec
 
 
@@ -30,7 +30,7 @@ def test_a_poll_is_one_reading() -> None:
     assert reading.online
     assert not reading.probe
     assert rig.schedule.next(0.5) == Rest(1.0)
-    assert rig.schedule.errand is Errand.POLL
+    assert rig.schedule.errand is Purpose.POLL
 
 
 def test_an_outcome_without_a_question_is_a_mistake() -> None:
@@ -51,7 +51,7 @@ def test_requests_go_before_polls_and_jobs_in_their_share_too() -> None:
 
 def test_a_job_in_its_share_leaves_the_rest_to_the_polls() -> None:
     rig = Rig(spec(1, 0.0))
-    words = [word for _ in range(1000) for word in (asking(7), Later(0.0))]
+    words = [word for _ in range(1000) for word in (asking(7), Requeue(0.0))]
     rig.schedule.submit(Task(*words, share=0.3), 0.0)
     rig.run(20.0)
     assert rig.asked.count(7) / len(rig.asked) == pytest.approx(0.3, abs=0.03)
@@ -76,7 +76,7 @@ def test_another_interval_is_another_grid_of_the_same_device() -> None:
 def test_a_slice_of_a_job_is_not_interrupted() -> None:
     rig = Rig(spec(1, 0.0))
     rig.run(0.1)
-    rig.schedule.submit(Task(asking(7), Again(), asking(8), Again(), asking(9), share=0.1), rig.now)
+    rig.schedule.submit(Task(asking(7), Continue(), asking(8), Continue(), asking(9), share=0.1), rig.now)
     rig.asked.clear()
     rig.run(rig.now + 0.2)
     assert rig.asked[:4] == [7, 8, 9, 1]
@@ -94,7 +94,7 @@ def test_others_are_polled_while_a_job_rests_and_it_may_be_woken() -> None:
     rig.schedule.wake(asleep, rig.now)
     rig.schedule.wake(resting, rig.now)
     assert rig.ask() == asking(8)
-    assert rig.schedule.errand is Errand.SCAN
+    assert rig.schedule.errand is Purpose.SCAN
 
 
 def test_a_slave_id_that_a_job_excludes_is_polled_by_nobody_else() -> None:
@@ -296,7 +296,7 @@ def test_a_requested_poll_does_not_disturb_the_one_in_progress() -> None:
 
 def test_a_line_without_devices_carries_out_jobs() -> None:
     rig = Rig()
-    rig.schedule = Schedule(T9600, 0.0)
+    rig.schedule = Scheduler(T9600, 0.0)
     rig.schedule.submit(Task(asking(7)), 0.0)
     assert rig.run(1.0) == []
     assert rig.asked == [7]
@@ -315,8 +315,8 @@ def test_jobs_and_requested_polls_outlast_a_change_of_what_is_polled() -> None:
 
 def test_a_job_that_probes_has_the_share_of_probes_while_somebody_answers() -> None:
     rig = Rig(spec(1, 0.0))
-    job = Task(*[word for _ in range(2000) for word in (asking(7), Later(0.0))], share=0.3)
-    job.errand = Errand.PROBE
+    job = Task(*[word for _ in range(2000) for word in (asking(7), Requeue(0.0))], share=0.3)
+    job.errand = Purpose.PROBE
     rig.run(0.5)
     rig.schedule.submit(job, rig.now)
     rig.run(100.0)
@@ -360,7 +360,7 @@ def test_a_single_dead_device_is_probed_and_the_line_rests_until_then() -> None:
     ask = rig.ask()
     assert ask is not None
     device = rig.schedule.devices["slave-1"]
-    assert rig.schedule.errand is Errand.PROBE
+    assert rig.schedule.errand is Purpose.PROBE
     assert (device.polling, device.last_asked) == (True, rig.now)
     (reading,) = rig.settle(ask)
     assert reading.probe
@@ -369,7 +369,7 @@ def test_a_single_dead_device_is_probed_and_the_line_rests_until_then() -> None:
 
 def test_the_line_rests_until_the_share_of_a_job_allows() -> None:
     rig = Rig()
-    rig.schedule.submit(Task(*[word for _ in range(9) for word in (asking(7), Later(0.0))], share=0.01), 0.0)
+    rig.schedule.submit(Task(*[word for _ in range(9) for word in (asking(7), Requeue(0.0))], share=0.01), 0.0)
     while (ask := rig.ask()) is not None:
         rig.settle(ask)
     decision = rig.schedule.next(rig.now)
@@ -444,11 +444,11 @@ def test_grids_of_slow_devices_lie_two_exchanges_apart() -> None:
     assert rig.schedule.devices["slave-2"].due == pytest.approx(2 * T9600.exchange(8, 9))
 
 
-@pytest.mark.parametrize(("errand", "share"), [(Errand.SCAN, 0.3), (Errand.CHANGE, 0.2)])
-def test_a_change_pays_half_as_much_again_on_a_crowded_line(errand: Errand, share: float) -> None:
+@pytest.mark.parametrize(("errand", "share"), [(Purpose.SCAN, 0.3), (Purpose.CHANGE, 0.2)])
+def test_a_change_pays_half_as_much_again_on_a_crowded_line(errand: Purpose, share: float) -> None:
     rig = Rig(spec(1, 0.0))
     rig.run(0.5)
-    job = Task(*[word for _ in range(1000) for word in (asking(7), Later(0.0))], share=0.3)
+    job = Task(*[word for _ in range(1000) for word in (asking(7), Requeue(0.0))], share=0.3)
     job.errand = errand
     rig.schedule.submit(job, rig.now)
     rig.asked.clear()
@@ -458,8 +458,8 @@ def test_a_change_pays_half_as_much_again_on_a_crowded_line(errand: Errand, shar
 
 def test_a_change_pays_nothing_for_others_where_there_are_none() -> None:
     rig = Rig()
-    job = Task(*[word for _ in range(1000) for word in (asking(7), Later(0.0))], share=0.3)
-    job.errand = Errand.CHANGE
+    job = Task(*[word for _ in range(1000) for word in (asking(7), Requeue(0.0))], share=0.3)
+    job.errand = Purpose.CHANGE
     rig.schedule.submit(job, 0.0)
     rig.run(20.0)
     assert len(rig.asked) * (TAKES + T9600.gap) / 20.0 == pytest.approx(0.3, abs=0.03)
@@ -481,7 +481,7 @@ def test_those_probed_in_turn_after_the_first_answer_are_asked_twice_where_they_
 def test_a_slave_is_asked_no_sooner_than_its_rest_allows_and_others_have_the_line_meanwhile() -> None:
     rig = Rig(replace(spec(1, 100.0), request_gap=0.5), spec(2, 0.0))
     rig.run(0.2)
-    rig.schedule.submit(Task(asking(1), Later(0.0), asking(1)), rig.now)
+    rig.schedule.submit(Task(asking(1), Requeue(0.0), asking(1)), rig.now)
     rig.schedule.submit(rig.poll_of("slave-1", 5), rig.now)
     readings = rig.run(3.0)
     of_1 = [(began, ended) for slave, began, ended in rig.times if slave == 1]

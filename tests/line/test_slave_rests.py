@@ -13,8 +13,8 @@ from lfs10d.line.jobs.poll import Poll
 from lfs10d.line.slave_rests import SlaveRests
 from lfs10d.modbus.exchange import LateAnswer
 from lfs10d.modbus.frames import ReadRegisters
-from lfs10d.modbus.pending import Unanswered
-from lfs10d.reading import Errand, Fault, FaultCode
+from lfs10d.modbus.pending import PendingRequests
+from lfs10d.reading import Fault, FaultCode, Purpose
 from tests.support.outcomes import ended
 from tests.support.schedules import RTU, Task, spec
 
@@ -112,7 +112,7 @@ def test_a_poll_begins_no_sooner_than_the_shortest_interval_after_the_one_before
     device = a_device(1, min_interval=2.0)
     line = Line(device)
     device.polled_at = 1.0
-    poll = Poll(device, Unanswered(), due=1.5, errand=Errand.REQUEST)
+    poll = Poll(device, PendingRequests(), due=1.5, errand=Purpose.REQUEST)
     assert line.until(ask(1), poll) == 3.0
     assert line.until(ask(1)) == -inf
     poll.heard(ended(ask(1).request, fault=Fault(FaultCode.CRC, "crc"), ended=3.1), 3.1)

@@ -13,7 +13,7 @@ import pytest
 
 from lfs10d.line.device import DeviceSpec, PollRules
 from lfs10d.line.poller import Poller
-from lfs10d.line.scheduler import Schedule
+from lfs10d.line.scheduler import Scheduler
 from lfs10d.line.thread import IDLE_MOST, WAKING, LineThread
 from lfs10d.modbus.bus import Bus, LineRules, Wait
 from lfs10d.modbus.frames import Codec, Framing
@@ -70,7 +70,7 @@ class Rig:
         self.failure: BaseException | None = None
         self._told = threading.Condition()
         bus = Bus(SerialPort(PortSettings(str(path))), LineRules(), time.monotonic)
-        schedule = Schedule(LineTiming.of(9600), time.monotonic())
+        schedule = Scheduler(LineTiming.of(9600), time.monotonic())
         spec = DeviceSpec("mast", 1, LFS10, Codec(Framing.RTU), interval)
         schedule.replace([spec], PollRules(), time.monotonic())
         self.poller = Poller(bus, schedule, self._tell, time.monotonic)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.modbus.frame_search import KEPT, Catch, Hunt, Quarry
+from lfs10d.modbus.frame_search import KEPT, ExpectedFrame, FoundFrame, FrameSearch
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
 
 RTU = Codec(Framing.RTU)
@@ -17,9 +17,9 @@ ANSWER = bytes.fromhex("010304414FD70A002F")
 BROKEN = bytes.fromhex("010304414FD70A0030")
 
 
-def fed(*pieces: bytes) -> tuple[Hunt, Quarry, Catch | None]:
+def fed(*pieces: bytes) -> tuple[FrameSearch, ExpectedFrame, FoundFrame | None]:
     """Feed pieces at 0, 1, 2 ... s; return what was caught first."""
-    hunt, quarry, caught = Hunt(), Quarry(RTU, NORMAL), None
+    hunt, quarry, caught = FrameSearch(), ExpectedFrame(RTU, NORMAL), None
     for now, piece in enumerate(pieces):
         hunt.feed(piece, float(now))
         caught = caught or hunt.seek(quarry)
@@ -31,7 +31,7 @@ def test_a_frame_is_caught_the_moment_it_is_whole() -> None:
     assert caught is None
     assert quarry.partial
     hunt.feed(ANSWER[-1:], 7.0)
-    assert hunt.seek(quarry) == Catch(ANSWER[:-2], 0, 9, 0.0, 7.0)
+    assert hunt.seek(quarry) == FoundFrame(ANSWER[:-2], 0, 9, 0.0, 7.0)
 
 
 @given(st.binary(max_size=40), st.binary(max_size=40), st.lists(st.integers(0, 89), max_size=6))
@@ -85,8 +85,8 @@ def test_a_frame_is_claimed_where_one_byte_of_it_is() -> None:
     assert not hunt.claimed(caught)
     hunt.claim(caught)
     assert hunt.claimed(caught)
-    assert hunt.claimed(Catch(b"", 8, 12, 0.0, 0.0))
-    assert not hunt.claimed(Catch(b"", 9, 12, 0.0, 0.0))
+    assert hunt.claimed(FoundFrame(b"", 8, 12, 0.0, 0.0))
+    assert not hunt.claimed(FoundFrame(b"", 9, 12, 0.0, 0.0))
 
 
 def test_claimed_frames_are_explained() -> None:
@@ -137,7 +137,7 @@ def test_one_huge_piece_is_searched_whole() -> None:
     ],
 )
 def test_what_is_missing_is_what_the_soonest_frame_still_needs(heard: str, missing: int) -> None:
-    hunt, normal, exception = Hunt(), Quarry(RTU, NORMAL), Quarry(RTU, EXCEPTION)
+    hunt, normal, exception = FrameSearch(), ExpectedFrame(RTU, NORMAL), ExpectedFrame(RTU, EXCEPTION)
     hunt.feed(bytes.fromhex(heard), 0.0)
     for quarry in (normal, exception):
         hunt.seek(quarry)
@@ -156,7 +156,7 @@ def test_of_two_frames_the_first_is_caught_first() -> None:
 def test_a_head_that_overlaps_a_false_one_is_found() -> None:
     (normal, _) = RTU.shapes(ReadRegisters(4, 0x0001, 2, 4))
     frame = RTU.wrap(bytes.fromhex("040404414FD70A"))
-    hunt, quarry = Hunt(), Quarry(RTU, normal)
+    hunt, quarry = FrameSearch(), ExpectedFrame(RTU, normal)
     hunt.feed(b"\x04" + frame, 0.0)
     caught = hunt.seek(quarry)
     assert caught is not None
@@ -178,7 +178,7 @@ def test_a_frame_that_spans_what_is_forgotten_keeps_the_time_of_its_first_byte()
 
 
 def test_no_more_is_kept_than_twice_the_least() -> None:
-    hunt = Hunt()
+    hunt = FrameSearch()
     for now in range(100):
         hunt.feed(b"\xff" * 100, float(now))
         assert len(hunt._stream) <= 2 * KEPT + 100
@@ -210,7 +210,7 @@ def test_what_lies_around_a_claimed_frame_is_told_though_older_bytes_are_forgott
 
 
 def test_a_head_that_began_before_the_start_is_no_beginning() -> None:
-    hunt, quarry = Hunt(), Quarry(RTU, NORMAL)
+    hunt, quarry = FrameSearch(), ExpectedFrame(RTU, NORMAL)
     quarry.skip(1)
     hunt.feed(ANSWER[:2], 0.0)
     assert hunt.seek(quarry) is None

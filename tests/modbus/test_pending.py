@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from lfs10d.modbus.exchange import LateAnswer
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters, Request, WriteRegister
-from lfs10d.modbus.pending import EQUALS_KEPT, Unanswered
+from lfs10d.modbus.pending import EQUALS_KEPT, PendingRequests
 from lfs10d.reading import Fault, FaultCode
 from tests.support.outcomes import ended
 
@@ -25,10 +25,10 @@ PLAIN = ended(WIND, fault=Fault(FaultCode.TIMEOUT, "no answer"))
 
 
 class Line:
-    """An `Unanswered` and what happens on its line."""
+    """An `PendingRequests` and what happens on its line."""
 
     def __init__(self) -> None:
-        self.unanswered = Unanswered()
+        self.unanswered = PendingRequests()
 
     def silent(self, request: Request, at: float, code: FaultCode = FaultCode.TIMEOUT, *late: Request) -> None:
         self._settle(request, at, fault=Fault(code, ""), late=late)

@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from lfs10d.errors import PortBusyError, PortLostError
-from lfs10d.modbus.port_errors import Facts, hung_up, look, number_of, refusal
+from lfs10d.modbus.port_errors import PortErrorFacts, hung_up, look, number_of, refusal
 
-FACTS = Facts(user="wind", group="dialout")
+FACTS = PortErrorFacts(user="wind", group="dialout")
 
 
 @pytest.mark.parametrize(
@@ -44,13 +44,13 @@ def test_each_cause_has_its_words_and_what_to_do(code: int, words: str) -> None:
 
 
 def test_a_dangling_link_says_where_it_leads() -> None:
-    error = refusal("/dev/serial/by-id/a", errno.ENOENT, Facts(target="/dev/ttyUSB1"))
+    error = refusal("/dev/serial/by-id/a", errno.ENOENT, PortErrorFacts(target="/dev/ttyUSB1"))
 
     assert "the link leads to /dev/ttyUSB1, which is not there" in error.message
 
 
 def test_a_device_that_no_group_may_use_needs_a_udev_rule() -> None:
-    error = refusal("/dev/ttyS0", errno.EACCES, Facts(user="wind"))
+    error = refusal("/dev/ttyS0", errno.EACCES, PortErrorFacts(user="wind"))
 
     assert "denied to the user wind, and no group may use it" in error.message
     assert 'GROUP="dialout", MODE="0660"' in error.message
@@ -58,14 +58,14 @@ def test_a_device_that_no_group_may_use_needs_a_udev_rule() -> None:
 
 @pytest.mark.parametrize("code", [errno.EBUSY, errno.EWOULDBLOCK])
 def test_a_port_in_use_names_who_uses_it(code: int) -> None:
-    error = refusal("/dev/ttyUSB0", code, Facts(holder="mbpoll (process 4711)"))
+    error = refusal("/dev/ttyUSB0", code, PortErrorFacts(holder="mbpoll (process 4711)"))
 
     assert isinstance(error, PortBusyError)
     assert error.message == "in use by mbpoll (process 4711): end that, or free the port there"
 
 
 def test_a_port_in_use_by_nobody_knows_whom_is_told_so() -> None:
-    assert "in use by another program" in refusal("/dev/ttyUSB0", errno.EBUSY, Facts()).message
+    assert "in use by another program" in refusal("/dev/ttyUSB0", errno.EBUSY, PortErrorFacts()).message
 
 
 def test_a_hang_up_says_why_and_what_to_do() -> None:

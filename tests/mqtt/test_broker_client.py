@@ -17,9 +17,9 @@ from typing import TypeAlias
 import pytest
 
 from lfs10d.errors import BrokerError
-from lfs10d.mqtt.broker_client import Link
+from lfs10d.mqtt.broker_client import BrokerClient
 from lfs10d.mqtt.messages import Accepted, Filter, Incoming
-from lfs10d.mqtt.reasons import Ended, Ending
+from lfs10d.mqtt.reasons import Disconnect, DisconnectReason
 from lfs10d.mqtt.settings import BrokerSettings, Tls, Version
 from lfs10d.system.secret import Secret
 from tests.support.brokers import Authority, Mosquitto
@@ -36,7 +36,7 @@ class Witness:
     def __init__(self) -> None:
         self.told: list[str] = []
         self.acceptances: list[Accepted] = []
-        self.endings: list[Ended] = []
+        self.endings: list[Disconnect] = []
         self.acknowledgements: dict[int, int] = {}
         self.subscriptions: dict[int, tuple[int, ...]] = {}
         self.messages: list[Incoming] = []
@@ -46,7 +46,7 @@ class Witness:
         self.acceptances.append(accepted)
         self._tell("accepted")
 
-    def ended(self, ended: Ended) -> None:
+    def ended(self, ended: Disconnect) -> None:
         self.endings.append(ended)
         self._tell("ended")
 
@@ -80,10 +80,10 @@ def settings_of(port: int, **changes: object) -> BrokerSettings:
 
 
 @contextlib.asynccontextmanager
-async def linked(settings: BrokerSettings) -> AsyncIterator[tuple[Link, Witness]]:
+async def linked(settings: BrokerSettings) -> AsyncIterator[tuple[BrokerClient, Witness]]:
     """Give a link that has begun, and leave at the end."""
     witness = Witness()
-    link = Link(settings, witness, chance=lambda: 1.0)
+    link = BrokerClient(settings, witness, chance=lambda: 1.0)
     link.start()
     try:
         yield link, witness
@@ -200,7 +200,7 @@ def test_a_reason_code_that_nobody_knows_is_an_answer_like_any_other(serving: Se
         async with serving(broker) as port, linked(settings_of(port)) as (_, witness):
             await witness.until(lambda: bool(witness.endings))
             [ended] = witness.endings[:1]
-            assert (ended.ending, ended.reason, ended.by_message) == (Ending.LOST, 0xD3, True)
+            assert (ended.ending, ended.reason, ended.by_message) == (DisconnectReason.LOST, 0xD3, True)
 
     asyncio.run(scenario())
 
@@ -539,7 +539,7 @@ def black_hole() -> Iterator[int]:
 def test_a_host_that_swallows_everything_holds_up_neither_the_loop_nor_the_end() -> None:
     async def scenario(port: int) -> float:
         witness = Witness()
-        link = Link(settings_of(port), witness)
+        link = BrokerClient(settings_of(port), witness)
         link.start()
         began = time.monotonic()
         with pytest.raises(BrokerError, match=r"no answer within 0\.2 s"):
@@ -559,7 +559,7 @@ def test_what_is_given_up_before_it_was_open_never_speaks_to_the_broker(mosquitt
         return Secret("x")
 
     async def scenario() -> None:
-        link = Link(settings_of(mosquitto.port, username="gate", password=password), Witness())
+        link = BrokerClient(settings_of(mosquitto.port, username="gate", password=password), Witness())
         link.start()
         await link.leave(1.0)
         given_up.set()
@@ -573,7 +573,7 @@ def test_what_is_given_up_before_it_was_open_never_speaks_to_the_broker(mosquitt
 
 def test_waiters_are_all_told_and_a_late_one_is_told_no_more(mosquitto: Mosquitto) -> None:
     async def scenario() -> None:
-        link = Link(settings_of(mosquitto.port), Witness())
+        link = BrokerClient(settings_of(mosquitto.port), Witness())
         with pytest.raises(BrokerError):
             await link.opened(0.0)
         early = asyncio.create_task(link.opened(PATIENCE))
@@ -596,7 +596,7 @@ def test_a_server_that_says_nothing_holds_up_nothing_either(serving: Serving) ->
             gone.set()
 
         async with serving(silent) as port:
-            link = Link(settings_of(port), Witness())
+            link = BrokerClient(settings_of(port), Witness())
             link.start()
             await asyncio.wait_for(heard.wait(), PATIENCE)
             await link.leave(1.0)

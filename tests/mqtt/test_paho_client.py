@@ -14,10 +14,10 @@ from paho.mqtt.enums import CallbackAPIVersion, LogLevel, MQTTErrorCode
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.reasoncodes import ReasonCode
 
-from lfs10d.mqtt.broker_client import Link
+from lfs10d.mqtt.broker_client import BrokerClient
 from lfs10d.mqtt.messages import Accepted, Filter, Incoming
 from lfs10d.mqtt.paho_client import LARGEST_PACKET, BoundedClient, every_reason
-from lfs10d.mqtt.reasons import Ended
+from lfs10d.mqtt.reasons import Disconnect
 from lfs10d.mqtt.settings import BrokerSettings, Version
 from tests.support.old_brokers import Answer
 
@@ -48,9 +48,9 @@ class Taker:
     """Takes what a connection tells, and subscribes."""
 
     def __init__(self) -> None:
-        self.link: Link
+        self.link: BrokerClient
         self.messages: list[Incoming] = []
-        self.endings: list[Ended] = []
+        self.endings: list[Disconnect] = []
         self.come = asyncio.Event()
 
     def accepted(self, _: Accepted) -> None:
@@ -58,7 +58,7 @@ class Taker:
         assert standing is not None
         standing.subscribe([Filter("t")])
 
-    def ended(self, ended: Ended) -> None:
+    def ended(self, ended: Disconnect) -> None:
         self.endings.append(ended)
         self.come.set()
 
@@ -119,7 +119,7 @@ def test_a_payload_of_any_size_comes_cut_is_acknowledged_and_followed_by_the_nex
     async def scenario() -> None:
         async with serving(answer) as port:
             taker = Taker()
-            taker.link = Link(BrokerSettings("127.0.0.1", port, "me", version), taker)
+            taker.link = BrokerClient(BrokerSettings("127.0.0.1", port, "me", version), taker)
             taker.link.start()
             with contextlib.suppress(TimeoutError):
                 await taker.until(lambda: len(taker.messages) == 3 or bool(taker.endings))
@@ -160,7 +160,7 @@ def test_why_a_connection_ended_is_told(serving: Serving, bytes_said: bytes, wor
     async def scenario() -> None:
         async with serving(answer) as port:
             taker = Taker()
-            taker.link = Link(BrokerSettings("127.0.0.1", port, "me"), taker)
+            taker.link = BrokerClient(BrokerSettings("127.0.0.1", port, "me"), taker)
             taker.link.start()
             await taker.until(lambda: bool(taker.endings))
             assert taker.endings[0].message.startswith(f"broker 127.0.0.1:{port}: {words}")
@@ -186,7 +186,7 @@ def test_a_retained_message_of_qos_0_comes_whole_with_properties_or_without(serv
     async def scenario() -> None:
         async with serving(answer) as port:
             taker = Taker()
-            taker.link = Link(BrokerSettings("127.0.0.1", port, "me", version), taker)
+            taker.link = BrokerClient(BrokerSettings("127.0.0.1", port, "me", version), taker)
             taker.link.start()
             await taker.until(lambda: bool(taker.endings))
             assert taker.messages == [

@@ -9,7 +9,7 @@ import ssl
 import pytest
 
 from lfs10d.errors import BrokerError
-from lfs10d.mqtt.reasons import NOT_FOR_A_MESSAGE, Ending, failed, gone, reason_in_words
+from lfs10d.mqtt.reasons import NOT_FOR_A_MESSAGE, DisconnectReason, failed, gone, reason_in_words
 from lfs10d.mqtt.settings import BrokerSettings, Tls
 
 SETTINGS = BrokerSettings("gate.example", 8883, "me", tls=Tls())
@@ -51,7 +51,7 @@ def tls_error(reason: str | None, kind: type[ssl.SSLError] = ssl.SSLError) -> ss
 )
 def test_a_failed_attempt_names_the_broker_and_the_cause(error: Exception, words: str) -> None:
     ended = failed(error, SETTINGS)
-    assert ended.ending in {Ending.UNREACHABLE, Ending.CLOSED, Ending.REFUSED}
+    assert ended.ending in {DisconnectReason.UNREACHABLE, DisconnectReason.CLOSED, DisconnectReason.REFUSED}
     assert ended.message.startswith(f"broker gate.example:8883: {words}")
 
 
@@ -72,19 +72,21 @@ def test_an_unknown_reason_code_is_shown_as_the_number_it_is() -> None:
 @pytest.mark.parametrize(
     ("error", "ending"),
     [
-        (socket.gaierror(-2, "Name or service not known"), Ending.UNREACHABLE),
-        (ConnectionRefusedError(errno.ECONNREFUSED, "Connection refused"), Ending.UNREACHABLE),
-        (TimeoutError("timed out"), Ending.UNREACHABLE),
-        (OSError(errno.EHOSTUNREACH, "No route to host"), Ending.UNREACHABLE),
-        (ConnectionResetError(errno.ECONNRESET, "reset"), Ending.CLOSED),
-        (tls_error("UNEXPECTED_EOF_WHILE_READING", ssl.SSLEOFError), Ending.CLOSED),
-        (tls_error("WRONG_VERSION_NUMBER"), Ending.REFUSED),
-        (certificate_error(), Ending.REFUSED),
-        (BrokerError("mqtt.tls.ca: /x: no such file"), Ending.REFUSED),
-        (UnicodeError("label too long"), Ending.REFUSED),
+        (socket.gaierror(-2, "Name or service not known"), DisconnectReason.UNREACHABLE),
+        (ConnectionRefusedError(errno.ECONNREFUSED, "Connection refused"), DisconnectReason.UNREACHABLE),
+        (TimeoutError("timed out"), DisconnectReason.UNREACHABLE),
+        (OSError(errno.EHOSTUNREACH, "No route to host"), DisconnectReason.UNREACHABLE),
+        (ConnectionResetError(errno.ECONNRESET, "reset"), DisconnectReason.CLOSED),
+        (tls_error("UNEXPECTED_EOF_WHILE_READING", ssl.SSLEOFError), DisconnectReason.CLOSED),
+        (tls_error("WRONG_VERSION_NUMBER"), DisconnectReason.REFUSED),
+        (certificate_error(), DisconnectReason.REFUSED),
+        (BrokerError("mqtt.tls.ca: /x: no such file"), DisconnectReason.REFUSED),
+        (UnicodeError("label too long"), DisconnectReason.REFUSED),
     ],
 )
-def test_a_broker_that_is_not_there_is_told_from_one_that_refuses_us(error: Exception, ending: Ending) -> None:
+def test_a_broker_that_is_not_there_is_told_from_one_that_refuses_us(
+    error: Exception, ending: DisconnectReason
+) -> None:
     """The first is tried every second, the other with back-off."""
     assert failed(error, SETTINGS).ending is ending
 
@@ -102,7 +104,7 @@ def test_why_it_ended_is_always_told() -> None:
         tls_error("UNEXPECTED_EOF_WHILE_READING"),
     ]
     endings = [gone("broker b:1", left=False, accepted=True, cause=cause) for cause in causes]
-    assert {ended.ending for ended in endings} == {Ending.LOST}
+    assert {ended.ending for ended in endings} == {DisconnectReason.LOST}
     assert [ended.message.removeprefix("broker b:1: the connection is lost: ") for ended in endings] == [
         "the broker closed it and did not say why",
         "connection reset by peer",
@@ -117,14 +119,14 @@ def test_why_it_ended_is_always_told() -> None:
 @pytest.mark.parametrize("reason", [0x80, 0x81, 0x83, 0x87, 0x90, 0x95, 0x99, 0xC3])
 def test_a_disconnect_may_be_for_a_message_and_is_no_duplicate_client(reason: int) -> None:
     ended = gone("broker b:1", left=False, accepted=True, reason=reason)
-    assert (ended.ending, ended.reason, ended.by_message) == (Ending.LOST, reason, True)
+    assert (ended.ending, ended.reason, ended.by_message) == (DisconnectReason.LOST, reason, True)
     assert ended.message == f"broker b:1: {reason_in_words(reason)}"
 
 
 @pytest.mark.parametrize("reason", sorted(NOT_FOR_A_MESSAGE))
 def test_a_disconnect_for_another_reason_is_no_message_s_fault(reason: int) -> None:
     ended = gone("broker b:1", left=False, accepted=True, reason=reason)
-    assert ended.ending is (Ending.TAKEN_OVER if reason == 0x8E else Ending.LOST)
+    assert ended.ending is (DisconnectReason.TAKEN_OVER if reason == 0x8E else DisconnectReason.LOST)
     assert not ended.by_message
 
 
@@ -132,15 +134,15 @@ def test_a_disconnect_for_another_reason_is_no_message_s_fault(reason: int) -> N
 @pytest.mark.parametrize("alert", ["TLSV13_ALERT_CERTIFICATE_REQUIRED", "SSLV3_ALERT_CERTIFICATE_EXPIRED"])
 def test_a_certificate_of_ours_that_is_refused_after_the_handshake_is_named(alert: str, accepted: bool) -> None:  # noqa: FBT001 - both sides of one claim
     ended = gone("broker b:1", left=False, accepted=accepted, cause=tls_error(alert))
-    assert ended.ending is Ending.REFUSED
+    assert ended.ending is DisconnectReason.REFUSED
     assert ended.message.startswith("broker b:1: the broker does not accept mqtt.tls.cert: ")
 
 
 def test_an_end_before_the_answer_and_one_of_our_own_will() -> None:
     words = "broker b:1: closed the connection without an answer: check mqtt.port and mqtt.tls"
     before = gone("broker b:1", left=False, accepted=False, cause=ConnectionResetError(errno.ECONNRESET, "reset"))
-    assert (before.ending, before.message, before.by_message) == (Ending.WRONG_VERSION, words, False)
+    assert (before.ending, before.message, before.by_message) == (DisconnectReason.WRONG_VERSION, words, False)
     garbage = gone("broker b:1", left=False, accepted=False, cause="Received malformed packet: x")
     assert garbage.message == f"{words} (Received malformed packet: x)"
     ours = gone("broker b:1", left=True, accepted=True)
-    assert (ours.ending, ours.by_message) == (Ending.LEFT, False)
+    assert (ours.ending, ours.by_message) == (DisconnectReason.LEFT, False)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.mqtt.reasons import UNSUPPORTED_VERSION, Ended, Ending
+from lfs10d.mqtt.reasons import UNSUPPORTED_VERSION, Disconnect, DisconnectReason
 from lfs10d.mqtt.reconnect import (
     AWAY_EVERY,
     HELD,
@@ -18,19 +18,19 @@ from lfs10d.mqtt.reconnect import (
 )
 from lfs10d.mqtt.settings import Version
 
-UNREACHABLE = Ended(Ending.UNREACHABLE, "")
-WRONG_VERSION = Ended(Ending.WRONG_VERSION, "")
-REFUSED = Ended(Ending.REFUSED, "", 0x87)
-CLOSED = Ended(Ending.CLOSED, "")
-LOST = Ended(Ending.LOST, "")
-TAKEN_OVER = Ended(Ending.TAKEN_OVER, "")
+UNREACHABLE = Disconnect(DisconnectReason.UNREACHABLE, "")
+WRONG_VERSION = Disconnect(DisconnectReason.WRONG_VERSION, "")
+REFUSED = Disconnect(DisconnectReason.REFUSED, "", 0x87)
+CLOSED = Disconnect(DisconnectReason.CLOSED, "")
+LOST = Disconnect(DisconnectReason.LOST, "")
+TAKEN_OVER = Disconnect(DisconnectReason.TAKEN_OVER, "")
 
 
 def fresh(version: Version = Version.V5, nodes: int = 1) -> Reconnect:
     return Reconnect(version, lambda: 0.0, nodes)
 
 
-def live(policy: Reconnect, start: float, seconds: float, ended: Ended = LOST) -> None:
+def live(policy: Reconnect, start: float, seconds: float, ended: Disconnect = LOST) -> None:
     policy.accepted(start)
     policy.ended(ended, start + seconds)
 
@@ -62,7 +62,7 @@ def test_attempts_that_are_refused_are_1_2_4_up_to_30_s_apart() -> None:
 
 @pytest.mark.parametrize("ended", [UNREACHABLE, REFUSED])
 @given(chance=st.floats(0, 1))
-def test_chance_shortens_a_delay_by_at_most_a_quarter(ended: Ended, chance: float) -> None:
+def test_chance_shortens_a_delay_by_at_most_a_quarter(ended: Disconnect, chance: float) -> None:
     policy = Reconnect(Version.V5, lambda: chance)
     policy.begun(0.0)
     policy.ended(ended, 0.0)
@@ -127,7 +127,7 @@ def test_a_broker_that_has_spoken_5_and_says_nothing_now_is_asked_in_5_again() -
 def test_a_broker_that_has_spoken_5_and_refuses_it_in_so_many_words_is_asked_in_3_1_1_at_once() -> None:
     policy = fresh()
     live(policy, 0.0, HELD)
-    policy.ended(Ended(Ending.WRONG_VERSION, "", UNSUPPORTED_VERSION), 100.0)
+    policy.ended(Disconnect(DisconnectReason.WRONG_VERSION, "", UNSUPPORTED_VERSION), 100.0)
     assert (policy.version, policy.due) == (Version.V311, 100.0)
 
 
@@ -327,10 +327,14 @@ def test_two_gateways_with_one_id_meet_less_and_less_often() -> None:
 
 @pytest.mark.parametrize(
     ("ended", "explained"),
-    [(Ended(Ending.LOST, "", 0x87, by_message=True), False), (Ended(Ending.LOST, "", 0x8B), False), (LOST, True)],
+    [
+        (Disconnect(DisconnectReason.LOST, "", 0x87, by_message=True), False),
+        (Disconnect(DisconnectReason.LOST, "", 0x8B), False),
+        (LOST, True),
+    ],
 )
 def test_a_broker_that_ends_connections_for_a_reason_or_a_message_is_no_duplicate_client(
-    ended: Ended,
+    ended: Disconnect,
     explained: bool,  # noqa: FBT001 - a column of the table
 ) -> None:
     policy = fresh()

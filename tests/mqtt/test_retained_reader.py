@@ -11,7 +11,7 @@ import pytest
 
 from lfs10d.mqtt.connection import Connection
 from lfs10d.mqtt.messages import Filter, Incoming
-from lfs10d.mqtt.retained_reader import EarlierLife
+from lfs10d.mqtt.retained_reader import RetainedReader
 from lfs10d.mqtt.topics import Topics
 
 WANTED = frozenset({"line/state", "device/a/config"})
@@ -42,7 +42,7 @@ class Site:
         self.went_on: list[str] = []
         self.go = asyncio.Event()
         self.go.set()
-        self.life = EarlierLife(Topics("b/l"), WANTED, told or self._told)
+        self.life = RetainedReader(Topics("b/l"), WANTED, told or self._told)
 
     async def _told(self, found: Mapping[str, bytes]) -> None:
         self.told.append(dict(found))

@@ -12,18 +12,18 @@ import pytest
 
 from lfs10d.mqtt.connection import Connection
 from lfs10d.mqtt.messages import Accepted
-from lfs10d.mqtt.reasons import NO_MATCHING_SUBSCRIBERS, Ended, Ending, reason_in_words
-from lfs10d.mqtt.sender import ACKNOWLEDGED_WITHIN, LETTERS_AT_ONCE, SAMPLES_AT_ONCE, Dispatch
+from lfs10d.mqtt.reasons import NO_MATCHING_SUBSCRIBERS, Disconnect, DisconnectReason, reason_in_words
+from lfs10d.mqtt.sender import ACKNOWLEDGED_WITHIN, LETTERS_AT_ONCE, SAMPLES_AT_ONCE, Sender
 from lfs10d.mqtt.settings import Version
 from lfs10d.mqtt.topics import Topics
 from lfs10d.outbox.backlog import ARRAY_BYTES, PAST_AFTER
 from lfs10d.outbox.outbox import Outbox
-from lfs10d.telemetry.publication import Kind, Publication, Sample, event, retained
+from lfs10d.telemetry.publication import Publication, PublicationKind, Sample, event, retained
 
 ONLINE = retained("availability", "online")
-LOST = Ended(Ending.LOST, "broker b:1: the connection is lost")
-BY_MESSAGE = Ended(Ending.LOST, "broker b:1: the connection is lost: closed", by_message=True)
-DENIED = Ended(Ending.LOST, "broker b:1: not authorized", 0x87, by_message=True)
+LOST = Disconnect(DisconnectReason.LOST, "broker b:1: the connection is lost")
+BY_MESSAGE = Disconnect(DisconnectReason.LOST, "broker b:1: the connection is lost: closed", by_message=True)
+DENIED = Disconnect(DisconnectReason.LOST, "broker b:1: not authorized", 0x87, by_message=True)
 
 
 class VirtualSelector(selectors.SelectSelector):
@@ -79,7 +79,7 @@ class Desk:
         self.outbox = Outbox()
         self.wire = Wire()
         self.stuck = 0
-        self.dispatch = Dispatch(self.outbox, Topics("b/line0"), "line0", epoch_ms=lambda: 7, stuck=self._stuck)
+        self.dispatch = Sender(self.outbox, Topics("b/line0"), "line0", epoch_ms=lambda: 7, stuck=self._stuck)
         self.accepted = Accepted(Version.V5, receive_maximum, limit)
 
     def _stuck(self) -> None:
@@ -120,7 +120,7 @@ class Desk:
 
 def sample(seq: int) -> Publication:
     measured = Sample("a", "k", seq, 0, "synced", None, {}, (), "bad", "timeout", None)
-    return Publication("device/a/telemetry", {"seq": seq}, Kind.SAMPLE, retain=False, qos=1, sample=measured)
+    return Publication("device/a/telemetry", {"seq": seq}, PublicationKind.SAMPLE, retain=False, qos=1, sample=measured)
 
 
 def test_a_sample_that_nobody_listened_to_after_the_first_connect_goes_once_more_as_history() -> None:
@@ -145,7 +145,9 @@ def test_a_letter_goes_with_its_topic_qos_retain_flag_and_correlation() -> None:
         desk = Desk()
         await desk.connect()
         desk.add(retained("device/a/stats", {}, qos=0))
-        desk.outbox.add(Publication("response/x", {}, Kind.RESPONSE, retain=False, qos=1), 0.0, correlation=b"\1")
+        desk.outbox.add(
+            Publication("response/x", {}, PublicationKind.RESPONSE, retain=False, qos=1), 0.0, correlation=b"\1"
+        )
         await desk.turn()
         assert desk.wire.sent == [
             ("b/line0/availability", b"online", 1, True, None),
@@ -315,7 +317,7 @@ def test_an_answer_to_nothing_is_passed_over() -> None:
 # What the broker refuses, or ends the connection for
 
 
-async def again(desk: Desk, ended: Ended) -> None:
+async def again(desk: Desk, ended: Disconnect) -> None:
     """End the connection and make another, on which nothing but the burst is acknowledged yet."""
     desk.dispatch.lost(ended)
     desk.wire = Wire()
@@ -500,7 +502,9 @@ def test_a_sample_larger_than_an_array_may_be_goes_alone() -> None:
     async def scenario() -> None:
         desk = Desk(limit=2000)
         long = Sample("a", "k", 1, 0, "synced", None, {}, (), "bad", "x" * 1700, None)
-        desk.add(Publication("device/a/telemetry", {}, Kind.SAMPLE, retain=False, qos=1, sample=long), sample(2))
+        desk.add(
+            Publication("device/a/telemetry", {}, PublicationKind.SAMPLE, retain=False, qos=1, sample=long), sample(2)
+        )
         await asyncio.sleep(5.0)
         await desk.connect()
         for _ in range(30):

@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 
 from lfs10d.outbox.backlog import ARRAY_MOST, PAST_AFTER, SAMPLE_EVERY, TURN_EVERY
 from lfs10d.outbox.drain import LEVEL_MOST
-from lfs10d.outbox.items import Array, Letter, Live, Message, Retained, samples_of
+from lfs10d.outbox.items import HistoryBatch, LiveSample, Message, OutboxItem, Retained, samples_of
 from lfs10d.outbox.outbox import BURST_FIRST, IN_FLIGHT_MOST, LEAST_WEIGHT, REFRESH_WEIGHT, WEIGHT, Outbox
 from lfs10d.telemetry import publication
-from lfs10d.telemetry.publication import Kind, Publication, Sample
+from lfs10d.telemetry.publication import Publication, PublicationKind, Sample
 
 ONLINE = publication.retained("availability", "online")
 WEIGHTS = 3 * WEIGHT + WEIGHT * LEVEL_MOST + REFRESH_WEIGHT + 2 * LEAST_WEIGHT
@@ -28,7 +28,7 @@ WEIGHTS = 3 * WEIGHT + WEIGHT * LEVEL_MOST + REFRESH_WEIGHT + 2 * LEAST_WEIGHT
 def sample(device: str, seq: int) -> Publication:
     measured = Sample(device, "k", seq, 1000 * seq, "synced", None, {}, (), "bad", "timeout", None)
     topic = publication.device_topic(device, publication.TELEMETRY)
-    return Publication(topic, {}, Kind.SAMPLE, retain=False, qos=1, sample=measured)
+    return Publication(topic, {}, PublicationKind.SAMPLE, retain=False, qos=1, sample=measured)
 
 
 @dataclass
@@ -56,7 +56,7 @@ class Uplink:
     changes: dict[str, float] = field(default_factory=dict)
     """How long each change of a retained topic took to be acknowledged."""
     asked: dict[str, float] = field(default_factory=dict)
-    acknowledgements: list[tuple[float, int, Letter]] = field(default_factory=list)
+    acknowledgements: list[tuple[float, int, OutboxItem]] = field(default_factory=list)
     most_under_way: int = 0
     events: int = 0
     warned: list[float] = field(default_factory=list)
@@ -120,9 +120,9 @@ class Uplink:
             heapq.heappush(self.acknowledgements, (self.now + self.round_trip, next(self._numbers), letter))
         under_way = self.outbox.under_way
         assert len(under_way) <= min(self.window, IN_FLIGHT_MOST)
-        self.most_under_way = max(self.most_under_way, sum(isinstance(each, Array) for each in under_way))
+        self.most_under_way = max(self.most_under_way, sum(isinstance(each, HistoryBatch) for each in under_way))
 
-    def _acknowledge(self, letter: Letter) -> None:
+    def _acknowledge(self, letter: OutboxItem) -> None:
         self.outbox.settled(letter, self.now)
         if self.outbox.congested(self.now) is not None:
             self.warned.append(self.now)
@@ -269,7 +269,7 @@ def test_a_fast_device_takes_no_turns_from_a_slow_one() -> None:
         outbox.add(sample("fast", seq), 0.0)
     outbox.add(sample("slow", 1), 0.1)
     order = []
-    while isinstance(letter := outbox.next(0.2), Live):
+    while isinstance(letter := outbox.next(0.2), LiveSample):
         order.append(letter.kept.key[0])
     assert order == ["fast", "slow", "fast", "fast"]
 

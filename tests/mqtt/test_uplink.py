@@ -18,10 +18,10 @@ from lfs10d.mqtt.settings import BrokerSettings, Version
 from lfs10d.mqtt.topics import InboundRequest
 from lfs10d.mqtt.uplink import Uplink
 from lfs10d.outbox.store.database import Limits
-from lfs10d.outbox.store.sample_file import Entry
+from lfs10d.outbox.store.sample_file import StoreEntry
 from lfs10d.outbox.store.store import Store
 from lfs10d.telemetry import publication
-from lfs10d.telemetry.publication import Kind, Publication, Sample
+from lfs10d.telemetry.publication import Publication, PublicationKind, Sample
 from tests.support.brokers import Listener, Mosquitto
 from tests.support.old_brokers import OldBroker
 
@@ -35,7 +35,7 @@ def sample(seq: int, device: str = "a") -> Publication:
         ("wind_speed",), "good", None, 18.2,
     )  # fmt: skip
     topic = publication.device_topic(device, publication.TELEMETRY)
-    return Publication(topic, measured.payload("line0"), Kind.SAMPLE, retain=False, qos=1, sample=measured)
+    return Publication(topic, measured.payload("line0"), PublicationKind.SAMPLE, retain=False, qos=1, sample=measured)
 
 
 class Site:
@@ -467,7 +467,7 @@ def test_beyond_ten_thousand_samples_the_oldest_go_and_that_is_told_once(
         async with running(Site(unused_port)) as uplink:
             uplink.publish(sample(seq) for seq in range(1, 10_002))
             uplink.publish([sample(10_002)])
-            assert uplink.backlog == publication.Backlog(depth=10_000, oldest_ts=3000, dropped=2)
+            assert uplink.backlog == publication.BacklogStats(depth=10_000, oldest_ts=3000, dropped=2)
 
     asyncio.run(scenario())
     assert sum("the oldest are dropped" in each for each in caplog.messages) == 1
@@ -593,7 +593,7 @@ def test_while_a_backlog_on_disk_leaves_in_order_live_samples_stay_live(mosquitt
     limits = Limits(size=10**9, age=10**12)
     store = Store(tmp_path, boot="k0000000", limits=limits)
     kept = [sample(seq, "b").sample for seq in range(1, stored + 1)]
-    store.append([Entry(each, 0) for each in kept if each is not None], losses=(), now=0, mono=0)
+    store.append([StoreEntry(each, 0) for each in kept if each is not None], losses=(), now=0, mono=0)
     store.close()
 
     async def scenario() -> None:

@@ -10,12 +10,20 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
 from lfs10d.outbox.backlog import AWAY_AFTER, PAST_AFTER, SPILL_EVERY, SPILL_MOST
-from lfs10d.outbox.items import Array, Declaration, Letter, Live, samples_of
+from lfs10d.outbox.items import HistoryBatch, LiveSample, LossNotice, OutboxItem, samples_of
 from lfs10d.outbox.losses import DECLARED_EVERY, Loss
 from lfs10d.outbox.outbox import Outbox
-from lfs10d.outbox.store.sample_file import Row
-from lfs10d.system.clock import ClockState
-from lfs10d.telemetry.publication import TELEMETRY, Backlog, Kind, Publication, Sample, device_topic, retained
+from lfs10d.outbox.store.sample_file import StoredRow
+from lfs10d.system.clock_step import ClockState
+from lfs10d.telemetry.publication import (
+    TELEMETRY,
+    BacklogStats,
+    Publication,
+    PublicationKind,
+    Sample,
+    device_topic,
+    retained,
+)
 
 NOT_AUTHORIZED, QUOTA_EXCEEDED = 0x87, 0x97
 ONLINE = retained("availability", "online")
@@ -24,7 +32,7 @@ ONLINE = retained("availability", "online")
 def sample(seq: int, device: str = "a", *, boot: str = "k2", clock: ClockState = "synced") -> Publication:
     measured = Sample(device, boot, seq, 1000 * seq, clock, None, {}, (), "bad", "timeout", None)
     topic = device_topic(device, TELEMETRY)
-    return Publication(topic, measured.payload("line0"), Kind.SAMPLE, retain=False, qos=1, sample=measured)
+    return Publication(topic, measured.payload("line0"), PublicationKind.SAMPLE, retain=False, qos=1, sample=measured)
 
 
 @dataclass
@@ -32,7 +40,7 @@ class MemoryStore:
     """What the store does, without a disk. `room`: rows that fit."""
 
     room: int = 10**9
-    rows: dict[int, Row] = field(default_factory=dict)
+    rows: dict[int, StoredRow] = field(default_factory=dict)
     next: int = 1
     losses: tuple[Loss, ...] = ()
     broken: bool = False
@@ -55,7 +63,7 @@ class MemoryStore:
             return
         delivered, evicted = past.stored.delivered, []
         for each in kept:
-            self.rows[self.next] = Row(self.next, each.sample, each.shift, each.repeated)
+            self.rows[self.next] = StoredRow(self.next, each.sample, each.shift, each.repeated)
             self.next += 1
         for number in [number for number in self.rows if number > past.beyond]:
             if len(self.rows) <= self.room:
@@ -111,7 +119,7 @@ def connect(outbox: Outbox, now: float) -> None:
         outbox.settled(letter, now)
 
 
-def seqs(letter: Letter | None) -> list[int]:
+def seqs(letter: OutboxItem | None) -> list[int]:
     assert letter is not None
     return [kept.sample.seq for kept in samples_of(letter)]
 
@@ -141,7 +149,7 @@ def test_before_the_first_connect_what_is_older_than_three_seconds_is_kept_at_on
     assert not store.spill(outbox, 8.0)
     assert store.spill(outbox, 8.1)
     assert len(store.rows) == 2
-    assert outbox.backlog == Backlog(depth=2, oldest_ts=1000, dropped=0)
+    assert outbox.backlog == BacklogStats(depth=2, oldest_ts=1000, dropped=0)
 
 
 def test_a_broker_that_is_back_within_three_seconds_costs_no_write() -> None:
@@ -232,7 +240,7 @@ def test_on_return_the_past_comes_from_the_store_first_and_then_from_memory() ->
         assert due is not None
         now = max(now, due)
         array = outbox.next(now)
-        assert isinstance(array, Array)
+        assert isinstance(array, HistoryBatch)
         told += seqs(array)
         outbox.settled(array, now)
     assert told == list(range(1, 22))
@@ -247,7 +255,7 @@ def test_a_loss_in_the_middle_sends_once_more_what_was_acknowledged_lately_and_t
     connect(outbox, 100.0)
     store.page(outbox, 110.0)
     first = outbox.next(110.0)
-    assert isinstance(first, Array)
+    assert isinstance(first, HistoryBatch)
     outbox.settled(first, 110.0)
     store.page(outbox, 110.0)
     assert seqs(outbox.next(110.2)) == list(range(8, 15))
@@ -266,14 +274,14 @@ def test_an_array_of_the_store_that_is_too_large_is_cut_and_a_dead_sample_declar
     connect(outbox, 100.0)
     store.page(outbox, 110.0)
     both = outbox.next(110.0)
-    assert isinstance(both, Array)
+    assert isinstance(both, HistoryBatch)
     assert not outbox.unfit(both)
     one = outbox.next(110.0)
-    assert isinstance(one, Array)
+    assert isinstance(one, HistoryBatch)
     assert seqs(one) == [1]
     assert outbox.unfit(one)
     declaration = outbox.next(110.0)
-    assert isinstance(declaration, Declaration)
+    assert isinstance(declaration, LossNotice)
     assert outbox.past.undeclared() == [Loss("a", "k2", 1, 1, 1)]
     outbox.settled(declaration, 110.0)
     assert seqs(outbox.next(110.2)) == [2]
@@ -297,7 +305,7 @@ def test_samples_of_earlier_boots_come_first_and_never_in_one_array_with_others(
     told = []
     for now in (15.0, 15.2):
         array = outbox.next(now)
-        assert isinstance(array, Array)
+        assert isinstance(array, HistoryBatch)
         told.append([(kept.sample.boot, kept.sample.seq) for kept in array.samples])
         outbox.settled(array, now)
     assert told == [[("k1", 8), ("k1", 9)], [("k2", 1)]]
@@ -308,7 +316,7 @@ def test_samples_of_earlier_boots_come_first_and_never_in_one_array_with_others(
 
 def heard_by_nobody(outbox: Outbox, now: float) -> None:
     letter = outbox.next(now)
-    assert isinstance(letter, Live)
+    assert isinstance(letter, LiveSample)
     outbox.settled(letter, now, heard=False)
 
 
@@ -324,7 +332,7 @@ def test_what_nobody_listened_to_after_the_first_connect_of_a_life_goes_once_mor
     assert outbox.due() == PAST_AFTER
     assert outbox.next(PAST_AFTER - 0.1) is None
     array = outbox.next(PAST_AFTER)
-    assert isinstance(array, Array)
+    assert isinstance(array, HistoryBatch)
     assert [(kept.sample.seq, kept.repeated) for kept in array.samples] == [(1, True)]
     outbox.settled(array, PAST_AFTER)
     outbox.add(sample(3), 11.0)
@@ -370,14 +378,16 @@ def test_a_clock_set_right_corrects_what_waits_wherever_it_waits_and_nothing_els
     outbox.add(sample(3, clock="unsynced"), 8.0, shift=500)
     outbox.add(sample(4), 8.0, shift=7000)
     ours, earlier = sample_of(sample(9, clock="unsynced")), sample_of(sample(8))
-    outbox.past.stored.take_page([Row(1, ours, 0, repeated=False), Row(2, earlier, None, repeated=False)], 9)
+    outbox.past.stored.take_page(
+        [StoredRow(1, ours, 0, repeated=False), StoredRow(2, earlier, None, repeated=False)], 9
+    )
     outbox.correct(7000)
     outbox.not_spilled(8.0)
     connect(outbox, 8.1)
     live = [outbox.next(8.1), outbox.next(8.1)]
     told = []
     for letter in live:
-        assert isinstance(letter, Live)
+        assert isinstance(letter, LiveSample)
         payload = letter.publication.payload
         assert isinstance(payload, dict)
         told.append((payload["seq"], payload["ts"], payload["time"], payload["clock"]))
@@ -446,11 +456,11 @@ def test_where_history_is_refused_the_store_keeps_it_and_the_others_go_on() -> N
     connect(outbox, 10.0)
     store.page(outbox, 20.0)  # both in one, and one row more after it
     array = outbox.next(20.0)
-    assert isinstance(array, Array)
+    assert isinstance(array, HistoryBatch)
     assert outbox.refused(array, 0x87, 20.0)
     for now in (20.2, 20.4):
         other = outbox.next(now)
-        assert isinstance(other, Array)
+        assert isinstance(other, HistoryBatch)
         assert other.topic == "device/b/history"
         outbox.settled(other, now)
         assert outbox.next(now + 0.1) is None
@@ -483,17 +493,17 @@ def test_a_topic_that_is_tried_again_on_the_same_connection_gets_what_it_missed_
     connect(outbox, 10.0)
     store.page(outbox, 20.0, most=20)
     array = outbox.next(20.0)
-    assert isinstance(array, Array)
+    assert isinstance(array, HistoryBatch)
     assert outbox.refused(array, QUOTA_EXCEEDED, 20.0)
     other = outbox.next(20.2)
-    assert isinstance(other, Array)
+    assert isinstance(other, HistoryBatch)
     outbox.settled(other, 20.2)
     assert outbox.next(20.4) is None
     assert (outbox.due(), outbox.depth) == (21.0, 4)
     assert outbox.next(21.0) is None
     assert store.page(outbox, 21.0, most=20)
     last = outbox.next(21.2)
-    assert isinstance(last, Array)
+    assert isinstance(last, HistoryBatch)
     assert (last.topic, seqs(last)) == ("device/a/history", [1, 2, 3, 4])
     outbox.settled(last, 21.2)
     assert (outbox.next(22.0), outbox.depth) == (None, 0)
@@ -512,7 +522,7 @@ def test_what_would_be_refused_is_not_sent_and_waits() -> None:
     outbox.add(sample(1), 0.0)
     connect(outbox, 10.0)
     array = outbox.next(20.0)
-    assert isinstance(array, Array)
+    assert isinstance(array, HistoryBatch)
     assert outbox.refused(array, 0x87, 20.0)
     outbox.add(sample(4), 20.0)
     outbox.age(30.0)
@@ -523,7 +533,7 @@ def test_what_would_be_refused_is_not_sent_and_waits() -> None:
 def test_where_events_are_refused_losses_wait_and_the_past_goes_on() -> None:
     outbox = lost_three()
     declaration = outbox.next(20.0)
-    assert isinstance(declaration, Declaration)
+    assert isinstance(declaration, LossNotice)
     assert outbox.refused(declaration, 0x87, 20.0)
     outbox.add(sample(1, "b"), 20.0)
     outbox.age(30.0)
@@ -542,12 +552,12 @@ def test_losing_a_connection_that_never_was_is_no_new_absence() -> None:
 
 def test_a_declaration_under_way_is_made_again_after_a_loss_and_kept_until_then() -> None:
     outbox = lost_three()
-    assert isinstance(outbox.next(30.0), Declaration)
+    assert isinstance(outbox.next(30.0), LossNotice)
     assert outbox.past.undeclared() == [Loss("a", "k2", 1, 3, 3)]
     outbox.lost(31.0)
     assert outbox.past.undeclared() == [Loss("a", "k2", 1, 3, 3)]
     connect(outbox, 32.0)
-    assert isinstance(outbox.next(42.0), Declaration)
+    assert isinstance(outbox.next(42.0), LossNotice)
 
 
 def test_an_array_of_memory_that_is_too_large_is_cut() -> None:
@@ -556,7 +566,7 @@ def test_an_array_of_memory_that_is_too_large_is_cut() -> None:
         outbox.add(sample(seq), 0.0)
     connect(outbox, 10.0)
     array = outbox.next(20.0)
-    assert isinstance(array, Array)
+    assert isinstance(array, HistoryBatch)
     assert not outbox.unfit(array)
     assert seqs(outbox.next(20.0)) == [1, 2]
 
@@ -568,7 +578,7 @@ def test_an_array_that_ended_its_connection_leaves_shorter_ones_after_it_for_a_t
     for now in (10.0, 30.0, 100.0, 130.0, 160.0):
         connect(outbox, now)
         array = outbox.next(now + 10.0)
-        assert isinstance(array, Array)
+        assert isinstance(array, HistoryBatch)
         lengths.append(len(array.samples))
         if now == 10.0:
             outbox.past.cut_for(array, 90.0)
@@ -586,7 +596,7 @@ def test_an_array_of_the_store_is_shortened_and_refused_without_a_loss() -> None
     connect(outbox, 10.0)
     store.page(outbox, 20.0)
     array = outbox.next(20.0)
-    assert isinstance(array, Array)
+    assert isinstance(array, HistoryBatch)
     shorter = outbox.past.shorten(array, 2)
     assert seqs(shorter) == [1, 2]
     outbox.past.refused(shorter)
@@ -615,7 +625,7 @@ def test_what_is_acknowledged_until_the_past_is_opened_goes_once_more_and_nothin
     for seq, now in ((1, 60.5), (2, 69.5), (3, 80.0)):
         outbox.add(sample(seq), now)
         letter = outbox.next(now)
-        assert isinstance(letter, Live)
+        assert isinstance(letter, LiveSample)
         outbox.settled(letter, now)
     assert seqs(outbox.next(80.0)) == [1, 2]
 
@@ -630,7 +640,7 @@ def test_what_was_acknowledged_before_is_no_loss_when_its_second_sending_is_unfi
     outbox.lost(51.0)
     connect(outbox, 52.0)
     again = outbox.next(62.0)
-    assert isinstance(again, Array)
+    assert isinstance(again, HistoryBatch)
     assert outbox.unfit(again)
     assert outbox.past.undeclared() == []
 
@@ -643,7 +653,7 @@ def test_the_broker_is_away_until_it_is_there_and_when_it_is_gone() -> None:
     outbox.lost(1.0)
     told.append(outbox.past.away)
     assert told == [True, False, True]
-    assert outbox.backlog == Backlog()
+    assert outbox.backlog == BacklogStats()
 
 
 # Laws
@@ -750,8 +760,8 @@ class PastLaws(RuleBasedStateMachine):
         else:
             self.settle(letter)
 
-    def settle(self, letter: Letter) -> None:
-        if isinstance(letter, Array):
+    def settle(self, letter: OutboxItem) -> None:
+        if isinstance(letter, HistoryBatch):
             kept = [(each.sample.boot, each.sample.seq) for each in letter.samples]
             assert kept == sorted(set(kept))
             assert len({each.key for each in letter.samples}) == 1
@@ -759,7 +769,7 @@ class PastLaws(RuleBasedStateMachine):
         for each in samples_of(letter):
             key = (each.sample.device, each.sample.boot, each.sample.seq)
             self.delivered.setdefault(key, []).append(self.now)
-        if isinstance(letter, Declaration):
+        if isinstance(letter, LossNotice):
             self.declared.append(letter.loss)
 
     @invariant()

@@ -7,16 +7,16 @@ from dataclasses import replace
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.outbox.history import History, Kept
+from lfs10d.outbox.history import History, QueuedSample
 from lfs10d.telemetry.publication import Sample
 
 
-def kept(device: str, seq: int, since: float | None = None, *, repeated: bool = False) -> Kept:
+def kept(device: str, seq: int, since: float | None = None, *, repeated: bool = False) -> QueuedSample:
     sample = Sample(device, "k", seq, 0, "synced", None, {}, (), "bad", "timeout", None)
-    return Kept(sample, float(seq) if since is None else since, repeated)
+    return QueuedSample(sample, float(seq) if since is None else since, repeated)
 
 
-def seqs(taken: tuple[Kept, ...]) -> list[tuple[str, int]]:
+def seqs(taken: tuple[QueuedSample, ...]) -> list[tuple[str, int]]:
     return [(each.sample.device, each.sample.seq) for each in taken]
 
 
@@ -69,7 +69,7 @@ def test_no_more_are_taken_than_asked_for() -> None:
 def test_one_array_never_mixes_boots() -> None:
     history = History()
     other = Sample("a", "j", 9, 0, "synced", None, {}, (), "bad", "timeout", None)
-    history.extend([kept("a", 1), Kept(other, 0.0)])
+    history.extend([kept("a", 1), QueuedSample(other, 0.0)])
     assert [each.sample.boot for each in history.take(100)] == ["j"]
 
 
@@ -108,7 +108,7 @@ def test_whatever_the_order_of_arrival_each_device_leaves_in_order_of_seq(
 def test_a_clock_set_right_corrects_what_had_none_and_knows_its_shift() -> None:
     unsynced = replace(kept("a", 1).sample, clock="unsynced", ts=5000)
     history = History()
-    history.extend([Kept(unsynced, 1.0, shift=1000), Kept(replace(unsynced, seq=2), 2.0), kept("a", 3)])
+    history.extend([QueuedSample(unsynced, 1.0, shift=1000), QueuedSample(replace(unsynced, seq=2), 2.0), kept("a", 3)])
     history.correct(9000)
     told = [(each.sample.ts, each.sample.clock, each.shift) for each in history.take(9)]
     assert told == [(13_000, "synced", 9000), (5000, "unsynced", None), (0, "synced", None)]
@@ -117,7 +117,9 @@ def test_a_clock_set_right_corrects_what_had_none_and_knows_its_shift() -> None:
 def test_a_clock_that_was_set_corrects_what_waited_before_and_marks_it() -> None:
     unknown = replace(kept("a", 1).sample, clock="unknown", ts=5000)
     history = History()
-    history.extend([Kept(unknown, 1.0, shift=1000), Kept(replace(unknown, seq=2), 2.0, shift=8900), kept("a", 3)])
+    history.extend(
+        [QueuedSample(unknown, 1.0, shift=1000), QueuedSample(replace(unknown, seq=2), 2.0, shift=8900), kept("a", 3)]
+    )
     history.correct(9000, "unsynced")
     told = [(each.sample.ts, each.sample.clock, each.shift) for each in history.take(9)]
     assert told == [(13_000, "unsynced", 9000), (5000, "unknown", 8900), (0, "synced", None)]

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from lfs10d.outbox.history import Kept
-from lfs10d.outbox.items import Array, Declaration, Letter, Live, Message, Retained, samples_of
+from lfs10d.outbox.history import QueuedSample
+from lfs10d.outbox.items import HistoryBatch, LiveSample, LossNotice, Message, OutboxItem, Retained, samples_of
 from lfs10d.outbox.losses import Loss
-from lfs10d.telemetry.publication import Kind, Publication, event, retained
+from lfs10d.telemetry.publication import Publication, PublicationKind, event, retained
 from tests.support.samples import SAMPLE
 
-KEPT = Kept(SAMPLE, since=0.0)
-NEXT = Kept(SAMPLE, since=1.0)
-LIVE = Publication("device/mast-top/telemetry", {}, Kind.SAMPLE, retain=False, qos=1, sample=SAMPLE)
+KEPT = QueuedSample(SAMPLE, since=0.0)
+NEXT = QueuedSample(SAMPLE, since=1.0)
+LIVE = Publication("device/mast-top/telemetry", {}, PublicationKind.SAMPLE, retain=False, qos=1, sample=SAMPLE)
 
 
 @pytest.mark.parametrize(
@@ -20,15 +20,17 @@ LIVE = Publication("device/mast-top/telemetry", {}, Kind.SAMPLE, retain=False, q
     [
         (Retained(retained("line/state", {})), "line/state", ()),
         (Message(event("device_added", 0), b"c"), "event", ()),
-        (Live(LIVE, KEPT), "device/mast-top/telemetry", (KEPT,)),
-        (Array((KEPT, NEXT)), "device/mast-top/history", (KEPT, NEXT)),
-        (Declaration(Loss("mast-top", "k3f9a2c7", 1, 2, 2)), "event", ()),
+        (LiveSample(LIVE, KEPT), "device/mast-top/telemetry", (KEPT,)),
+        (HistoryBatch((KEPT, NEXT)), "device/mast-top/history", (KEPT, NEXT)),
+        (LossNotice(Loss("mast-top", "k3f9a2c7", 1, 2, 2)), "event", ()),
     ],
 )
-def test_each_letter_has_its_topic_and_its_samples(letter: Letter, topic: str, samples: tuple[Kept, ...]) -> None:
+def test_each_letter_has_its_topic_and_its_samples(
+    letter: OutboxItem, topic: str, samples: tuple[QueuedSample, ...]
+) -> None:
     assert (letter.topic, samples_of(letter)) == (topic, samples)
 
 
 def test_two_letters_that_say_the_same_are_two_messages() -> None:
-    letters: list[Letter] = [Live(LIVE, KEPT), Live(LIVE, KEPT)]
+    letters: list[OutboxItem] = [LiveSample(LIVE, KEPT), LiveSample(LIVE, KEPT)]
     assert letters.index(letters[1]) == 1

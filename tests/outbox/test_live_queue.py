@@ -7,21 +7,21 @@ from dataclasses import replace
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.outbox.history import Kept
-from lfs10d.outbox.items import Live
+from lfs10d.outbox.history import QueuedSample
+from lfs10d.outbox.items import LiveSample
 from lfs10d.outbox.live_queue import LiveQueue
-from lfs10d.telemetry.publication import Kind, Publication, Sample
+from lfs10d.telemetry.publication import Publication, PublicationKind, Sample
 
 
-def live(device: str, seq: int, since: float = 0.0) -> Live:
+def live(device: str, seq: int, since: float = 0.0) -> LiveSample:
     measured = Sample(device, "k", seq, 1000 * seq, "synced", None, {}, (), "bad", "timeout", None)
-    return Live(
-        Publication(f"device/{device}/telemetry", {}, Kind.SAMPLE, retain=False, qos=1, sample=measured),
-        Kept(measured, since),
+    return LiveSample(
+        Publication(f"device/{device}/telemetry", {}, PublicationKind.SAMPLE, retain=False, qos=1, sample=measured),
+        QueuedSample(measured, since),
     )
 
 
-def told(letter: Live | None) -> tuple[str, int] | None:
+def told(letter: LiveSample | None) -> tuple[str, int] | None:
     return None if letter is None else (letter.kept.sample.device, letter.kept.sample.seq)
 
 

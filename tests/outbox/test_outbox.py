@@ -12,28 +12,28 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
 from lfs10d.outbox.backlog import ARRAY_MOST, PAST_AFTER, SAMPLE_EVERY, TURN_EVERY
-from lfs10d.outbox.history import Kept
-from lfs10d.outbox.items import Array, Declaration, Letter, Live, Message, Retained, samples_of
+from lfs10d.outbox.history import QueuedSample
+from lfs10d.outbox.items import HistoryBatch, LiveSample, LossNotice, Message, OutboxItem, Retained, samples_of
 from lfs10d.outbox.losses import DECLARED_EVERY, Loss
 from lfs10d.outbox.outbox import LIVE_FOR, MESSAGES_MOST, Outbox
 from lfs10d.outbox.refusals import BANNED_FOR
-from lfs10d.system.clock import ClockState
+from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry import publication as telemetry
-from lfs10d.telemetry.publication import Kind, Publication, Sample
+from lfs10d.telemetry.publication import Publication, PublicationKind, Sample
 
 ARRAY_EVERY = ARRAY_MOST * SAMPLE_EVERY
 NOT_AUTHORIZED = 0x87
 QUOTA_EXCEEDED = 0x97
 ONLINE = telemetry.retained("availability", "online")
 
-AnyLetter = TypeVar("AnyLetter", bound=Letter)
+AnyLetter = TypeVar("AnyLetter", bound=OutboxItem)
 
 
 def sample(seq: int, device: str = "a") -> Publication:
     """Return a live sample; its ts is 1000 x seq."""
     measured = Sample(device, "k", seq, 1000 * seq, "synced", None, {}, (), "bad", "timeout", None)
     topic = telemetry.device_topic(device, telemetry.TELEMETRY)
-    return Publication(topic, {}, Kind.SAMPLE, retain=False, qos=1, sample=measured)
+    return Publication(topic, {}, PublicationKind.SAMPLE, retain=False, qos=1, sample=measured)
 
 
 def state(version: int, device: str = "a") -> Publication:
@@ -41,10 +41,10 @@ def state(version: int, device: str = "a") -> Publication:
 
 
 def trace(number: int) -> Publication:
-    return Publication("trace", {"n": number}, Kind.TRACE, retain=False, qos=0)
+    return Publication("trace", {"n": number}, PublicationKind.TRACE, retain=False, qos=0)
 
 
-def seqs(letter: Letter | None) -> list[int]:
+def seqs(letter: OutboxItem | None) -> list[int]:
     assert letter is not None
     return [kept.sample.seq for kept in samples_of(letter)]
 
@@ -95,7 +95,7 @@ def test_after_a_connect_the_burst_goes_first_and_online_when_all_of_it_is_settl
     outbox.settled(first, 0.0)
     online = take(outbox, 0.0, Retained)
     assert online.publication is ONLINE
-    assert take(outbox, 0.0, Live).kept.sample.seq == 1
+    assert take(outbox, 0.0, LiveSample).kept.sample.seq == 1
     assert not outbox.announced
     outbox.settled(online, 0.0)
     assert outbox.announced
@@ -128,7 +128,7 @@ def test_a_flood_of_responses_delays_no_sample() -> None:
     outbox.add(sample(1), 0.0)
     outbox.add(sample(2), 0.0)
     kinds = [type(outbox.next(0.0)) for _ in range(6)]
-    assert kinds == [Message, Live, Message, Live, Message, Message]
+    assert kinds == [Message, LiveSample, Message, LiveSample, Message, Message]
 
 
 def test_classes_go_in_order() -> None:
@@ -139,14 +139,14 @@ def test_classes_go_in_order() -> None:
     outbox.add(state(1), 1.0)
     assert take(outbox, 1.0, Retained).topic == "device/a/state"
     assert take(outbox, 1.0, Message).topic == "event"
-    assert take(outbox, 1.0, Live).topic == "device/a/telemetry"
+    assert take(outbox, 1.0, LiveSample).topic == "device/a/telemetry"
     assert take(outbox, 1.0, Message).topic == "trace"
     assert outbox.next(1.0) is None
 
 
 def test_a_response_keeps_its_correlation() -> None:
     outbox = connected()
-    response = Publication("response/health", {}, Kind.RESPONSE, retain=False, qos=1)
+    response = Publication("response/health", {}, PublicationKind.RESPONSE, retain=False, qos=1)
     outbox.add(response, 0.0, correlation=b"\1")
     assert take(outbox, 0.0, Message).correlation == b"\1"
 
@@ -156,8 +156,8 @@ def test_no_more_than_the_window_is_under_way() -> None:
     connect(outbox, 0.0, window=2)
     for seq in range(1, 4):
         outbox.add(sample(seq), 0.0)
-    first = take(outbox, 0.0, Live)
-    take(outbox, 0.0, Live)
+    first = take(outbox, 0.0, LiveSample)
+    take(outbox, 0.0, LiveSample)
     assert outbox.next(0.0) is None
     outbox.settled(first, 0.0)
     assert seqs(outbox.next(0.0)) == [3]
@@ -229,9 +229,9 @@ def test_a_sample_older_than_three_seconds_is_history() -> None:
     outbox.add(sample(1), 0.0)
     outbox.add(sample(2), 0.1)
     live = outbox.next(LIVE_FOR + 0.05)
-    assert isinstance(live, Live)
+    assert isinstance(live, LiveSample)
     assert seqs(live) == [2]
-    assert seqs(take(outbox, LIVE_FOR + 0.05, Array)) == [1]
+    assert seqs(take(outbox, LIVE_FOR + 0.05, HistoryBatch)) == [1]
 
 
 def test_the_past_is_opened_ten_seconds_after_a_connect() -> None:
@@ -240,7 +240,7 @@ def test_the_past_is_opened_ten_seconds_after_a_connect() -> None:
     connect(outbox, 100.0)
     assert outbox.next(100.0 + PAST_AFTER - 0.01) is None
     assert outbox.due() == 100.0 + PAST_AFTER
-    array = take(outbox, 100.0 + PAST_AFTER, Array)
+    array = take(outbox, 100.0 + PAST_AFTER, HistoryBatch)
     assert array.topic == "device/a/history"
 
 
@@ -252,7 +252,7 @@ def test_an_array_has_at_most_100_samples_of_one_device_in_order() -> None:
     connect(outbox, 50.0)
     now, arrays = 60.0, []
     while outbox.depth:
-        letter = take(outbox, now, Array)
+        letter = take(outbox, now, HistoryBatch)
         assert len({kept.sample.device for kept in letter.samples}) == 1
         arrays.append((letter.topic, seqs(letter)))
         outbox.settled(letter, now)
@@ -268,13 +268,13 @@ def test_one_array_is_under_way_at_a_time_and_a_thousand_samples_leave_in_a_seco
     for seq in range(1, 301):
         outbox.add(sample(seq), 0.0)
     connect(outbox, 50.0)
-    first = take(outbox, 60.0, Array)
+    first = take(outbox, 60.0, HistoryBatch)
     assert outbox.next(60.5) is None
     assert outbox.due() == 60.0 + TURN_EVERY  # contract, section 3: one array at least every 2 s, whatever is under way
     outbox.settled(first, 60.05)
     assert outbox.next(60.05) is None
     assert outbox.due() == 60.0 + ARRAY_EVERY
-    assert isinstance(outbox.next(60.0 + ARRAY_EVERY), Array)
+    assert isinstance(outbox.next(60.0 + ARRAY_EVERY), HistoryBatch)
 
 
 def test_live_samples_go_before_the_past() -> None:
@@ -282,8 +282,8 @@ def test_live_samples_go_before_the_past() -> None:
     outbox.add(sample(1), 0.0)
     connect(outbox, 50.0)
     outbox.add(sample(2), 60.0)
-    assert isinstance(outbox.next(60.0), Live)
-    assert isinstance(outbox.next(60.0), Array)
+    assert isinstance(outbox.next(60.0), LiveSample)
+    assert isinstance(outbox.next(60.0), HistoryBatch)
 
 
 # Loss of the connection
@@ -293,8 +293,8 @@ def test_what_is_under_way_when_the_connection_is_lost_waits_again_in_order() ->
     outbox = connected()
     for seq in range(1, 4):
         outbox.add(sample(seq), 0.0)
-    take(outbox, 0.0, Live)
-    take(outbox, 0.0, Live)
+    take(outbox, 0.0, LiveSample)
+    take(outbox, 0.0, LiveSample)
     outbox.lost(0.1)
     assert outbox.under_way == ()
     connect(outbox, 0.2)
@@ -305,7 +305,7 @@ def test_an_array_under_way_when_the_connection_is_lost_waits_again() -> None:
     outbox = Outbox()
     outbox.add(sample(1), 0.0)
     connect(outbox, 10.0)
-    take(outbox, 20.0, Array)
+    take(outbox, 20.0, HistoryBatch)
     outbox.lost(21.0)
     connect(outbox, 22.0)
     assert seqs(outbox.next(32.0)) == [1]
@@ -314,18 +314,18 @@ def test_an_array_under_way_when_the_connection_is_lost_waits_again() -> None:
 def test_an_unfit_array_is_declared_but_for_what_was_acknowledged_before() -> None:
     outbox = connected(now=-100.0)
     outbox.add(sample(1), 0.0)
-    outbox.settled(take(outbox, 0.0, Live), 0.0)
+    outbox.settled(take(outbox, 0.0, LiveSample), 0.0)
     outbox.lost(1.0)
     outbox.add(sample(2), 1.0)
     connect(outbox, 10.0)
-    array = take(outbox, 20.0, Array)
+    array = take(outbox, 20.0, HistoryBatch)
     assert seqs(array) == [1, 2]
     assert not outbox.unfit(array)
     for seq in (1, 2):
-        one = take(outbox, 20.0 + seq, Array)
+        one = take(outbox, 20.0 + seq, HistoryBatch)
         assert seqs(one) == [seq]
         assert outbox.unfit(one) is (seq == 1)
-    assert take(outbox, 23.0, Declaration).loss == Loss("a", "k", 2, 2, 1)
+    assert take(outbox, 23.0, LossNotice).loss == Loss("a", "k", 2, 2, 1)
 
 
 def test_messages_under_way_wait_again_in_order_and_traces_do_not() -> None:
@@ -373,13 +373,13 @@ def test_what_was_acknowledged_around_a_loss_goes_once_more_ten_seconds_after_th
     outbox = connected(now=-100.0)
     for seq, now in ((1, 0.0), (2, 15.0), (3, 24.0)):
         outbox.add(sample(seq), now)
-        outbox.settled(take(outbox, now, Live), now)
+        outbox.settled(take(outbox, now, LiveSample), now)
     outbox.lost(25.0)
     outbox.add(sample(4), 26.0)
     connect(outbox, 40.0)
     outbox.add(sample(5), 45.0)
-    outbox.settled(take(outbox, 45.0, Live), 45.0)
-    array = take(outbox, 50.0, Array)
+    outbox.settled(take(outbox, 45.0, LiveSample), 45.0)
+    array = take(outbox, 50.0, HistoryBatch)
     assert seqs(array) == [2, 3, 4, 5]
     outbox.settled(array, 50.0)
     assert outbox.next(51.0) is None
@@ -389,7 +389,7 @@ def test_what_was_acknowledged_around_a_loss_goes_once_more_ten_seconds_after_th
 def test_there_is_no_second_sending_without_a_loss() -> None:
     outbox = connected(now=0.0)
     outbox.add(sample(1), 5.0)
-    outbox.settled(take(outbox, 5.0, Live), 5.0)
+    outbox.settled(take(outbox, 5.0, LiveSample), 5.0)
     assert outbox.next(20.0) is None
     assert outbox.due() is None
 
@@ -397,7 +397,7 @@ def test_there_is_no_second_sending_without_a_loss() -> None:
 def test_the_second_sending_is_due_by_time_alone() -> None:
     outbox = connected(now=0.0)
     outbox.add(sample(1), 5.0)
-    outbox.settled(take(outbox, 5.0, Live), 5.0)
+    outbox.settled(take(outbox, 5.0, LiveSample), 5.0)
     outbox.lost(6.0)
     connect(outbox, 7.0)
     assert outbox.due() == 7.0 + PAST_AFTER
@@ -407,7 +407,7 @@ def test_a_connection_found_dead_late_still_repeats_the_last_ten_seconds_it_ackn
     outbox = connected(now=-100.0)
     for now in (0.0, 6.0):
         outbox.add(sample(int(now) + 1), now)
-        outbox.settled(take(outbox, now, Live), now)
+        outbox.settled(take(outbox, now, LiveSample), now)
     outbox.lost(45.0)
     connect(outbox, 46.0)
     assert seqs(outbox.next(56.0)) == [1, 7]
@@ -417,7 +417,7 @@ def test_what_was_acknowledged_long_before_a_loss_does_not_go_again() -> None:
     outbox = Outbox(detection=40.0)
     connect(outbox, -100.0)
     outbox.add(sample(1), 0.0)
-    outbox.settled(take(outbox, 0.0, Live), 0.0)
+    outbox.settled(take(outbox, 0.0, LiveSample), 0.0)
     outbox.lost(1000.0)
     connect(outbox, 1001.0)
     assert outbox.next(1011.0) is None
@@ -426,7 +426,7 @@ def test_what_was_acknowledged_long_before_a_loss_does_not_go_again() -> None:
 def test_a_second_loss_before_the_second_sending_forgets_nothing() -> None:
     outbox = connected(now=-100.0)
     outbox.add(sample(1), 0.0)
-    outbox.settled(take(outbox, 0.0, Live), 0.0)
+    outbox.settled(take(outbox, 0.0, LiveSample), 0.0)
     outbox.lost(1.0)
     connect(outbox, 5000.0)
     outbox.lost(5001.0)
@@ -441,10 +441,10 @@ def test_beyond_the_capacity_the_oldest_is_dropped_and_declared_before_the_backl
     outbox = Outbox(capacity=3)
     for seq in range(1, 7):
         outbox.add(sample(seq), float(seq))
-    assert outbox.backlog == telemetry.Backlog(depth=3, oldest_ts=4000, dropped=3)
+    assert outbox.backlog == telemetry.BacklogStats(depth=3, oldest_ts=4000, dropped=3)
     connect(outbox, 100.0)
     assert outbox.due() == 110.0
-    declaration = take(outbox, 110.0, Declaration)
+    declaration = take(outbox, 110.0, LossNotice)
     assert (declaration.topic, declaration.loss) == ("event", Loss("a", "k", 1, 3, 3))
     assert outbox.next(110.0) is None
     outbox.settled(declaration, 110.0)
@@ -462,7 +462,7 @@ def test_what_is_only_repeated_goes_first_and_is_no_loss() -> None:
     outbox = connected(now=-100.0, capacity=4)
     for seq in (1, 2):
         outbox.add(sample(seq), 0.0)
-        outbox.settled(take(outbox, 0.0, Live), 0.0)
+        outbox.settled(take(outbox, 0.0, LiveSample), 0.0)
     outbox.lost(1.0)
     for seq in (3, 4, 5):
         outbox.add(sample(seq), 2.0)
@@ -476,16 +476,16 @@ def test_a_declaration_that_is_not_acknowledged_is_made_again() -> None:
     for seq in (1, 2):
         outbox.add(sample(seq), 0.0)
     connect(outbox, 10.0)
-    first = take(outbox, 20.0, Declaration)
+    first = take(outbox, 20.0, LossNotice)
     outbox.lost(21.0)
     connect(outbox, 30.0)
-    assert take(outbox, 40.0, Declaration).loss == first.loss
+    assert take(outbox, 40.0, LossNotice).loss == first.loss
 
 
 def test_what_is_under_way_is_never_dropped() -> None:
     outbox = connected(capacity=1)
     outbox.add(sample(1), 0.0)
-    live = take(outbox, 0.0, Live)
+    live = take(outbox, 0.0, LiveSample)
     outbox.add(sample(2), 0.0)
     assert outbox.under_way == (live,)
     assert outbox.depth == 1
@@ -499,10 +499,10 @@ def test_a_refused_topic_is_reported_once_and_its_samples_wait_for_history_until
     outbox = connected(now=-100.0)
     for seq in (1, 2, 3):
         outbox.add(sample(seq), 0.0)
-    first, second = take(outbox, 0.0, Live), take(outbox, 0.0, Live)
+    first, second = take(outbox, 0.0, LiveSample), take(outbox, 0.0, LiveSample)
     assert outbox.refused(first, NOT_AUTHORIZED, 0.0)
     assert not outbox.refused(second, NOT_AUTHORIZED, 0.0)
-    array = take(outbox, 0.0, Array)
+    array = take(outbox, 0.0, HistoryBatch)
     assert seqs(array) == [1, 2, 3]
     assert outbox.dropped == 0
     assert outbox.refused(array, NOT_AUTHORIZED, 0.0)
@@ -527,10 +527,10 @@ def test_a_refused_topic_does_not_stop_the_others() -> None:
 def test_refused_history_waits_and_the_other_devices_go_on() -> None:
     outbox = connected(now=-100.0)
     outbox.add(sample(1, "a"), 0.0)
-    assert outbox.refused(take(outbox, 50.0, Array), NOT_AUTHORIZED, 50.0)
+    assert outbox.refused(take(outbox, 50.0, HistoryBatch), NOT_AUTHORIZED, 50.0)
     outbox.add(sample(2, "a"), 50.0)
     outbox.add(sample(1, "b"), 50.1)
-    other = take(outbox, 60.0, Array)
+    other = take(outbox, 60.0, HistoryBatch)
     assert other.topic == "device/b/history"
     outbox.settled(other, 60.0)
     assert (outbox.next(61.0), outbox.dropped, outbox.depth) == (None, 0, 2)
@@ -539,7 +539,7 @@ def test_refused_history_waits_and_the_other_devices_go_on() -> None:
 def test_where_all_history_is_refused_nothing_goes_and_nothing_is_due() -> None:
     outbox = connected(now=-100.0)
     outbox.add(sample(1), 0.0)
-    assert outbox.refused(take(outbox, 50.0, Array), NOT_AUTHORIZED, 50.0)
+    assert outbox.refused(take(outbox, 50.0, HistoryBatch), NOT_AUTHORIZED, 50.0)
     outbox.add(sample(2), 50.0)
     assert outbox.next(60.0) is None
     assert (outbox.depth, outbox.due()) == (2, None)
@@ -553,7 +553,7 @@ def test_a_refused_availability_does_not_keep_the_rest_back() -> None:
     assert outbox.announced
     outbox.burst([], ONLINE)
     outbox.add(sample(1), 0.0)
-    assert isinstance(outbox.next(0.0), Live)
+    assert isinstance(outbox.next(0.0), LiveSample)
     assert outbox.announced
 
 
@@ -570,12 +570,12 @@ def test_a_refused_event_topic_keeps_losses_for_the_reload() -> None:
     for seq in (1, 2):
         outbox.add(sample(seq), 0.0)
     connect(outbox, 10.0)
-    assert outbox.refused(take(outbox, 20.0, Declaration), NOT_AUTHORIZED, 20.0)
+    assert outbox.refused(take(outbox, 20.0, LossNotice), NOT_AUTHORIZED, 20.0)
     assert outbox.due() == 20.0
-    outbox.settled(take(outbox, 20.0, Array), 20.0)
+    outbox.settled(take(outbox, 20.0, HistoryBatch), 20.0)
     assert outbox.next(200.0) is None
     assert outbox.reload(200.0)
-    assert take(outbox, 200.0, Declaration).loss.count == 1
+    assert take(outbox, 200.0, LossNotice).loss.count == 1
 
 
 def test_a_quota_is_asked_again_with_back_off_and_loses_nothing() -> None:
@@ -583,7 +583,7 @@ def test_a_quota_is_asked_again_with_back_off_and_loses_nothing() -> None:
     outbox.add(sample(1), -10.0)
     now, told, tried = 0.0, [], []
     for _ in range(9):
-        array = take(outbox, now, Array)
+        array = take(outbox, now, HistoryBatch)
         tried.append(now)
         told.append(outbox.refused(array, QUOTA_EXCEEDED, now))
         assert outbox.next(now + 0.9) is None
@@ -592,20 +592,20 @@ def test_a_quota_is_asked_again_with_back_off_and_loses_nothing() -> None:
         now = due
     assert tried == [0, 1, 3, 7, 15, 31, 63, 123, 183]
     assert told == [True, *[False] * 8]
-    outbox.settled(take(outbox, now, Array), now)
+    outbox.settled(take(outbox, now, HistoryBatch), now)
     assert (outbox.depth, outbox.dropped) == (0, 0)
 
 
 def test_a_live_sample_that_is_refused_goes_as_history_and_the_next_is_tried_live() -> None:
     outbox = connected(now=-100.0)
     outbox.add(sample(1), 0.0)
-    assert outbox.refused(take(outbox, 0.0, Live), QUOTA_EXCEEDED, 0.0)
+    assert outbox.refused(take(outbox, 0.0, LiveSample), QUOTA_EXCEEDED, 0.0)
     outbox.add(sample(2), 0.5)
-    array = take(outbox, 0.5, Array)
+    array = take(outbox, 0.5, HistoryBatch)
     assert seqs(array) == [1, 2]
     outbox.settled(array, 0.5)
     outbox.add(sample(3), 1.0)
-    assert take(outbox, 1.0, Live).kept.sample.seq == 3
+    assert take(outbox, 1.0, LiveSample).kept.sample.seq == 3
 
 
 def test_an_event_that_is_refused_waits_and_delays_no_response() -> None:
@@ -613,7 +613,7 @@ def test_an_event_that_is_refused_waits_and_delays_no_response() -> None:
     outbox.add(telemetry.event("first", 0), 0.0)
     event = take(outbox, 0.0, Message)
     outbox.add(telemetry.event("second", 0), 0.0)
-    outbox.add(Publication("response/x", {}, Kind.RESPONSE, retain=False, qos=1), 0.0)
+    outbox.add(Publication("response/x", {}, PublicationKind.RESPONSE, retain=False, qos=1), 0.0)
     assert outbox.refused(event, QUOTA_EXCEEDED, 0.0)
     assert take(outbox, 0.0, Message).topic == "response/x"
     assert outbox.next(0.9) is None
@@ -653,7 +653,7 @@ def test_what_clears_topics_goes_when_nothing_else_does() -> None:
     outbox.add(sample(1, "b"), -20.0)
     assert not outbox.idle
     kinds = [type(outbox.next(0.0)) for _ in range(6)]
-    assert kinds == [Retained, Live, Array, Retained, Retained, Retained]
+    assert kinds == [Retained, LiveSample, HistoryBatch, Retained, Retained, Retained]
 
 
 # What ends the connection
@@ -676,7 +676,7 @@ def test_an_array_that_ends_two_connections_is_cut_over_connects_until_a_reload(
         outbox.add(sample(seq), 0.0)
     for now in (100.0, 200.0, 300.0):
         connect(outbox, now)
-        array = take(outbox, now + PAST_AFTER, Array)
+        array = take(outbox, now + PAST_AFTER, HistoryBatch)
         found.append((len(array.samples), end(outbox, now + 20, under_way(outbox))))
     assert found == [(4, None), (4, "device/a/history"), (2, "device/a/history")]
     assert outbox.dropped == 0
@@ -693,12 +693,12 @@ def test_a_single_sample_that_ends_connections_is_declared_and_its_topic_rests_f
     outbox.add(sample(1), 0.0)
     for now in (100.0, 200.0):
         connect(outbox, now)
-        take(outbox, now + PAST_AFTER, Array)
+        take(outbox, now + PAST_AFTER, HistoryBatch)
         end(outbox, now + 20, under_way(outbox))
     outbox.add(sample(2), 221.0)
     connect(outbox, 222.0)
-    outbox.settled(take(outbox, 222.0, Live), 222.0)
-    declaration = take(outbox, 240.0, Declaration)
+    outbox.settled(take(outbox, 222.0, LiveSample), 222.0)
+    declaration = take(outbox, 240.0, LossNotice)
     assert declaration.loss == Loss("a", "k", 1, 1, 1)
     outbox.settled(declaration, 240.0)
     assert outbox.passes_over("device/a/history")
@@ -710,8 +710,8 @@ def test_a_denied_topic_loses_nothing_whatever_was_under_way_there() -> None:
     outbox = connected(now=-100.0)
     for seq in (1, 2):
         outbox.add(sample(seq), 0.0)
-    take(outbox, 0.0, Live)
-    take(outbox, 10.0, Array)
+    take(outbox, 0.0, LiveSample)
+    take(outbox, 10.0, HistoryBatch)
     for number, found in enumerate([None, "device/a/history"], 1):
         assert end(outbox, 10.0 * number, {"device/a/history": 100}, denied=True) == found
         connect(outbox, 10.0 * number + 1)
@@ -720,7 +720,7 @@ def test_a_denied_topic_loses_nothing_whatever_was_under_way_there() -> None:
     outbox.lost(40.0)
     outbox.past.losses.restore(Loss("b", "k", 1, 1, 1))
     connect(outbox, 41.0)
-    take(outbox, 60.0, Declaration)
+    take(outbox, 60.0, LossNotice)
     outbox.suspects.ended({"event": 9}, certain=True)
     assert end(outbox, 61.0, {"event": 9}, denied=True) == "event"
     assert outbox.past.undeclared() == [Loss("b", "k", 1, 1, 1)]
@@ -729,10 +729,10 @@ def test_a_denied_topic_loses_nothing_whatever_was_under_way_there() -> None:
 def test_a_live_sample_that_ends_connections_goes_as_history() -> None:
     outbox = connected(now=-100.0)
     outbox.add(sample(1), 0.0)
-    take(outbox, 0.0, Live)
+    take(outbox, 0.0, LiveSample)
     end(outbox, 0.1, under_way(outbox))
     connect(outbox, 0.2)
-    take(outbox, 0.3, Live)
+    take(outbox, 0.3, LiveSample)
     assert end(outbox, 0.4, under_way(outbox)) == "device/a/telemetry"
     connect(outbox, 0.5)
     assert outbox.next(0.5) is None
@@ -749,7 +749,7 @@ def test_a_message_that_ends_connections_is_dead_and_the_others_go_on() -> None:
         connect(outbox, 2.0)
     assert found == [None, "event"]
     outbox.add(sample(1), 2.0)
-    assert isinstance(outbox.next(2.0), Live)
+    assert isinstance(outbox.next(2.0), LiveSample)
     assert outbox.next(2.0) is None
 
 
@@ -788,24 +788,24 @@ def test_what_goes_alone_waits_until_nothing_is_under_way() -> None:
     outbox.add(sample(1), -10.0)
     outbox.add(sample(2), -10.0)
     outbox.add(sample(1, "b"), 0.0)
-    live = take(outbox, 0.0, Live)
+    live = take(outbox, 0.0, LiveSample)
     assert outbox.next(0.0) is None
     outbox.add(sample(2, "b"), 0.0)
     assert outbox.next(0.0) is None
     outbox.settled(live, 0.0)
-    array = take(outbox, 0.0, Array)
+    array = take(outbox, 0.0, HistoryBatch)
     shorter = outbox.shorten(array, 1)
     assert seqs(shorter) == [1]
     assert outbox.next(0.0) is None
     outbox.settled(shorter, 0.0)
-    assert isinstance(outbox.next(0.0), Live)
+    assert isinstance(outbox.next(0.0), LiveSample)
 
 
 def test_an_array_under_way_is_shortened_and_the_rest_goes_after_it() -> None:
     outbox = connected(now=-100.0)
     for seq in range(1, 6):
         outbox.add(sample(seq), 0.0)
-    array = take(outbox, 50.0, Array)
+    array = take(outbox, 50.0, HistoryBatch)
     shorter = outbox.shorten(array, 2)
     assert (seqs(shorter), outbox.under_way, outbox.depth) == ([1, 2], (shorter,), 5)
     outbox.settled(shorter, 50.0)
@@ -821,21 +821,21 @@ def test_an_array_that_is_too_large_is_cut_until_it_fits() -> None:
         outbox.add(sample(seq), 0.0)
     sizes, told = [], []
     for _ in range(3):
-        array = take(outbox, 50.0, Array)
+        array = take(outbox, 50.0, HistoryBatch)
         sizes.append(len(array.samples))
         told.append(outbox.unfit(array))
     assert sizes == [5, 2, 1]
     assert told == [False, False, True]
     assert outbox.dropped == 1
-    take(outbox, 50.0, Declaration)
+    take(outbox, 50.0, LossNotice)
 
 
 def test_a_sample_that_is_too_large_is_declared_and_its_topic_reported_once() -> None:
     outbox = connected(now=-100.0)
     for seq in (1, 2, 3):
         outbox.add(sample(seq), 0.0)
-    assert outbox.unfit(take(outbox, 0.0, Live))
-    assert not outbox.unfit(take(outbox, 0.0, Live))
+    assert outbox.unfit(take(outbox, 0.0, LiveSample))
+    assert not outbox.unfit(take(outbox, 0.0, LiveSample))
     assert seqs(outbox.next(0.0)) == [3]
     assert outbox.dropped == 2
 
@@ -848,7 +848,7 @@ def test_idle_is_when_nothing_but_the_past_waits() -> None:
     idle = [outbox.idle]
     outbox.add(sample(1), 0.0)
     idle.append(outbox.idle)
-    live = take(outbox, 0.0, Live)
+    live = take(outbox, 0.0, LiveSample)
     idle.append(outbox.idle)
     outbox.settled(live, 0.0)
     idle.append(outbox.idle)
@@ -857,13 +857,13 @@ def test_idle_is_when_nothing_but_the_past_waits() -> None:
 
 def test_the_oldest_that_waits_is_told_wherever_it_waits() -> None:
     outbox = connected(now=-100.0)
-    assert outbox.backlog == telemetry.Backlog()
+    assert outbox.backlog == telemetry.BacklogStats()
     outbox.add(sample(7), 0.0)
     outbox.add(sample(8), 5.0)
-    assert outbox.backlog == telemetry.Backlog(depth=2, oldest_ts=7000, dropped=0)
-    take(outbox, 5.0, Live)
-    take(outbox, 5.0, Array)
-    assert outbox.backlog == telemetry.Backlog(depth=2, oldest_ts=7000, dropped=0)
+    assert outbox.backlog == telemetry.BacklogStats(depth=2, oldest_ts=7000, dropped=0)
+    take(outbox, 5.0, LiveSample)
+    take(outbox, 5.0, HistoryBatch)
+    assert outbox.backlog == telemetry.BacklogStats(depth=2, oldest_ts=7000, dropped=0)
 
 
 def test_what_the_store_could_not_take_waits_in_memory_as_far_as_there_is_room() -> None:
@@ -872,8 +872,8 @@ def test_what_the_store_could_not_take_waits_in_memory_as_far_as_there_is_room()
         outbox.add(sample(seq), 0.0)
     outbox.age(4.0)
     outbox.past.spill()
-    outbox.past.history.add(Kept(sample_of(3), 4.0))
-    outbox.past.history.add(Kept(sample_of(4), 4.0))
+    outbox.past.history.add(QueuedSample(sample_of(3), 4.0))
+    outbox.past.history.add(QueuedSample(sample_of(4), 4.0))
     outbox.not_spilled(4.0)
     assert (outbox.depth, outbox.dropped) == (3, 1)
 
@@ -888,7 +888,7 @@ def test_what_lies_in_the_store_counts_and_is_the_oldest() -> None:
     outbox = Outbox()
     outbox.past.stored.told(5, 77)
     outbox.add(sample(6), 0.0)
-    assert outbox.backlog == telemetry.Backlog(depth=6, oldest_ts=77, dropped=0)
+    assert outbox.backlog == telemetry.BacklogStats(depth=6, oldest_ts=77, dropped=0)
 
 
 def test_when_the_oldest_live_sample_grows_old_is_known() -> None:
@@ -909,7 +909,7 @@ def test_a_clock_set_right_corrects_live_samples_and_their_payloads() -> None:
         payload = measured.payload("line0")
         outbox.add(replace(publication, sample=measured, payload=payload), 0.0, shift=500)
     outbox.correct(7500)
-    told = [take(outbox, 0.0, Live).publication for _ in range(2)]
+    told = [take(outbox, 0.0, LiveSample).publication for _ in range(2)]
     assert [(each.sample and each.sample.ts, each.sample and each.sample.clock) for each in told] == [
         (8000, "synced"),
         (2000, "synced"),
@@ -978,9 +978,9 @@ class OutboxLaws(RuleBasedStateMachine):
         kept = samples_of(letter)
         assert [each.sample.seq for each in kept] == sorted({each.sample.seq for each in kept})
         assert len({each.key for each in kept}) <= 1
-        if isinstance(letter, Live):
+        if isinstance(letter, LiveSample):
             assert self.now - letter.kept.since <= LIVE_FOR
-        if isinstance(letter, Array):
+        if isinstance(letter, HistoryBatch):
             assert len(kept) <= ARRAY_MOST
 
     @precondition(lambda self: self.outbox.under_way)
@@ -992,7 +992,7 @@ class OutboxLaws(RuleBasedStateMachine):
         if fate == "settled":
             self.outbox.settled(letter, self.now)
             self.delivered |= {(each.sample.device, each.sample.seq) for each in samples_of(letter)}
-            if isinstance(letter, Declaration):
+            if isinstance(letter, LossNotice):
                 self.declared.append(letter.loss)
         elif fate == "refused":
             self.outbox.refused(letter, QUOTA_EXCEEDED, self.now)
@@ -1006,7 +1006,7 @@ class OutboxLaws(RuleBasedStateMachine):
         assert self.outbox.depth <= self.CAPACITY
         assert len(self.outbox.under_way) <= self.WINDOW
         # Arrays may be several (contract, section 3: one at least every 2 s, however long the round trip is).
-        assert sum(isinstance(each, Declaration) for each in self.outbox.under_way) <= 1
+        assert sum(isinstance(each, LossNotice) for each in self.outbox.under_way) <= 1
 
     def teardown(self) -> None:
         """Drain: then every sample was delivered or declared, and the declared count is right."""
@@ -1015,7 +1015,7 @@ class OutboxLaws(RuleBasedStateMachine):
         for letter in self.outbox.under_way:
             self.outbox.settled(letter, self.now)
             self.delivered |= {(each.sample.device, each.sample.seq) for each in samples_of(letter)}
-            if isinstance(letter, Declaration):
+            if isinstance(letter, LossNotice):
                 self.declared.append(letter.loss)
         self.outbox.reload(self.now)
         self.now += PAST_AFTER + DECLARED_EVERY
@@ -1024,7 +1024,7 @@ class OutboxLaws(RuleBasedStateMachine):
             if taken is not None:
                 self.outbox.settled(taken, self.now)
                 self.delivered |= {(each.sample.device, each.sample.seq) for each in samples_of(taken)}
-                if isinstance(taken, Declaration):
+                if isinstance(taken, LossNotice):
                     self.declared.append(taken.loss)
                 continue
             due = self.outbox.due()
@@ -1068,7 +1068,7 @@ def test_it_says_whether_anything_waits() -> None:
     assert letter is not None
     told.append(outbox.waits)
     outbox.settled(letter, 0.0)
-    outbox.add(Publication("event", {}, Kind.EVENT, retain=False, qos=1), 0.0)
+    outbox.add(Publication("event", {}, PublicationKind.EVENT, retain=False, qos=1), 0.0)
     told.append(outbox.waits)
     assert told == [False, True, False, True]
 
@@ -1111,7 +1111,7 @@ def test_once_the_window_was_full_refreshes_have_their_turn_until_nothing_waits(
     assert outbox.next(0.0) is None
     outbox.add(refresh(2), 1.0)
     outbox.add(sample(13), 1.0)
-    assert isinstance(outbox.next(1.0), Live)
+    assert isinstance(outbox.next(1.0), LiveSample)
 
 
 def test_no_array_is_taken_while_the_one_before_is_not_on_its_way() -> None:
@@ -1119,7 +1119,7 @@ def test_no_array_is_taken_while_the_one_before_is_not_on_its_way() -> None:
     outbox.add(sample(1), 0.0)
     connect(outbox, 50.0)
     assert outbox.next(60.0, past=False) is None
-    assert isinstance(outbox.next(60.0), Array)
+    assert isinstance(outbox.next(60.0), HistoryBatch)
 
 
 def test_a_burst_that_lasts_takes_turns_with_the_rest_after_ten_seconds() -> None:
@@ -1136,7 +1136,7 @@ def test_a_burst_that_lasts_takes_turns_with_the_rest_after_ten_seconds() -> Non
         kinds.append(type(letter))
         outbox.settled(letter, now)
     assert kinds[:3] == [Retained] * 3
-    assert Live in kinds[3:]
+    assert LiveSample in kinds[3:]
     assert Retained in kinds[3:]
 
 
@@ -1152,7 +1152,7 @@ def test_without_telemetry_samples_are_not_taken_and_the_backlog_stays_where_it_
     outbox.add(state(1), 61.0)
     assert take(outbox, 61.0, Retained).topic == "device/a/state"
     outbox.telemetry = True
-    assert seqs(take(outbox, 62.0, Array)) == [1]
+    assert seqs(take(outbox, 62.0, HistoryBatch)) == [1]
 
 
 def test_what_carries_no_sample_counts_for_nothing_in_the_depth() -> None:
@@ -1160,5 +1160,5 @@ def test_what_carries_no_sample_counts_for_nothing_in_the_depth() -> None:
     outbox.add(state(1), 0.0)
     outbox.add(sample(1), 0.0)
     take(outbox, 0.0, Retained)
-    take(outbox, 0.0, Live)
+    take(outbox, 0.0, LiveSample)
     assert outbox.depth == 1

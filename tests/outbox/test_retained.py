@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 from lfs10d.outbox.items import Retained
-from lfs10d.outbox.retained import Retention
+from lfs10d.outbox.retained import RetainedQueue
 from lfs10d.telemetry import publication
 
 NONE: frozenset[str] = frozenset()
@@ -17,7 +17,7 @@ def state(version: int, topic: str = "state") -> publication.Publication:
 
 
 def test_nothing_waits_at_first() -> None:
-    retention = Retention()
+    retention = RetainedQueue()
     assert (bool(retention), retention.announced, retention.first, retention.next_change(NONE)) == (
         False,
         True,
@@ -27,7 +27,7 @@ def test_nothing_waits_at_first() -> None:
 
 
 def test_the_newest_version_waits_until_the_one_under_way_is_over() -> None:
-    retention = Retention()
+    retention = RetainedQueue()
     retention.add(state(1))
     first = retention.next_change(NONE)
     assert first is not None
@@ -42,7 +42,7 @@ def test_the_newest_version_waits_until_the_one_under_way_is_over() -> None:
 
 
 def test_a_burst_is_announced_when_its_last_is_over() -> None:
-    retention = Retention()
+    retention = RetainedQueue()
     retention.burst([state(1)], ONLINE)
     first = retention.next_change(NONE)
     assert first is not None
@@ -57,7 +57,7 @@ def test_a_burst_is_announced_when_its_last_is_over() -> None:
 
 
 def test_a_refused_last_is_no_reason_to_wait() -> None:
-    retention = Retention()
+    retention = RetainedQueue()
     retention.burst([state(1)], ONLINE)
     assert retention.next_change(frozenset({"state", "availability"})) is None
     assert retention.announced
@@ -65,7 +65,7 @@ def test_a_refused_last_is_no_reason_to_wait() -> None:
 
 
 def test_a_second_last_waits_for_the_first() -> None:
-    retention = Retention()
+    retention = RetainedQueue()
     retention.burst([], ONLINE)
     first = retention.next_change(NONE)
     assert first is not None
@@ -76,7 +76,7 @@ def test_a_second_last_waits_for_the_first() -> None:
 
 
 def test_a_loss_leaves_only_what_clears_a_topic() -> None:
-    retention = Retention()
+    retention = RetainedQueue()
     retention.burst([state(1), publication.retained("gone", None)], ONLINE)
     retention.lost()
     left = retention.next_clearing(NONE)
@@ -86,7 +86,7 @@ def test_a_loss_leaves_only_what_clears_a_topic() -> None:
 
 
 def test_a_clearing_is_put_back_unless_a_newer_version_waits() -> None:
-    retention = Retention()
+    retention = RetainedQueue()
     for topic in ("gone", "back", "again"):
         retention.add(publication.retained(topic, None))
     gone, back, again = (retention.next_clearing(NONE) for _ in range(3))
@@ -105,7 +105,7 @@ def test_a_clearing_is_put_back_unless_a_newer_version_waits() -> None:
         "gone",
         None,
     ]
-    other = Retention()
+    other = RetainedQueue()
     other.add(state(1))
     version = other.next_change(NONE)
     assert version is not None
@@ -115,7 +115,7 @@ def test_a_clearing_is_put_back_unless_a_newer_version_waits() -> None:
 
 
 def test_the_newest_of_what_clears_and_what_fills_a_topic_waits() -> None:
-    retention = Retention()
+    retention = RetainedQueue()
     retention.add(publication.retained("state", None))
     retention.add(state(1))
     assert retention.next_clearing(NONE) is None
@@ -131,7 +131,7 @@ def test_the_newest_of_what_clears_and_what_fills_a_topic_waits() -> None:
 
 
 def test_what_is_passed_over_waits_in_its_newest_version_until_its_topic_is_tried_again() -> None:
-    retention = Retention()
+    retention = RetainedQueue()
     retention.burst([state(1), publication.retained("gone", None)], ONLINE)
     refused = frozenset({"state", "gone", "availability"})
     assert (retention.next_change(refused), retention.next_clearing(refused), bool(retention)) == (None, None, False)
@@ -153,7 +153,7 @@ def test_what_is_passed_over_waits_in_its_newest_version_until_its_topic_is_trie
 
 
 def test_thousands_of_clearings_are_taken_in_linear_time() -> None:
-    retention = Retention()
+    retention = RetainedQueue()
     for number in range(60_000):
         retention.add(publication.retained(f"device/{number}/state", None))
     under_way: list[Retained] = []
@@ -170,7 +170,7 @@ def refresh(version: int, topic: str = "state") -> publication.Publication:
 
 
 def test_refreshes_wait_apart_and_a_newer_one_replaces_in_its_place() -> None:
-    retention = Retention()
+    retention = RetainedQueue()
     replaced = [retention.add(refresh(version, topic)) for version, topic in ((1, "a"), (2, "b"), (3, "a"))]
     assert replaced == [False, False, True]
     assert retention.next_change(NONE) is None
@@ -183,7 +183,7 @@ def test_refreshes_wait_apart_and_a_newer_one_replaces_in_its_place() -> None:
 
 
 def test_a_change_takes_the_place_of_a_refresh() -> None:
-    retention = Retention()
+    retention = RetainedQueue()
     retention.add(refresh(1))
     assert retention.add(state(2))
     assert retention.next_refresh(NONE) is None
@@ -193,7 +193,7 @@ def test_a_change_takes_the_place_of_a_refresh() -> None:
 
 
 def test_a_refresh_of_a_topic_whose_change_waits_goes_as_the_change() -> None:
-    retention = Retention()
+    retention = RetainedQueue()
     retention.add(state(1))
     assert not retention.add(refresh(2))
     change = retention.next_change(NONE)
@@ -204,7 +204,7 @@ def test_a_refresh_of_a_topic_whose_change_waits_goes_as_the_change() -> None:
 
 def test_the_last_of_a_burst_follows_the_refreshes_in_it_and_waits_for_no_other() -> None:
     """With the figures apart, `online` and every sample waited 10 s after each connect."""
-    retention = Retention()
+    retention = RetainedQueue()
     retention.add(refresh(1))
     retention.add(publication.retained("state", None))
     retention.burst([refresh(2), refresh(1, "stats"), publication.retained("gone", None)], ONLINE)
@@ -220,7 +220,7 @@ def test_the_last_of_a_burst_follows_the_refreshes_in_it_and_waits_for_no_other(
 
 
 def test_a_loss_forgets_refreshes() -> None:
-    retention = Retention()
+    retention = RetainedQueue()
     retention.add(refresh(1))
     assert retention
     retention.lost()
@@ -228,7 +228,7 @@ def test_a_loss_forgets_refreshes() -> None:
 
 
 def test_refreshes_of_a_burst_go_with_its_changes_and_before_its_last() -> None:
-    retention = Retention()
+    retention = RetainedQueue()
     retention.burst([publication.retained("stats", {}, qos=0, refresh=True), state(1)], ONLINE)
     told = []
     while not retention.announced:

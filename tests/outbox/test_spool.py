@@ -2,34 +2,34 @@
 
 from __future__ import annotations
 
-from lfs10d.outbox.history import Kept
-from lfs10d.outbox.spool import AGAIN_WITHIN, RELEASE_EVERY, RELEASE_MOST, Stored
-from lfs10d.outbox.store.sample_file import Row
+from lfs10d.outbox.history import QueuedSample
+from lfs10d.outbox.spool import AGAIN_WITHIN, RELEASE_EVERY, RELEASE_MOST, Spool
+from lfs10d.outbox.store.sample_file import StoredRow
 from lfs10d.telemetry.publication import Sample
 
 
-def row(number: int, *, repeated: bool = False) -> Row:
+def row(number: int, *, repeated: bool = False) -> StoredRow:
     sample = Sample("a", "k", number, 1000 * number, "synced", None, {}, (), "bad", "timeout", None)
-    return Row(number, sample, None, repeated)
+    return StoredRow(number, sample, None, repeated)
 
 
-def rows(first: int, last: int) -> list[Row]:
+def rows(first: int, last: int) -> list[StoredRow]:
     return [row(number) for number in range(first, last + 1)]
 
 
-def filled(count: int) -> Stored:
+def filled(count: int) -> Spool:
     """Return what is known of a store of so many rows, of which the whole is taken as a page."""
-    stored = Stored(rows=count, oldest_ts=1000, more=True)
+    stored = Spool(rows=count, oldest_ts=1000, more=True)
     stored.take_page(rows(1, count), count + 1)
     return stored
 
 
-def ids(kept: tuple[Kept, ...]) -> list[int | None]:
+def ids(kept: tuple[QueuedSample, ...]) -> list[int | None]:
     return [each.row for each in kept]
 
 
 def test_a_page_goes_in_order_and_a_short_one_is_the_last() -> None:
-    stored = Stored(rows=5, more=True)
+    stored = Spool(rows=5, more=True)
     stored.take_page(rows(1, 3), 3)
     assert (stored.more, stored.after) == (True, 3)
     assert ids(stored.page.take(9)) == [1, 2, 3]
@@ -56,7 +56,7 @@ def test_what_is_passed_over_is_read_again_and_nothing_else() -> None:
 
 
 def test_what_was_repeated_before_a_restart_is_known_as_such() -> None:
-    stored = Stored(rows=1)
+    stored = Spool(rows=1)
     stored.take_page([row(1, repeated=True)], 9)
     assert stored.page.take(1)[0].repeated
 
@@ -96,7 +96,7 @@ def test_after_a_loss_what_was_acknowledged_lately_is_read_and_sent_once_more() 
 
 
 def test_nothing_is_read_again_where_the_store_is_empty() -> None:
-    stored = Stored()
+    stored = Spool()
     stored.rewind()
     assert not stored.more
 
@@ -129,7 +129,7 @@ def test_what_never_will_be_delivered_is_let_go_too() -> None:
 
 
 def test_the_oldest_is_the_pages_first_else_the_stores_and_none_where_none_waits() -> None:
-    stored = Stored(rows=2, oldest_ts=7)
+    stored = Spool(rows=2, oldest_ts=7)
     assert stored.oldest() == 7
     stored.take_page(rows(1, 2), 9)
     assert stored.oldest() == 1000
@@ -137,5 +137,5 @@ def test_the_oldest_is_the_pages_first_else_the_stores_and_none_where_none_waits
     assert stored.oldest() is None
 
 
-def ids_of(kept: tuple[Kept, ...]) -> list[int]:
+def ids_of(kept: tuple[QueuedSample, ...]) -> list[int]:
     return [each.row for each in kept if each.row is not None]

@@ -13,16 +13,16 @@ from pathlib import Path
 import pytest
 
 from lfs10d.outbox.backlog import PAST_AFTER, SPILL_EVERY
-from lfs10d.outbox.items import Array, samples_of
+from lfs10d.outbox.items import HistoryBatch, samples_of
 from lfs10d.outbox.losses import Loss
 from lfs10d.outbox.outbox import Outbox
 from lfs10d.outbox.spool import AGAIN_WITHIN
-from lfs10d.outbox.spooler import Stowage
+from lfs10d.outbox.spooler import Spooler
 from lfs10d.outbox.store.database import Limits
 from lfs10d.outbox.store.store import Store, StoreError
-from lfs10d.system.clock import ClockState
+from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry import publication
-from lfs10d.telemetry.publication import Kind, Publication, Sample
+from lfs10d.telemetry.publication import Publication, PublicationKind, Sample
 
 ROOMY = Limits(size=512_000_000, age=7 * 86_400_000)
 ONLINE = publication.retained("availability", "online")
@@ -44,7 +44,7 @@ def sample(seq: int, *, clock: ClockState = "synced", ts: int | None = None) -> 
         "a", "k2", seq, 1000 * seq if ts is None else ts, clock, {"x": seq / 8}, {"x": "m/s"}, ("x",), "good", None, 1.5
     )
     return Publication(
-        "device/a/telemetry", measured.payload("line0"), Kind.SAMPLE, retain=False, qos=1, sample=measured
+        "device/a/telemetry", measured.payload("line0"), PublicationKind.SAMPLE, retain=False, qos=1, sample=measured
     )
 
 
@@ -62,7 +62,7 @@ class Place:
     def __post_init__(self) -> None:
         self.outbox = Outbox()
         self.store = Store(self.folder, boot="k2", limits=self.limits)
-        self.stowage = Stowage(
+        self.stowage = Spooler(
             self.outbox,
             self.store,
             epoch_ms=lambda: self.epoch_ms,
@@ -149,7 +149,7 @@ def test_what_the_broker_does_not_take_goes_to_disk_and_from_there_to_the_broker
             place.add(1, 250)
             await place.move(3.5)
             await until(lambda: place.store.rows == 250, "the spill")
-            assert place.outbox.backlog == publication.Backlog(depth=250, oldest_ts=1000, dropped=0)
+            assert place.outbox.backlog == publication.BacklogStats(depth=250, oldest_ts=1000, dropped=0)
             place.connect()
             await place.move(PAST_AFTER)
             await until(lambda: bool(place.outbox.past.stored.page), "the page")
@@ -301,7 +301,7 @@ def test_other_limits_and_a_clock_set_right_reach_the_disk_and_the_page(tmp_path
             await until(lambda: bool(place.outbox.past.stored.page), "the page")
             place.outbox.correct(7000)
             letter = place.outbox.next(asyncio.get_running_loop().time())
-            assert isinstance(letter, Array)
+            assert isinstance(letter, HistoryBatch)
             assert [(kept.sample.ts, kept.sample.clock) for kept in letter.samples] == [
                 (8000, "synced"),
                 (9000, "synced"),

@@ -23,7 +23,7 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
         return call()
 
     for module in ("physical.place", "running", "requests.device"):
-        monkeypatch.setattr(f"lfs10d.{module}.aside", at_once)
+        monkeypatch.setattr(f"lfs10d.{module}.run_in_thread", at_once)
     loop = Loop()
     loop.set_exception_handler(_mistake)
     made = Bench(tmp_path, loop)

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from lfs10d.command import Answer, Call
+from lfs10d.command import Command, Result
 from lfs10d.profiles.library import parse_profile
-from lfs10d.reconfiguration.adopt import Newcomer
+from lfs10d.reconfiguration.adopt import AdoptRequest
 from lfs10d.simulator.registers import Blueprint, blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
@@ -49,8 +49,8 @@ def writes(bench: Bench) -> list[bytes]:
     return [request.body for request in bench.line.log if request.body[1:2] == b"\x06"]
 
 
-def adopted(bench: Bench, life: Life, **wanted: Any) -> Answer:  # noqa: ANN401 - as Newcomer
-    return bench.ask(life, life.physical.adopt(Newcomer(**wanted), Call("n1")), within=300.0)
+def adopted(bench: Bench, life: Life, **wanted: Any) -> Result:  # noqa: ANN401 - as Newcomer
+    return bench.ask(life, life.physical.adopt(AdoptRequest(**wanted), Command("n1")), within=300.0)
 
 
 @pytest.mark.parametrize("baudrate", [9600, 19200])
@@ -139,7 +139,7 @@ def test_wherever_it_dies_the_newcomer_is_polled_or_can_be_adopted_again(bench: 
         life = bench.sensors(2, baudrate=baudrate)
         bench.go(life, 3.0)
         sensor = plugged(bench)
-        task = bench.loop.create_task(life.physical.adopt(Newcomer(), Call("n1")))
+        task = bench.loop.create_task(life.physical.adopt(AdoptRequest(), Command("n1")))
         if turns < 0:
             bench.files.steps_left = bench.files.steps - turns
         for _ in range(turns if turns >= 0 else 2000):
@@ -168,7 +168,7 @@ def test_the_first_sensor_of_a_line_is_adopted_as_any_other(bench: Bench, slaves
     bench.go(life, 3.0)
     if cut:  # the daemon dies right after the write, and finds the newcomer in its next life
         bench.line.after_each_request(lambda _: None)
-        task = bench.loop.create_task(life.physical.adopt(Newcomer(), Call("n1")))
+        task = bench.loop.create_task(life.physical.adopt(AdoptRequest(), Command("n1")))
         while not writes(bench):
             bench.turn(life)
         bench.cut()
@@ -306,7 +306,7 @@ def test_wherever_it_dies_one_of_another_profile_is_polled_or_can_be_adopted_aga
         life = bench.sensors(names=False)
         vane = renke(bench)
         bench.go(life, 3.0)
-        task = bench.loop.create_task(life.physical.adopt(Newcomer(profile="renke.yaml"), Call("n1")))
+        task = bench.loop.create_task(life.physical.adopt(AdoptRequest(profile="renke.yaml"), Command("n1")))
         for _ in range(turns):
             bench.turn(life)
             if task.done():
@@ -327,7 +327,7 @@ def test_an_open_adoption_whose_profile_is_gone_waits_for_it(bench: Bench) -> No
     life = bench.sensors(names=False)
     vane = renke(bench)
     bench.go(life, 3.0)
-    task = bench.loop.create_task(life.physical.adopt(Newcomer(profile="renke.yaml"), Call("n1")))
+    task = bench.loop.create_task(life.physical.adopt(AdoptRequest(profile="renke.yaml"), Command("n1")))
     while len(writes(bench)) < 2:
         bench.turn(life)
     bench.cut()

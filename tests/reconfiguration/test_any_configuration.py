@@ -1,6 +1,6 @@
 """Every request over every kind of configuration (none, disabled, foreign, mixed) has one answer, none internal.
 
-The whole daemon but its thread, its port and its broker, in virtual time: `DaemonPowers` as the daemon builds them.
+The whole daemon but its thread, its port and its broker, in virtual time: `LineAccess` as the daemon builds them.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from lfs10d.commands.dispatcher import Service
+from lfs10d.commands.dispatcher import Dispatcher
 from lfs10d.commands.handlers.registry import REQUESTS
-from lfs10d.commands.line_access import DaemonPowers
+from lfs10d.commands.line_access import LineAccess
 from lfs10d.config.effective import Effective
-from lfs10d.config.reload import Plan
+from lfs10d.config.reload import ReloadPlan
 from lfs10d.daemon.settings import device_facts, line_facts
 from lfs10d.line.line import Line
 from lfs10d.mqtt.uplink import Uplink
@@ -26,7 +26,7 @@ from lfs10d.reading import Event
 from lfs10d.simulator.registers import blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.system.clock import Instant
-from lfs10d.telemetry.publication import Backlog
+from lfs10d.telemetry.publication import BacklogStats
 from lfs10d.telemetry.station import Station
 from tests.support.lives import EPOCH, Bench, Life, Wire
 from tests.support.stations import DAEMON
@@ -86,7 +86,7 @@ class VirtualLine(Wire):
 class NoBroker:
     """An uplink to nowhere."""
 
-    backlog = Backlog()
+    backlog = BacklogStats()
     connected = False
 
     def republish(self) -> None:
@@ -101,7 +101,7 @@ class Whole(Life):
         config, profiles = self.running.now.config, self.running.loaded.profiles
         facts = device_facts(config, profiles)
         self.station = Station(DAEMON, line_facts(config.line), facts, self._instant())
-        self.powers = DaemonPowers(
+        self.powers = LineAccess(
             self.station,
             cast("Uplink", NoBroker()),
             now=self._instant,
@@ -112,7 +112,7 @@ class Whole(Life):
             publish=lambda _: None,
         )
         self.powers.physical = self.physical
-        self.service = Service(
+        self.service = Dispatcher(
             REQUESTS,
             self.powers,
             allowed=frozenset({"polling", "sensors", "registers"}),
@@ -130,7 +130,7 @@ class Whole(Life):
             now = self._instant()
             self.powers.heard(event, self.station.heard(event, now), now)
 
-    async def _take(self, plan: Plan, before: Effective) -> None:
+    async def _take(self, plan: ReloadPlan, before: Effective) -> None:
         now = self.running.now
         facts = device_facts(now.config, now.loaded.profiles)
         self.station.configure(line_facts(now.config.line), facts, self._instant())

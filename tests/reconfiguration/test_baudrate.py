@@ -6,15 +6,15 @@ from typing import Any
 
 import pytest
 
-from lfs10d.command import Answer, Call
-from lfs10d.reconfiguration.adopt import Newcomer
-from lfs10d.simulator.line import Request
+from lfs10d.command import Command, Result
+from lfs10d.reconfiguration.adopt import AdoptRequest
+from lfs10d.simulator.line import HeardRequest
 from lfs10d.simulator.sensor import Sensor
 from tests.support.lives import Bench, Life
 
 
-def change(bench: Bench, life: Life, to: int = 19200, *, power_cycle: bool = False, dry_run: bool = False) -> Answer:
-    request = life.physical.baudrate(to, power_cycle=power_cycle, dry_run=dry_run, call=Call("b1"))
+def change(bench: Bench, life: Life, to: int = 19200, *, power_cycle: bool = False, dry_run: bool = False) -> Result:
+    request = life.physical.baudrate(to, power_cycle=power_cycle, dry_run=dry_run, call=Command("b1"))
     return bench.ask(life, request, within=400.0)
 
 
@@ -92,7 +92,7 @@ def test_where_a_later_one_fails_the_others_are_moved_back(bench: Bench, ailment
     if ailment == "silent":
         struck: list[object] = []
 
-        def strike(request: Request) -> None:
+        def strike(request: HeardRequest) -> None:
             if request.body[:2] == b"\x04\x06" and not struck:
                 struck.append(second.ail("silent"))
 
@@ -155,7 +155,7 @@ def test_while_sensors_are_still_to_come_up_nothing_else_is_done_to_them(bench: 
     assert life.running.now.config.line.baudrate == 19200, "s5 is there already"
     busy = bench.readdress(life, "s3", 9)
     assert (busy.status, busy.code) == ("rejected", "busy")
-    adopting = bench.ask(life, life.physical.adopt(Newcomer(), Call("n1")))
+    adopting = bench.ask(life, life.physical.adopt(AdoptRequest(), Command("n1")))
     assert (adopting.status, adopting.code) == ("rejected", "busy")
     assert bench.readdress(life, "s5", 9, id="a2").status == "ok", "it is there already"
     for sensor in bench.line.sensors[:2]:
@@ -219,7 +219,7 @@ def test_a_device_removed_while_its_change_is_carried_out_has_one_answer(bench: 
     assert not life.physical.open
 
 
-async def removed(life: Life, device: str) -> Answer:
+async def removed(life: Life, device: str) -> Result:
     """Take a device out of the configuration, as `device/remove` does."""
     await life.running.change(lambda now: now.changes.removing(device, now.said))
-    return Answer("ok")
+    return Result("ok")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from lfs10d.reconfiguration.baudrate_watch import Losing
+from lfs10d.reconfiguration.baudrate_watch import BaudrateWatch
 from lfs10d.simulator.wire import Format
 from tests.support.lives import Bench, Life
 
@@ -14,7 +14,7 @@ def looking_out(bench: Bench, life: Life) -> list[str | None]:
     told: list[str | None] = []
 
     async def begin() -> None:
-        Losing(
+        BaudrateWatch(
             running=lambda: life.running.now,
             talk=life.physical.talk,
             devices=lambda: tuple(life.poller.schedule.devices.values()),

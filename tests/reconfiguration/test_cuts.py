@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from lfs10d.simulator.line import Request
+from lfs10d.simulator.line import HeardRequest
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from tests.support.lives import Bench, Life
@@ -123,9 +123,9 @@ def test_cut_at_every_exchange_nobody_is_stranded(bench: Bench, name: str) -> No
     assert exchanges >= 10
     for last in range(1, exchanges + 1):
         life = case.begin(bench)
-        heard: list[Request] = []
+        heard: list[HeardRequest] = []
 
-        def cut(request: Request, heard: list[Request] = heard, last: int = last) -> None:
+        def cut(request: HeardRequest, heard: list[HeardRequest] = heard, last: int = last) -> None:
             heard.append(request)
             if len(heard) == last:
                 raise PowerCutError

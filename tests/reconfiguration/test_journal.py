@@ -9,7 +9,16 @@ from pathlib import Path
 import pytest
 
 from lfs10d.errors import StateError
-from lfs10d.reconfiguration.journal import ASIDE, REMEMBERED, REMEMBERED_FOR_MS, Asked, Journal, Move, Spot, Told
+from lfs10d.reconfiguration.journal import (
+    ASIDE,
+    REMEMBERED,
+    REMEMBERED_FOR_MS,
+    CommandRecord,
+    Endpoint,
+    Journal,
+    Move,
+    ResultRecord,
+)
 from lfs10d.system.disk import Disk
 from tests.support.volatile_disk import ForgetfulFiles, PowerCutError
 
@@ -18,11 +27,11 @@ FILE = STATE / "journal.json"
 
 
 def move(device: str = "mast-top", old: int = 3, new: int = 9) -> Move:
-    return Move(device=device, old=Spot(slave=old, baudrate=9600), new=Spot(slave=new, baudrate=9600))
+    return Move(device=device, old=Endpoint(slave=old, baudrate=9600), new=Endpoint(slave=new, baudrate=9600))
 
 
-def told(key: str | None, at: int = 0) -> Told:
-    return Told(asked=Asked(name="device/readdress", id=key), status="ok", at=at)
+def told(key: str | None, at: int = 0) -> ResultRecord:
+    return ResultRecord(asked=CommandRecord(name="device/readdress", id=key), status="ok", at=at)
 
 
 def read(files: ForgetfulFiles) -> Journal:
@@ -45,7 +54,7 @@ def test_an_intent_outlives_a_power_cut_once_it_is_told() -> None:
 def test_a_cut_at_any_step_leaves_what_was_or_what_is_to_be(steps: int) -> None:
     files = ForgetfulFiles()
     journal = read(files)
-    first = journal.intend("readdress", (move(),), 5, Asked(name="r", id=1))
+    first = journal.intend("readdress", (move(),), 5, CommandRecord(name="r", id=1))
     files.steps_left = files.steps + steps
     try:
         journal.close(frozenset({first.number}), told("a"))
@@ -168,20 +177,20 @@ def test_an_intent_that_was_written_but_not_synced_is_taken_back_with_its_refusa
 def test_a_request_is_told_from_its_repeat_by_its_id_or_else_its_transaction(
     id_: str | None, transaction: int | None, key: str | int | None
 ) -> None:
-    assert Asked(name="r", id=id_, transaction=transaction).key == key
+    assert CommandRecord(name="r", id=id_, transaction=transaction).key == key
 
 
-ASKED = Asked(name="device/readdress", id="a", topic="response/mine", correlation="00" * 1024)
+ASKED = CommandRecord(name="device/readdress", id="a", topic="response/mine", correlation="00" * 1024)
 
 
 def test_an_answer_that_was_given_keeps_neither_topic_nor_correlation_a_repeat_brings_its_own() -> None:
     files = ForgetfulFiles()
     journal = read(files)
     kept = journal.intend("readdress", (move(),), 5, ASKED)
-    journal.keep(kept.number, Told(asked=ASKED, status="failed", at=1))
+    journal.keep(kept.number, ResultRecord(asked=ASKED, status="failed", at=1))
     closed = journal.intend("readdress", (move("b"),), 5, ASKED)
     assert read(files).open[1].asked == ASKED, "an answer that is still owed goes where it was asked for"
-    journal.close(frozenset({closed.number}), Told(asked=ASKED, status="ok", at=2))
+    journal.close(frozenset({closed.number}), ResultRecord(asked=ASKED, status="ok", at=2))
     for each in (journal, read(files)):
         assert {(one.asked.topic, one.asked.correlation) for one in each.answers} == {(None, None)}
         assert [one.asked.key for one in each.answers] == ["a", "a"]

@@ -5,17 +5,17 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.command import Answer, Call, failed, ok, rejected
+from lfs10d.command import Command, Result, failed, ok, rejected
 from lfs10d.reconfiguration.journal import answer_of, asked_by, call_of, told
 
 KEYS = st.none() | st.text(max_size=64) | st.integers()
 CALLS = st.builds(
-    Call, KEYS, KEYS, fingerprint=st.text(), topic=st.none() | st.text(), correlation=st.none() | st.binary()
+    Command, KEYS, KEYS, fingerprint=st.text(), topic=st.none() | st.text(), correlation=st.none() | st.binary()
 )
 
 
 @given(CALLS)
-def test_a_request_comes_back_as_it_was(call: Call) -> None:
+def test_a_request_comes_back_as_it_was(call: Command) -> None:
     asked = asked_by("device/readdress", call)
     assert (asked.name, asked.key) == ("device/readdress", call.key)
     assert call_of(asked) == call
@@ -26,8 +26,8 @@ def test_a_request_comes_back_as_it_was(call: Call) -> None:
         [ok({"a": 1}), rejected("address_in_use", "taken", param="to"), failed("refused", "no", exception_code=3)]
     )
 )
-def test_an_answer_comes_back_as_it_was(answer: Answer) -> None:
-    kept = told(asked_by("x", Call("a")), answer, 5)
+def test_an_answer_comes_back_as_it_was(answer: Result) -> None:
+    kept = told(asked_by("x", Command("a")), answer, 5)
     assert kept is not None
     assert kept.at == 5
     again = answer_of(kept)

@@ -65,7 +65,7 @@ def test_what_was_found_out_is_kept_and_answered_though_the_daemon_ends(
         del name
         return step()
 
-    monkeypatch.setattr("lfs10d.config.live_config.aside", slowly)
+    monkeypatch.setattr("lfs10d.config.live_config.run_in_thread", slowly)
     life.request("device/readdress", id="x", device="s3", to=9)
     while not held:
         bench.turn(life)

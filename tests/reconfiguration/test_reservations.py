@@ -5,19 +5,19 @@ from __future__ import annotations
 import pytest
 
 from lfs10d.command import RefusedError
-from lfs10d.reconfiguration.journal import Move, OpenChange, Spot
-from lfs10d.reconfiguration.reservations import Reserving
+from lfs10d.reconfiguration.journal import Endpoint, Move, OpenChange
+from lfs10d.reconfiguration.reservations import Reservations
 
 OPEN = OpenChange(
     number=1,
     kind="readdress",
-    moves=(Move(device="north", old=Spot(slave=3, baudrate=9600), new=Spot(slave=9, baudrate=9600)),),
+    moves=(Move(device="north", old=Endpoint(slave=3, baudrate=9600), new=Endpoint(slave=9, baudrate=9600)),),
     begun=0,
 )
 
 
 def test_whoever_comes_while_the_place_is_held_is_told_busy() -> None:
-    reserving = Reserving(lambda: ())
+    reserving = Reservations(lambda: ())
     assert reserving.busy is None
     with reserving.held("line/scan"):
         assert reserving.underway == "line/scan"
@@ -28,7 +28,7 @@ def test_whoever_comes_while_the_place_is_held_is_told_busy() -> None:
 
 
 def test_what_is_underway_and_what_is_open_reserve_their_ids() -> None:
-    reserving = Reserving(lambda: (OPEN,))
+    reserving = Reservations(lambda: (OPEN,))
     with reserving.held("line/adopt", frozenset({1, 2})):
         assert reserving.brought == {1, 2}
         assert dict(reserving.reserved) == {

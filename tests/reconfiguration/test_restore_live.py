@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from lfs10d.config.changes import Place
 from lfs10d.config.changes_file import FILE_NAME
 from lfs10d.reconfiguration.locate import in_turn
-from lfs10d.reconfiguration.restore import Recalling
+from lfs10d.reconfiguration.restore import Restore
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from tests.support.lives import STATE, Bench, Life
@@ -21,7 +21,7 @@ def recalled(bench: Bench, life: Life, baudrate: int = 9600, **slaves: int) -> N
     """Give a daemon what the broker retained, as at its first connect."""
 
     async def told() -> None:
-        recalling = Recalling(
+        recalling = Restore(
             running=lambda: life.running.now,
             learn=life.running.learn,
             devices=life.poller.schedule.devices.values,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from lfs10d.command import Call
-from lfs10d.reconfiguration.adopt import Newcomer
+from lfs10d.command import Command
+from lfs10d.reconfiguration.adopt import AdoptRequest
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from tests.support.lives import Bench, Life
@@ -54,6 +54,6 @@ def test_during_an_adoption_the_others_keep_90_percent_of_their_rate(
     if newcomer is not None:
         bench.line.add(Sensor(1, format=Format(newcomer)))
     begun = bench.clock.now
-    answer = bench.ask(life, life.physical.adopt(Newcomer(), Call("n1")))
+    answer = bench.ask(life, life.physical.adopt(AdoptRequest(), Command("n1")))
     assert answer.status == ("ok" if newcomer else "rejected")
     assert kept(bench, life, interval, since=begun) >= KEPT

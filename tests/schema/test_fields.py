@@ -13,14 +13,14 @@ from lfs10d.schema.fields import (
     BaseTopic,
     Choice,
     Duration,
+    FieldError,
+    FieldKind,
     FilePath,
     Flag,
     Host,
     Hosts,
-    Kind,
     Name,
     Node,
-    RefusedError,
     Size,
     Text,
     Whole,
@@ -31,7 +31,7 @@ from lfs10d.schema.fields import (
 )
 
 DURATION = Duration(0.02, 86400.0, zero="as fast as can be", auto="learned")
-KINDS: tuple[Kind, ...] = (
+KINDS: tuple[FieldKind, ...] = (
     Whole(1, 255),
     Flag(),
     Choice((8, 7)),
@@ -79,7 +79,7 @@ KINDS: tuple[Kind, ...] = (
         (BaseTopic(), "site/%H/wind", "site/%H/wind"),
     ],
 )
-def test_what_is_of_the_kind_is_taken(kind: Kind, value: object, meant: object) -> None:
+def test_what_is_of_the_kind_is_taken(kind: FieldKind, value: object, meant: object) -> None:
     taken = kind.accept(value)
     assert taken == meant
     assert type(taken) is type(meant)
@@ -130,21 +130,21 @@ def test_what_is_of_the_kind_is_taken(kind: Kind, value: object, meant: object) 
         (FilePath(), "tcp://x", "must be a path in the file system; network addresses are not supported"),
     ],
 )
-def test_the_refusal_says_what_is_wrong_and_what_would_be_right(kind: Kind, value: object, message: str) -> None:
-    with pytest.raises(RefusedError) as refused:
+def test_the_refusal_says_what_is_wrong_and_what_would_be_right(kind: FieldKind, value: object, message: str) -> None:
+    with pytest.raises(FieldError) as refused:
         kind.accept(value)
     assert str(refused.value).endswith(message)
 
 
 @pytest.mark.parametrize("topic", ["a//b", "/a", "a/", "a/#", "+", "$SYS", "a\0", "a" * 201, "", 5, None])
 def test_a_base_topic_can_begin_every_topic(topic: object) -> None:
-    with pytest.raises(RefusedError, match="must be 1 to 200 characters as levels joined by /"):
+    with pytest.raises(FieldError, match="must be 1 to 200 characters as levels joined by /"):
         BaseTopic().accept(topic)
 
 
 @pytest.mark.parametrize("host", ["mqtt://me:hunter2@broker", "me:hunter2@broker", "broker:1883", "a b", "", 5])
 def test_a_wrong_host_is_not_shown_for_it_may_hold_a_login(host: object) -> None:
-    with pytest.raises(RefusedError) as refused:
+    with pytest.raises(FieldError) as refused:
         Host().accept(host)
     assert "hunter2" not in str(refused.value)
     assert "no login" in str(refused.value)
@@ -167,7 +167,7 @@ def test_quoted_text_is_one_short_line_that_prints(text: str) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_kind_has_words(kind: Kind) -> None:
+def test_every_kind_has_words(kind: FieldKind) -> None:
     assert kind.words.isprintable()
     assert kind.words[-1] not in ".;,"
 
@@ -175,11 +175,11 @@ def test_every_kind_has_words(kind: Kind) -> None:
 @given(
     st.sampled_from(KINDS), st.none() | st.booleans() | st.integers() | st.floats() | st.text() | st.lists(st.none())
 )
-def test_a_kind_takes_a_value_or_refuses_it_in_one_line(kind: Kind, value: object) -> None:
+def test_a_kind_takes_a_value_or_refuses_it_in_one_line(kind: FieldKind, value: object) -> None:
     told = ""
     try:
         kind.accept(value)
-    except RefusedError as refused:
+    except FieldError as refused:
         told = str(refused)
     assert told.isprintable()
 
@@ -221,14 +221,14 @@ def test_a_node_may_have_a_port_of_its_own(text: str, host: str, port: int | Non
     ],
 )
 def test_a_wrong_node_is_refused_and_never_shown(text: str) -> None:
-    with pytest.raises(RefusedError) as refused:
+    with pytest.raises(FieldError) as refused:
         Node().accept(text)
     assert str(refused.value) == f"must be {Node().words} (no mqtt://, no login)"
 
 
 @pytest.mark.parametrize("value", [[], ["a", "b", "a"], ["a", "[::1]", "::1"], [f"a{count}" for count in range(17)]])
 def test_nodes_are_at_least_one_not_many_and_each_once(value: list[str]) -> None:
-    with pytest.raises(RefusedError, match="must be a list of 1 to 16 nodes, each once"):
+    with pytest.raises(FieldError, match="must be a list of 1 to 16 nodes, each once"):
         Hosts().accept(value)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from lfs10d.errors import ConfigError
 from lfs10d.simulator.fault_file import FaultFile, load_faults, parse_faults
-from lfs10d.simulator.faults import Kind, ailment
+from lfs10d.simulator.faults import FaultKind, ailment
 
 
 def problems(text: str) -> list[str]:
@@ -40,8 +40,8 @@ def test_faults_can_be_written_short_or_long(text: str, expected: tuple[object, 
     assert tuple(fault.ailment for fault in faults.slaves[3].faults) == expected
 
 
-@pytest.mark.parametrize("kind", list(Kind))
-def test_every_kind_can_be_named(kind: Kind) -> None:
+@pytest.mark.parametrize("kind", list(FaultKind))
+def test_every_kind_can_be_named(kind: FaultKind) -> None:
     (fault,) = parse_faults(f"all: {kind}", "f.yaml", []).all
     assert fault.ailment.kind is kind
 

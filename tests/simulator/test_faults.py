@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.simulator.faults import ALWAYS, Kind, Window, ailment, window
+from lfs10d.simulator.faults import ALWAYS, FaultKind, Window, ailment, window
 from lfs10d.simulator.wire import SECOND
 
 TIMES = st.integers(min_value=0, max_value=1000)
@@ -58,9 +58,9 @@ def test_outside_its_window_nothing_strikes() -> None:
 
 
 def test_late_has_a_delay_of_its_own_unless_told() -> None:
-    assert ailment(Kind.LATE).delay == SECOND * 6 // 10
-    assert ailment(Kind.LATE, delay=0.1).delay == SECOND // 10
-    assert ailment(Kind.NOISY).delay == 0
+    assert ailment(FaultKind.LATE).delay == SECOND * 6 // 10
+    assert ailment(FaultKind.LATE, delay=0.1).delay == SECOND // 10
+    assert ailment(FaultKind.NOISY).delay == 0
 
 
 def test_an_unknown_kind_is_refused() -> None:

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.simulator.judge import ROUNDING, Judge, Verdict
-from lfs10d.simulator.line import Request, SimulatedLine
+from lfs10d.simulator.judge import ROUNDING, Judge, JudgeReport
+from lfs10d.simulator.line import HeardRequest, SimulatedLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import SECOND, Format, seal
 
@@ -26,7 +26,7 @@ def line_with(*sent: tuple[int, bytes], shape: Format = SLOW) -> SimulatedLine:
 
 
 def verdicts(line: SimulatedLine) -> list[str]:
-    def plain(request: Request) -> str:
+    def plain(request: HeardRequest) -> str:
         return str(request.verdict)
 
     return [plain(request) for request in line.log]
@@ -176,7 +176,7 @@ def test_an_ascii_frame_is_given_up_after_a_second() -> None:
 def test_what_is_settled_is_settled_once() -> None:
     judge = Judge()
     hearing = judge.listen(REQUEST, 0, SLOW, quiet_since=None, slower=SLOW, busy=False)
-    assert judge.settle(hearing, struck=False) is Verdict.HEARD
+    assert judge.settle(hearing, struck=False) is JudgeReport.HEARD
     assert judge.settle(hearing, struck=False) is None
     assert judge.expire(hearing, SECOND) is None
     assert judge.requests == 1
@@ -186,8 +186,8 @@ def test_a_piece_after_a_gap_begins_another_request() -> None:
     judge = Judge()
     torn = judge.listen(REQUEST[:3], 0, SLOW, quiet_since=None, slower=SLOW, busy=False)
     other = judge.listen(REQUEST, SECOND, SLOW, quiet_since=0, slower=SLOW, busy=False)
-    assert torn.verdict is Verdict.MALFORMED
-    assert judge.settle(other, struck=False) is Verdict.HEARD
+    assert torn.verdict is JudgeReport.MALFORMED
+    assert judge.settle(other, struck=False) is JudgeReport.HEARD
 
 
 def test_the_summary_counts_every_gap_in_one_place() -> None:

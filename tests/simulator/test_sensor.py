@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import pytest
 
-from lfs10d.simulator.faults import Kind
+from lfs10d.simulator.faults import FaultKind
 from lfs10d.simulator.registers import Blueprint, Signal
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format, unseal
@@ -417,7 +417,7 @@ def test_other_devices_are_just_data(bench: Maker) -> None:
     assert line.read(5, 30, 1) == bytes.fromhex("05 03 02 00 08")
     sensor.power_cycle()
     assert repr(sensor) == "<Sensor 5 at 9600>"
-    sensor.ail(Kind.NAN)
+    sensor.ail(FaultKind.NAN)
     assert line.read(5, 10, 1) == bytes.fromhex("05 03 02 FF FF")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lfs10d.simulator.faults import Kind
+from lfs10d.simulator.faults import FaultKind
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import SECOND, Format, seal
@@ -31,7 +31,7 @@ def asked(sensor: Sensor, *requests: tuple[float, bytes], stray: float | None = 
 def late(delay: float) -> Sensor:
     """Return a sensor that answers late."""
     sensor = Sensor(1)
-    sensor.ail(Kind.LATE, delay=delay)
+    sensor.ail(FaultKind.LATE, delay=delay)
     return sensor
 
 
@@ -56,7 +56,7 @@ def test_a_struck_answer_is_not_believable() -> None:
 
 def test_answers_without_a_value_are_none() -> None:
     broken = Sensor(1)
-    broken.ail(Kind.NAN)
+    broken.ail(FaultKind.NAN)
     assert asked(broken, (1.0, WIND)) == []
     assert asked(Sensor(1), (1.0, ID)) == []
 

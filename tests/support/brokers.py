@@ -24,8 +24,6 @@ from bench.broker import free_port
 
 PATIENCE = 10.0
 """Seconds after which something awaited counts as not happening; no test waits this long when all is well."""
-
-
 SEARCH_PATH = os.pathsep.join((os.environ.get("PATH", os.defpath), "/usr/sbin", "/sbin"))
 """Debian keeps daemons in /usr/sbin, which is not on a user's PATH."""
 

@@ -5,22 +5,22 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Protocol
 
-from lfs10d.command import Answer, Call, RefusedError, ok, rejected
-from lfs10d.commands.reads import Inquiry
-from lfs10d.config.changes_file import ChangeFile
+from lfs10d.command import Command, RefusedError, Result, ok, rejected
+from lfs10d.commands.reads import ReadResult
+from lfs10d.config.changes_file import ChangesFile
 from lfs10d.config.effective import Edit, Effective
-from lfs10d.config.live_config import Running
+from lfs10d.config.live_config import LiveConfig
 from lfs10d.config.loader import load
 from lfs10d.config.models import SlaveConfig
-from lfs10d.config.reload import Plan
-from lfs10d.line.jobs.identification import Finding
-from lfs10d.line.jobs.ping import Knock
+from lfs10d.config.reload import ReloadPlan
+from lfs10d.line.jobs.identification import FoundDevice
+from lfs10d.line.jobs.ping import Ping
 from lfs10d.line.jobs.register_access import Access, Target
 from lfs10d.line.jobs.scan import Scan
-from lfs10d.line.jobs.scan_plan import Search
+from lfs10d.line.jobs.scan_plan import ScanPlan
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.frames import Request as RegisterRequest
-from lfs10d.modbus.pending import Unanswered
+from lfs10d.modbus.pending import PendingRequests
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
@@ -45,10 +45,10 @@ class FakePowers:
 
     def __init__(self, file: Path) -> None:
         self.done: list[object] = []
-        self.inquiry: Inquiry | None = None
+        self.inquiry: ReadResult | None = None
         self.running: tuple[str, ...] = ()
         self.busy = False
-        self.findings: tuple[Finding, ...] = ()
+        self.findings: tuple[FoundDevice, ...] = ()
         self.scanned = True, False
         """Whether a scan is complete, and whether its port was lost."""
         self.broken: Exception | None = None
@@ -64,25 +64,25 @@ class FakePowers:
     def reserved(self) -> dict[int, str]:
         return {77: "is reserved by the open change of slave-3"}
 
-    async def readdress(self, device: str, to: int, *, dry_run: bool, call: Call) -> Answer:
+    async def readdress(self, device: str, to: int, *, dry_run: bool, call: Command) -> Result:
         self.done.append(("readdress", device, to, dry_run, call.id))
         return ok({"device": device})
 
-    async def baudrate(self, to: int, *, power_cycle: bool, dry_run: bool, call: Call) -> Answer:
+    async def baudrate(self, to: int, *, power_cycle: bool, dry_run: bool, call: Command) -> Result:
         self.done.append(("baudrate", to, power_cycle, dry_run, call.id))
         return ok({"to": to})
 
     async def adopt(
-        self, *, name: str | None, label: str | None, profile: str, factory: int | None, to: int | None, call: Call
-    ) -> Answer:
+        self, *, name: str | None, label: str | None, profile: str, factory: int | None, to: int | None, call: Command
+    ) -> Result:
         self.done.append(("adopt", name, label, profile, factory, to, call.id))
         return ok({"device": name})
 
     def start(self) -> None:
         """Begin anew, as a daemon does."""
-        self.holding = Running(load(self.file), ChangeFile(STATE, Disk(self.disk)), self._take)
+        self.holding = LiveConfig(load(self.file), ChangesFile(STATE, Disk(self.disk)), self._take)
 
-    async def _take(self, plan: Plan, before: Effective) -> None:
+    async def _take(self, plan: ReloadPlan, before: Effective) -> None:
         assert before is not self.holding.now
         self.done.append(plan.applied)
 
@@ -111,25 +111,25 @@ class FakePowers:
     async def change(self, edit: Edit) -> tuple[Effective, Effective]:
         return await self.holding.change(edit)
 
-    def applied(self, request: str, call: Call, **facts: object) -> None:
+    def applied(self, request: str, call: Command, **facts: object) -> None:
         self.told.append({"request": request, "id": call.key, **facts})
 
-    async def knock(self, slave: int, profile: Profile) -> Knock:
+    async def knock(self, slave: int, profile: Profile) -> Ping:
         self.done.append(f"knock {slave}")
-        knock = Knock(slave, profile, Codec(Framing.RTU), lambda _: None)
+        knock = Ping(slave, profile, Codec(Framing.RTU), lambda _: None)
         knock.answered = slave in self.at
         knock.fault = None if knock.answered else self.silence
         return knock
 
     async def access(self, what: RegisterRequest, device: SlaveConfig | None) -> Access:
         self.done.append((device and device.name, what))
-        never = Unanswered()
+        never = PendingRequests()
         access = Access(Target(1, Codec(Framing.RTU)), what, unanswered=never, echo_known=bool, over=lambda _: None)
         for name, what_came in self.came.items():
             setattr(access, name, what_came)
         return access
 
-    async def read(self, device: str) -> Inquiry | None:
+    async def read(self, device: str) -> ReadResult | None:
         self.done.append(f"read {device}")
         return self.inquiry
 
@@ -140,7 +140,7 @@ class FakePowers:
         self._begin()
         self.done.append((ids, rates, share))
         timings = tuple(LineTiming.of(rate) for rate in rates or (9600, 19200))
-        scan = Scan(Search(ids, timings, Codec(Framing.RTU), (load_profile("lfs10", relative_to=self.file),)))
+        scan = Scan(ScanPlan(ids, timings, Codec(Framing.RTU), (load_profile("lfs10", relative_to=self.file),)))
         scan.complete, scan.lost = self.scanned
         scan._found = {(each.slave, each.baudrate): each for each in self.findings}
         return scan
@@ -161,7 +161,7 @@ class FakePowers:
 class Ask(Protocol):
     """Asks a request by its name with the payload as JSON text, and returns its answer."""
 
-    def __call__(self, name: str, payload: str = "{}") -> Answer:
+    def __call__(self, name: str, payload: str = "{}") -> Result:
         """Return the answer of admission, or of the request itself."""
 
 

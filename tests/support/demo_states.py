@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 
-from lfs10d.cli.demo.state import Picture
+from lfs10d.cli.demo.state import DemoState
 
 
 class Told:
     """A picture that is told things in short."""
 
     def __init__(self) -> None:
-        self.picture = Picture()
+        self.picture = DemoState()
 
     def sample(self, name: str, speed: float | None, error: str | None = None) -> None:
         """Let a sensor's sample be heard."""

@@ -54,8 +54,6 @@ def attempt(request: ReadRegisters | WriteRegister = WIND, codec: Codec = RTU) -
 
 
 PLAIN = attempt()
-
-
 ECHOING = replace(PLAIN, echo=Echo.ON)
 UNKNOWN = replace(PLAIN, echo=Echo.UNKNOWN)
 REQUEST = RTU.encode(WIND)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from lfs10d.line.device import DeviceSpec, PollRules
 from lfs10d.line.poller import Poller
-from lfs10d.line.scheduler import Schedule
+from lfs10d.line.scheduler import Scheduler
 from lfs10d.modbus.bus import Bus, LineRules, Wait
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.port_settings import PortSettings
@@ -18,9 +18,9 @@ from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Event, Exchanged, FaultCode, PortChanged, Reading
 from lfs10d.simulator.burst import MASTER
-from lfs10d.simulator.line import Answer, Request, SimulatedLine
+from lfs10d.simulator.line import HeardRequest, SensorAnswer, SimulatedLine
 from lfs10d.simulator.port import SimulatedPort, VirtualClock, run
-from lfs10d.simulator.queued_sensor import InTurn
+from lfs10d.simulator.queued_sensor import QueuedSensor
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 
@@ -117,7 +117,7 @@ class Rig:
         return self
 
 
-def _nearest(requests: dict[int, Request], when: float) -> Request:
+def _nearest(requests: dict[int, HeardRequest], when: float) -> HeardRequest:
     begun = round(when * 1e9)
     for shift in range(-2000, 2001):  # floats of a long run
         if begun + shift in requests:
@@ -125,7 +125,7 @@ def _nearest(requests: dict[int, Request], when: float) -> Request:
     raise AssertionError(f"no request was begun at {when}")
 
 
-def _is_ours(answer: Answer, request: Request) -> bool:
+def _is_ours(answer: SensorAnswer, request: HeardRequest) -> bool:
     return bool(answer.values) and answer.sensor.slave == request.body[0] and not answer.second
 
 
@@ -155,13 +155,13 @@ class Rigs:
         """Return a line with sensors at `slaves` (or 1 to that many), all of them polled unless `polled` says whom."""
         ids = range(1, slaves + 1) if isinstance(slaves, int) else tuple(slaves)
         shape = Format(baudrate)
-        kind = InTurn if in_turn else Sensor
+        kind = QueuedSensor if in_turn else Sensor
         sensors = [kind(slave, format=shape, turnaround=turnaround, jitter=jitter, seed=seed) for slave in ids]
         line = SimulatedLine(sensors, format=shape, seed=seed)
         clock = VirtualClock(started)
         port = SimulatedPort(line, clock, PortSettings("/dev/simulated", baudrate), echo=echo, latency=latency)
         bus = Bus(port, line_rules or LineRules(), clock)
-        schedule = Schedule(LineTiming.of(baudrate), started)
+        schedule = Scheduler(LineTiming.of(baudrate), started)
         if polled is None:
             polled = [a_spec(slave, interval, response_timeout=response_timeout) for slave in ids]
         schedule.replace(polled, rules or PollRules(), started)

@@ -9,30 +9,30 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from lfs10d.command import Answer, Call
-from lfs10d.commands.context import Powers
-from lfs10d.commands.dispatcher import Service
+from lfs10d.command import Command, Result
+from lfs10d.commands.context import Context
+from lfs10d.commands.dispatcher import Dispatcher
 from lfs10d.commands.handlers.registry import REQUESTS
-from lfs10d.config.changes_file import ChangeFile
+from lfs10d.config.changes_file import ChangesFile
 from lfs10d.config.effective import Effective
-from lfs10d.config.live_config import Edit, Running
+from lfs10d.config.live_config import Edit, LiveConfig
 from lfs10d.config.loader import load
-from lfs10d.config.reload import Plan
+from lfs10d.config.reload import ReloadPlan
 from lfs10d.line.budget import timing_of
 from lfs10d.line.jobs.job import Job
-from lfs10d.line.jobs.procedure import Course
+from lfs10d.line.jobs.procedure import Procedure
 from lfs10d.line.poller import Poller
-from lfs10d.line.scheduler import Schedule
+from lfs10d.line.scheduler import Scheduler
 from lfs10d.line.settings import device_specs, line_rules, poll_rules, port_settings
 from lfs10d.modbus.bus import Bus
 from lfs10d.modbus.exchange import Echo
-from lfs10d.modbus.pending import Unanswered
+from lfs10d.modbus.pending import PendingRequests
 from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.mqtt.topics import InboundRequest
 from lfs10d.reading import Event, PortChanged, Reading
-from lfs10d.reconfiguration.adopt import Newcomer
+from lfs10d.reconfiguration.adopt import AdoptRequest
 from lfs10d.reconfiguration.journal import Journal
-from lfs10d.reconfiguration.reconfiguration import Physical
+from lfs10d.reconfiguration.reconfiguration import Reconfiguration
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.port import SimulatedPort, VirtualClock, run
 from lfs10d.simulator.sensor import Sensor
@@ -43,19 +43,11 @@ from tests.support.virtual_loop import Loop
 from tests.support.volatile_disk import ForgetfulFiles, PowerCutError
 
 T = TypeVar("T")
-
-
 STATE = Path("/state")
-
-
 CHANGING = ("device/readdress", "line/baudrate", "line/adopt")
 """The requests that physically change a sensor."""
-
-
 STEP = 0.05
 """The line goes on by so much at a time, in s."""
-
-
 EPOCH = 1_700_000_000.0
 
 
@@ -66,7 +58,7 @@ class Wire:
         self.poller = poller
 
     @property
-    def unanswered(self) -> Unanswered:
+    def unanswered(self) -> PendingRequests:
         return self.poller.schedule.unanswered
 
     def echo_known(self) -> bool:
@@ -75,7 +67,7 @@ class Wire:
     def submit(self, job: Job) -> None:
         self.poller.submit(job)
 
-    def go_on(self, course: Course, answer: object) -> None:
+    def go_on(self, course: Procedure, answer: object) -> None:
         def tell(now: float) -> None:
             course.go_on(answer)
             self.poller.schedule.wake(course, now)
@@ -88,25 +80,25 @@ class Life:
     """One life of the daemon."""
 
     bench: Bench
-    running: Running = field(init=False)
+    running: LiveConfig = field(init=False)
     poller: Poller = field(init=False)
-    physical: Physical = field(init=False)
+    physical: Reconfiguration = field(init=False)
     events: list[tuple[str, Mapping[str, object]]] = field(default_factory=list)
     readings: list[Reading] = field(default_factory=list)
-    service: Service = field(init=False)
+    service: Dispatcher = field(init=False)
 
     def __post_init__(self) -> None:
         bench = self.bench
         disk = Disk(bench.files)
-        self.running = Running(load(bench.file), ChangeFile(STATE, disk), self._take)
-        self.service = Service(
+        self.running = LiveConfig(load(bench.file), ChangesFile(STATE, disk), self._take)
+        self.service = Dispatcher(
             {name: REQUESTS[name] for name in CHANGING},
-            cast("Powers", self),
+            cast("Context", self),
             allowed=frozenset({"sensors"}),
             respond=bench.respond,
             clear=bench.cleared.append,
         )
-        self.physical = Physical(
+        self.physical = Reconfiguration(
             Journal(STATE, disk),
             running=lambda: self.running.now,
             change=self._change,
@@ -121,7 +113,7 @@ class Life:
         config, profiles = self.physical.polled(), self.running.loaded.profiles
         bench.port = SimulatedPort(bench.line, bench.clock, port_settings(config.line), echo=bench.echo)
         bus = Bus(bench.port, line_rules(config.line), bench.clock)
-        schedule = Schedule(timing_of(config.line), bench.clock.now)
+        schedule = Scheduler(timing_of(config.line), bench.clock.now)
         schedule.replace(
             device_specs(config, profiles), poll_rules(config.poll), bench.clock.now
         )  # fmt: skip
@@ -131,17 +123,17 @@ class Life:
     def effective(self) -> Effective:
         return self.running.now
 
-    async def readdress(self, device: str, to: int, *, dry_run: bool, call: Call) -> Answer:
+    async def readdress(self, device: str, to: int, *, dry_run: bool, call: Command) -> Result:
         """Perform a request, as the daemon's powers do; so do the next two."""
         return await self.physical.readdress(device, to, dry_run=dry_run, call=call)
 
-    async def baudrate(self, to: int, *, power_cycle: bool, dry_run: bool, call: Call) -> Answer:
+    async def baudrate(self, to: int, *, power_cycle: bool, dry_run: bool, call: Command) -> Result:
         return await self.physical.baudrate(to, power_cycle=power_cycle, dry_run=dry_run, call=call)
 
     async def adopt(
-        self, *, name: str | None, label: str | None, profile: str, factory: int | None, to: int | None, call: Call
-    ) -> Answer:
-        return await self.physical.adopt(Newcomer(name, label, factory, to, profile), call)
+        self, *, name: str | None, label: str | None, profile: str, factory: int | None, to: int | None, call: Command
+    ) -> Result:
+        return await self.physical.adopt(AdoptRequest(name, label, factory, to, profile), call)
 
     def request(self, name: str, **parameters: Any) -> None:  # noqa: ANN401 - any JSON
         """Let a request come in by MQTT; its response comes to `bench.responses`."""
@@ -162,7 +154,7 @@ class Life:
 
         self.bench.loop.run_until_complete(ended())
 
-    async def _take(self, plan: Plan, before: Effective) -> None:
+    async def _take(self, plan: ReloadPlan, before: Effective) -> None:
         now = self.running.now
         if plan.line:
             self.poller.reconfigure(port_settings(now.config.line), line_rules(now.config.line))
@@ -267,7 +259,7 @@ class Bench:
             return  # it is the power that failed: nobody is there any more
         self.responses.append(response)
 
-    def ask(self, life: Life, coroutine: Awaitable[Answer], *, within: float = 120.0) -> Answer:
+    def ask(self, life: Life, coroutine: Awaitable[Result], *, within: float = 120.0) -> Result:
         """Let everything go on until a request is answered."""
         task = asyncio.ensure_future(coroutine, loop=self.loop)
         until = self.clock.now + within
@@ -276,9 +268,9 @@ class Bench:
             self.turn(life)
         return task.result()
 
-    def readdress(self, life: Life, device: str, to: int, *, dry_run: bool = False, id: str = "a1") -> Answer:  # noqa: A002 - the request's own word
+    def readdress(self, life: Life, device: str, to: int, *, dry_run: bool = False, id: str = "a1") -> Result:  # noqa: A002 - the request's own word
         """Ask for another slave id and wait for the answer."""
-        return self.ask(life, life.physical.readdress(device, to, dry_run=dry_run, call=Call(id)))
+        return self.ask(life, life.physical.readdress(device, to, dry_run=dry_run, call=Command(id)))
 
     def cut(self, *surviving: Path) -> None:
         """Cut the gateway's power: everything that ran is gone, and of the files what was not synced."""

@@ -15,7 +15,7 @@ from typing import Any
 
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
-from lfs10d.simulator.line import Request, SimulatedLine
+from lfs10d.simulator.line import HeardRequest, SimulatedLine
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.registers import blueprint_of
 from lfs10d.simulator.sensor import Sensor
@@ -25,15 +25,9 @@ from tests.support.brokers import Mosquitto
 from tests.support.sites import Site, View, good, tell
 
 ROOT = Path(__file__).parents[2]
-
-
 BAUDRATE = 19200
-
-
 WELL_SAMPLES = 6
 """So many good samples of each device are waited for while all is well."""
-
-
 TANK = """\
 name: tank
 title: Tank level sensor
@@ -126,7 +120,7 @@ class Recording:
         return next(unit for unit in self.units if unit.name == name)
 
     @cached_property
-    def log(self) -> list[tuple[Unit, bytes, Request]]:
+    def log(self) -> list[tuple[Unit, bytes, HeardRequest]]:
         """Every request as the line heard it: to whom, without its check."""
         by_slave = {unit.slave: unit for unit in self.units}
         entries = []
@@ -251,8 +245,6 @@ def _ask(made: Recording) -> None:
 
 AT_ONCE = (11, 12, 13)
 """Values written to one register by three requests at the same time."""
-
-
 REQUESTS: dict[Framing, list[tuple[str, dict[str, Any]]]] = {
     "rtu": [
         ("read", {"device": "pump", "address": 0x3000, "count": 5}),

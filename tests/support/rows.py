@@ -5,18 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from lfs10d.outbox.store.database import Limits
-from lfs10d.outbox.store.sample_file import Entry
+from lfs10d.outbox.store.sample_file import StoreEntry
 from lfs10d.reading import Number
-from lfs10d.system.clock import ClockState
+from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry.publication import Sample
 
 BOOT = "k0000002"
-
-
 START = 1_795_298_022_000
 """Epoch ms of seq 0."""
-
-
 ROOMY = Limits(size=512_000_000, age=7 * 86_400_000)
 
 
@@ -48,6 +44,6 @@ def sample(
     )
 
 
-def entries(*samples: Sample, shift: int = START, repeated: bool = False) -> list[Entry]:
+def entries(*samples: Sample, shift: int = START, repeated: bool = False) -> list[StoreEntry]:
     """Return samples as they are handed to the store."""
-    return [Entry(each, shift, repeated) for each in samples]
+    return [StoreEntry(each, shift, repeated) for each in samples]

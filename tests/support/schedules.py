@@ -6,14 +6,14 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from lfs10d.line.device import DeviceSpec, PollRules
-from lfs10d.line.jobs.job import Again, Ask, Done, Hold, Later, Next
+from lfs10d.line.jobs.job import Ask, Continue, Done, Hold, Next, Requeue
 from lfs10d.line.jobs.poll import Poll
-from lfs10d.line.scheduler import Rest, Schedule
+from lfs10d.line.scheduler import Rest, Scheduler
 from lfs10d.modbus.exchange import LateAnswer, Outcome
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.library import load_profile
-from lfs10d.reading import Errand, Fault, FaultCode, Reading
+from lfs10d.reading import Fault, FaultCode, Purpose, Reading
 
 RTU = Codec(Framing.RTU)
 LFS10 = load_profile("lfs10", relative_to=Path())
@@ -35,7 +35,7 @@ class Task:
         self.words = list(words)
         self.share = share
         self.excludes = excludes
-        self.errand = Errand.SCAN
+        self.errand = Purpose.SCAN
         self.over_at: float | None = None
 
     def ask(self, now: float) -> Ask | Hold | Done:  # noqa: ARG002 - a job
@@ -48,7 +48,7 @@ class Task:
     def heard(self, outcome: Outcome, now: float) -> Next:  # noqa: ARG002 - a job
         self.words = self.words[1:]
         word = self.words.pop(0) if self.words else Done()
-        assert isinstance(word, Later | Again | Done)
+        assert isinstance(word, Requeue | Continue | Done)
         return word
 
     def cut_off(self, now: float) -> None:
@@ -64,7 +64,7 @@ class Rig:
 
     def __init__(self, *specs: DeviceSpec, rules: PollRules | None = None) -> None:
         self.now = 0.0
-        self.schedule = Schedule(T9600, 0.0)
+        self.schedule = Scheduler(T9600, 0.0)
         self.rules = rules or PollRules()
         self.schedule.replace(specs, self.rules, 0.0)
         self.dead: set[int] = set()
@@ -132,4 +132,4 @@ class Rig:
 
     def poll_of(self, name: str, request: int = 1) -> Poll:
         device = self.schedule.devices[name]
-        return Poll(device, self.schedule.unanswered, due=self.now, errand=Errand.REQUEST, request=request)
+        return Poll(device, self.schedule.unanswered, due=self.now, errand=Purpose.REQUEST, request=request)

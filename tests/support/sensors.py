@@ -8,19 +8,17 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from lfs10d.line.jobs.job import Ask, Hold
-from lfs10d.line.jobs.procedure import Aside, LineLostError, Now, Step
+from lfs10d.line.jobs.procedure import Await, LineLostError, ProcedureClock, Step
 from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters, Request, WriteRegister
-from lfs10d.modbus.pending import Unanswered
+from lfs10d.modbus.pending import PendingRequests
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Fault, FaultCode
-from lfs10d.reconfiguration.procedures.identity_query import Asking
+from lfs10d.reconfiguration.procedures.identity_query import IdentityQuery
 from tests.support.outcomes import ended
 
 T = TypeVar("T")
-
-
 CODEC = Codec(Framing.RTU)
 
 
@@ -29,8 +27,6 @@ LFS10 = load_profile("lfs10", relative_to=Path())
 
 EXCHANGE = 0.03
 """What an answered question takes, in s."""
-
-
 RATE_CODES = {1: 9600, 2: 19200}
 
 
@@ -77,8 +73,8 @@ class Pretence:
     """The line. `asked` is every question, `aside` everything to be done off the line, with what is answered to it."""
 
     sensors: list[Mimic] = field(default_factory=list)
-    clock: Now = field(default_factory=Now)
-    unanswered: Unanswered = field(default_factory=Unanswered)
+    clock: ProcedureClock = field(default_factory=ProcedureClock)
+    unanswered: PendingRequests = field(default_factory=PendingRequests)
     line_rate: int = 9600
     asked: list[Ask] = field(default_factory=list)
     aside: list[object] = field(default_factory=list)
@@ -97,9 +93,9 @@ class Pretence:
         self.sensors.append(Mimic(slave, **facts))
         return self.sensors[-1]
 
-    def asking(self, profile: Profile = LFS10) -> Asking:
+    def asking(self, profile: Profile = LFS10) -> IdentityQuery:
         """Return what asks sensors of this profile."""
-        return Asking(profile, CODEC, self.unanswered, self.clock, line_rate=self.line_rate)
+        return IdentityQuery(profile, CODEC, self.unanswered, self.clock, line_rate=self.line_rate)
 
     @property
     def requests(self) -> list[Request]:
@@ -128,7 +124,7 @@ class Pretence:
                     assert step.until is not None
                     self.clock.now, value = max(self.clock.now, step.until), None
                 else:
-                    assert isinstance(step, Aside)
+                    assert isinstance(step, Await)
                     self.aside.append(step.what)
                     value = self.answer
         except StopIteration as end:

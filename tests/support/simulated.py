@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from lfs10d.simulator.line import Answer, SimulatedLine
+from lfs10d.simulator.line import SensorAnswer, SimulatedLine
 from lfs10d.simulator.port import SimulatedPort, VirtualClock
 from lfs10d.simulator.wire import Framing, seal, unseal
 
@@ -55,6 +55,6 @@ class Bench:
         self.clock.now = max(self.clock.now, seconds)
 
     @property
-    def answer(self) -> Answer:
+    def answer(self) -> SensorAnswer:
         """The last answer that a sensor sent."""
         return self.line.log[-1].answers[-1]

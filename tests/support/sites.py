@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from lfs10d.simulator.builder import Plan, build
+from lfs10d.simulator.builder import LinePlan, build
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.wire import Format
@@ -23,8 +23,6 @@ from tests.support.brokers import Heard, Listener
 
 PATIENCE = 20.0
 """Seconds after which something awaited counts as not happening; no test waits this long when all is well."""
-
-
 ENDS_WITHIN = 2.0
 """Seconds from SIGTERM to the end (contract, section 2)."""
 
@@ -205,7 +203,7 @@ class Site:
         started: bool = True,
     ) -> PtyLine:
         """Put up a simulated line; with `started`, plugged in."""
-        line = build(Plan(slaves, shape or Format(19200), turnaround=0.003, unique=True), keep_log=True)
+        line = build(LinePlan(slaves, shape or Format(19200), turnaround=0.003, unique=True), keep_log=True)
         served = PtyLine(line, link=self.tty, echo=echo)
         self.lines.append(served)
         if started:

@@ -7,14 +7,14 @@ from dataclasses import replace
 from typing import cast
 
 from lfs10d.reading import Fault, FaultCode, Reading
-from lfs10d.system.clock import ClockState
+from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry.publication import Payload, Publication
-from lfs10d.telemetry.station import DaemonFacts, DeviceFacts, Instant, LineFacts, Station
+from lfs10d.telemetry.station import DaemonInfo, DeviceInfo, Instant, LineInfo, Station
 
 WALL = 1_795_298_000.0
-DAEMON = DaemonFacts("0.1", "gw", "k3f9a2c7", "k3f9a2c6", "abc", 0, {"version": "5"}, ("store",))
-LINE = LineFacts("line0", "/dev/ttyUSB0", 9600, "none", 8, 1, "rtu", 0.0036458)
-ONE_VALUE = DeviceFacts(
+DAEMON = DaemonInfo("0.1", "gw", "k3f9a2c7", "k3f9a2c6", "abc", 0, {"version": "5"}, ("store",))
+LINE = LineInfo("line0", "/dev/ttyUSB0", 9600, "none", 8, 1, "rtu", 0.0036458)
+ONE_VALUE = DeviceInfo(
     name="a",
     slave=2,
     label=None,
@@ -48,7 +48,7 @@ def instant(mono: float, clock: ClockState = "synced") -> Instant:
     return Instant(mono, WALL + mono, clock)
 
 
-def station(*devices: DeviceFacts) -> Station:
+def station(*devices: DeviceInfo) -> Station:
     return Station(DAEMON, LINE, devices or (ONE_VALUE, TWO_VALUES), instant(0))
 
 

@@ -16,8 +16,6 @@ IDS = (3, 4, 5)
 RATES = 9600 + 19200
 LONGEST = 4000
 """Turns of 50 ms after which a request counts as never answered."""
-
-
 FOREIGN: list[dict[int, int]] = [
     {0: 3, 1: 225, 2: 0, 3: 7, 4: 9, 5: 700},
     {1: 225, 2: 0, 4: 1, 5: 1},

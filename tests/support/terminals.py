@@ -13,8 +13,6 @@ from bench.engine import crc16
 from bench.line import PacedLine
 
 BAUDRATE = 1200
-
-
 CHARACTER = 10 / BAUDRATE
 
 
@@ -22,12 +20,8 @@ T35 = 3.5 * CHARACTER
 
 
 PATIENCE = 10.0
-
-
 WIND = bytes((3, 0, 1, 0, 2))
 """Read registers 0x0001 and 0x0002: the wind speed."""
-
-
 ID = bytes((3, 0, 5, 0, 1))
 """Read register 0x0005: the slave id."""
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from lfs10d.system.clock import ClockState
-from lfs10d.system.clock_step import STEP_MS, corrects, stepped
+from lfs10d.system.clock_step import STEP_MS, ClockState, corrects, stepped
 
 
 @pytest.mark.parametrize(("by", "set_"), [(0, 0), (300, 0), (STEP_MS - 1, 0), (STEP_MS, 1), (400 * 86_400_000, 1)])

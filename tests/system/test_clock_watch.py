@@ -8,7 +8,8 @@ import time
 import pytest
 
 from lfs10d.system import clock
-from lfs10d.system.clock import ClockState, Moments
+from lfs10d.system.clock import Clock
+from lfs10d.system.clock_step import ClockState
 
 
 def nothing() -> None:
@@ -17,7 +18,7 @@ def nothing() -> None:
 
 def test_a_moment_is_told_on_both_clocks() -> None:
     before = time.monotonic(), time.time()
-    now = Moments(nothing, nothing).now()
+    now = Clock(nothing, nothing).now()
     after = time.monotonic(), time.time()
 
     assert before[0] <= now.mono <= after[0]
@@ -40,7 +41,7 @@ class Looked:
         monkeypatch.setattr(clock, "look_again", self._look_again)
         real = time.time
         monkeypatch.setattr(time, "time", lambda: real() + self.ahead)
-        self.moments = Moments(lambda: self.told.append("synchronised"), lambda: self.told.append("stepped"))
+        self.moments = Clock(lambda: self.told.append("synchronised"), lambda: self.told.append("stepped"))
 
     def _look(self) -> ClockState:
         if not self.answers:

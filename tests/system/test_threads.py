@@ -8,7 +8,7 @@ from typing import NoReturn
 
 import pytest
 
-from lfs10d.system.threads import OwnThread
+from lfs10d.system.threads import WorkerThread
 
 
 def test_calls_are_made_in_order_in_one_thread_of_that_name() -> None:
@@ -20,7 +20,7 @@ def test_calls_are_made_in_order_in_one_thread_of_that_name() -> None:
         return number * 2
 
     async def scenario() -> list[int]:
-        thread = OwnThread("disk")
+        thread = WorkerThread("disk")
         results = await asyncio.gather(*(thread.call(note, number) for number in range(5)))
         thread.end()
         return results
@@ -34,7 +34,7 @@ def test_what_is_raised_is_raised_for_the_caller_and_the_next_call_is_made() -> 
         raise ValueError(message)
 
     async def scenario() -> int:
-        thread = OwnThread("disk")
+        thread = WorkerThread("disk")
         with pytest.raises(ValueError, match="for the test"):
             await thread.call(fail, message="for the test")
         return await thread.call(lambda: 7)
@@ -50,7 +50,7 @@ def test_who_no_longer_waits_abandons_the_result_alone() -> None:
         let_go.wait(10)
 
     async def scenario() -> str:
-        thread = OwnThread("disk")
+        thread = WorkerThread("disk")
         with pytest.raises(TimeoutError):
             await asyncio.wait_for(thread.call(hold), 0.01)
         let_go.set()
@@ -62,7 +62,7 @@ def test_who_no_longer_waits_abandons_the_result_alone() -> None:
 
 def test_a_call_that_outlives_the_loop_is_nobodys_error() -> None:
     let_go, over = threading.Event(), threading.Event()
-    thread = OwnThread("disk")
+    thread = WorkerThread("disk")
 
     async def scenario() -> None:
         with pytest.raises(TimeoutError):

@@ -9,13 +9,13 @@ import threading
 
 import pytest
 
-from lfs10d.system.threads import aside
+from lfs10d.system.threads import run_in_thread
 
 
 def test_what_the_call_returns_comes_back() -> None:
     here = threading.get_ident()
 
-    there = asyncio.run(aside(threading.get_ident, "elsewhere"))
+    there = asyncio.run(run_in_thread(threading.get_ident, "elsewhere"))
 
     assert there != here
 
@@ -25,7 +25,7 @@ def test_what_the_call_raises_is_raised() -> None:
         raise LookupError("no such thing")
 
     with pytest.raises(LookupError, match="no such thing"):
-        asyncio.run(aside(fail, "failing"))
+        asyncio.run(run_in_thread(fail, "failing"))
 
 
 def thread_called(name: str) -> threading.Thread:
@@ -37,7 +37,7 @@ def test_who_no_longer_waits_is_told_nothing() -> None:
     go_on = threading.Event()
 
     async def give_up() -> bool:
-        task = asyncio.create_task(aside(go_on.wait, "abandoned"))
+        task = asyncio.create_task(run_in_thread(go_on.wait, "abandoned"))
         await asyncio.sleep(0)
         task.cancel()
         thread = thread_called("abandoned")
@@ -54,7 +54,7 @@ def test_a_loop_that_is_closed_is_told_nothing() -> None:
     go_on = threading.Event()
 
     async def leave() -> None:
-        task = asyncio.create_task(aside(go_on.wait, "left behind"))
+        task = asyncio.create_task(run_in_thread(go_on.wait, "left behind"))
         await asyncio.sleep(0)
         task.cancel()
 

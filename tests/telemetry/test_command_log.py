@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.command import Answer, Call, failed, ok, rejected
+from lfs10d.command import Command, Result, failed, ok, rejected
 from lfs10d.telemetry import command_log
 
 ANY = st.recursive(st.none() | st.integers() | st.text(), lambda inner: st.dictionaries(st.text(), inner), max_leaves=5)
@@ -93,21 +93,21 @@ ANY = st.recursive(st.none() | st.integers() | st.text(), lambda inner: st.dicti
     ],
 )
 def test_one_line_says_what_of_which_device_from_and_to(
-    name: str, parameters: dict[str, Any], answer: Answer, words: str
+    name: str, parameters: dict[str, Any], answer: Result, words: str
 ) -> None:
-    assert command_log.line(name, Call("a1", None, parameters), answer) == f"request {name} (id a1): {words}"
+    assert command_log.line(name, Command("a1", None, parameters), answer) == f"request {name} (id a1): {words}"
 
 
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (Call(), "request x: ok"),
-        (Call(7), "request x (id 7): ok"),
-        (Call(None, "t"), "request x (id t): ok"),
-        (Call(7, "t"), "request x (id 7): ok"),
+        (Command(), "request x: ok"),
+        (Command(7), "request x (id 7): ok"),
+        (Command(None, "t"), "request x (id t): ok"),
+        (Command(7, "t"), "request x (id 7): ok"),
     ],
 )
-def test_it_names_the_request_by_its_id(call: Call, words: str) -> None:
+def test_it_names_the_request_by_its_id(call: Command, words: str) -> None:
     assert command_log.line("x", call, ok()) == words
 
 
@@ -116,5 +116,5 @@ def test_whatever_it_holds_it_is_one_line_and_no_long_one(
     text: str, data: object, parameters: dict[str, Any], name: str
 ) -> None:
     for answer in (ok(data), ok({"device": text, "from": data}), failed("internal", text, data=data)):
-        assert command_log.line(name, Call(text, None, parameters), answer).isprintable()
-    assert len(command_log.line("x", Call("i", None, {"device": "x" * 4000}), ok())) < command_log.LONGEST + 100
+        assert command_log.line(name, Command(text, None, parameters), answer).isprintable()
+    assert len(command_log.line("x", Command("i", None, {"device": "x" * 4000}), ok())) < command_log.LONGEST + 100

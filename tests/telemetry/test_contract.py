@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from lfs10d.telemetry import publication
 from lfs10d.telemetry.contract import OUTBOUND, check, outbound
-from lfs10d.telemetry.payloads import Dropped, Event, NoError
+from lfs10d.telemetry.payloads import DroppedPayload, Event, NoError
 
 FINE = '{"v":1,"active":false,"code":null,"last_code":null,"cleared":null}'
 
@@ -60,7 +60,7 @@ def test_an_error_object_of_half_a_mind_is_refused() -> None:
 def test_dropped_is_told_from_other_events() -> None:
     lost = publication.dropped("a", "k3f9a2c7", 3, 9, count=7, ts=5)
     added = publication.event("device_added", 5, device="a")
-    assert isinstance(check("event", json.dumps(lost.payload)), Dropped)
+    assert isinstance(check("event", json.dumps(lost.payload)), DroppedPayload)
     assert isinstance(check("event", json.dumps(added.payload)), Event)
 
 

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.reading import Errand, Exchanged, Fault, FaultCode, Reading, UartCounters
-from lfs10d.telemetry.counters import DeviceTally, LineTally, percentile, scaled
-from lfs10d.telemetry.publication import Backlog
+from lfs10d.reading import Exchanged, Fault, FaultCode, Purpose, Reading, UartCounters
+from lfs10d.telemetry.counters import DeviceCounters, LineCounters, percentile, scaled
+from lfs10d.telemetry.publication import BacklogStats
 
 START = 1000.0
 TIMEOUT = Fault(FaultCode.TIMEOUT, "")
@@ -25,7 +25,7 @@ def exchange(
     *,
     took: float = 0.03,
     gap: float | None = 0.004,
-    errand: Errand = Errand.POLL,
+    errand: Purpose = Purpose.POLL,
     unsolicited: int = 0,
     late: int = 0,
 ) -> Exchanged:
@@ -67,11 +67,11 @@ def reading(
     )
 
 
-def figures(tally: LineTally, now: float = START + 30) -> Mapping[str, object]:
-    return tally.payload(now, ts=7, gap_required=0.0036458, backlog=Backlog(5, 3, 2))
+def figures(tally: LineCounters, now: float = START + 30) -> Mapping[str, object]:
+    return tally.payload(now, ts=7, gap_required=0.0036458, backlog=BacklogStats(5, 3, 2))
 
 
-def gaps(tally: LineTally) -> dict[str, float | None]:
+def gaps(tally: LineCounters) -> dict[str, float | None]:
     return cast("dict[str, float | None]", figures(tally)["gap_us"])
 
 
@@ -90,7 +90,7 @@ def test_of_nothing_there_is_no_percentile() -> None:
 
 
 def test_before_anything_happened_all_that_is_unknown_is_null() -> None:
-    assert LineTally(START).payload(START, ts=7, gap_required=0.0036458, backlog=Backlog()) == {
+    assert LineCounters(START).payload(START, ts=7, gap_required=0.0036458, backlog=BacklogStats()) == {
         "v": 1,
         "ts": 7,
         "load_pct": None,
@@ -107,12 +107,12 @@ def test_before_anything_happened_all_that_is_unknown_is_null() -> None:
 
 
 def test_an_idle_line_is_known_to_be_idle() -> None:
-    payload = figures(LineTally(START))
+    payload = figures(LineCounters(START))
     assert (payload["load_pct"], payload["polls_per_s"], payload["cycle_s"]) == (0.0, 0.0, None)
 
 
 def test_the_load_is_the_share_of_the_time_the_line_was_given_away() -> None:
-    tally = LineTally(START)
+    tally = LineCounters(START)
     for number in range(600):
         tally.exchanged(exchange(START + 0.05 * (number + 1), took=0.02))
     payload = figures(tally)
@@ -121,13 +121,13 @@ def test_the_load_is_the_share_of_the_time_the_line_was_given_away() -> None:
 
 
 def test_the_load_never_exceeds_the_line() -> None:
-    tally = LineTally(START)
+    tally = LineCounters(START)
     tally.exchanged(exchange(START + 0.1, took=5.0))
     assert figures(tally, START + 1.5)["load_pct"] == 100.0
 
 
 def test_rates_are_of_the_last_half_minute_alone() -> None:
-    tally = LineTally(START)
+    tally = LineCounters(START)
     for number in range(1000):
         tally.polled(reading(START + 0.1 * number), 0.1)
     assert figures(tally, START + 100)["polls_per_s"] == pytest.approx(10, abs=0.1)
@@ -136,7 +136,7 @@ def test_rates_are_of_the_last_half_minute_alone() -> None:
 
 
 def test_shortly_after_the_start_rates_are_of_the_time_since() -> None:
-    tally = LineTally(START)
+    tally = LineCounters(START)
     for number in range(20):
         tally.polled(reading(START + 0.1 * number), None)
     assert figures(tally, START + 2)["polls_per_s"] == 10.0
@@ -144,7 +144,7 @@ def test_shortly_after_the_start_rates_are_of_the_time_since() -> None:
 
 @pytest.mark.parametrize("since", [0.0, 5e-324, 0.9])
 def test_within_the_first_second_no_rate_is_known(since: float) -> None:
-    tally = LineTally(0.0)
+    tally = LineCounters(0.0)
     tally.exchanged(exchange(0.0))
     tally.polled(reading(0.0), None)
     payload = figures(tally, since)
@@ -152,7 +152,7 @@ def test_within_the_first_second_no_rate_is_known(since: float) -> None:
 
 
 def test_the_cycle_is_the_longest_time_between_two_polls_of_one_device() -> None:
-    tally = LineTally(START)
+    tally = LineCounters(START)
     for apart in (0.3, 0.9, None, 0.5):
         tally.polled(reading(START + 1), apart)
     assert figures(tally)["cycle_s"] == 0.9
@@ -160,37 +160,37 @@ def test_the_cycle_is_the_longest_time_between_two_polls_of_one_device() -> None
 
 
 def test_an_event_that_comes_in_late_joins_the_newest_second() -> None:
-    tally = LineTally(START)
+    tally = LineCounters(START)
     tally.polled(reading(START + 5), None)
     tally.polled(reading(START + 3.9), None)
     assert figures(tally, START + 10)["polls_per_s"] == 0.2
 
 
 def test_gaps_are_told_by_their_least_median_and_99th_percentile() -> None:
-    tally = LineTally(START)
+    tally = LineCounters(START)
     for number in range(100):
         tally.exchanged(exchange(START, gap=0.004 + number * 1e-5))
     assert gaps(tally) == {"min": 4000.0, "p50": 4490.0, "p99": 4980.0}
 
 
 def test_the_least_gap_is_since_boot_and_the_others_of_the_last_thousand() -> None:
-    tally = LineTally(START)
+    tally = LineCounters(START)
     tally.exchanged(exchange(START, gap=0.0037))
     for _ in range(1000):
         tally.exchanged(exchange(START, gap=0.005))
     assert gaps(tally) == {"min": 3700.0, "p50": 5000.0, "p99": 5000.0}
 
 
-@pytest.mark.parametrize("errand", [Errand.SCAN, Errand.CHANGE])
-def test_gaps_at_other_rates_are_left_out(errand: Errand) -> None:
-    tally = LineTally(START)
+@pytest.mark.parametrize("errand", [Purpose.SCAN, Purpose.CHANGE])
+def test_gaps_at_other_rates_are_left_out(errand: Purpose) -> None:
+    tally = LineCounters(START)
     tally.exchanged(exchange(START, gap=0.001, errand=errand))
     tally.exchanged(exchange(START, gap=None))
     assert gaps(tally) == {"min": None, "p50": None, "p99": None}
 
 
 def test_a_line_at_another_rate_has_no_gaps_yet() -> None:
-    tally = LineTally(START)
+    tally = LineCounters(START)
     tally.exchanged(exchange(START, gap=0.0019))
     tally.retimed()
     tally.exchanged(exchange(START, gap=0.0040))
@@ -198,7 +198,7 @@ def test_a_line_at_another_rate_has_no_gaps_yet() -> None:
 
 
 def test_errors_count_every_attempt_of_a_poll_but_no_busy_device() -> None:
-    tally = LineTally(START)
+    tally = LineCounters(START)
     tally.polled(reading(START, failed=(FaultCode.CRC,)), None)
     tally.polled(reading(START, TIMEOUT, failed=(FaultCode.CRC,)), None)
     tally.polled(reading(START, BUSY), None)
@@ -206,21 +206,21 @@ def test_errors_count_every_attempt_of_a_poll_but_no_busy_device() -> None:
 
 
 def test_late_answers_are_counted_one_by_one_and_not_again_with_their_poll() -> None:
-    tally = LineTally(START)
+    tally = LineCounters(START)
     tally.exchanged(exchange(START, late=2))
     tally.polled(reading(START, Fault(FaultCode.LATE, ""), failed=(FaultCode.LATE,)), None)
     assert figures(tally)["errors"] == {"late": 2}
 
 
 def test_losses_of_the_port_and_missed_points_of_the_grid_are_counted() -> None:
-    tally = LineTally(START)
+    tally = LineCounters(START)
     tally.lost(FaultCode.PORT_BUSY)
     tally.overran(3)
     assert figures(tally)["errors"] == {"port_busy": 1, "overrun": 3}
 
 
 def test_unsolicited_bytes_uart_and_store_are_told() -> None:
-    tally = LineTally(START)
+    tally = LineCounters(START)
     tally.exchanged(exchange(START, unsolicited=4))
     tally.exchanged(exchange(START, unsolicited=1))
     tally.uart = UartCounters(framing=1, parity=2, overrun=3, breaks=4)
@@ -231,7 +231,7 @@ def test_unsolicited_bytes_uart_and_store_are_told() -> None:
 
 
 def test_a_device_never_polled_has_nulls() -> None:
-    assert DeviceTally(None).payload(7) == {
+    assert DeviceCounters(None).payload(7) == {
         "v": 1,
         "ts": 7,
         "polls": 0,
@@ -245,18 +245,18 @@ def test_a_device_never_polled_has_nulls() -> None:
 
 
 def test_a_fixed_time_out_is_known_before_the_first_poll() -> None:
-    assert DeviceTally(0.25).payload(7)["response_timeout_ms"] == 250.0
+    assert DeviceCounters(0.25).payload(7)["response_timeout_ms"] == 250.0
 
 
 def test_a_configured_rest_is_known_before_the_first_poll_and_a_learned_one_after_it() -> None:
-    tally = DeviceTally(None, 0.1)
+    tally = DeviceCounters(None, 0.1)
     assert tally.payload(7)["request_gap_ms"] == 100.0
     tally.polled(replace(reading(1.0), request_gap=0.4), 7)
     assert tally.payload(7)["request_gap_ms"] == 400.0
 
 
 def test_a_device_s_polls_values_errors_and_times_are_told() -> None:
-    tally = DeviceTally(None)
+    tally = DeviceCounters(None)
     for number in range(100):
         tally.polled(reading(START + number, rtt=0.0101 + number / 1000), 5000 + number)
     tally.polled(reading(START + 100, TIMEOUT, overruns=2), 6000)
@@ -275,19 +275,19 @@ def test_a_device_s_polls_values_errors_and_times_are_told() -> None:
 
 
 def test_a_good_reading_without_a_time_of_answer_spoils_no_percentile() -> None:
-    tally = DeviceTally(None)
+    tally = DeviceCounters(None)
     tally.polled(reading(START, rtt=None), 1)
     assert (tally.payload(7)["good"], tally.payload(7)["rtt_ms"]) == (1, {"p50": None, "p95": None})
 
 
 def test_the_time_between_two_polls_is_told() -> None:
-    tally = DeviceTally(None)
+    tally = DeviceCounters(None)
     assert tally.polled(reading(START), 1) is None
     assert tally.polled(reading(START + 0.5, TIMEOUT), 2) == 0.5
 
 
 def test_probes_are_polls_but_stand_apart() -> None:
-    tally = DeviceTally(None)
+    tally = DeviceCounters(None)
     tally.polled(reading(START), 1)
     assert tally.polled(reading(START + 15, TIMEOUT, probe=True), 2) is None
     assert tally.polled(reading(START + 30), 3) is None
@@ -295,7 +295,7 @@ def test_probes_are_polls_but_stand_apart() -> None:
 
 
 def test_a_lost_port_is_an_error_but_no_poll() -> None:
-    tally = DeviceTally(None)
+    tally = DeviceCounters(None)
     tally.polled(reading(START), 1)
     assert tally.polled(reading(START + 1, LOST), 2) is None
     assert tally.polled(reading(START + 9), 3) is None
@@ -307,13 +307,13 @@ def test_a_percentile_is_not_one_too_small_where_the_share_is_just_above_a_whole
 
 
 def test_figures_are_told_to_a_tenth_of_their_unit() -> None:
-    tally = LineTally(START)
+    tally = LineCounters(START)
     odd = 0.50000014
     tally.exchanged(exchange(START + 1.0, gap=odd))
-    told = tally.payload(START + 30, ts=7, gap_required=odd, backlog=Backlog())
+    told = tally.payload(START + 30, ts=7, gap_required=odd, backlog=BacklogStats())
     assert told["gap_required_us"] == 500_000.1
     assert told["gap_us"] == {"min": 500_000.1, "p50": 500_000.1, "p99": 500_000.1}
-    device = DeviceTally(0.50014)
+    device = DeviceCounters(0.50014)
     device.polled(reading(START, rtt=0.50014), 7)
     device.response_timeout = 0.50014
     told = device.payload(7)
@@ -322,7 +322,7 @@ def test_figures_are_told_to_a_tenth_of_their_unit() -> None:
 
 
 def test_rates_are_told_in_tenths_of_a_percent_hundredths_of_a_poll_and_milliseconds() -> None:
-    tally = LineTally(START)
+    tally = LineCounters(START)
     tally.exchanged(exchange(START + 1.0, took=0.37037))
     tally.polled(reading(START + 1.0), 1.23456)
     rates = tally.rates(START + 3.0)
@@ -330,28 +330,28 @@ def test_rates_are_told_in_tenths_of_a_percent_hundredths_of_a_poll_and_millisec
 
 
 def test_a_load_of_half_the_time_is_half() -> None:
-    tally = LineTally(START)
+    tally = LineCounters(START)
     for second in range(30):
         tally.exchanged(exchange(START + second + 0.6, took=0.5))
     assert tally.rates(START + 30).load_pct == pytest.approx(50.0, abs=0.1)
 
 
 def test_within_the_first_second_the_cycle_is_known_and_after_it_the_rates() -> None:
-    tally = LineTally(START)
+    tally = LineCounters(START)
     tally.polled(reading(START + 0.5), 0.25)
     assert tally.rates(START + 0.9).payload() == {"load_pct": None, "polls_per_s": None, "cycle_s": 0.25}
     assert tally.rates(START + 1.0).polls_per_s == 1.0
 
 
 def test_the_events_of_one_second_are_kept_as_one() -> None:
-    tally = LineTally(START)
+    tally = LineCounters(START)
     for n in range(1000):
         tally.exchanged(exchange(START + n / 1001, took=0.0))
     assert len(tally._seconds) == 1
 
 
 def test_of_gaps_only_the_last_thousand_are_kept() -> None:
-    tally = LineTally(START)
+    tally = LineCounters(START)
     for gap in (0.5, 0.25):
         for n in range(1000):
             tally.exchanged(exchange(START + n, gap=gap))
@@ -359,7 +359,7 @@ def test_of_gaps_only_the_last_thousand_are_kept() -> None:
 
 
 def test_of_answer_times_only_the_last_hundred_are_kept() -> None:
-    tally = DeviceTally(None)
+    tally = DeviceCounters(None)
     for rtt in (0.5, 0.25):
         for n in range(100):
             tally.polled(reading(START + n, rtt=rtt), 7)
@@ -367,7 +367,7 @@ def test_of_answer_times_only_the_last_hundred_are_kept() -> None:
 
 
 def test_what_happens_twice_counts_twice() -> None:
-    line, device = LineTally(START), DeviceTally(None)
+    line, device = LineCounters(START), DeviceCounters(None)
     for at in (START, START + 1):
         line.exchanged(exchange(at, late=2))
         line.overran(3)

@@ -10,9 +10,9 @@ import pytest
 
 from lfs10d.reading import AnsweredTwice, Fault, FaultCode, Reading
 from lfs10d.system.clock import Instant
-from lfs10d.telemetry.device_state import STATE_EARLY, Standing
-from lfs10d.telemetry.info import DeviceFacts
-from lfs10d.telemetry.publication import STATE, Kind, Publication
+from lfs10d.telemetry.device_state import STATE_EARLY, DeviceState
+from lfs10d.telemetry.info import DeviceInfo
+from lfs10d.telemetry.publication import STATE, Publication, PublicationKind
 from tests.support.stations import ONE_VALUE
 
 FACTS = replace(ONE_VALUE, slave=3, label="Mast", interval=0.25)
@@ -31,7 +31,7 @@ class Watched:
     """A standing with a hand on its clock: `poll` reads at a time in s and returns the leaves published."""
 
     def __init__(self, *, seq: int = 0) -> None:
-        self.standing = Standing(FACTS, line="line0", boot="k3f9a2c7", seq=seq, now=instant(0))
+        self.standing = DeviceState(FACTS, line="line0", boot="k3f9a2c7", seq=seq, now=instant(0))
 
     def publish(
         self, at: float, outcome: float | Fault, *, online: bool | None = None, masked: bool = False
@@ -74,7 +74,7 @@ def test_a_device_is_offline_and_without_a_value_until_its_first_answer() -> Non
 
 
 def test_a_device_disabled_from_the_start_says_so_and_has_no_sample() -> None:
-    standing = Standing(replace(FACTS, enabled=False), line="line0", boot="k3f9a2c7", seq=0, now=instant(0))
+    standing = DeviceState(replace(FACTS, enabled=False), line="line0", boot="k3f9a2c7", seq=0, now=instant(0))
     state, _, availability, error, _ = standing.burst(instant(1.0))
     assert fields(state.payload, "wind_speed", "quality", "error", "seq") == (None, "bad", "disabled", 0)
     assert availability.payload == "offline"
@@ -87,7 +87,7 @@ def test_the_first_answer_is_available_first_and_shown_at_once() -> None:
     assert leaves(published) == ["telemetry", "availability", "state"]
     sample, available, state = published
     assert sample.sample is not None
-    assert (sample.kind, sample.retain, sample.qos) == (Kind.SAMPLE, False, 1)
+    assert (sample.kind, sample.retain, sample.qos) == (PublicationKind.SAMPLE, False, 1)
     assert sample.sample.payload("line0") == sample.payload
     assert available.payload == "online"
     assert state.payload == sample.payload
@@ -360,13 +360,13 @@ def test_a_good_reading_without_a_time_of_answer_has_none() -> None:
 
 
 def test_a_disabled_devices_requested_sample_is_of_the_line_too() -> None:
-    standing = Standing(replace(FACTS, enabled=False), line="line0", boot="k3f9a2c7", seq=0, now=instant(0))
+    standing = DeviceState(replace(FACTS, enabled=False), line="line0", boot="k3f9a2c7", seq=0, now=instant(0))
     reading = Reading("a", 1.0, {"wind_speed": 1.0}, None, 0.02, online=False, response_timeout=0.2)
     assert fields(standing.read(reading, instant(1.0), masked=False)[0].payload, "line") == ("line0",)
 
 
 def test_statistics_have_a_time_and_know_a_fixed_time_out_from_the_start() -> None:
-    standing = Standing(replace(FACTS, response_timeout=0.3), line="line0", boot="b", seq=0, now=instant(0))
+    standing = DeviceState(replace(FACTS, response_timeout=0.3), line="line0", boot="b", seq=0, now=instant(0))
     assert fields(standing.stats(instant(5.0)).payload, "ts", "response_timeout_ms") == (1_795_298_005_000, 300.0)
 
 
@@ -375,7 +375,7 @@ def test_the_configuration_is_that_of_the_facts() -> None:
 
 
 def test_a_rest_that_was_learned_is_published_with_the_configuration_once() -> None:
-    standing = Standing(replace(FACTS, request_gap=0.1), line="line0", boot="b", seq=0, now=instant(0))
+    standing = DeviceState(replace(FACTS, request_gap=0.1), line="line0", boot="b", seq=0, now=instant(0))
     rested = Reading("a", 1.0, {"wind_speed": 1.0}, None, 0.02, online=True, response_timeout=0.2, request_gap=0.4)
     told = [leaves(standing.read(replace(rested, at=at), instant(at), masked=False)) for at in (1.0, 2.0)]
     assert [("config" in each) for each in told] == [True, False]
@@ -436,7 +436,7 @@ def test_an_id_answered_twice_is_an_event_and_an_error_beside_good_samples() -> 
     assert fields(watched.shown["error"], "active") == (False,)
 
 
-def every(state_every: float) -> DeviceFacts:
+def every(state_every: float) -> DeviceInfo:
     return replace(FACTS, state_every=state_every)
 
 

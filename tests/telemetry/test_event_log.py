@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from lfs10d.reading import Errand, Exchanged, Fault, FaultCode, PortChanged, Reading
-from lfs10d.telemetry.event_log import Logbook
-from lfs10d.telemetry.publication import Kind, Publication, Sample, device_topic, retained
+from lfs10d.reading import Exchanged, Fault, FaultCode, PortChanged, Purpose, Reading
+from lfs10d.telemetry.event_log import EventLog
+from lfs10d.telemetry.publication import Publication, PublicationKind, Sample, device_topic, retained
 
 PORT = "/dev/ttyUSB0"
 
@@ -21,7 +21,7 @@ def a_sample(*, good: bool, device: str = "mast") -> Publication:
         error=None if good else "timeout", rtt_ms=None,
     )  # fmt: skip
     topic = device_topic(device, "telemetry")
-    return Publication(topic, sample.payload("line0"), Kind.SAMPLE, retain=False, qos=1, sample=sample)
+    return Publication(topic, sample.payload("line0"), PublicationKind.SAMPLE, retain=False, qos=1, sample=sample)
 
 
 def an_error(code: str | None, device: str = "mast") -> Publication:
@@ -30,7 +30,7 @@ def an_error(code: str | None, device: str = "mast") -> Publication:
 
 
 def test_a_failing_device_is_told_once_and_its_recovery_too() -> None:
-    book = Logbook()
+    book = EventLog()
 
     assert not book.published([a_sample(good=False)])
     risen = book.published([a_sample(good=False), an_error("timeout")])
@@ -44,7 +44,7 @@ def test_a_failing_device_is_told_once_and_its_recovery_too() -> None:
 
 
 def test_an_error_that_is_masked_is_no_recovery_and_may_rise_anew() -> None:
-    book = Logbook()
+    book = EventLog()
     book.published([an_error("timeout")])
 
     assert not book.published([an_error(None)])
@@ -53,7 +53,7 @@ def test_an_error_that_is_masked_is_no_recovery_and_may_rise_anew() -> None:
 
 
 def test_a_device_that_is_removed_is_forgotten() -> None:
-    book = Logbook()
+    book = EventLog()
     book.published([an_error("timeout")])
 
     assert not book.published([retained(device_topic("mast", "error"), None)])
@@ -61,11 +61,11 @@ def test_a_device_that_is_removed_is_forgotten() -> None:
 
 
 def test_other_topics_say_nothing() -> None:
-    assert not Logbook().published([retained("line/error", {"active": True}), retained("info", {})])
+    assert not EventLog().published([retained("line/error", {"active": True}), retained("info", {})])
 
 
 def test_the_port_is_told_with_what_one_should_know_of_it() -> None:
-    book = Logbook()
+    book = EventLog()
 
     lost = PortChanged(0.0, Fault(FaultCode.PORT_LOST, f"{PORT}: hung up"))
     assert book.happened(lost, port=PORT, notices=(), frames=False) == [
@@ -79,7 +79,7 @@ def test_the_port_is_told_with_what_one_should_know_of_it() -> None:
 
 def test_a_port_that_is_freed_on_request_is_no_warning() -> None:
     freed = PortChanged(0.0, Fault(FaultCode.PORT_LOST, "freed"), freed=True)
-    told = Logbook().happened(freed, port=PORT, notices=(), frames=False)
+    told = EventLog().happened(freed, port=PORT, notices=(), frames=False)
     assert told == [(logging.INFO, f"{PORT}: freed for another program")]
 
 
@@ -92,17 +92,17 @@ def test_a_port_that_is_freed_on_request_is_no_warning() -> None:
 )
 def test_frames_are_told_at_debug_where_they_are_wanted(heard: bytes, fault: FaultCode | None, words: str) -> None:
     happened = Exchanged(
-        at=1.0, asked=0.0, began=0.1, gap=0.004, slave=1, errand=Errand.POLL, fault=fault, sent=b"\x01\x03\x00",
+        at=1.0, asked=0.0, began=0.1, gap=0.004, slave=1, errand=Purpose.POLL, fault=fault, sent=b"\x01\x03\x00",
         heard=heard,
     )  # fmt: skip
-    book = Logbook()
+    book = EventLog()
 
     assert book.happened(happened, port=PORT, notices=(), frames=True) == [(logging.DEBUG, words)]
     assert not book.happened(happened, port=PORT, notices=(), frames=False)
 
 
 def test_a_learned_rest_is_told_once_with_what_to_set() -> None:
-    book = Logbook()
+    book = EventLog()
     plain = Reading("mast", 1.0, {"a": 1.0}, None, 0.02, online=True, response_timeout=0.2, request_gap=0.2)
     rested = replace(plain, request_gap=0.4, gap_learned=True)
 

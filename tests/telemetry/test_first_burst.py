@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from lfs10d.telemetry.first_burst import FirstBurst
-from lfs10d.telemetry.publication import Kind, Publication, Sample, retained
+from lfs10d.telemetry.publication import Publication, PublicationKind, Sample, retained
 
 UNKNOWN = [
     retained("line/state", {"open": False}),
@@ -51,7 +51,7 @@ def test_states_are_held_back_until_then_samples_clearings_and_the_line_are_not(
     first = FirstBurst(UNKNOWN)
     sample = Sample("mast", "0", 1, 0, "synced", None, {}, ("wind_speed",), "bad", "timeout", None)
     passing = [
-        Publication("device/mast/telemetry", {}, Kind.SAMPLE, retain=False, qos=1, sample=sample),
+        Publication("device/mast/telemetry", {}, PublicationKind.SAMPLE, retain=False, qos=1, sample=sample),
         retained("device/mast/state", None),
         KNOWN[0],
         KNOWN[4],

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from lfs10d.system.clock import Instant
-from lfs10d.telemetry.info import DaemonFacts, LineFacts
+from lfs10d.telemetry.info import DaemonInfo, LineInfo
 from tests.support.stations import ONE_VALUE
 
 DEVICE = replace(ONE_VALUE, name="mast-top", slave=3, label="Mast, 10 m", interval=0.25)
@@ -45,7 +45,7 @@ def test_the_array_of_devices_calls_the_slave_id() -> None:
 
 
 def test_info_says_who_runs_since_when_and_by_which_clock() -> None:
-    daemon = DaemonFacts("0.1", "gw", "k3f9a2c7", "k3f9a2c6", "abc", 2, {"version": "5"}, ("store",))
+    daemon = DaemonInfo("0.1", "gw", "k3f9a2c7", "k3f9a2c6", "abc", 2, {"version": "5"}, ("store",))
     assert daemon.payload(started=5, clock="unsynced") == {
         "v": 1,
         "version": "0.1",
@@ -62,7 +62,7 @@ def test_info_says_who_runs_since_when_and_by_which_clock() -> None:
 
 
 def test_the_line_state_is_configuration_and_what_goes_on() -> None:
-    line = LineFacts("line0", "/dev/ttyUSB0", 9600, "none", 8, 1, "rtu", 0.00365)
+    line = LineInfo("line0", "/dev/ttyUSB0", 9600, "none", 8, 1, "rtu", 0.00365)
     assert line.payload(is_open=True, activity="polling", requests="ok") == {
         "v": 1,
         "port": "/dev/ttyUSB0",

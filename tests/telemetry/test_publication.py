@@ -10,7 +10,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.telemetry.publication import Kind, Publication, device_of, device_topic, dropped, event, iso_time, retained
+from lfs10d.telemetry.publication import (
+    Publication,
+    PublicationKind,
+    device_of,
+    device_topic,
+    dropped,
+    event,
+    iso_time,
+    retained,
+)
 from tests.support.samples import SAMPLE
 
 
@@ -74,7 +83,7 @@ def test_a_time_before_the_epoch_is_still_a_time() -> None:
 def test_a_retained_publication_is_kept_by_the_broker_at_least_once() -> None:
     topic = device_topic("mast-top", "state")
     assert topic == "device/mast-top/state"
-    assert retained(topic, None) == Publication(topic, None, Kind.RETAINED, retain=True, qos=1)
+    assert retained(topic, None) == Publication(topic, None, PublicationKind.RETAINED, retain=True, qos=1)
     assert retained("line/stats", {}, qos=0).qos == 0
 
 
@@ -82,7 +91,7 @@ def test_an_event_tells_its_type_time_and_facts() -> None:
     assert event("device_added", 7, device="a", slave=3) == Publication(
         "event",
         {"v": 1, "type": "device_added", "ts": 7, "device": "a", "slave": 3},
-        Kind.EVENT,
+        PublicationKind.EVENT,
         retain=False,
         qos=1,
     )

@@ -9,9 +9,9 @@ from typing import cast
 
 import pytest
 
-from lfs10d.reading import Errand, Exchanged, FaultCode, PortChanged, UartCounted, UartCounters
+from lfs10d.reading import Exchanged, FaultCode, PortChanged, Purpose, UartCounted, UartCounters
 from lfs10d.telemetry.contract import outbound
-from lfs10d.telemetry.publication import Backlog, Kind, Payload
+from lfs10d.telemetry.publication import BacklogStats, Payload, PublicationKind
 from lfs10d.telemetry.station import Instant, Station
 from tests.support.stations import (
     DAEMON,
@@ -115,7 +115,7 @@ def test_a_reading_of_a_device_unknown_or_disabled_is_passed_over(device: str) -
 
 def test_an_exchange_changes_figures_alone() -> None:
     running = station()
-    happened = Exchanged(1.0, 0.9, 0.9, 0.004, 2, Errand.POLL, None, b"", b"", unsolicited=3)
+    happened = Exchanged(1.0, 0.9, 0.9, 0.004, 2, Purpose.POLL, None, b"", b"", unsolicited=3)
     assert running.heard(happened, instant(1)) == []
     assert fields(shown(running, "line/stats", 10), "exchanges", "unsolicited_bytes") == (1, 3)
 
@@ -294,7 +294,7 @@ def test_statistics_come_every_half_minute_and_are_not_made_up_for_a_sleep() -> 
 
 
 def test_statistics_tell_what_waits_for_the_broker() -> None:
-    waiting = Station(DAEMON, LINE, [ONE_VALUE], instant(0), backlog=lambda: Backlog(7, 5, 2))
+    waiting = Station(DAEMON, LINE, [ONE_VALUE], instant(0), backlog=lambda: BacklogStats(7, 5, 2))
     published = waiting.tick(instant(30))
     assert fields(published[0].payload, "store") == ({"depth": 7, "oldest_ts": 5, "dropped": 2},)
 
@@ -331,7 +331,7 @@ def test_an_added_device_is_announced_with_all_its_topics() -> None:
         "devices",
     ]
     assert fields(published[0].payload, "type", "device", "slave") == ("device_added", "c", 4)
-    assert published[0].kind is Kind.EVENT
+    assert published[0].kind is PublicationKind.EVENT
     assert fields(published[1].payload, "quality", "seq", "error") == ("bad", 0, "starting")
 
 
@@ -407,7 +407,7 @@ def test_a_device_on_another_profile_starts_anew_but_for_its_numbers() -> None:
 
 def test_another_rate_is_shown_and_its_gaps_are_measured_anew() -> None:
     running = station()
-    running.heard(Exchanged(1, 1, 1, 0.0037, 2, Errand.POLL, None, b"", b""), instant(1))
+    running.heard(Exchanged(1, 1, 1, 0.0037, 2, Purpose.POLL, None, b"", b""), instant(1))
     faster = replace(LINE, baudrate=19200, gap_required=0.0018229)
     assert topics(running.configure(faster, [ONE_VALUE, TWO_VALUES], instant(2))) == ["line/state"]
     stats = shown(running, "line/stats")
@@ -416,7 +416,7 @@ def test_another_rate_is_shown_and_its_gaps_are_measured_anew() -> None:
 
 def test_another_port_keeps_the_gaps() -> None:
     running = station()
-    running.heard(Exchanged(1, 1, 1, 0.0037, 2, Errand.POLL, None, b"", b""), instant(1))
+    running.heard(Exchanged(1, 1, 1, 0.0037, 2, Purpose.POLL, None, b"", b""), instant(1))
     moved = replace(LINE, port="/dev/ttyUSB1")
     assert topics(running.configure(moved, [ONE_VALUE, TWO_VALUES], instant(2))) == ["line/state"]
     assert fields(shown(running, "line/stats"), "gap_us") == ({"min": 3700.0, "p50": 3700.0, "p99": 3700.0},)
@@ -467,7 +467,7 @@ def test_a_summary_counts_who_is_polled_and_says_how_busy_the_line_is() -> None:
     running = station(ONE_VALUE, TWO_VALUES, replace(THIRD, enabled=False))
     running.heard(good("a", 0.4), instant(0.4))
     assert running.summary(instant(0.5)) == "1 of 2 slaves online"
-    running.heard(Exchanged(1.5, 0.0, 0.0, None, 2, Errand.POLL, None, b"", b""), instant(1.5))
+    running.heard(Exchanged(1.5, 0.0, 0.0, None, 2, Purpose.POLL, None, b"", b""), instant(1.5))
     assert running.summary(instant(2)) == "1 of 2 slaves online, line 75 % busy"
 
 

@@ -10,11 +10,11 @@ from typing import cast
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lfs10d.reading import Errand, Exchanged, Fault, FaultCode, PortChanged, Reading
-from lfs10d.system.clock import ClockState
+from lfs10d.reading import Exchanged, Fault, FaultCode, PortChanged, Purpose, Reading
+from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry.contract import check
 from lfs10d.telemetry.publication import Payload, Publication
-from lfs10d.telemetry.station import DeviceFacts, Instant, Station
+from lfs10d.telemetry.station import DeviceInfo, Instant, Station
 from tests.support.stations import DAEMON, LINE, LOCKED, LOST, ONE_VALUE, THIRD, TWO_VALUES, fields, good, instant
 
 FLEET = (ONE_VALUE, TWO_VALUES, THIRD)
@@ -39,7 +39,7 @@ readings = st.builds(
     st.integers(0, 2),
 )
 exchanges = st.builds(
-    lambda took, gap, late: Exchanged(took, 0, 0, gap, 2, Errand.POLL, None, b"", b"", late=late),
+    lambda took, gap, late: Exchanged(took, 0, 0, gap, 2, Purpose.POLL, None, b"", b"", late=late),
     st.floats(0, 2),
     st.none() | st.floats(0.001, 10),
     st.integers(0, 2),
@@ -78,7 +78,7 @@ def take(running: Station, step: object, now: Instant) -> list[Publication]:
         case str():
             return running.acting(step, now)
         case _:
-            return running.configure(LINE, cast("tuple[DeviceFacts, ...]", step), now)
+            return running.configure(LINE, cast("tuple[DeviceInfo, ...]", step), now)
 
 
 @settings(deadline=None)  # the claim is about truth, not about speed

@@ -10,7 +10,7 @@ import click
 
 from lfs10d.cli.demo import texts
 from lfs10d.cli.demo.broker import Broker
-from lfs10d.cli.demo.state import Picture, Row
+from lfs10d.cli.demo.state import DemoRow, DemoState
 
 COLUMN: Final = 9
 """With eight sensors and the time a line has 80 characters."""
@@ -20,7 +20,7 @@ HEAD_EVERY: Final = 20
 class Lines:
     """The text of the plain view; it remembers what it has told."""
 
-    def __init__(self, picture: Picture) -> None:
+    def __init__(self, picture: DemoState) -> None:
         self._picture = picture
         self._told = {name: (row.state, False) for name, row in picture.rows.items()}
         self._since_head = HEAD_EVERY
@@ -49,7 +49,7 @@ class Lines:
         yield clock + "".join(_cell(row).rjust(COLUMN) for row in rows)
 
 
-def _cell(row: Row) -> str:
+def _cell(row: DemoRow) -> str:
     if row.speed is not None:
         return f"{row.speed:.2f}"
     return row.fault or "-"
@@ -61,7 +61,7 @@ class LinesView:
     every: Final = 1.0
     """Seconds from one turn to the next."""
 
-    def __init__(self, picture: Picture, broker: Broker) -> None:
+    def __init__(self, picture: DemoState, broker: Broker) -> None:
         self._lines = Lines(picture)
         self._broker = broker
 

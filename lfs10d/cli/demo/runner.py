@@ -19,18 +19,18 @@ from lfs10d.cli.demo.broker import LOOPBACK, Broker, start_broker
 from lfs10d.cli.demo.line_view import LinesView
 from lfs10d.cli.demo.processes import PYTHON, Children, passing_folder
 from lfs10d.cli.demo.scenario import BASE_TOPIC, BAUDRATE, LINE, configuration, faults, slaves
-from lfs10d.cli.demo.state import TOPICS, Picture
+from lfs10d.cli.demo.state import TOPICS, DemoState
 from lfs10d.errors import FailedError
 from lfs10d.mqtt.connection import Connection
 from lfs10d.mqtt.messages import Accepted, Filter, Incoming
-from lfs10d.mqtt.reasons import Ended
+from lfs10d.mqtt.reasons import Disconnect
 from lfs10d.mqtt.settings import BrokerSettings, Version
 from lfs10d.mqtt.topics import Topics
 
 STANDARD_OUTPUT: Final = 1
 
 
-class View(AbstractContextManager["View"], Protocol):
+class DemoView(AbstractContextManager["DemoView"], Protocol):
     """What shows the picture between enter and exit."""
 
     @property
@@ -44,7 +44,7 @@ class View(AbstractContextManager["View"], Protocol):
 class Subscriber:
     """Listens to the broker as any other client would, and passes on to the picture what it hears."""
 
-    def __init__(self, broker: Broker, picture: Picture) -> None:
+    def __init__(self, broker: Broker, picture: DemoState) -> None:
         self._picture = picture
         self._topics = Topics.of(BASE_TOPIC, LINE)
         self.gone: str | None = None
@@ -63,7 +63,7 @@ class Subscriber:
         if topic is not None:
             self._picture.heard(topic, message.payload)
 
-    def ended(self, ended: Ended) -> None:
+    def ended(self, ended: Disconnect) -> None:
         """Note why."""
         self.gone = ended.message
 
@@ -91,7 +91,7 @@ async def show(*, duration: float | None, broker: str) -> None:
     over = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         asyncio.get_running_loop().add_signal_handler(number, over.set)
-    picture = Picture()
+    picture = DemoState()
     begun = time.monotonic()
     with passing_folder() as folder:
         children = Children(folder)
@@ -117,7 +117,7 @@ async def _until(over: asyncio.Event, play: Coroutine[None, None, None]) -> None
         await playing
 
 
-async def _play(children: Children, picture: Picture, wanted: str, duration: float | None) -> None:
+async def _play(children: Children, picture: DemoState, wanted: str, duration: float | None) -> None:
     broker = await _start(children, wanted)
     subscriber = Subscriber(broker, picture)
     try:
@@ -151,7 +151,7 @@ async def _start(children: Children, wanted: str) -> Broker:
     return broker
 
 
-def _view(picture: Picture, broker: Broker) -> View:
+def _view(picture: DemoState, broker: Broker) -> DemoView:
     """Return the table where there is a terminal that can show it, else the lines."""
     if sys.stdout is not None and sys.stdout.isatty():
         from lfs10d.cli.demo.table_view import TableView  # noqa: PLC0415  # a pipe needs nothing to draw with

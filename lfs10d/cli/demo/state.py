@@ -18,7 +18,7 @@ TOPICS: Final = ("device/+/telemetry", "device/+/availability", "device/+/error"
 
 
 @dataclass(slots=True)
-class Row:
+class DemoRow:
     """One sensor as MQTT tells of it."""
 
     role: Role
@@ -59,11 +59,11 @@ class LineFigures:
     gap_required: float
 
 
-class Picture:
+class DemoState:
     """A row for each sensor, and the line's figures."""
 
     def __init__(self, cast: Sequence[Role] = CAST) -> None:
-        self.rows = {role.name: Row(role) for role in cast}
+        self.rows = {role.name: DemoRow(role) for role in cast}
         self.line: LineFigures | None = None
         """None before the first statistics."""
 
@@ -93,7 +93,7 @@ class Picture:
         return sum(row.online is True for row in self.rows.values())
 
     @staticmethod
-    def _sample(row: Row, sample: dict[str, Any]) -> None:
+    def _sample(row: DemoRow, sample: dict[str, Any]) -> None:
         row.speed, row.fault = sample["wind_speed"], sample["error"]
         row.samples += 1
         row.failed += row.speed is None

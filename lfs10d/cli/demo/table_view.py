@@ -13,7 +13,7 @@ from rich.text import Text
 
 from lfs10d.cli.demo import texts
 from lfs10d.cli.demo.broker import Broker
-from lfs10d.cli.demo.state import Picture, Row
+from lfs10d.cli.demo.state import DemoRow, DemoState
 
 LEAST_WIDTH: Final = 80
 LEAST_HEIGHT: Final = 20
@@ -37,7 +37,7 @@ class TableView:
     every: Final = 0.2
     """Seconds from one turn to the next."""
 
-    def __init__(self, picture: Picture, broker: Broker) -> None:
+    def __init__(self, picture: DemoState, broker: Broker) -> None:
         self._picture, self._broker = picture, broker
         self._console = Console(highlight=False, force_terminal=True)
         self._live = Live(
@@ -70,7 +70,7 @@ class TableView:
         return draw(self._picture, self._broker, self._console.width, unicode=unicode)
 
 
-def draw(picture: Picture, broker: Broker, width: int, *, unicode: bool = True) -> Group:
+def draw(picture: DemoState, broker: Broker, width: int, *, unicode: bool = True) -> Group:
     """Return the whole view for a terminal of this width in characters, in ASCII if it has no `unicode`."""
     trend = min(TREND_MOST, max(TREND_LEAST, width - _BESIDE_TREND))
     return Group(
@@ -90,7 +90,7 @@ def _story(name: str, story: str) -> Text:
     return Text.assemble((name, "bold yellow"), f" {story}")
 
 
-def _table(rows: Iterable[Row], trend: int, *, unicode: bool) -> Table:
+def _table(rows: Iterable[DemoRow], trend: int, *, unicode: bool) -> Table:
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, padding=(0, 1, 0, 0), header_style="bold")
     table.add_column("id", justify="right")
     table.add_column("sensor", style="cyan", no_wrap=True)
@@ -110,7 +110,7 @@ def _table(rows: Iterable[Row], trend: int, *, unicode: bool) -> Table:
     return table
 
 
-def _trend(row: Row, length: int, *, unicode: bool) -> Iterator[tuple[str, str]]:
+def _trend(row: DemoRow, length: int, *, unicode: bool) -> Iterator[tuple[str, str]]:
     bars = _BARS if unicode else _PLAIN_BARS
     for speed in list(row.trend)[-length:]:
         if speed is None:

@@ -7,7 +7,7 @@ from typing import Final
 
 from lfs10d.cli.demo.broker import Broker
 from lfs10d.cli.demo.scenario import BASE_TOPIC, BAUDRATE, Role
-from lfs10d.cli.demo.state import LineFigures, Picture
+from lfs10d.cli.demo.state import DemoState, LineFigures
 
 SUBJECT: Final = f"eight LFS10 wind sensors on a simulated RS485 line, {BAUDRATE} baud"
 FAREWELL: Final = "Ctrl-C ends it and leaves nothing behind."
@@ -40,7 +40,7 @@ def figures(line: LineFigures | None) -> str:
     )
 
 
-def summary(picture: Picture, seconds: float) -> str:
+def summary(picture: DemoState, seconds: float) -> str:
     """Return one line for the end."""
     return (
         f"lfs10d demo: {picture.samples} samples in {seconds:.0f} s, {picture.online} of {len(picture.rows)} sensors "

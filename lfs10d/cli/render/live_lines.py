@@ -7,8 +7,8 @@ from datetime import tzinfo
 from typing import Any
 
 from lfs10d.cli.local_time import stamp, zone_name
-from lfs10d.cli.render.live_state import Device, Live
-from lfs10d.cli.render.live_table import Line, Row, Source, header, rows, table
+from lfs10d.cli.render.live_state import LiveState, ShownDevice
+from lfs10d.cli.render.live_table import DataSource, Line, TableRow, header, rows, table
 from lfs10d.telemetry.publication import iso_time
 
 WIDE = 10_000
@@ -24,7 +24,7 @@ class LiveLines:
         self._told: dict[str, tuple[object, ...]] = {}
 
     def news(
-        self, live: Live, source: Source, *, now: float, wall: float
+        self, live: LiveState, source: DataSource, *, now: float, wall: float
     ) -> Iterator[tuple[str, dict[str, Any] | None]]:
         """Yield each new line as text and as data for JSON; a heading, which begins with #, has no data."""
         heading = tuple("".join(text for text, _ in line) for line in self._header(live, source, wall))
@@ -41,26 +41,26 @@ class LiveLines:
                 data = _data(device, row, iso_time(ts), age=live.age(device, wall), alive=source.alive)
                 yield _text(row, stamp(ts, self._zone)), data
 
-    def _header(self, live: Live, source: Source, wall: float) -> list[Line]:
+    def _header(self, live: LiveState, source: DataSource, wall: float) -> list[Line]:
         return header(live, source, WIDE, pace=False, wall=wall, zone=self._zone)
 
 
 def health(status: Mapping[str, Any], zone: tzinfo | None = None) -> Iterator[str]:
     """Yield how everything is, as the daemon tells it in its status."""
     line, broker, ts = status.get("line"), status.get("broker"), status.get("ts")
-    live = Live(str(line.get("name")) if isinstance(line, dict) else "?")
+    live = LiveState(str(line.get("name")) if isinstance(line, dict) else "?")
     live.read(status, now=0.0)
     connected = isinstance(broker, dict) and broker.get("connected") is True
     waiting = broker.get("depth") if isinstance(broker, dict) else None
     words = f"broker {'connected' if connected else 'away'}" + (f", {waiting} samples wait" if waiting else "")
     wall = ts / 1000 if isinstance(ts, int) else 0.0
-    source = Source(f"{words}; times: {zone_name(wall * 1000, zone)}", alive=True)
+    source = DataSource(f"{words}; times: {zone_name(wall * 1000, zone)}", alive=True)
     shown = rows(live, source, now=0.0, wall=wall, zone=zone)
     for pieces in (*header(live, source, WIDE, wall=wall, zone=zone), (), *table(shown, WIDE)):
         yield "".join(text for text, _ in pieces)
 
 
-def _text(row: Row, time: str) -> str:
+def _text(row: TableRow, time: str) -> str:
     words = [time, row.name, row.slave, row.value, row.state]
     if row.rtt:
         words.append(f"answer {row.rtt}")
@@ -71,7 +71,7 @@ def _text(row: Row, time: str) -> str:
     return "  ".join(words)
 
 
-def _data(device: Device, row: Row, time: str, *, age: float | None, alive: bool) -> dict[str, Any]:
+def _data(device: ShownDevice, row: TableRow, time: str, *, age: float | None, alive: bool) -> dict[str, Any]:
     return {
         "time": time,
         "device": device.name,

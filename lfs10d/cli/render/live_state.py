@@ -23,7 +23,7 @@ LATE_AFTER: Final = 3.0
 
 
 @dataclass(slots=True)
-class Device:
+class ShownDevice:
     """One slave. `values` are those of the last sample, `good_ts` (epoch ms, its clock) when there were any."""
 
     name: str
@@ -64,12 +64,12 @@ class Device:
         return max(values) - min(values) if values else 0.0
 
 
-class Live:
+class LiveState:
     """One line as it is known from one source. `now` is monotonic, `wall` epoch s of our own clock."""
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self.devices: dict[str, Device] = {}
+        self.devices: dict[str, ShownDevice] = {}
         """Those that are configured, in order."""
         self.line: dict[str, Any] = {}
         """`line/state` and `line/stats`."""
@@ -79,7 +79,7 @@ class Live:
         """Epoch ms of the daemon's clock."""
         self.known = False
         """Something of a daemon was heard."""
-        self._met: dict[str, Device] = {}
+        self._met: dict[str, ShownDevice] = {}
         """Every device something was heard of: a broker sends what is retained in any order."""
         self._ahead = 0.0
         """Seconds our clock is ahead of the daemon's."""
@@ -114,10 +114,10 @@ class Live:
                 self.devices[name] = device = self._device(name)
                 _describe(device, entry, slave=entry.get("id"))
 
-    def _device(self, name: str) -> Device:
-        return self._met.setdefault(name, Device(name))
+    def _device(self, name: str) -> ShownDevice:
+        return self._met.setdefault(name, ShownDevice(name))
 
-    def _told(self, device: Device, leaf: str, payload: Any, *, old: bool, now: float, wall: float) -> None:  # noqa: ANN401 - parsed JSON
+    def _told(self, device: ShownDevice, leaf: str, payload: Any, *, old: bool, now: float, wall: float) -> None:  # noqa: ANN401 - parsed JSON
         if leaf == "availability":
             self._available(device, payload == "online", now=None if old else now)
         elif isinstance(payload, dict):
@@ -130,7 +130,7 @@ class Live:
             elif leaf in {"state", "telemetry"}:
                 self._sampled(device, payload, old=old, now=now, wall=wall)
 
-    def _sampled(self, device: Device, sample: Mapping[str, Any], *, old: bool, now: float, wall: float) -> None:
+    def _sampled(self, device: ShownDevice, sample: Mapping[str, Any], *, old: bool, now: float, wall: float) -> None:
         seq, boot, ts = sample.get("seq"), str(sample.get("boot")), _number(sample.get("ts"))
         if not isinstance(seq, int) or ts is None or (boot == device.boot and seq <= device.seq):
             return  # the state of a sample that telemetry has told, or none
@@ -149,7 +149,7 @@ class Live:
         if not old:
             _trail(device, now)
 
-    def _available(self, device: Device, online: bool, *, now: float | None) -> None:  # noqa: FBT001 - what it says
+    def _available(self, device: ShownDevice, online: bool, *, now: float | None) -> None:  # noqa: FBT001 - what it says
         if now is not None and online is not device.online:
             device.turned = now, online
         device.online = online
@@ -174,7 +174,7 @@ class Live:
                 self.devices[name] = device = self._device(name)
                 self._restate(device, entry, ts, now=now if known else None)
 
-    def _restate(self, device: Device, entry: Mapping[str, Any], ts: float, *, now: float | None) -> None:
+    def _restate(self, device: ShownDevice, entry: Mapping[str, Any], ts: float, *, now: float | None) -> None:
         _describe(device, entry, slave=entry.get("slave"))
         self._available(device, entry.get("online") is True, now=now)
         values, units, seq = entry.get("values"), entry.get("units"), entry.get("seq")
@@ -190,20 +190,20 @@ class Live:
 
     # -- what is to be shown
 
-    def age(self, device: Device, wall: float) -> float | None:
+    def age(self, device: ShownDevice, wall: float) -> float | None:
         """Return how many s ago it gave its last good value; None: never as far as we know."""
         if device.good_ts is None:
             return None
         return max(0.0, wall - self._ahead - device.good_ts / 1000)
 
-    def late(self, device: Device, wall: float) -> bool:
+    def late(self, device: ShownDevice, wall: float) -> bool:
         """Whether its last good value is older than it should be."""
         age = self.age(device, wall)
         return age is None or age > 3 * device.interval + LATE_AFTER
 
-    def movers(self, now: float) -> Iterator[Device]:
+    def movers(self, now: float) -> Iterator[ShownDevice]:
         """Yield the devices that just moved: of each unit the one that went farther than all others by much."""
-        moved: dict[str, list[tuple[float, Device]]] = {}
+        moved: dict[str, list[tuple[float, ShownDevice]]] = {}
         for device in self.devices.values():
             moved.setdefault(device.unit, []).append((device.moved(now), device))
         for ranking in moved.values():
@@ -213,7 +213,7 @@ class Live:
                 yield device
 
 
-def _describe(device: Device, entry: Mapping[str, Any], *, slave: object) -> None:
+def _describe(device: ShownDevice, entry: Mapping[str, Any], *, slave: object) -> None:
     device.slave = slave if isinstance(slave, int) else None
     label = entry.get("label")
     device.label = label if isinstance(label, str) else None
@@ -221,7 +221,9 @@ def _describe(device: Device, entry: Mapping[str, Any], *, slave: object) -> Non
     device.interval = _number(entry.get("interval")) or 1.0
 
 
-def _sample(device: Device, sample: Mapping[str, Any], values: Mapping[str, Any], units: Mapping[str, Any]) -> None:
+def _sample(
+    device: ShownDevice, sample: Mapping[str, Any], values: Mapping[str, Any], units: Mapping[str, Any]
+) -> None:
     error = sample.get("error")
     device.good = sample.get("quality") == "good"
     device.error = error if isinstance(error, str) else None
@@ -230,7 +232,7 @@ def _sample(device: Device, sample: Mapping[str, Any], values: Mapping[str, Any]
     device.units = {str(name): unit for name, unit in units.items() if isinstance(unit, str)}
 
 
-def _trail(device: Device, now: float) -> None:
+def _trail(device: ShownDevice, now: float) -> None:
     if device.value is not None:
         device.trail.append((now, device.value))
 

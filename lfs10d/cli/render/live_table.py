@@ -11,7 +11,7 @@ from datetime import tzinfo
 from typing import Final, TypeAlias
 
 from lfs10d.cli.local_time import since_text, zone_name
-from lfs10d.cli.render.live_state import Device, Live
+from lfs10d.cli.render.live_state import LiveState, ShownDevice
 from lfs10d.system.logs import escape
 
 Piece: TypeAlias = tuple[str, str]
@@ -48,7 +48,7 @@ _MARK_STYLES: Final = {"moved": "bold black on green", "came": "bold green", "we
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class DataSource:
     """Where it comes from, in words; `alive`: what is shown is of now."""
 
     words: str
@@ -56,7 +56,7 @@ class Source:
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class TableRow:
     """One device as it is shown. `stale`: what is shown is not of now."""
 
     name: str
@@ -80,7 +80,7 @@ class _Moment:
     zone: tzinfo | None
 
 
-def rows(live: Live, source: Source, *, now: float, wall: float, zone: tzinfo | None = None) -> list[Row]:
+def rows(live: LiveState, source: DataSource, *, now: float, wall: float, zone: tzinfo | None = None) -> list[TableRow]:
     """Return the devices as they are to be shown, times in `zone` (None: this machine's)."""
     movers = {device.name for device in live.movers(now)} if source.alive else set()
     return [
@@ -89,7 +89,7 @@ def rows(live: Live, source: Source, *, now: float, wall: float, zone: tzinfo | 
     ]
 
 
-def _with_unit(device: Device, name: str, value: float) -> str:
+def _with_unit(device: ShownDevice, name: str, value: float) -> str:
     """Return a value with its unit; a bare number among others with its name."""
     unit = device.units.get(name, "")
     if unit != "1":
@@ -97,14 +97,14 @@ def _with_unit(device: Device, name: str, value: float) -> str:
     return _number(value) if len(device.values) == 1 else f"{escape(name)} {_number(value)}"
 
 
-def _row(live: Live, device: Device, source: Source, moment: _Moment, *, moved: bool) -> Row:
+def _row(live: LiveState, device: ShownDevice, source: DataSource, moment: _Moment, *, moved: bool) -> TableRow:
     stale = not source.alive or (device.good and live.late(device, moment.wall))
     just = "moved" if moved else ""
     if source.alive and device.turned is not None and moment.now - device.turned[0] < JUST:
         just = "came" if device.turned[1] else "went"
     values = [_with_unit(device, name, value) for name, value in device.values.items()]
     age = live.age(device, moment.wall) if device.enabled else None
-    return Row(
+    return TableRow(
         name=escape(device.name),
         slave="" if device.slave is None else str(device.slave),
         label=escape(device.label or ""),
@@ -123,7 +123,7 @@ def _number(value: float) -> str:
     return str(value) if isinstance(value, int) else f"{value:.2f}"
 
 
-def _state(device: Device, moment: _Moment, *, stale: bool) -> str:
+def _state(device: ShownDevice, moment: _Moment, *, stale: bool) -> str:
     """Return availability and what ails it, as code and words, and since when."""
     if not device.enabled:
         return "disabled"
@@ -158,7 +158,7 @@ def age_text(seconds: float) -> str:
 @dataclass(frozen=True, slots=True)
 class _Column:
     head: str
-    of: Callable[[Row], str]
+    of: Callable[[TableRow], str]
     right: bool = False
     least: int = 0
     most: int = 40
@@ -179,7 +179,7 @@ LEAST_LABEL: Final = 6
 """A label cut shorter than this tells nothing."""
 
 
-def table(shown: Sequence[Row], width: int) -> list[Line]:
+def table(shown: Sequence[TableRow], width: int) -> list[Line]:
     """Return head and rows for a terminal `width` columns wide; none of the lines is longer."""
     widths = _widths(shown, width)
     head: list[Piece] = [("  ", "")]
@@ -187,7 +187,7 @@ def table(shown: Sequence[Row], width: int) -> list[Line]:
     return [_cut(tuple(head), width), *(_cut(_line(row, widths), width) for row in shown)]
 
 
-def _line(row: Row, widths: dict[_Column, int]) -> Line:
+def _line(row: TableRow, widths: dict[_Column, int]) -> Line:
     pieces: list[Piece] = [(f"{_MARKS.get(row.just, ' ')} ", _MARK_STYLES.get(row.just, ""))]
     for column, size in widths.items():
         style = ""
@@ -203,7 +203,7 @@ def _line(row: Row, widths: dict[_Column, int]) -> Line:
     return tuple(pieces)
 
 
-def _widths(shown: Sequence[Row], width: int) -> dict[_Column, int]:
+def _widths(shown: Sequence[TableRow], width: int) -> dict[_Column, int]:
     """Return the columns there is room for and how wide they are; the label has what is left."""
     wanted = {
         column: min(column.most, max(column.least, len(column.head), *(len(column.of(row)) for row in shown), 0))
@@ -241,7 +241,7 @@ def _cut(line: Line, width: int) -> Line:
 
 
 def header(
-    live: Live, source: Source, width: int, *, pace: bool = True, wall: float = 0.0, zone: tzinfo | None = None
+    live: LiveState, source: DataSource, width: int, *, pace: bool = True, wall: float = 0.0, zone: tzinfo | None = None
 ) -> list[Line]:
     """Return what is to be known of the line and where all this comes from; `pace`: also what changes all the time.
 
@@ -287,7 +287,7 @@ def _wrapped(line: Line, width: int) -> Iterable[Line]:
 
 
 def screen(
-    live: Live, source: Source, size: tuple[int, int], *, now: float, wall: float, zone: tzinfo | None = None
+    live: LiveState, source: DataSource, size: tuple[int, int], *, now: float, wall: float, zone: tzinfo | None = None
 ) -> list[Line]:
     """Return everything for a terminal of `size` columns and lines; where lines are short, the worst rows first."""
     width, height = size
@@ -305,7 +305,7 @@ def screen(
     return [*above, *table(shown, width), (), _cut(((legend, "dim"),), width)]
 
 
-def _rank(row: Row) -> int:
+def _rank(row: TableRow) -> int:
     """Return how much a row wants to be seen: what moves, what fails, the rest."""
     if row.just:
         return 0

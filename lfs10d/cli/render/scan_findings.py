@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from lfs10d.cli.options import LineOptions
-from lfs10d.line.jobs.identification import Finding
+from lfs10d.line.jobs.identification import FoundDevice
 from lfs10d.modbus.frames import EXCEPTION_NAMES, Framing
 from lfs10d.schema.quantities import duration_text
 
@@ -25,13 +25,13 @@ ILLEGAL_FUNCTION = 1
 BY_ID = Path("/dev/serial/by-id")
 
 
-def row(finding: Finding) -> tuple[str, ...]:
+def row(finding: FoundDevice) -> tuple[str, ...]:
     """Return a finding as a row of the table."""
     answers_in = f"{finding.rtt * 1e3:.0f} ms" if finding.rtt is not None else "-"
     return str(finding.slave), str(finding.baudrate), answers_in, what(finding), "; ".join(remarks(finding))
 
 
-def what(finding: Finding) -> str:
+def what(finding: FoundDevice) -> str:
     """Return what it is, with what it measures just now."""
     profile = finding.profile
     if profile is not None:
@@ -45,7 +45,7 @@ def what(finding: Finding) -> str:
     return "unknown device, answers function 03"
 
 
-def value_text(finding: Finding) -> str:
+def value_text(finding: FoundDevice) -> str:
     """Return its first value with its unit."""
     profile = finding.profile
     if profile is None or profile.value_names[0] not in finding.values:
@@ -55,7 +55,7 @@ def value_text(finding: Finding) -> str:
     return f"{finding.values[first.name]}{unit}"
 
 
-def remarks(finding: Finding) -> Iterator[str]:
+def remarks(finding: FoundDevice) -> Iterator[str]:
     """Yield what a newcomer should know of it."""
     if finding.duplicate:
         yield f"DUPLICATE? {finding.spoilt} of {finding.tries} answers garbled: two sensors with this id?"
@@ -73,18 +73,18 @@ def remarks(finding: Finding) -> Iterator[str]:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class ScanRequest:
     """How the line was scanned: with which check, and in which files the user's own profiles lie, by their names."""
 
     checksum: str = "crc"
     files: Mapping[str, str] = field(default_factory=dict)
 
 
-AS_USUAL = Asked()
+AS_USUAL = ScanRequest()
 
 
 def snippet(
-    findings: Sequence[Finding], options: LineOptions, by_id: Path = BY_ID, asked: Asked = AS_USUAL
+    findings: Sequence[FoundDevice], options: LineOptions, by_id: Path = BY_ID, asked: ScanRequest = AS_USUAL
 ) -> Iterator[str]:
     """Yield a configuration file that polls what was found; what cannot be polled as it is stands in comments."""
     baudrate = usual_rate(findings)
@@ -109,7 +109,7 @@ def snippet(
     yield "mqtt: {host: localhost}"
 
 
-def usual_rate(findings: Sequence[Finding]) -> int:
+def usual_rate(findings: Sequence[FoundDevice]) -> int:
     """Return the rate at which most were found."""
     rates = [finding.baudrate for finding in findings if finding.answers and not finding.suspect]
     return max(rates, key=lambda rate: (rates.count(rate), -rate), default=DEFAULT_BAUDRATE)
@@ -125,7 +125,7 @@ def lasting_name(port: str, by_id: Path = BY_ID) -> str:
     return next(lasting, os.path.abspath(port))  # noqa: PTH100  # resolve() would follow links that may be meant
 
 
-def _entry(finding: Finding, options: LineOptions, asked: Asked) -> str:
+def _entry(finding: FoundDevice, options: LineOptions, asked: ScanRequest) -> str:
     fields = [f"id: {finding.slave}"]
     profile = finding.profile
     if profile is not None and profile.name != DEFAULT_PROFILE:
@@ -138,7 +138,7 @@ def _entry(finding: Finding, options: LineOptions, asked: Asked) -> str:
     return str(finding.slave) if len(fields) == 1 else f"{{{', '.join(fields)}}}"
 
 
-def _obstacle(finding: Finding, baudrate: int) -> str | None:
+def _obstacle(finding: FoundDevice, baudrate: int) -> str | None:
     """Return why it cannot be polled as it is."""
     if finding.suspect:
         return "suspect"
@@ -151,7 +151,7 @@ def _obstacle(finding: Finding, baudrate: int) -> str | None:
     return None
 
 
-def plain(finding: Finding) -> dict[str, Any]:
+def plain(finding: FoundDevice) -> dict[str, Any]:
     """Return a finding for JSON."""
     profile = finding.profile
     return {

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 import click
 
 from lfs10d.cli.render import scan_findings
-from lfs10d.line.jobs.identification import Finding
+from lfs10d.line.jobs.identification import FoundDevice
 from lfs10d.line.jobs.scan import Scan
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ TELL_EVERY = 10.0
 """Percent between two lines where no bar can be drawn."""
 
 
-class View(Protocol):
+class ScanView(Protocol):
     """Shows how far a scan is."""
 
     def update(self) -> None:
@@ -28,13 +28,13 @@ class View(Protocol):
 
 
 @contextmanager
-def view(scan: Scan, port: str, *, quiet: bool) -> Iterator[View]:
+def view(scan: Scan, port: str, *, quiet: bool) -> Iterator[ScanView]:
     """Give what shows the scan; `quiet`: only on a terminal, where it leaves nothing behind."""
     terminal = sys.stderr.isatty()
     if not (quiet and not terminal):
         click.echo(announcement(scan, port), err=True)
     if not terminal:
-        yield _Lines(scan, quiet=quiet)
+        yield _ProgressLines(scan, quiet=quiet)
         return
     bar = progress_bar()
     with bar:
@@ -65,7 +65,7 @@ class _News:
         self._scan = scan
         self._told: set[tuple[int, int]] = set()
 
-    def fresh(self) -> Iterator[Finding]:
+    def fresh(self) -> Iterator[FoundDevice]:
         """Yield what was found since the last call."""
         for finding in self._scan.found:
             key = finding.slave, finding.baudrate
@@ -74,11 +74,11 @@ class _News:
                 yield finding
 
 
-def _sentence(finding: Finding) -> str:
+def _sentence(finding: FoundDevice) -> str:
     return f"found {finding.slave} at {finding.baudrate} baud: {scan_findings.what(finding)}"
 
 
-class _Lines:
+class _ProgressLines:
     def __init__(self, scan: Scan, *, quiet: bool) -> None:
         self._scan = scan
         self._quiet = quiet

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated
 
-from lfs10d.command import Answer, Call, RefusedError, ok, rejected
-from lfs10d.commands.admission import Form
-from lfs10d.commands.context import Powers, Request
+from lfs10d.command import Command, RefusedError, Result, ok, rejected
+from lfs10d.commands.admission import CommandSpec
+from lfs10d.commands.context import Context, Handler
 from lfs10d.commands.handlers.config_edit import altered, amend, known_device, refuse
 from lfs10d.commands.message import NoParameters, Parameters
 from lfs10d.config import changes
@@ -44,12 +44,12 @@ class WhichChange(Parameters):
         raise refuse("invalid_param", f"key: no request changed {quoted(self.key)}", param="key")
 
 
-async def get(_: NoParameters, powers: Powers, __: Call) -> Answer:
+async def get(_: NoParameters, powers: Context, __: Command) -> Result:
     """Tell the effective configuration."""
     return ok(powers.configuration())
 
 
-async def reload(_: NoParameters, powers: Powers, __: Call) -> Answer:
+async def reload(_: NoParameters, powers: Context, __: Command) -> Result:
     """Read the files again; a broken one changes nothing."""
     try:
         return ok(await powers.reload())
@@ -57,7 +57,7 @@ async def reload(_: NoParameters, powers: Powers, __: Call) -> Answer:
         return rejected("invalid_param", str(error.problems[0]))
 
 
-async def reset(parameters: WhichChange, powers: Powers, call: Call) -> Answer:
+async def reset(parameters: WhichChange, powers: Context, call: Command) -> Result:
     """Take back what requests changed."""
     try:
         device, key = parameters.place
@@ -104,8 +104,8 @@ def _fact(device: str) -> str:
     return f"the slave id of {device} was verified on the line; device/readdress changes it"
 
 
-REQUESTS: Mapping[str, Request] = {
-    "config/get": Request(Form("always"), get),
-    "config/reload": Request(Form("polling"), reload),
-    "config/reset": Request(Form("polling", WhichChange), reset),
+REQUESTS: Mapping[str, Handler] = {
+    "config/get": Handler(CommandSpec("always"), get),
+    "config/reload": Handler(CommandSpec("polling"), reload),
+    "config/reset": Handler(CommandSpec("polling", WhichChange), reset),
 }

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from lfs10d.command import Answer, ErrorCode, RefusedError, rejected
-from lfs10d.commands.context import Powers
+from lfs10d.command import ErrorCode, RefusedError, Result, rejected
+from lfs10d.commands.context import Context
 from lfs10d.config.diff import difference
 from lfs10d.config.effective import Edit, Effective
 from lfs10d.config.models import SlaveConfig
 from lfs10d.errors import StateError
 
 
-async def amend(edit: Edit, powers: Powers) -> tuple[Effective, Effective]:
+async def amend(edit: Edit, powers: Context) -> tuple[Effective, Effective]:
     """Change what holds; raises RefusedError, also where the change cannot be kept."""
     try:
         return await powers.change(edit)
@@ -25,7 +25,7 @@ def refuse(code: ErrorCode, message: str, *, param: str | None = None, **facts: 
     return RefusedError(rejected(code, message, param=param, **facts))
 
 
-def unknown_device(device: str, known: tuple[str, ...]) -> Answer:
+def unknown_device(device: str, known: tuple[str, ...]) -> Result:
     """Return the rejection of a name that no device has."""
     names = ", ".join(known) or "none"
     return rejected("unknown_device", f"there is no device {device}; configured are: {names}", param="device")

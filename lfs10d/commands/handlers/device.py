@@ -7,9 +7,9 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
-from lfs10d.command import Answer, Call, ErrorCode, RefusedError, failed, ok
-from lfs10d.commands.admission import Form
-from lfs10d.commands.context import Powers, Request
+from lfs10d.command import Command, ErrorCode, RefusedError, Result, failed, ok
+from lfs10d.commands.admission import CommandSpec
+from lfs10d.commands.context import Context, Handler
 from lfs10d.commands.handlers.config_edit import amend, known_device, plainly, refuse, unknown_device
 from lfs10d.commands.message import Parameters
 from lfs10d.config.changes import OPTIONS, Changes, Place
@@ -22,7 +22,7 @@ from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import FaultCode
 from lfs10d.schema.fields import FilePath, Flag, Name, quoted
-from lfs10d.system.threads import aside
+from lfs10d.system.threads import run_in_thread
 
 SHOWN = ("label", "profile", "interval", "enabled", "response_timeout")
 """What the answer tells of a device that was added."""
@@ -73,7 +73,7 @@ class Options(Parameters):
         return {key: getattr(self, key) for key in OPTIONS if key in self.model_fields_set}
 
 
-async def add(parameters: NewDevice, powers: Powers, call: Call) -> Answer:
+async def add(parameters: NewDevice, powers: Context, call: Command) -> Result:
     """Poll one more slave; with `probe` only if it answers."""
     try:
         profile = await profile_of(parameters.profile, powers.effective())
@@ -107,7 +107,9 @@ async def profile_of(word: str, now: Effective) -> Profile:
     beside = not path.is_absolute() and ".." not in path.parts and path.suffix in {".yaml", ".yml"}
     if word in builtin_names() or beside:
         try:
-            return await aside(partial(load_profile, word, relative_to=now.file.path.parent.absolute()), "profile")
+            return await run_in_thread(
+                partial(load_profile, word, relative_to=now.file.path.parent.absolute()), "profile"
+            )
         except ConfigError:
             pass  # what is in a file is not told to whoever asks
     names = ", ".join(builtin_names())
@@ -134,7 +136,7 @@ def _check_new(wanted: NewDevice, profile: Profile, now: Effective, reserved: Ma
         raise refuse("invalid_param", message, param="name")
 
 
-async def _knock(slave: int, profile: Profile, powers: Powers) -> None:
+async def _knock(slave: int, profile: Profile, powers: Context) -> None:
     """Raise RefusedError unless there is an answer."""
     knock = await powers.knock(slave, profile)
     if knock.answered:
@@ -146,7 +148,7 @@ async def _knock(slave: int, profile: Profile, powers: Powers) -> None:
     raise refuse("timeout", message)
 
 
-async def remove(parameters: OneDevice, powers: Powers, call: Call) -> Answer:
+async def remove(parameters: OneDevice, powers: Context, call: Command) -> Result:
     """Poll a device no more."""
     device = parameters.device
 
@@ -165,7 +167,7 @@ async def remove(parameters: OneDevice, powers: Powers, call: Call) -> Answer:
     return ok({"device": device, "slave": None if gone is None else gone.id})
 
 
-async def options(parameters: Options, powers: Powers, call: Call) -> Answer:
+async def options(parameters: Options, powers: Context, call: Command) -> Result:
     """Change how a device is polled and called."""
     device, wanted = parameters.device, parameters.wanted
 
@@ -192,7 +194,7 @@ async def options(parameters: Options, powers: Powers, call: Call) -> Answer:
     return ok({"from": old, "to": new})
 
 
-async def read(parameters: OneDevice, powers: Powers, _: Call) -> Answer:
+async def read(parameters: OneDevice, powers: Context, _: Command) -> Result:
     """Poll a device now, in turn with everybody else."""
     device = parameters.device
     if device not in powers.devices():
@@ -211,9 +213,9 @@ async def read(parameters: OneDevice, powers: Powers, _: Call) -> Answer:
     return failed(code, f"{device}: {fault.message}", data=inquiry.sample, **facts)
 
 
-REQUESTS: Mapping[str, Request] = {
-    "device/add": Request(Form("polling", NewDevice), add),
-    "device/remove": Request(Form("polling", OneDevice), remove),
-    "device/options": Request(Form("polling", Options), options),
-    "device/read": Request(Form("polling", OneDevice), read),
+REQUESTS: Mapping[str, Handler] = {
+    "device/add": Handler(CommandSpec("polling", NewDevice), add),
+    "device/remove": Handler(CommandSpec("polling", OneDevice), remove),
+    "device/options": Handler(CommandSpec("polling", Options), options),
+    "device/read": Handler(CommandSpec("polling", OneDevice), read),
 }

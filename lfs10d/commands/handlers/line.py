@@ -7,9 +7,9 @@ from typing import Annotated
 
 from pydantic import Field
 
-from lfs10d.command import Answer, Call, RefusedError, ok
-from lfs10d.commands.admission import Form
-from lfs10d.commands.context import Powers, Request
+from lfs10d.command import Command, RefusedError, Result, ok
+from lfs10d.commands.admission import CommandSpec
+from lfs10d.commands.context import Context, Handler
 from lfs10d.commands.message import NoParameters, Parameters
 from lfs10d.schema.fields import Duration
 
@@ -25,13 +25,13 @@ class HowLong(Parameters):
     duration: Annotated[float, Duration(0.1, LONGEST)] = Field(default=USUAL, alias="for")
 
 
-async def trace(parameters: HowLong, powers: Powers, _: Call) -> Answer:
+async def trace(parameters: HowLong, powers: Context, _: Command) -> Result:
     """Tell every frame on `trace` for a while."""
     powers.trace(parameters.duration)
     return ok({"for": parameters.duration})
 
 
-async def pause(parameters: HowLong, powers: Powers, _: Call) -> Answer:
+async def pause(parameters: HowLong, powers: Context, _: Command) -> Result:
     """Free the port for another program for a while."""
     try:
         await powers.pause(parameters.duration)
@@ -40,13 +40,13 @@ async def pause(parameters: HowLong, powers: Powers, _: Call) -> Answer:
     return ok({"for": parameters.duration})
 
 
-async def cancel(_: NoParameters, powers: Powers, __: Call) -> Answer:
+async def cancel(_: NoParameters, powers: Context, __: Command) -> Result:
     """End a scan, a trace, a pause."""
     return ok({"cancelled": list(powers.cancel())})
 
 
-REQUESTS: Mapping[str, Request] = {
-    "line/trace": Request(Form("sensors", HowLong), trace),
-    "line/pause": Request(Form("sensors", HowLong), pause),
-    "line/cancel": Request(Form("sensors"), cancel),
+REQUESTS: Mapping[str, Handler] = {
+    "line/trace": Handler(CommandSpec("sensors", HowLong), trace),
+    "line/pause": Handler(CommandSpec("sensors", HowLong), pause),
+    "line/cancel": Handler(CommandSpec("sensors"), cancel),
 }

@@ -7,9 +7,9 @@ from typing import Annotated
 
 from pydantic import Field
 
-from lfs10d.command import Answer, Call, RefusedError
-from lfs10d.commands.admission import Form
-from lfs10d.commands.context import Powers, Request
+from lfs10d.command import Command, RefusedError, Result
+from lfs10d.commands.admission import CommandSpec
+from lfs10d.commands.context import Context, Handler
 from lfs10d.commands.handlers import device
 from lfs10d.commands.message import Parameters
 from lfs10d.schema.fields import Choice, FilePath, Flag, Name, Text, Whole
@@ -18,7 +18,7 @@ REMEMBERED_FOR = 86_400.0
 """How long the answer to a physical change is kept for its repeats, in s."""
 
 
-class Readdress(Parameters):
+class ReaddressParameters(Parameters):
     """Which device gets which slave id; with `dry_run` nothing is written."""
 
     device: Annotated[str, Name()]
@@ -26,12 +26,12 @@ class Readdress(Parameters):
     dry_run: Annotated[bool, Flag()] = False
 
 
-async def readdress(parameters: Readdress, powers: Powers, call: Call) -> Answer:
+async def readdress(parameters: ReaddressParameters, powers: Context, call: Command) -> Result:
     """Give a sensor another slave id."""
     return await powers.readdress(parameters.device, parameters.to, dry_run=parameters.dry_run, call=call)
 
 
-class Baudrate(Parameters):
+class BaudrateParameters(Parameters):
     """Which rate; with `power_cycle` the sensors obey when their power is switched off and on."""
 
     to: Annotated[int, Choice((9600, 19200, 1200, 2400, 4800, 38400, 57600, 115200))]
@@ -39,14 +39,14 @@ class Baudrate(Parameters):
     dry_run: Annotated[bool, Flag()] = False
 
 
-async def baudrate(parameters: Baudrate, powers: Powers, call: Call) -> Answer:
+async def baudrate(parameters: BaudrateParameters, powers: Context, call: Command) -> Result:
     """Move every sensor and the port to another rate."""
     return await powers.baudrate(
         parameters.to, power_cycle=parameters.power_cycle, dry_run=parameters.dry_run, call=call
     )
 
 
-class Adopt(Parameters):
+class AdoptParameters(Parameters):
     """What the new sensor is to be called, what it is, where it is and which slave id it is to get."""
 
     name: Annotated[str, Name()] | None = None
@@ -58,7 +58,7 @@ class Adopt(Parameters):
     to: Annotated[int, Whole(1, 255)] | None = Field(default=None, description="Without: the next free id from 2.")
 
 
-async def adopt(parameters: Adopt, powers: Powers, call: Call) -> Answer:
+async def adopt(parameters: AdoptParameters, powers: Context, call: Command) -> Result:
     """Take in a factory-new sensor."""
     wanted = parameters
     try:
@@ -75,8 +75,8 @@ async def adopt(parameters: Adopt, powers: Powers, call: Call) -> Answer:
     )
 
 
-REQUESTS: Mapping[str, Request] = {
-    "device/readdress": Request(Form("sensors", Readdress, REMEMBERED_FOR), readdress),
-    "line/adopt": Request(Form("sensors", Adopt, REMEMBERED_FOR), adopt),
-    "line/baudrate": Request(Form("sensors", Baudrate, REMEMBERED_FOR), baudrate),
+REQUESTS: Mapping[str, Handler] = {
+    "device/readdress": Handler(CommandSpec("sensors", ReaddressParameters, REMEMBERED_FOR), readdress),
+    "line/adopt": Handler(CommandSpec("sensors", AdoptParameters, REMEMBERED_FOR), adopt),
+    "line/baudrate": Handler(CommandSpec("sensors", BaudrateParameters, REMEMBERED_FOR), baudrate),
 }

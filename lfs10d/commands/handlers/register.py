@@ -16,9 +16,9 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from lfs10d.command import Answer, Call, ErrorCode, RefusedError, failed, ok, rejected
-from lfs10d.commands.admission import Form
-from lfs10d.commands.context import Powers, Request
+from lfs10d.command import Command, ErrorCode, RefusedError, Result, failed, ok, rejected
+from lfs10d.commands.admission import CommandSpec
+from lfs10d.commands.context import Context, Handler
 from lfs10d.commands.handlers.config_edit import known_device, refuse
 from lfs10d.commands.message import Parameters
 from lfs10d.config.effective import Effective
@@ -57,7 +57,7 @@ class OneRegister(OnePlace):
     value: Annotated[int, Whole(0, REGISTERS - 1)] = Field(description="What the register is to hold, unscaled.")
 
 
-async def read(parameters: SomeRegisters, powers: Powers, _: Call) -> Answer:
+async def read(parameters: SomeRegisters, powers: Context, _: Command) -> Result:
     """Read registers as they are, with function 03."""
     now = powers.effective()
     address, count = parameters.address, parameters.count
@@ -78,7 +78,7 @@ async def read(parameters: SomeRegisters, powers: Powers, _: Call) -> Answer:
     return _ended(access, f"slave {slave}")
 
 
-async def write(parameters: OneRegister, powers: Powers, call: Call) -> Answer:
+async def write(parameters: OneRegister, powers: Context, call: Command) -> Result:
     """Write one register with function 06 and read it back; only settings that the device's profile marks."""
     now = powers.effective()
     address, value = parameters.address, parameters.value
@@ -159,7 +159,7 @@ def _writable(settings: Iterable[Setting]) -> str:
     return ", ".join(f"0x{each.register:04X} ({each.name})" for each in settings if each.writable) or "none"
 
 
-def _ended(access: Access, who: str, *, data: object = None, writes: bool = False) -> Answer:
+def _ended(access: Access, who: str, *, data: object = None, writes: bool = False) -> Result:
     """Return the answer to an access that did not do what was asked: rejected where a write was not even sent."""
     code, words = _why(access)
     fault = access.fault
@@ -190,7 +190,7 @@ def _why(access: Access) -> tuple[ErrorCode, str]:
     return "timeout" if silent else "line_error", said
 
 
-REQUESTS: Mapping[str, Request] = {
-    "register/read": Request(Form("registers", SomeRegisters), read),
-    "register/write": Request(Form("registers", OneRegister), write),
+REQUESTS: Mapping[str, Handler] = {
+    "register/read": Handler(CommandSpec("registers", SomeRegisters), read),
+    "register/write": Handler(CommandSpec("registers", OneRegister), write),
 }

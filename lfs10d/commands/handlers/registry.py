@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from lfs10d.commands.context import Request
+from lfs10d.commands.context import Handler
 from lfs10d.commands.handlers import config, device, general, line, reconfigure, register, scan
 
-REQUESTS: Mapping[str, Request] = {
+REQUESTS: Mapping[str, Handler] = {
     **general.REQUESTS,
     **config.REQUESTS,
     **device.REQUESTS,

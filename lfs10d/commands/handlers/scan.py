@@ -8,21 +8,21 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from lfs10d.command import Answer, Call, RefusedError, failed, ok
-from lfs10d.commands.admission import Form
-from lfs10d.commands.context import Powers, Request
+from lfs10d.command import Command, RefusedError, Result, failed, ok
+from lfs10d.commands.admission import CommandSpec
+from lfs10d.commands.context import Context, Handler
 from lfs10d.commands.handlers import device
 from lfs10d.commands.message import Parameters
-from lfs10d.line.jobs.identification import Finding
+from lfs10d.line.jobs.identification import FoundDevice
 from lfs10d.line.jobs.scan import Scan
 from lfs10d.line.jobs.scan_plan import LAST_ID, ids_of
-from lfs10d.schema.fields import Choice, Flag, Kind, Whole
+from lfs10d.schema.fields import Choice, FieldKind, Flag, Whole
 
 BAUDRATES = Choice((1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200))
 
 
 @dataclass(frozen=True)
-class SlaveIds(Kind):
+class SlaveIds(FieldKind):
     """Slave ids, as text of ids and ranges or as a list."""
 
     @property
@@ -44,7 +44,7 @@ class SlaveIds(Kind):
 
 
 @dataclass(frozen=True)
-class Rates(Kind):
+class ScanRates(FieldKind):
     """Rates of a line, as a list."""
 
     @property
@@ -65,7 +65,7 @@ class WhomToFind(Parameters):
     """Where to look, with how much of the line's time in percent, and whether to add who is found."""
 
     ids: Annotated[tuple[int, ...], SlaveIds()] = Field(default=f"1-{LAST_ID}", validate_default=True)
-    baudrates: Annotated[tuple[int, ...] | None, Rates()] = Field(
+    baudrates: Annotated[tuple[int, ...] | None, ScanRates()] = Field(
         default=None, description="Without: the line's own, and both of an LFS10."
     )
     share: Annotated[int, Whole(1, 100)] = Field(
@@ -77,7 +77,7 @@ class WhomToFind(Parameters):
     )
 
 
-async def scan(parameters: WhomToFind, powers: Powers, call: Call) -> Answer:
+async def scan(parameters: WhomToFind, powers: Context, call: Command) -> Result:
     """Find out who is on the line."""
     try:
         done = await powers.scan(parameters.ids, parameters.baudrates or (), parameters.share / 100)
@@ -94,7 +94,7 @@ async def scan(parameters: WhomToFind, powers: Powers, call: Call) -> Answer:
     return ok(data)
 
 
-def _known(finding: Finding, powers: Powers) -> str | None:
+def _known(finding: FoundDevice, powers: Context) -> str | None:
     """Return the name of the device that is configured where this was found."""
     config = powers.effective().config
     if finding.baudrate != config.line.baudrate:
@@ -102,7 +102,7 @@ def _known(finding: Finding, powers: Powers) -> str | None:
     return next((slave.name for slave in config.slaves if slave.id == finding.slave), None)
 
 
-def _told(finding: Finding, powers: Powers) -> dict[str, Any]:
+def _told(finding: FoundDevice, powers: Context) -> dict[str, Any]:
     name = _known(finding, powers)
     return {
         "id": finding.slave,
@@ -116,7 +116,7 @@ def _told(finding: Finding, powers: Powers) -> dict[str, Any]:
     }
 
 
-async def _add(done: Scan, powers: Powers, call: Call) -> dict[str, list[dict[str, Any]]]:
+async def _add(done: Scan, powers: Context, call: Command) -> dict[str, list[dict[str, Any]]]:
     """Have polled who is new and beyond doubt, each as `device/add` does; return who was added and who was not."""
     added: list[dict[str, Any]] = []
     refused: list[dict[str, Any]] = []
@@ -134,4 +134,4 @@ async def _add(done: Scan, powers: Powers, call: Call) -> dict[str, list[dict[st
     return {"added": added, "not_added": refused}
 
 
-REQUESTS: Mapping[str, Request] = {"line/scan": Request(Form("sensors", WhomToFind), scan)}
+REQUESTS: Mapping[str, Handler] = {"line/scan": Handler(CommandSpec("sensors", WhomToFind), scan)}

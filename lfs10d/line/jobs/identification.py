@@ -36,12 +36,12 @@ SILENCES = 3
 _EXCEPTION_BODY = 3
 """Slave, function, code: the body of the shortest answer (Modbus Application Protocol V1.1b3, section 7)."""
 
-Conversation: TypeAlias = "Generator[ReadRegisters, Outcome, Finding | None]"
+Conversation: TypeAlias = "Generator[ReadRegisters, Outcome, FoundDevice | None]"
 """Yields what to read, is sent the outcome, returns what was found; None: nobody is there."""
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class FoundDevice:
     """What is at one slave id at one rate.
 
     `answers`: a right frame came; without it only bytes that make none. `rtt` in s is the middle one of the
@@ -116,10 +116,10 @@ def _read_of(block: Block, slave: int) -> ReadRegisters:
     return ReadRegisters(slave, block.address, block.count, block.function)
 
 
-class Interview:
+class Identification:
     """One slave id at one rate; `first` is an outcome that is known already. `converse` does it."""
 
-    def __init__(self, finding: Finding, profiles: Sequence[Profile], codec: Codec, first: Outcome | None) -> None:
+    def __init__(self, finding: FoundDevice, profiles: Sequence[Profile], codec: Codec, first: Outcome | None) -> None:
         self._finding = finding
         self._slave = finding.slave
         self._profiles = [profile for profile in profiles if profile.ids[0] <= finding.slave <= profile.ids[1]]

@@ -11,7 +11,7 @@ from typing import Protocol, TypeAlias
 
 from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import Codec, Request
-from lfs10d.reading import Errand
+from lfs10d.reading import Purpose
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,25 +46,25 @@ class Done:
 
 
 @dataclass(frozen=True, slots=True)
-class Later:
+class Requeue:
     """More to ask, but not before what was due by `key`."""
 
     key: float
 
 
 @dataclass(frozen=True, slots=True)
-class Again:
+class Continue:
     """More to ask at once, whatever the share says: the slice at another rate goes on.
 
     A job says so for a quarter of a second at most; the rate is changed per slice, never per exchange.
     """
 
 
-Next: TypeAlias = Later | Again | Done
+Next: TypeAlias = Requeue | Continue | Done
 
 
 class Account(Protocol):
-    """What holds a job to its part of the line's time; see `lfs10d.line.quota.Share`."""
+    """What holds a job to its part of the line's time; see `lfs10d.line.quota.Quota`."""
 
     def allows(self, now: float) -> bool:
         """Whether the line may be used now."""
@@ -87,7 +87,7 @@ class Job(Protocol):
     """
 
     @property
-    def errand(self) -> Errand:
+    def errand(self) -> Purpose:
         """What its exchanges are for."""
         ...
 

@@ -6,24 +6,24 @@ from collections.abc import Callable
 
 from lfs10d.line.device import FIRST_TIMEOUTS
 from lfs10d.line.jobs.identification import first_read, speaks
-from lfs10d.line.jobs.job import Ask, Done, Later, Next
+from lfs10d.line.jobs.job import Ask, Done, Next, Requeue
 from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import Codec
 from lfs10d.profiles.profile import Profile
-from lfs10d.reading import Errand, Fault
+from lfs10d.reading import Fault, Purpose
 
 
-class Knock:
+class Ping:
     """Asks slave id `slave` what a device of `profile` is asked first, as patiently as one never heard before.
 
     Any right frame of the slave is an answer, an exception too. `over` is called once, with this job, when it is
     over: `answered`, or `fault` says what came instead; neither where the port is lost.
     """
 
-    errand = Errand.REQUEST
+    errand = Purpose.REQUEST
     share = 1.0
 
-    def __init__(self, slave: int, profile: Profile, codec: Codec, over: Callable[[Knock], None]) -> None:
+    def __init__(self, slave: int, profile: Profile, codec: Codec, over: Callable[[Ping], None]) -> None:
         self.slave = slave
         self.excludes = frozenset({slave})
         self.answered = False
@@ -47,7 +47,7 @@ class Knock:
         if outcome.fault is not None and (self.fault is None or outcome.fault.heard):
             self.fault = outcome.fault
         if not self.answered and self._asked < len(FIRST_TIMEOUTS):
-            return Later(now)
+            return Requeue(now)
         self._over(self)
         return Done()
 

@@ -20,12 +20,12 @@ from dataclasses import replace
 from functools import lru_cache
 
 from lfs10d.line.device import Device
-from lfs10d.line.jobs.job import Ask, Done, Hold, Later, Next
+from lfs10d.line.jobs.job import Ask, Done, Hold, Next, Requeue
 from lfs10d.modbus.exchange import FAULT_HEARD, Outcome
 from lfs10d.modbus.frames import ReadRegisters
-from lfs10d.modbus.pending import Unanswered
+from lfs10d.modbus.pending import PendingRequests
 from lfs10d.profiles.blocks import Block
-from lfs10d.reading import ALIVE_CODES, Errand, Fault, FaultCode, Number, Reading
+from lfs10d.reading import ALIVE_CODES, Fault, FaultCode, Number, Purpose, Reading
 
 WAKES = 3
 """So often within one poll a silence after a pause is taken for sleep."""
@@ -53,7 +53,7 @@ class Poll:
     excludes = _NOTHING
 
     def __init__(
-        self, device: Device, unanswered: Unanswered, *, due: float, errand: Errand, request: int | None = None
+        self, device: Device, unanswered: PendingRequests, *, due: float, errand: Purpose, request: int | None = None
     ) -> None:
         self.device = device
         self.errand = errand
@@ -67,8 +67,8 @@ class Poll:
         self._unanswered = unanswered
         self._blocks = device.spec.profile.reads()
         self._block = 0
-        self._retries = device.retries if errand is not Errand.PROBE else 0
-        self._barrier_due = errand is Errand.PROBE
+        self._retries = device.retries if errand is not Purpose.PROBE else 0
+        self._barrier_due = errand is Purpose.PROBE
         self._barrier_asked = False
         self._begun = False
         self._waking = False
@@ -104,7 +104,7 @@ class Poll:
             self._barrier_asked = True
         elif (until := self._unanswered.lingering_until(request, spec.codec, now)) is not None:
             return Hold(until)
-        timeout = device.probe_timeout if self.errand is Errand.PROBE else device.timeout
+        timeout = device.probe_timeout if self.errand is Purpose.PROBE else device.timeout
         return Ask(request, spec.codec, timeout, device.patience)
 
     def heard(self, outcome: Outcome, now: float) -> Next:
@@ -119,7 +119,7 @@ class Poll:
             if not device.gap.sleeps:
                 self.failed_attempts.append(fault.code)
             self._barrier_due = False
-            return Later(self.due)
+            return Requeue(self.due)
         if fault is None or fault.code is not FaultCode.LATE:  # else the attempt itself is counted as late
             self.failed_attempts += [
                 FaultCode.LATE for late in outcome.late if late.ours and late.request.slave == device.slave
@@ -130,17 +130,17 @@ class Poll:
             )
             if alive:
                 self._barrier_due = False
-                return Later(self.due)
+                return Requeue(self.due)
         elif fault is None and outcome.answer is not None:
             fault = self._take(self._blocks[self._block], outcome.answer, outcome.heard)
             if fault is None:
                 self.rtt = outcome.rtt
-                return Later(self.due) if self._block < len(self._blocks) else Done()
+                return Requeue(self.due) if self._block < len(self._blocks) else Done()
         if fault is not None and fault.code not in ALIVE_CODES and self._retries > 0:
             self._retries -= 1
             self.failed_attempts.append(fault.code)
             self.due = now
-            return Later(now)
+            return Requeue(now)
         self.fault = None if fault is None else told_busy(fault, device.spec.profile.busy_exceptions)
         self.values = {}
         return Done()
@@ -178,7 +178,7 @@ def _reading(device: Device, at: float, fault: Fault | None, poll: Poll | None, 
         rtt=poll.rtt if poll else None,
         online=device.online,
         response_timeout=device.timeout,
-        probe=poll is not None and poll.errand is Errand.PROBE,
+        probe=poll is not None and poll.errand is Purpose.PROBE,
         failed_attempts=tuple(poll.failed_attempts) if poll else (),
         overruns=overruns,
         requests=tuple(each.request for each in polls if each.request is not None),

@@ -1,6 +1,6 @@
 """A course: a job whose questions follow from the answers, told as one generator. Pure.
 
-Its generator yields `Ask` and is sent the outcome; yields `Hold(until)` to rest; yields `Aside(...)` to have something
+Its generator yields `Ask` and is sent the outcome; yields `Hold(until)` to rest; yields `Await(...)` to have something
 done off the line (an intent put on the disk) and is sent what `go_on` brings, while others have the line. What it
 returns goes aside too: the job is over only when that has been taken care of, so that its slave ids stay its own
 until the configuration says who has them. Where the port is lost `LineLostError` is thrown into it.
@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from math import inf
 from typing import Any, TypeAlias
 
-from lfs10d.line.jobs.job import Again, Ask, Done, Hold, Later, Next
+from lfs10d.line.jobs.job import Ask, Continue, Done, Hold, Next, Requeue
 from lfs10d.modbus.exchange import Outcome
-from lfs10d.reading import Errand
+from lfs10d.reading import Purpose
 
 SLICE = 0.25
 """The longest stay at another rate than the line's, in s; one question may take longer."""
@@ -26,32 +26,32 @@ class LineLostError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Aside:
+class Await:
     """Something to be done off the line; the course goes on when it is."""
 
     what: object
 
 
 @dataclass(frozen=True, slots=True)
-class Over:
+class Finished:
     """The course is at its end: `result` is what it returned, None where the port was lost before it could say."""
 
     result: Any
 
 
-Step: TypeAlias = "Ask | Hold | Aside"
+Step: TypeAlias = Ask | Hold | Await
 Steps: TypeAlias = "Generator[Step, Any, Any]"
 
 
-class Now:
+class ProcedureClock:
     """The time at which a course goes on."""
 
     def __init__(self) -> None:
         self.now = 0.0
 
 
-class Course:
-    """The job. `aside(course, what)` is told what to do off the line, and in the end `Over` with what was returned.
+class Procedure:
+    """The job. `aside(course, what)` is told what to do off the line, and in the end `Finished` with what was returned.
 
     It is called once for each, in the line's thread, and is answered with `go_on` and a wake. `line_rate` is the
     line's own rate.
@@ -60,13 +60,13 @@ class Course:
     def __init__(
         self,
         steps: Steps,
-        clock: Now,
-        aside: Callable[[Course, object], None],
+        clock: ProcedureClock,
+        aside: Callable[[Procedure, object], None],
         *,
         line_rate: int,
         excludes: frozenset[int] = frozenset(),
         share: float = 0.3,
-        errand: Errand = Errand.CHANGE,
+        errand: Purpose = Purpose.CHANGE,
     ) -> None:
         self.excludes = excludes
         self.share = share
@@ -124,10 +124,10 @@ class Course:
         if not self._told:
             self._told = True
             step = self._following
-            if isinstance(step, Aside):
+            if isinstance(step, Await):
                 self._aside(self, step.what)
             else:
-                self._aside(self, Over(self._result))
+                self._aside(self, Finished(self._result))
 
     def _advance(self, value: object) -> None:
         try:
@@ -145,12 +145,12 @@ class Course:
         following = self._following
         if isinstance(following, Ask):
             if following.at_once:
-                return Again()
+                return Continue()
             stays = following.baudrate == asked.baudrate not in (None, self._line_rate)
             if stays and now + following.timeout <= self._slice_until:
-                return Again()
+                return Continue()
         self._slice_until = -inf
-        return Later(now)
+        return Requeue(now)
 
     def cut_off(self, now: float) -> None:
         """Learn that the port is lost: the course says what that makes of it."""
@@ -164,6 +164,6 @@ class Course:
         try:
             self._steps.throw(LineLostError())
         except StopIteration as end:
-            self._aside(self, Over(end.value))
+            self._aside(self, Finished(end.value))
         except LineLostError:
-            self._aside(self, Over(None))
+            self._aside(self, Finished(None))

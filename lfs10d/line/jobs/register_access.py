@@ -19,13 +19,13 @@ from enum import StrEnum
 from typing import TypeAlias
 
 from lfs10d.line.device import FIRST_TIMEOUTS
-from lfs10d.line.jobs.job import Ask, Done, Hold, Later, Next
+from lfs10d.line.jobs.job import Ask, Done, Hold, Next, Requeue
 from lfs10d.line.jobs.poll import told_busy
 from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import Codec, ReadRegisters, Request, WriteRegister
-from lfs10d.modbus.pending import Unanswered
+from lfs10d.modbus.pending import PendingRequests
 from lfs10d.profiles.profile import BUSY_EXCEPTIONS, Profile
-from lfs10d.reading import Errand, Fault, FaultCode
+from lfs10d.reading import Fault, FaultCode, Purpose
 
 BUSY_PAUSE = 0.3
 """A busy slave is left alone for so long, in s; so is one whose register does not hold yet what was written."""
@@ -86,7 +86,7 @@ class Access:
     left. `before` is what the register held before a write, where it can be read.
     """
 
-    errand = Errand.REQUEST
+    errand = Purpose.REQUEST
     share = 1.0
 
     def __init__(
@@ -94,7 +94,7 @@ class Access:
         target: Target,
         what: Request,
         *,
-        unanswered: Unanswered,
+        unanswered: PendingRequests,
         echo_known: Callable[[], bool],
         over: Callable[[Access], None],
     ) -> None:
@@ -143,13 +143,13 @@ class Access:
         """Take the outcome of what was asked."""
         self._now = now
         if self._shaping and (outcome.fault is None or _refused(outcome)):
-            return Later(now)
+            return Requeue(now)
         try:
             self._following = self._steps.send(outcome)
         except StopIteration as over:
             self._finish(over.value)
             return Done()
-        return Later(now)
+        return Requeue(now)
 
     def cut_off(self, now: float) -> None:
         """Learn that the port is lost."""

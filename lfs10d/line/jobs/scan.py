@@ -4,7 +4,7 @@ Rules
 -----
 1. It only reads. Each id is asked one read, with a short time-out: an answer that comes later than that is still
    known for what it is (`Outcome.late`), and the last id of a round is waited for until none can come any more.
-2. Any right frame of a slave is an answer, an exception too; then it is interviewed (`lfs10d.line.jobs.identification`).
+2. Any right frame of a slave is an answer, an exception too; then it is identified (`lfs10d.line.jobs.identification`).
 3. Ids at which other bytes were heard are asked again at the end of the round, patiently, and so are the ids asked
    shortly before them while such noise is rare: a late answer may have run into our next request. Where most ids
    are noisy it is the line, and nobody is asked again.
@@ -20,11 +20,11 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from math import inf
 
-from lfs10d.line.jobs.identification import Finding, Interview, shortest_answer, speaks, spoilt, strangers
-from lfs10d.line.jobs.job import Again, Ask, Done, Later, Next
-from lfs10d.line.jobs.scan_plan import LAST_TIMEOUT, RESERVED_FROM, Search
+from lfs10d.line.jobs.identification import FoundDevice, Identification, shortest_answer, speaks, spoilt, strangers
+from lfs10d.line.jobs.job import Ask, Continue, Done, Next, Requeue
+from lfs10d.line.jobs.scan_plan import LAST_TIMEOUT, RESERVED_FROM, ScanPlan
 from lfs10d.modbus.exchange import Outcome
-from lfs10d.reading import Errand, Fault, FaultCode
+from lfs10d.reading import Fault, FaultCode, Purpose
 
 PATIENT_TIMEOUT = 0.4
 """How long an id is waited for in an interview or asked once more, in s."""
@@ -80,16 +80,16 @@ class Scan:
     `ended` is called once, with this job, when it is over.
     """
 
-    errand = Errand.SCAN
+    errand = Purpose.SCAN
     excludes: frozenset[int] = frozenset()
 
-    def __init__(self, search: Search, ended: Callable[[Scan], None] = _nobody) -> None:
+    def __init__(self, search: ScanPlan, ended: Callable[[Scan], None] = _nobody) -> None:
         self.search = search
         self.share = search.share
         self.over = self.complete = self.lost = False
         self._ended = ended
         self.noise = Noise()
-        self._found: dict[tuple[int, int], Finding] = {}
+        self._found: dict[tuple[int, int], FoundDevice] = {}
         self._slow: set[int] = set()
         self._asked_at: dict[int, set[int]] = {timing.baudrate: set() for timing in search.timings}
         self._asked = 0
@@ -102,7 +102,7 @@ class Scan:
         self._following: Ask | None = next(self._course, None)
 
     @property
-    def found(self) -> tuple[Finding, ...]:
+    def found(self) -> tuple[FoundDevice, ...]:
         """Who was found so far, by rate and id."""
         answering = {finding.slave for finding in tuple(self._found.values()) if finding.answers}
         findings = (
@@ -150,9 +150,9 @@ class Scan:
         stays = following.baudrate == asked.baudrate != self.search.line_rate
         ends = now + following.timeout + self._cost_at(following.baudrate)
         if stays and self.search.line_rate is not None and ends <= self._slice_until:
-            return Again()
+            return Continue()
         self._slice_until = -inf
-        return Later(now)
+        return Requeue(now)
 
     def cut_off(self, now: float) -> None:
         """Learn that the port is lost."""
@@ -217,7 +217,7 @@ class Scan:
         self, slave: int, baudrate: int, timeout: float, first: Outcome | None
     ) -> Generator[Ask, Outcome, None]:
         search = self.search
-        conversation = Interview(Finding(slave, baudrate), search.profiles, search.codec, first).converse()
+        conversation = Identification(FoundDevice(slave, baudrate), search.profiles, search.codec, first).converse()
         try:
             request = next(conversation)
             while True:

@@ -36,7 +36,7 @@ def ids_of(text: str) -> tuple[int, ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class Search:
+class ScanPlan:
     """What to look for: `ids` at each rate of `timings`, in this order; `profiles` are tried in their order.
 
     `line_rate` is the rate that others speak on the line, None where nobody does. `share` is the greatest part of

@@ -10,8 +10,7 @@ import sqlite3
 from dataclasses import dataclass, replace
 
 from lfs10d.outbox.store.row import DamagedError, Series, check
-from lfs10d.system.clock import ClockState
-from lfs10d.system.clock_step import corrects
+from lfs10d.system.clock_step import ClockState, corrects
 from lfs10d.telemetry.publication import Sample
 
 EVEN_WITHIN = 20

@@ -16,7 +16,7 @@ from lfs10d.outbox.store import database
 from lfs10d.outbox.store.catalogue import Catalogue
 from lfs10d.outbox.store.database import PAGE, Limits, number, transaction
 from lfs10d.outbox.store.row import Cell, DamagedError, check, pack_rtt, unpack_rtt, values_from, values_of
-from lfs10d.system.clock import ClockState
+from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry.publication import Sample
 
 EVICTED_AT_ONCE = 256
@@ -33,7 +33,7 @@ RANGES_MOST = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class StoreEntry:
     """A sample to be kept; `shift`: wall clock less monotonic clock when it was measured, in ms."""
 
     sample: Sample
@@ -42,7 +42,7 @@ class Entry:
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class StoredRow:
     """A sample that is kept. `shift` is None for one of an earlier boot."""
 
     id: int
@@ -93,7 +93,7 @@ class SampleFile:
 
     def append(
         self,
-        entries: Sequence[Entry],
+        entries: Sequence[StoreEntry],
         *,
         losses: Sequence[Loss],
         now: int,
@@ -118,7 +118,7 @@ class SampleFile:
         self.rows += len(entries)
         return evicted
 
-    def _insert(self, entry: Entry) -> None:
+    def _insert(self, entry: StoreEntry) -> None:
         sample = entry.sample
         series_id, series, base = self._catalogue.place(sample, entry.shift, repeated=entry.repeated)
         key, at, rtt = self.next, sample.ts - base, pack_rtt(sample.rtt_ms)
@@ -142,7 +142,7 @@ class SampleFile:
 
     # Out
 
-    def read(self, after: int, most: int) -> list[Row]:
+    def read(self, after: int, most: int) -> list[StoredRow]:
         """Return up to `most` samples of ids above `after`, the oldest first."""
         found = self._db.execute(
             "SELECT id, series, seq, at, rtt, value, checked FROM sample WHERE id > ? ORDER BY id LIMIT ?",
@@ -157,7 +157,7 @@ class SampleFile:
                 further.setdefault(key, []).append(value)
         return [self._row(columns, further.get(columns[0], [])) for columns in found]
 
-    def _row(self, columns: tuple[int, int, int, int, Cell, Cell, int], others: list[Cell]) -> Row:
+    def _row(self, columns: tuple[int, int, int, int, Cell, Cell, int], others: list[Cell]) -> StoredRow:
         key, series_id, seq, at, rtt, value, checked = columns
         era, series = self._catalogue.find(series_id)
         if check(series.text, seq, at, rtt, value, *others) != checked:
@@ -175,7 +175,7 @@ class SampleFile:
             error=series.error,
             rtt_ms=unpack_rtt(rtt),
         )
-        return Row(key, sample, era.shift if era.boot == self._boot else None, series.repeated)
+        return StoredRow(key, sample, era.shift if era.boot == self._boot else None, series.repeated)
 
     def oldest(self) -> int | None:
         """Return the `ts` of the oldest sample, None where there is none."""

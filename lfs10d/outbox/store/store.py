@@ -28,8 +28,8 @@ from lfs10d.errors import StateError
 from lfs10d.outbox.losses import Loss
 from lfs10d.outbox.store.database import ForeignError, Limits
 from lfs10d.outbox.store.row import DamagedError
-from lfs10d.outbox.store.sample_file import Entry, Row, SampleFile
-from lfs10d.system.clock import ClockState
+from lfs10d.outbox.store.sample_file import SampleFile, StoredRow, StoreEntry
+from lfs10d.system.clock_step import ClockState
 from lfs10d.system.disk import Disk
 
 T = TypeVar("T")
@@ -65,7 +65,7 @@ class StoreError(StateError):
 
 
 @dataclass(frozen=True, slots=True)
-class Aside:
+class FileSetAside:
     """A file that was put aside: where it is now, and why."""
 
     path: Path
@@ -84,7 +84,7 @@ class Store:
         self._next = 1
         self._doubtful: tuple[int, tuple[Loss, ...]] | None = None
         self._aside = 0
-        self.reports: deque[Aside] = deque()
+        self.reports: deque[FileSetAside] = deque()
         """Files put aside that nobody has told of yet."""
         self.rows = 0
         """Samples on the disk."""
@@ -122,7 +122,7 @@ class Store:
 
     def append(
         self,
-        entries: Sequence[Entry],
+        entries: Sequence[StoreEntry],
         *,
         losses: Sequence[Loss],
         now: int,
@@ -162,7 +162,7 @@ class Store:
         self._doubtful = None
         return evicted if file.take_back(first) else ()
 
-    def read(self, after: int, most: int) -> list[Row]:
+    def read(self, after: int, most: int) -> list[StoredRow]:
         """Return up to `most` samples of ids above `after`, the oldest first. Raises StoreError."""
         return self._use(lambda file: file.read(after, most))
 
@@ -221,7 +221,7 @@ class Store:
         except OSError as error:
             raise StoreError(f"the backlog {self.path} {reason} and cannot be renamed: {_in_words(error)}") from None
         self.rows, self.oldest_ts = 0, None
-        self.reports.append(Aside(target, reason))
+        self.reports.append(FileSetAside(target, reason))
 
     def _free_name(self, word: str) -> Path:
         name = f"{self.path.name}.{word}-{self._boot}"

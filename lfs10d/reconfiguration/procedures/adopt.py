@@ -4,7 +4,7 @@ Rules
 -----
 1. It is looked for at the line's rate first, then at its factory's and at each other rate of its profile. Where
    something answers at several, or garbage is heard, there is more than one: plug in one at a time.
-2. What answers must be recognised as a sensor of the profile, and must be there alone (`lfs10d.reconfiguration.procedures.recognition`):
+2. What answers must be recognised as a sensor of the profile, and must be there alone (see `recognition`):
    nothing is ever written to another device.
 3. A new id is free if not one byte is heard there, at no rate. The candidates are tried in order.
 4. One intent, on the disk before the first write, covers all. First the rate is written, while the sensor still has
@@ -18,15 +18,15 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import Any
 
-from lfs10d.line.jobs.procedure import Aside, LineLostError, Step
-from lfs10d.reconfiguration.journal import Spot
-from lfs10d.reconfiguration.procedures.baudrate import Sensor, restored, shifted
-from lfs10d.reconfiguration.procedures.identity_query import Asking
+from lfs10d.line.jobs.procedure import Await, LineLostError, Step
+from lfs10d.reconfiguration.journal import Endpoint
+from lfs10d.reconfiguration.procedures.baudrate import RateSensor, restored, shifted
+from lfs10d.reconfiguration.procedures.identity_query import IdentityQuery
 from lfs10d.reconfiguration.procedures.readdress import (
     ECHO_READS,
-    Ending,
-    Verdict,
-    Write,
+    IdWrite,
+    ReaddressEnding,
+    ReaddressReport,
     alone,
     free,
     judge,
@@ -39,7 +39,7 @@ from lfs10d.reconfiguration.procedures.recognition import recognised
 
 
 @dataclass(frozen=True, slots=True)
-class Newcomer:
+class AdoptWish:
     """What is wanted: the sensor at slave id `factory` at one of `candidates` and at `line_rate`.
 
     `rates` are those of its profile, in the order in which it is looked for.
@@ -52,11 +52,11 @@ class Newcomer:
 
 
 @dataclass(frozen=True, slots=True)
-class Adopted:
+class AdoptReport:
     """How it ended: the sensor was at `old`, and was to get `to` (None: no id is free)."""
 
-    verdict: Verdict
-    old: Spot | None = None
+    verdict: ReaddressReport
+    old: Endpoint | None = None
     to: int | None = None
     at_rate: bool = True
     """False: it ended with the write of the rate; its id is as it was."""
@@ -64,80 +64,86 @@ class Adopted:
     """What its register of the rate held when it was recognised."""
 
 
-def adopt(wish: Newcomer, asking: Asking, echo_known: Callable[[], bool]) -> Generator[Step, Any, Adopted]:
+def adopt(wish: AdoptWish, asking: IdentityQuery, echo_known: Callable[[], bool]) -> Generator[Step, Any, AdoptReport]:
     """Carry it out; see the rules."""
     try:
         looked = yield from _looked_before(wish, asking, echo_known)
-        if looked.verdict.ending is not Ending.FREE or looked.old is None or looked.to is None:
+        if looked.verdict.ending is not ReaddressEnding.FREE or looked.old is None or looked.to is None:
             return looked
         old, to = looked.old, looked.to
-        new = Spot(slave=to, baudrate=wish.line_rate)
-        why = yield Aside(Write(old, new, looked.verdict.register))
+        new = Endpoint(slave=to, baudrate=wish.line_rate)
+        why = yield Await(IdWrite(old, new, looked.verdict.register))
         if why is not None:
-            return Adopted(Verdict(Ending.UNWRITTEN, why=str(why)), old, to)
+            return AdoptReport(ReaddressReport(ReaddressEnding.UNWRITTEN, why=str(why)), old, to)
     except LineLostError:
-        return Adopted(Verdict(Ending.LOST_BEFORE))
+        return AdoptReport(ReaddressReport(ReaddressEnding.LOST_BEFORE))
     try:
         if old.baudrate != wish.line_rate:
             verdict = yield from _at_line_rate(old, wish.line_rate, asking.knowing(old.baudrate, looked.rate_code))
             if verdict is not None:
-                return Adopted(verdict, old, to, at_rate=False)
-        here = Spot(slave=old.slave, baudrate=wish.line_rate)
+                return AdoptReport(verdict, old, to, at_rate=False)
+        here = Endpoint(slave=old.slave, baudrate=wish.line_rate)
         exception = yield from written(here, asking.id_register, to, asking)
         found = yield from verified(here, new, asking)
         verdict = judge(found, looked.verdict.register, exception, to)
-        return Adopted((yield from parted(verdict, here, to, asking)), old, to)
+        return AdoptReport((yield from parted(verdict, here, to, asking)), old, to)
     except LineLostError:
-        return Adopted(Verdict(Ending.NOWHERE, stays_open=True), old, to)
+        return AdoptReport(ReaddressReport(ReaddressEnding.NOWHERE, stays_open=True), old, to)
 
 
-def _looked_before(wish: Newcomer, asking: Asking, echo_known: Callable[[], bool]) -> Generator[Step, Any, Adopted]:
+def _looked_before(
+    wish: AdoptWish, asking: IdentityQuery, echo_known: Callable[[], bool]
+) -> Generator[Step, Any, AdoptReport]:
     """Find the newcomer and a free id; `FREE` where it may be written."""
     newcomer = yield from _newcomer(wish, asking)
     old = newcomer.old
-    if newcomer.verdict.ending is not Ending.FREE or old is None:
+    if newcomer.verdict.ending is not ReaddressEnding.FREE or old is None:
         return newcomer
     to, refusal = yield from _free_id(wish, old, asking)
     if to is None:
-        return Adopted(Verdict(Ending.TAKEN, at=old.baudrate), old, next(iter(wish.candidates), None))
+        return AdoptReport(
+            ReaddressReport(ReaddressEnding.TAKEN, at=old.baudrate), old, next(iter(wish.candidates), None)
+        )
     if refusal is not None:
-        return Adopted(refusal, old, to)
+        return AdoptReport(refusal, old, to)
     for _ in range(ECHO_READS):
         if echo_known():
             break
         yield from asking.who(old)
     if not echo_known():
-        return Adopted(Verdict(Ending.DEAF), old, to)
+        return AdoptReport(ReaddressReport(ReaddressEnding.DEAF), old, to)
     again = yield from present(old, asking)
     if not again.answers or not (yield from asking.settle(old)):
-        return Adopted(Verdict(Ending.ABSENT), old, to)
-    return Adopted(newcomer.verdict, old, to, rate_code=newcomer.rate_code)
+        return AdoptReport(ReaddressReport(ReaddressEnding.ABSENT), old, to)
+    return AdoptReport(newcomer.verdict, old, to, rate_code=newcomer.rate_code)
 
 
-def _newcomer(wish: Newcomer, asking: Asking) -> Generator[Step, Any, Adopted]:
+def _newcomer(wish: AdoptWish, asking: IdentityQuery) -> Generator[Step, Any, AdoptReport]:
     """Find the one sensor at the factory id; `FREE` if there is just one, and it is recognised."""
-    found: list[Adopted] = []
+    found: list[AdoptReport] = []
     for rate in wish.rates:
-        spot = Spot(slave=wish.factory, baudrate=rate)
+        spot = Endpoint(slave=wish.factory, baudrate=rate)
         reply = yield from present(spot, asking)
         if reply.silent:
             continue
-        ending, why, code = Ending.BOTH, "", None
+        ending, why, code = ReaddressEnding.BOTH, "", None
         if reply.answers:
             recognition = yield from recognised(spot, reply, asking)
             why, code = recognition.why or "", recognition.rate_code
             if not recognition.spoilt:  # the winds of two differ, though both say the same id
-                ending = Ending.UNRECOGNISED if why else Ending.FREE
-        verdict = Verdict(ending, reply.register, reply.exception, rate, why)
-        found.append(Adopted(verdict, spot, rate_code=code))
+                ending = ReaddressEnding.UNRECOGNISED if why else ReaddressEnding.FREE
+        verdict = ReaddressReport(ending, reply.register, reply.exception, rate, why)
+        found.append(AdoptReport(verdict, spot, rate_code=code))
     if not found:
-        return Adopted(Verdict(Ending.ABSENT))
+        return AdoptReport(ReaddressReport(ReaddressEnding.ABSENT))
     if len(found) > 1:
-        return Adopted(Verdict(Ending.BOTH, at=found[0].verdict.at), found[0].old)
+        return AdoptReport(ReaddressReport(ReaddressEnding.BOTH, at=found[0].verdict.at), found[0].old)
     return found[0]
 
 
-def _free_id(wish: Newcomer, old: Spot, asking: Asking) -> Generator[Step, Any, tuple[int | None, Verdict | None]]:
+def _free_id(
+    wish: AdoptWish, old: Endpoint, asking: IdentityQuery
+) -> Generator[Step, Any, tuple[int | None, ReaddressReport | None]]:
     """Return the first candidate at which nothing is heard, None if there is none, and why it must not be written.
 
     At the newcomer's own rate the candidate is listened to while it is found out whether the newcomer is alone.
@@ -146,26 +152,26 @@ def _free_id(wish: Newcomer, old: Spot, asking: Asking) -> Generator[Step, Any, 
         clear = True
         for rate in wish.rates:
             if rate != old.baudrate:
-                clear = clear and (yield from free(Spot(slave=candidate, baudrate=rate), asking))
-        refusal = (yield from alone(old, candidate, asking)) if clear else Verdict(Ending.TAKEN)
-        if refusal is None or refusal.ending is not Ending.TAKEN:
+                clear = clear and (yield from free(Endpoint(slave=candidate, baudrate=rate), asking))
+        refusal = (yield from alone(old, candidate, asking)) if clear else ReaddressReport(ReaddressEnding.TAKEN)
+        if refusal is None or refusal.ending is not ReaddressEnding.TAKEN:
             return candidate, refusal
     return None, None
 
 
-def _at_line_rate(old: Spot, rate: int, asking: Asking) -> Generator[Step, Any, Verdict | None]:
+def _at_line_rate(old: Endpoint, rate: int, asking: IdentityQuery) -> Generator[Step, Any, ReaddressReport | None]:
     """Bring the newcomer to the line's rate; return why that failed, None if it did not."""
-    sensor = Sensor("", old.slave, asking)
+    sensor = RateSensor("", old.slave, asking)
     exception, at, twins = yield from shifted(sensor, old.baudrate, rate)
     if twins:
         back = yield from restored(sensor, old.baudrate, rate)
-        return Verdict(Ending.BOTH, at=old.baudrate, stays_open=back is None)
+        return ReaddressReport(ReaddressEnding.BOTH, at=old.baudrate, stays_open=back is None)
     if at == rate:
         return None
     if at is None:
-        return Verdict(Ending.NOWHERE, exception=exception, stays_open=True)
+        return ReaddressReport(ReaddressEnding.NOWHERE, exception=exception, stays_open=True)
     if exception is not None:
         back = yield from restored(sensor, old.baudrate, rate)
-        return Verdict(Ending.REFUSED, exception=exception, stays_open=back is None)
+        return ReaddressReport(ReaddressEnding.REFUSED, exception=exception, stays_open=back is None)
     # What it stored may stay: after a power cycle the same request finds it at the line's rate.
-    return Verdict(Ending.PENDING)
+    return ReaddressReport(ReaddressEnding.PENDING)

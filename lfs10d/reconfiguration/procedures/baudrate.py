@@ -10,7 +10,7 @@ Rules
    new rate since an earlier change and wait for their power cycle. One that answers at both rates since the write is
    two sensors: they are moved back too. The other of two may be deaf just then: all are looked for once more.
 4. With `power_cycle` all are written and none is expected at the new rate yet; each register must say the new rate.
-5. A sensor that is found nowhere is looked for until it is found, and brought to the line's (`lfs10d.reconfiguration.procedures.recover_baudrate`).
+5. A sensor that is found nowhere is looked for until it is found, and brought to the line's (see `recover_baudrate`).
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from enum import StrEnum
 from typing import Any
 
 from lfs10d.line.jobs.job import Hold
-from lfs10d.line.jobs.procedure import Aside, LineLostError, Step
-from lfs10d.reconfiguration.journal import Spot
-from lfs10d.reconfiguration.procedures.identity_query import PATIENT, Asking
+from lfs10d.line.jobs.procedure import Await, LineLostError, Step
+from lfs10d.reconfiguration.journal import Endpoint
+from lfs10d.reconfiguration.procedures.identity_query import PATIENT, IdentityQuery
 from lfs10d.reconfiguration.procedures.readdress import ECHO_READS, TRIES, VERIFY, present, verified, written
 
 ROLL_BACK = 60.0
@@ -32,7 +32,7 @@ FIRST_PAUSE = 1.0
 """Between two rounds of questions to missing sensors, in s; doubled after each."""
 
 
-class Ended(StrEnum):
+class BaudrateEnding(StrEnum):
     """What came of it. All before `MOVED` mean that nothing was written."""
 
     ABSENT = "absent"
@@ -49,20 +49,28 @@ class Ended(StrEnum):
     UNVERIFIED = "unverified"
 
 
-UNTOUCHED = frozenset({Ended.ABSENT, Ended.DEAF, Ended.LOST_BEFORE, Ended.UNWRITTEN, Ended.FREE})
+UNTOUCHED = frozenset(
+    {
+        BaudrateEnding.ABSENT,
+        BaudrateEnding.DEAF,
+        BaudrateEnding.LOST_BEFORE,
+        BaudrateEnding.UNWRITTEN,
+        BaudrateEnding.FREE,
+    }
+)
 
 
 @dataclass(frozen=True, slots=True)
-class Sensor:
+class RateSensor:
     """One sensor: its name, its slave id, and how it is asked."""
 
     name: str
     slave: int
-    asking: Asking
+    asking: IdentityQuery
 
-    def at(self, baudrate: int) -> Spot:
+    def at(self, baudrate: int) -> Endpoint:
         """Return the place at a rate."""
-        return Spot(slave=self.slave, baudrate=baudrate)
+        return Endpoint(slave=self.slave, baudrate=baudrate)
 
     def code(self, baudrate: int) -> int:
         """Return what its register says for a rate."""
@@ -80,7 +88,7 @@ class Sensor:
 class RateWish:
     """What is wanted."""
 
-    sensors: tuple[Sensor, ...]
+    sensors: tuple[RateSensor, ...]
     old: int
     to: int
     power_cycle: bool = False
@@ -88,19 +96,19 @@ class RateWish:
     stored: frozenset[str] = frozenset()
     """Those that have stored the new rate since an earlier change, and would obey it at their next power-up."""
 
-    def touched(self, last: int) -> tuple[Sensor, ...]:
+    def touched(self, last: int) -> tuple[RateSensor, ...]:
         """Return the sensors that have, or may have, the new rate in mind when the `last` one was written."""
         return tuple(each for n, each in enumerate(self.sensors) if n <= last or each.name in self.stored)
 
 
 @dataclass(frozen=True, slots=True)
-class RateVerdict:
+class BaudrateReport:
     """How it ended: `where` is the rate at which each sensor was found last, None for one that was not.
 
     `names` are the sensors it is about, `why` what kept the intent from the disk.
     """
 
-    ended: Ended
+    ended: BaudrateEnding
     where: Mapping[str, int | None] = field(default_factory=dict)
     names: tuple[str, ...] = ()
     exception: int | None = None
@@ -109,7 +117,7 @@ class RateVerdict:
     @property
     def restored(self) -> bool:
         """Every sensor is at the old rate again."""
-        return self.ended is Ended.ROLLED_BACK
+        return self.ended is BaudrateEnding.ROLLED_BACK
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,45 +125,45 @@ class WriteRates:
     """The sensors are about to be written; answered with None when that is on the disk, else with why it is not."""
 
 
-def change_rate(wish: RateWish, echo_known: Callable[[], bool]) -> Generator[Step, Any, RateVerdict]:
+def change_rate(wish: RateWish, echo_known: Callable[[], bool]) -> Generator[Step, Any, BaudrateReport]:
     """Carry it out; see the rules."""
     try:
         refusal = yield from _looked_before(wish, echo_known)
         if refusal is not None:
             return refusal
-        why = yield Aside(WriteRates())
+        why = yield Await(WriteRates())
         if why is not None:
-            return RateVerdict(Ended.UNWRITTEN, why=str(why))
+            return BaudrateReport(BaudrateEnding.UNWRITTEN, why=str(why))
     except LineLostError:
-        return RateVerdict(Ended.LOST_BEFORE)
+        return BaudrateReport(BaudrateEnding.LOST_BEFORE)
     where: dict[str, int | None] = {sensor.name: wish.old for sensor in wish.sensors}
     try:
         if wish.power_cycle:
             return (yield from _all_written(wish, where))
         return (yield from _one_by_one(wish, where))
     except LineLostError:
-        return RateVerdict(Ended.UNVERIFIED, dict.fromkeys(where))
+        return BaudrateReport(BaudrateEnding.UNVERIFIED, dict.fromkeys(where))
 
 
-def _looked_before(wish: RateWish, echo_known: Callable[[], bool]) -> Generator[Step, Any, RateVerdict | None]:
+def _looked_before(wish: RateWish, echo_known: Callable[[], bool]) -> Generator[Step, Any, BaudrateReport | None]:
     absent = []
     for sensor in wish.sensors:
         reply = yield from present(sensor.at(wish.old), sensor.asking)
         if reply.register is None or not (yield from sensor.asking.settle(sensor.at(wish.old))):
             absent.append(sensor.name)
     if absent:
-        return RateVerdict(Ended.ABSENT, names=tuple(absent))
+        return BaudrateReport(BaudrateEnding.ABSENT, names=tuple(absent))
     for n in range(ECHO_READS):
         if echo_known() or not wish.sensors:
             break
         sensor = wish.sensors[n % len(wish.sensors)]
         yield from sensor.asking.who(sensor.at(wish.old))
     if wish.sensors and not echo_known():
-        return RateVerdict(Ended.DEAF)
-    return RateVerdict(Ended.FREE) if wish.dry_run else None
+        return BaudrateReport(BaudrateEnding.DEAF)
+    return BaudrateReport(BaudrateEnding.FREE) if wish.dry_run else None
 
 
-def _one_by_one(wish: RateWish, where: dict[str, int | None]) -> Generator[Step, Any, RateVerdict]:
+def _one_by_one(wish: RateWish, where: dict[str, int | None]) -> Generator[Step, Any, BaudrateReport]:
     for n, sensor in enumerate(wish.sensors):
         exception, rate, twins = yield from shifted(sensor, wish.old, wish.to)
         where[sensor.name] = rate
@@ -167,25 +175,25 @@ def _one_by_one(wish: RateWish, where: dict[str, int | None]) -> Generator[Step,
             back = yield from restored(sensor, wish.old, wish.to)
             where[sensor.name] = back
             if back != wish.old:
-                return RateVerdict(Ended.UNVERIFIED, where, (sensor.name,), exception)
-            ended = Ended.CANARY if exception is None else Ended.REFUSED
-            canary = RateVerdict(ended, where, (sensor.name,), exception)
+                return BaudrateReport(BaudrateEnding.UNVERIFIED, where, (sensor.name,), exception)
+            ended = BaudrateEnding.CANARY if exception is None else BaudrateEnding.REFUSED
+            canary = BaudrateReport(ended, where, (sensor.name,), exception)
             if wish.touched(n) == (sensor,):
                 return canary
             verdict = yield from rolled_back(wish.touched(n), wish.old, wish.to, where)
             return canary if verdict.restored else verdict
         return (yield from rolled_back(wish.touched(n), wish.old, wish.to, where))
-    return RateVerdict(Ended.MOVED, where)
+    return BaudrateReport(BaudrateEnding.MOVED, where)
 
 
-def _twins(wish: RateWish, last: int, where: dict[str, int | None]) -> Generator[Step, Any, RateVerdict]:
+def _twins(wish: RateWish, last: int, where: dict[str, int | None]) -> Generator[Step, Any, BaudrateReport]:
     """Bring everybody back, for the last one written is two."""
     verdict = yield from rolled_back(wish.touched(last), wish.old, wish.to, where)
     names = (wish.sensors[last].name,)
-    return replace(verdict, ended=Ended.TWINS, names=names) if verdict.restored else verdict
+    return replace(verdict, ended=BaudrateEnding.TWINS, names=names) if verdict.restored else verdict
 
 
-def _all_written(wish: RateWish, where: dict[str, int | None]) -> Generator[Step, Any, RateVerdict]:
+def _all_written(wish: RateWish, where: dict[str, int | None]) -> Generator[Step, Any, BaudrateReport]:
     for n, sensor in enumerate(wish.sensors):
         exception = yield from written(sensor.at(wish.old), sensor.register, sensor.code(wish.to), sensor.asking)
         says, rate = yield from found_at(sensor, (wish.to, wish.old))
@@ -195,10 +203,10 @@ def _all_written(wish: RateWish, where: dict[str, int | None]) -> Generator[Step
         if rate == wish.to and (yield from sensor.asking.who(sensor.at(wish.old))).answers:
             return (yield from _twins(wish, n, where))
     pending = tuple(name for name, rate in where.items() if rate != wish.to)
-    return RateVerdict(Ended.PENDING if pending else Ended.MOVED, where, pending)
+    return BaudrateReport(BaudrateEnding.PENDING if pending else BaudrateEnding.MOVED, where, pending)
 
 
-def shifted(sensor: Sensor, old: int, to: int) -> Generator[Step, Any, tuple[int | None, int | None, bool]]:
+def shifted(sensor: RateSensor, old: int, to: int) -> Generator[Step, Any, tuple[int | None, int | None, bool]]:
     """Write another rate to a sensor; return the code of an exception, and the rate at which it answers then.
 
     The third says that it answers at both: there are two of this slave id.
@@ -211,7 +219,7 @@ def shifted(sensor: Sensor, old: int, to: int) -> Generator[Step, Any, tuple[int
 
 
 def found_at(
-    sensor: Sensor, rates: Sequence[int], *, tries: int = TRIES, timeout: float | None = None
+    sensor: RateSensor, rates: Sequence[int], *, tries: int = TRIES, timeout: float | None = None
 ) -> Generator[Step, Any, tuple[int | None, int | None]]:
     """Look for a sensor at these rates; return what its register of the rate says, and the rate it answers at."""
     for _ in range(tries):
@@ -222,7 +230,7 @@ def found_at(
     return None, None
 
 
-def restored(sensor: Sensor, rate: int, other: int) -> Generator[Step, Any, int | None]:
+def restored(sensor: RateSensor, rate: int, other: int) -> Generator[Step, Any, int | None]:
     """Bring one sensor to `rate`, and its register; return the rate it answers at, None if it is not found."""
     says, at = yield from found_at(sensor, (other, rate))  # there first: of two of this id one may have moved
     if at is None or (at == rate and says == sensor.code(rate)):
@@ -238,7 +246,7 @@ def restored(sensor: Sensor, rate: int, other: int) -> Generator[Step, Any, int 
     return rate if (yield from written_back(sensor, rate)) else None
 
 
-def written_back(sensor: Sensor, rate: int) -> Generator[Step, Any, bool]:
+def written_back(sensor: RateSensor, rate: int) -> Generator[Step, Any, bool]:
     """Have a sensor that answers at `rate` store it too; whether its register says so then."""
     yield from written(sensor.at(rate), sensor.register, sensor.code(rate), sensor.asking)
     for _ in range(TRIES):
@@ -249,8 +257,8 @@ def written_back(sensor: Sensor, rate: int) -> Generator[Step, Any, bool]:
 
 
 def rolled_back(
-    sensors: Sequence[Sensor], rate: int, other: int, where: dict[str, int | None]
-) -> Generator[Step, Any, RateVerdict]:
+    sensors: Sequence[RateSensor], rate: int, other: int, where: dict[str, int | None]
+) -> Generator[Step, Any, BaudrateReport]:
     """Bring these sensors to `rate`, for up to `ROLL_BACK`; `where` learns where they are.
 
     All are looked for at the other rate in the end, after `VERIFY`, in which nobody is polled.
@@ -265,15 +273,15 @@ def rolled_back(
             now = sensor.asking.clock.now
             until = now + ROLL_BACK if until is None else until
             if now > until:
-                return RateVerdict(Ended.UNVERIFIED, where, tuple(each.name for each in missing))
+                return BaudrateReport(BaudrateEnding.UNVERIFIED, where, tuple(each.name for each in missing))
         if missing:
             yield Hold(missing[0].asking.clock.now + FIRST_PAUSE)
         else:
             missing = yield from _left_behind(sensors, other)
-    return RateVerdict(Ended.ROLLED_BACK, where)
+    return BaudrateReport(BaudrateEnding.ROLLED_BACK, where)
 
 
-def _left_behind(sensors: Sequence[Sensor], rate: int) -> Generator[Step, Any, list[Sensor]]:
+def _left_behind(sensors: Sequence[RateSensor], rate: int) -> Generator[Step, Any, list[RateSensor]]:
     """Return the sensors that somebody answers for at a rate they all have left: he was deaf after his last write."""
     yield Hold(sensors[0].asking.clock.now + VERIFY)
     left = []

@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 from lfs10d.line.device import Device
 from lfs10d.line.jobs.identification import first_read, speaks
 from lfs10d.line.jobs.job import Ask, Hold
-from lfs10d.line.jobs.procedure import Aside, Now, Step
+from lfs10d.line.jobs.procedure import Await, ProcedureClock, Step
 from lfs10d.line.probing import PROBE_SPACING
 
 LOST_AFTER = 30.0
@@ -26,7 +26,7 @@ Found: TypeAlias = "dict[str, int]"
 """The rate at which each device answered that did."""
 
 
-def seek(devices: Callable[[], Iterable[Device]], clock: Now, line_rate: int) -> Generator[Step, Any, None]:
+def seek(devices: Callable[[], Iterable[Device]], clock: ProcedureClock, line_rate: int) -> Generator[Step, Any, None]:
     """Ask one device after the other, between the probes, at each other rate of its profile; tell what was found.
 
     What goes aside is `Found`, anew whenever it changes; it is empty again when somebody answers at the line's rate.
@@ -41,7 +41,7 @@ def seek(devices: Callable[[], Iterable[Device]], clock: Now, line_rate: int) ->
             since = inf
             if found:
                 found = {}
-                yield Aside({})
+                yield Await({})
             continue
         since = min(since, clock.now)
         if clock.now < since + LOST_AFTER:
@@ -56,7 +56,7 @@ def seek(devices: Callable[[], Iterable[Device]], clock: Now, line_rate: int) ->
             outcome = yield Ask(request, device.spec.codec, TIMEOUT, None, rate)
             if speaks(outcome, device.spec.codec) and found.get(device.name) != rate:
                 found = {**found, device.name: rate}
-                yield Aside(dict(found))
+                yield Await(dict(found))
 
 
 def in_words(found: Found, line_rate: int, polled: int, *, filed: int) -> str:

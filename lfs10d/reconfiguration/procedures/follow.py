@@ -19,14 +19,14 @@ from collections.abc import Generator
 from typing import Any
 
 from lfs10d.line.jobs.job import Hold
-from lfs10d.line.jobs.procedure import Aside, Step
-from lfs10d.reconfiguration.journal import Spot
-from lfs10d.reconfiguration.procedures.identity_query import Asking
+from lfs10d.line.jobs.procedure import Await, Step
+from lfs10d.reconfiguration.journal import Endpoint
+from lfs10d.reconfiguration.procedures.identity_query import IdentityQuery
 from lfs10d.reconfiguration.procedures.readdress import (
     QUICK_LOOK,
-    Ending,
-    Found,
-    Verdict,
+    ReaddressEnding,
+    ReaddressFinding,
+    ReaddressReport,
     judge,
     parted,
     told,
@@ -36,13 +36,19 @@ from lfs10d.reconfiguration.procedures.readdress import (
 FIRST_PAUSE = 1.0
 """Between the first look and the first probes, in s; doubled after each."""
 
-DECIDED = frozenset({Ending.MOVED, Ending.LOCKED})
+DECIDED = frozenset({ReaddressEnding.MOVED, ReaddressEnding.LOCKED})
 """With these the sensor is found: at the new place, or at the old one to stay."""
 
 
 def follow(
-    old: Spot, new: Spot, asking: Asking, *, longest_pause: float, before: Spot | None = None, newcomer: bool = False
-) -> Generator[Step, Any, Verdict]:
+    old: Endpoint,
+    new: Endpoint,
+    asking: IdentityQuery,
+    *,
+    longest_pause: float,
+    before: Endpoint | None = None,
+    newcomer: bool = False,
+) -> Generator[Step, Any, ReaddressReport]:
     """Ask until the sensor is found; each look that did not find it goes aside.
 
     `before` is where it was before it came to `old`: it may be there still. `newcomer`: `old` is a factory's id.
@@ -51,7 +57,7 @@ def follow(
     verdict = yield from _judged(found, before, old, new, asking, newcomer=newcomer)
     pause = min(FIRST_PAUSE, longest_pause)
     while verdict.ending not in DECIDED:
-        yield Aside(verdict)
+        yield Await(verdict)
         while True:
             yield Hold(asking.clock.now + pause)
             pause = min(2 * pause, longest_pause)
@@ -69,19 +75,31 @@ def follow(
 
 
 def _judged(
-    found: Found, before: Spot | None, old: Spot, new: Spot, asking: Asking, *, newcomer: bool
-) -> Generator[Step, Any, Verdict]:
+    found: ReaddressFinding,
+    before: Endpoint | None,
+    old: Endpoint,
+    new: Endpoint,
+    asking: IdentityQuery,
+    *,
+    newcomer: bool,
+) -> Generator[Step, Any, ReaddressReport]:
     if newcomer and found.new.answers and not found.spoilt and found.old.register != new.slave:
-        return Verdict(Ending.MOVED, found.new.register)
+        return ReaddressReport(ReaddressEnding.MOVED, found.new.register)
     verdict = yield from parted(judge(found, None, None, new.slave), old, new.slave, asking)
-    if verdict.ending is Ending.NOWHERE:
+    if verdict.ending is ReaddressEnding.NOWHERE:
         return (yield from _still_there(before, new, asking)) or verdict
     return verdict
 
 
-def _still_there(before: Spot | None, new: Spot, asking: Asking) -> Generator[Step, Any, Verdict | None]:
+def _still_there(
+    before: Endpoint | None, new: Endpoint, asking: IdentityQuery
+) -> Generator[Step, Any, ReaddressReport | None]:
     """Ask the place of before, while the later ones are silent; return that the sensor stays there, None if not."""
     if before is None:
         return None
     reply = yield from asking.who(before)
-    return Verdict(Ending.LOCKED, reply.register) if reply.answers and reply.register != new.slave else None
+    return (
+        ReaddressReport(ReaddressEnding.LOCKED, reply.register)
+        if reply.answers and reply.register != new.slave
+        else None
+    )

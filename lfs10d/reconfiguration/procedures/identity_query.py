@@ -16,14 +16,14 @@ from dataclasses import dataclass, field, replace
 
 from lfs10d.line.jobs.identification import shortest_answer, strangers
 from lfs10d.line.jobs.job import Ask, Hold
-from lfs10d.line.jobs.procedure import Now, Step
+from lfs10d.line.jobs.procedure import ProcedureClock, Step
 from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import NOT_FINAL, Codec, ReadRegisters
-from lfs10d.modbus.pending import Unanswered
+from lfs10d.modbus.pending import PendingRequests
 from lfs10d.profiles.blocks import Block
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import FaultCode
-from lfs10d.reconfiguration.journal import Spot
+from lfs10d.reconfiguration.journal import Endpoint
 
 QUICK = 0.2
 """How long a sensor is usually waited for, in s."""
@@ -34,7 +34,7 @@ PATIENT = 1.0
 
 
 @dataclass(frozen=True, slots=True)
-class Reply:
+class IdentityReply:
     """What one place said.
 
     `answers`: a right frame of its own, with `register` as the content of its id register, or `exception`.
@@ -54,13 +54,15 @@ class Reply:
         return not (self.answers or self.noise)
 
 
-SILENCE = Reply()
+SILENCE = IdentityReply()
 
 
-class Asking:
+class IdentityQuery:
     """Asks devices of one profile. `line_rate` is the line's own; `clock` is that of the course this is for."""
 
-    def __init__(self, profile: Profile, codec: Codec, unanswered: Unanswered, clock: Now, *, line_rate: int) -> None:
+    def __init__(
+        self, profile: Profile, codec: Codec, unanswered: PendingRequests, clock: ProcedureClock, *, line_rate: int
+    ) -> None:
         if profile.slave_id is None:
             raise ValueError(f"profile {profile.name} knows no register of the slave id")
         self.profile = profile
@@ -72,8 +74,8 @@ class Asking:
         self.line_rate = line_rate
 
     def who(
-        self, spot: Spot, timeout: float | None = None, *, register: int | None = None
-    ) -> Generator[Step, Outcome, Reply]:
+        self, spot: Endpoint, timeout: float | None = None, *, register: int | None = None
+    ) -> Generator[Step, Outcome, IdentityReply]:
         """Ask a place for its id register, or for another one."""
         identity = ReadRegisters(spot.slave, self.id_register if register is None else register, 1)
         allowed = yield from self._allowed(identity, spot, timeout)
@@ -81,7 +83,7 @@ class Asking:
             return allowed
         return self._reply((yield self._ask(identity, spot, timeout)))
 
-    def knowing(self, baudrate: int, code: int | None) -> Asking:
+    def knowing(self, baudrate: int, code: int | None) -> IdentityQuery:
         """Return the same with the content of the rate's register for a rate that the profile has no code for.
 
         A sensor that came at such a rate can so be brought back to it.
@@ -91,11 +93,11 @@ class Asking:
             return self
         known = register.model_copy(update={"codes": {**register.codes, baudrate: code}})
         profile = self.profile.model_copy(update={"baudrate": known})
-        return Asking(profile, self.codec, self._unanswered, self.clock, line_rate=self.line_rate)
+        return IdentityQuery(profile, self.codec, self._unanswered, self.clock, line_rate=self.line_rate)
 
     def values(
-        self, spot: Spot, timeout: float | None = None, *, block: Block | None = None
-    ) -> Generator[Step, Outcome, Reply]:
+        self, spot: Endpoint, timeout: float | None = None, *, block: Block | None = None
+    ) -> Generator[Step, Outcome, IdentityReply]:
         """Ask a place for its values, whatever they are (the first `block` of the profile, or this one).
 
         A late answer to an older such question counts.
@@ -105,7 +107,9 @@ class Asking:
             yield Hold(until)
         return self._reply((yield self._ask(self._values_of(spot, block), spot, timeout)), values=True)
 
-    def listen(self, silent: Spot, timeout: float, before: int) -> Generator[Step, Outcome, tuple[Reply, bool]]:
+    def listen(
+        self, silent: Endpoint, timeout: float, before: int
+    ) -> Generator[Step, Outcome, tuple[IdentityReply, bool]]:
         """Ask a place that is expected to be silent directly behind another question; return what was received there.
 
         The second says that a right frame of slave `before` came which answers no older request to it: another device
@@ -117,7 +121,7 @@ class Asking:
         extra = before in strangers(outcome, self.codec) - late
         return self._reply(outcome, values=True), extra
 
-    def settle(self, spot: Spot) -> Generator[Step, Outcome, bool]:
+    def settle(self, spot: Endpoint) -> Generator[Step, Outcome, bool]:
         """Ask until no answer to an older question can come from a place; whether that could be reached."""
         for _ in range(8):
             if not self._unanswered.earlier(spot.slave):
@@ -134,11 +138,11 @@ class Asking:
             yield Hold(until)
         return not self._unanswered.earlier(spot.slave)
 
-    def _values_of(self, spot: Spot, block: Block | None = None) -> ReadRegisters:
+    def _values_of(self, spot: Endpoint, block: Block | None = None) -> ReadRegisters:
         block = block or self.profile.reads()[0]
         return ReadRegisters(spot.slave, block.address, block.count, block.function)
 
-    def _ask(self, request: ReadRegisters, spot: Spot, timeout: float | None) -> Ask:
+    def _ask(self, request: ReadRegisters, spot: Endpoint, timeout: float | None) -> Ask:
         baudrate = None if spot.baudrate == self.line_rate else spot.baudrate
         waits = self.timeout if timeout is None else timeout
         if self._unanswered.tardy(spot.slave):
@@ -146,8 +150,8 @@ class Asking:
         return Ask(request, self.codec, waits, None, baudrate, request_gap=self.profile.request_gap)
 
     def _allowed(
-        self, request: ReadRegisters, spot: Spot, timeout: float | None
-    ) -> Generator[Step, Outcome, Reply | None]:
+        self, request: ReadRegisters, spot: Endpoint, timeout: float | None
+    ) -> Generator[Step, Outcome, IdentityReply | None]:
         """Wait and ask what must be asked before `request` may be; return what came instead of an answer, if so."""
         unanswered, other = self._unanswered, self._values_of(spot)
         apart = self.codec.shapes(other)[0] != self.codec.shapes(request)[0]
@@ -168,7 +172,7 @@ class Asking:
             else:
                 return None
 
-    def _reply(self, outcome: Outcome, *, values: bool = False) -> Reply:
+    def _reply(self, outcome: Outcome, *, values: bool = False) -> IdentityReply:
         if outcome.turnaround is not None and outcome.turnaround > SLOW_FROM:
             self.timeout = PATIENT
         if any(late.request.slave == outcome.request.slave for late in outcome.late):
@@ -177,11 +181,11 @@ class Asking:
         if fault is None and outcome.answer is not None:
             extra = outcome.unsolicited >= shortest_answer(self.codec)
             if values:
-                return Reply(answers=True, noise=extra, words=outcome.answer)
-            return Reply(answers=True, noise=extra, register=outcome.answer[0])
+                return IdentityReply(answers=True, noise=extra, words=outcome.answer)
+            return IdentityReply(answers=True, noise=extra, register=outcome.answer[0])
         if fault is not None and fault.code is FaultCode.EXCEPTION and not outcome.ambiguous:
-            return Reply(answers=True, exception=fault.exception_code)
-        return Reply(noise=not quiet(outcome))
+            return IdentityReply(answers=True, exception=fault.exception_code)
+        return IdentityReply(noise=not quiet(outcome))
 
 
 def quiet(outcome: Outcome) -> bool:

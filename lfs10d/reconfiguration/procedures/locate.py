@@ -6,21 +6,23 @@ from collections.abc import Generator, Sequence
 from typing import Any
 
 from lfs10d.line.jobs.job import Hold
-from lfs10d.line.jobs.procedure import Aside, Step
-from lfs10d.reconfiguration.journal import Spot
-from lfs10d.reconfiguration.procedures.identity_query import Asking
+from lfs10d.line.jobs.procedure import Await, Step
+from lfs10d.reconfiguration.journal import Endpoint
+from lfs10d.reconfiguration.procedures.identity_query import IdentityQuery
 from lfs10d.reconfiguration.procedures.readdress import present
 
 FIRST_PAUSE = 1.0
 """Between the first look and the first probes, in s; doubled after each."""
 
 
-def locate(places: Sequence[Spot], asking: Asking, *, longest_pause: float) -> Generator[Step, Any, Spot]:
+def locate(
+    places: Sequence[Endpoint], asking: IdentityQuery, *, longest_pause: float
+) -> Generator[Step, Any, Endpoint]:
     """Return the first of `places` at which somebody answers; None goes aside once if nobody does at first."""
     for spot in places:
         if (yield from present(spot, asking)).answers:
             return spot
-    yield Aside(None)
+    yield Await(None)
     pause = min(FIRST_PAUSE, longest_pause)
     while True:
         yield Hold(asking.clock.now + pause)

@@ -4,7 +4,7 @@ Rules
 -----
 1. Before anything is written: the new id is silent in three questions at the line's rate and at each other rate of
    the profile, not one byte is heard; the sensor answers at its old id, it is there alone
-   (`lfs10d.reconfiguration.procedures.recognition`: two of one id would both move), and nothing older can come from there; how the adapter
+   (see `recognition`: two of one id would both move), and nothing older can come from there; how the adapter
    echoes is known.
 2. The intent is on the disk before the write. There is one write, to one slave, and no other register is written. Only
    where two had the old id and the one that stayed has stored the new one is its old id written back: it would come
@@ -34,12 +34,12 @@ from enum import StrEnum
 from typing import Any
 
 from lfs10d.line.jobs.job import Ask, Hold
-from lfs10d.line.jobs.procedure import Aside, LineLostError, Step
+from lfs10d.line.jobs.procedure import Await, LineLostError, Step
 from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import WriteRegister
 from lfs10d.reading import FaultCode
-from lfs10d.reconfiguration.journal import Spot
-from lfs10d.reconfiguration.procedures.identity_query import PATIENT, SILENCE, Asking, Reply
+from lfs10d.reconfiguration.journal import Endpoint
+from lfs10d.reconfiguration.procedures.identity_query import PATIENT, SILENCE, IdentityQuery, IdentityReply
 from lfs10d.reconfiguration.procedures.recognition import one_alone
 
 VERIFY = 5.0
@@ -60,7 +60,7 @@ ECHO_READS = 12
 """Reads after which the adapter's echo must be known."""
 
 
-class Ending(StrEnum):
+class ReaddressEnding(StrEnum):
     """What came of it. All before `MOVED` mean that nothing was written."""
 
     TAKEN = "taken"
@@ -82,29 +82,29 @@ class Ending(StrEnum):
 
 NOTHING_WRITTEN = frozenset(
     {
-        Ending.TAKEN,
-        Ending.ABSENT,
-        Ending.DEAF,
-        Ending.LOST_BEFORE,
-        Ending.UNWRITTEN,
-        Ending.TWINS,
-        Ending.UNRECOGNISED,
-        Ending.FREE,
+        ReaddressEnding.TAKEN,
+        ReaddressEnding.ABSENT,
+        ReaddressEnding.DEAF,
+        ReaddressEnding.LOST_BEFORE,
+        ReaddressEnding.UNWRITTEN,
+        ReaddressEnding.TWINS,
+        ReaddressEnding.UNRECOGNISED,
+        ReaddressEnding.FREE,
     }
 )
-STAYS_OPEN = frozenset({Ending.GARBAGE, Ending.PENDING, Ending.NOWHERE})
+STAYS_OPEN = frozenset({ReaddressEnding.GARBAGE, ReaddressEnding.PENDING, ReaddressEnding.NOWHERE})
 """With these the sensor may yet appear at either place; so it may where its register says the new id."""
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class ReaddressReport:
     """How it ended; `register` and `exception` are what the sensor said, `at` the rate where somebody was heard.
 
     `why` is what kept the intent from the disk, how two sensors show, or why it is not recognised. `stays_open`: the
     sensor may yet appear at either place.
     """
 
-    ending: Ending
+    ending: ReaddressEnding
     register: int | None = None
     exception: int | None = None
     at: int | None = None
@@ -113,54 +113,56 @@ class Verdict:
 
 
 @dataclass(frozen=True, slots=True)
-class Write:
+class IdWrite:
     """What is about to be written; answered with None when it is on the disk, else with why it is not."""
 
-    old: Spot
-    new: Spot
+    old: Endpoint
+    new: Endpoint
     register_before: int | None
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class ReaddressWish:
     """What is wanted: the sensor at `old` at slave id `to`; `rates` are those of its profile."""
 
-    old: Spot
+    old: Endpoint
     to: int
     rates: tuple[int, ...]
     dry_run: bool = False
 
     @property
-    def new(self) -> Spot:
+    def new(self) -> Endpoint:
         """Where it is to answer."""
-        return Spot(slave=self.to, baudrate=self.old.baudrate)
+        return Endpoint(slave=self.to, baudrate=self.old.baudrate)
 
 
-def readdress(wish: Wish, asking: Asking, echo_known: Callable[[], bool]) -> Generator[Step, Any, Verdict]:
+def readdress(
+    wish: ReaddressWish, asking: IdentityQuery, echo_known: Callable[[], bool]
+) -> Generator[Step, Any, ReaddressReport]:
     """Carry it out; see the rules."""
     try:
         refusal, before = yield from looked_before(wish, asking, echo_known)
         if refusal is not None:
             return refusal
         if wish.dry_run:
-            return Verdict(Ending.FREE, before.register)
-        why = yield Aside(Write(wish.old, wish.new, before.register))
+            return ReaddressReport(ReaddressEnding.FREE, before.register)
+        why = yield Await(IdWrite(wish.old, wish.new, before.register))
         if why is not None:
-            return Verdict(Ending.UNWRITTEN, why=str(why))
+            return ReaddressReport(ReaddressEnding.UNWRITTEN, why=str(why))
     except LineLostError:
-        return Verdict(Ending.LOST_BEFORE)
+        return ReaddressReport(ReaddressEnding.LOST_BEFORE)
     try:
         exception = yield from written(wish.old, asking.id_register, wish.to, asking)
         found = yield from verified(wish.old, wish.new, asking)
         verdict = judge(found, before.register, exception, wish.to)
         return (yield from parted(verdict, wish.old, wish.to, asking))
     except LineLostError:
-        return Verdict(Ending.NOWHERE, stays_open=True)
+        return ReaddressReport(ReaddressEnding.NOWHERE, stays_open=True)
 
 
 def looked_before(
-    wish: Wish, asking: Asking, echo_known: Callable[[], bool]
-) -> Generator[Step, Any, tuple[Verdict | None, Reply]]:
+    wish: ReaddressWish, asking: IdentityQuery, echo_known: Callable[[], bool]
+) -> Generator[Step, Any, tuple[ReaddressReport | None, IdentityReply]]:
     """Find out whether it may be written at all (rule 1); return why not, and what the sensor said."""
     before = yield from present(wish.old, asking)
     if before.register is None:
@@ -169,39 +171,39 @@ def looked_before(
     if refusal is not None:
         return refusal, before
     for rate in sorted(set(wish.rates) - {wish.old.baudrate}):
-        if not (yield from free(Spot(slave=wish.to, baudrate=rate), asking)):
-            return Verdict(Ending.TAKEN, at=rate), before
+        if not (yield from free(Endpoint(slave=wish.to, baudrate=rate), asking)):
+            return ReaddressReport(ReaddressEnding.TAKEN, at=rate), before
     for _ in range(ECHO_READS):
         if echo_known():
             break
         yield from asking.who(wish.old)
     if not echo_known():
-        return Verdict(Ending.DEAF), before
+        return ReaddressReport(ReaddressEnding.DEAF), before
     # The long look at the new id over, it must answer now, and nothing from before may still be under way.
     again = yield from present(wish.old, asking)
     if not again.answers or not (yield from asking.settle(wish.old)):
-        return Verdict(Ending.ABSENT), before
+        return ReaddressReport(ReaddressEnding.ABSENT), before
     return None, before
 
 
-def absent(reply: Reply) -> Verdict:
+def absent(reply: IdentityReply) -> ReaddressReport:
     """Return what it means that no id was read at a place: nothing there, a refusal, or answers that collide."""
     if reply.noise and not reply.answers:
-        return Verdict(Ending.TWINS, why="answers collide there")
-    return Verdict(Ending.ABSENT, exception=reply.exception)
+        return ReaddressReport(ReaddressEnding.TWINS, why="answers collide there")
+    return ReaddressReport(ReaddressEnding.ABSENT, exception=reply.exception)
 
 
-def alone(old: Spot, to: int, asking: Asking) -> Generator[Step, Any, Verdict | None]:
+def alone(old: Endpoint, to: int, asking: IdentityQuery) -> Generator[Step, Any, ReaddressReport | None]:
     """Find out whether one sensor is at a place and nothing at the slave id `to`; return what is wrong, if anything."""
-    look = yield from one_alone(old, Spot(slave=to, baudrate=old.baudrate), asking)
+    look = yield from one_alone(old, Endpoint(slave=to, baudrate=old.baudrate), asking)
     if look.twins is not None:
-        return Verdict(Ending.TWINS, why=look.twins)
+        return ReaddressReport(ReaddressEnding.TWINS, why=look.twins)
     if not look.answers:
-        return Verdict(Ending.ABSENT, exception=look.exception)
-    return Verdict(Ending.TAKEN, at=old.baudrate) if look.taken else None
+        return ReaddressReport(ReaddressEnding.ABSENT, exception=look.exception)
+    return ReaddressReport(ReaddressEnding.TAKEN, at=old.baudrate) if look.taken else None
 
 
-def present(spot: Spot, asking: Asking) -> Generator[Step, Any, Reply]:
+def present(spot: Endpoint, asking: IdentityQuery) -> Generator[Step, Any, IdentityReply]:
     """Ask a place up to three times, longer each time, until it answers."""
     reply = SILENCE
     for timeout in (None, 2 * asking.timeout, PATIENT):
@@ -211,7 +213,7 @@ def present(spot: Spot, asking: Asking) -> Generator[Step, Any, Reply]:
     return reply
 
 
-def free(spot: Spot, asking: Asking) -> Generator[Step, Any, bool]:
+def free(spot: Endpoint, asking: IdentityQuery) -> Generator[Step, Any, bool]:
     """Whether not one byte is heard when a place is asked three times."""
     for timeout in PROBE_TIMEOUTS:
         reply = yield from asking.values(spot, timeout)
@@ -220,7 +222,7 @@ def free(spot: Spot, asking: Asking) -> Generator[Step, Any, bool]:
     return True
 
 
-def written(spot: Spot, register: int, value: int, asking: Asking) -> Generator[Step, Any, int | None]:
+def written(spot: Endpoint, register: int, value: int, asking: IdentityQuery) -> Generator[Step, Any, int | None]:
     """Write once; return the code of an exception, if one came."""
     request = WriteRegister(spot.slave, register, value)
     baudrate = None if spot.baudrate == asking.line_rate else spot.baudrate
@@ -234,17 +236,17 @@ def written(spot: Spot, register: int, value: int, asking: Asking) -> Generator[
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class ReaddressFinding:
     """What the two places said in the end; `spoilt`: again and again bytes at the new one that make no frame."""
 
-    new: Reply
-    old: Reply
+    new: IdentityReply
+    old: IdentityReply
     spoilt: bool = False
 
 
 def verified(
-    old: Spot, new: Spot, asking: Asking, look: Sequence[float | None] = PATIENT_LOOK
-) -> Generator[Step, Any, Found]:
+    old: Endpoint, new: Endpoint, asking: IdentityQuery, look: Sequence[float | None] = PATIENT_LOOK
+) -> Generator[Step, Any, ReaddressFinding]:
     """Ask both places until the new one answers and the old one is silent, for up to `VERIFY`, and once more."""
     until = asking.clock.now + VERIFY
     while asking.clock.now < until:
@@ -257,8 +259,8 @@ def verified(
 
 
 def told(
-    old: Spot, new: Spot, asking: Asking, look: Sequence[float | None] = QUICK_LOOK
-) -> Generator[Step, Any, Found]:
+    old: Endpoint, new: Endpoint, asking: IdentityQuery, look: Sequence[float | None] = QUICK_LOOK
+) -> Generator[Step, Any, ReaddressFinding]:
     """Ask each of two places until it answers or was silent `TRIES` times, at the new one as long as `look` says."""
     spoilt = 0
     at_new = SILENCE
@@ -280,12 +282,14 @@ def told(
         at_old = _nearer(at_old, (yield from asking.who(old)))
         if at_old.answers:
             break
-    return Found(at_new, at_old, spoilt >= TRIES)
+    return ReaddressFinding(at_new, at_old, spoilt >= TRIES)
 
 
-def parted(verdict: Verdict, old: Spot, to: int, asking: Asking) -> Generator[Step, Any, Verdict]:
+def parted(
+    verdict: ReaddressReport, old: Endpoint, to: int, asking: IdentityQuery
+) -> Generator[Step, Any, ReaddressReport]:
     """Have the one of two that stayed at `old` forget the new id, if it has stored that."""
-    if verdict.ending is not Ending.BOTH or verdict.register != to:
+    if verdict.ending is not ReaddressEnding.BOTH or verdict.register != to:
         return verdict
     for _ in range(TRIES):
         yield from written(old, asking.id_register, old.slave, asking)
@@ -295,23 +299,23 @@ def parted(verdict: Verdict, old: Spot, to: int, asking: Asking) -> Generator[St
     return verdict
 
 
-def _nearer(one: Reply, other: Reply) -> Reply:
+def _nearer(one: IdentityReply, other: IdentityReply) -> IdentityReply:
     return max(one, other, key=lambda reply: (reply.answers, reply.noise))
 
 
-def judge(found: Found, register_before: int | None, exception: int | None, to: int) -> Verdict:
+def judge(found: ReaddressFinding, register_before: int | None, exception: int | None, to: int) -> ReaddressReport:
     """Return what follows from what the two places said, by the table."""
     new, old = found.new, found.old
     if old.answers and (new.answers or found.spoilt):
-        ending = Ending.BOTH
+        ending = ReaddressEnding.BOTH
     elif found.spoilt:
-        ending = Ending.GARBAGE
+        ending = ReaddressEnding.GARBAGE
     elif new.answers:
-        return Verdict(Ending.MOVED, new.register, exception)
+        return ReaddressReport(ReaddressEnding.MOVED, new.register, exception)
     elif not old.answers:
-        ending = Ending.NOWHERE
+        ending = ReaddressEnding.NOWHERE
     elif exception is not None:
-        ending = Ending.REFUSED
+        ending = ReaddressEnding.REFUSED
     else:
-        ending = Ending.PENDING if old.register == to != register_before else Ending.LOCKED
-    return Verdict(ending, old.register, exception, stays_open=ending in STAYS_OPEN or old.register == to)
+        ending = ReaddressEnding.PENDING if old.register == to != register_before else ReaddressEnding.LOCKED
+    return ReaddressReport(ending, old.register, exception, stays_open=ending in STAYS_OPEN or old.register == to)

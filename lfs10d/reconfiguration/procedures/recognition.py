@@ -27,8 +27,8 @@ from lfs10d.modbus.exchange import Outcome
 from lfs10d.profiles.blocks import Block
 from lfs10d.profiles.values import Value
 from lfs10d.reading import Fault
-from lfs10d.reconfiguration.journal import Spot
-from lfs10d.reconfiguration.procedures.identity_query import PATIENT, QUICK, SILENCE, Asking, Reply
+from lfs10d.reconfiguration.journal import Endpoint
+from lfs10d.reconfiguration.procedures.identity_query import PATIENT, QUICK, SILENCE, IdentityQuery, IdentityReply
 
 READS = 3
 """How often a value is read."""
@@ -70,7 +70,7 @@ class Look:
     exception: int | None = None
 
 
-def recognised(spot: Spot, identity: Reply, asking: Asking) -> Generator[Step, Outcome, Recognition]:
+def recognised(spot: Endpoint, identity: IdentityReply, asking: IdentityQuery) -> Generator[Step, Outcome, Recognition]:
     """Find out whether a sensor of the profile is at a place where `identity` was the answer to who is there."""
     profile = asking.profile
     if identity.exception is not None:
@@ -86,7 +86,7 @@ def recognised(spot: Spot, identity: Reply, asking: Asking) -> Generator[Step, O
     return (yield from _rate_fits(profile.baudrate.register, spot, asking))
 
 
-def _rate_fits(register: int, spot: Spot, asking: Asking) -> Generator[Step, Outcome, Recognition]:
+def _rate_fits(register: int, spot: Endpoint, asking: IdentityQuery) -> Generator[Step, Outcome, Recognition]:
     reply = SILENCE
     for timeout in _timeouts(asking):
         reply = yield from asking.who(spot, timeout, register=register)
@@ -98,11 +98,11 @@ def _rate_fits(register: int, spot: Spot, asking: Asking) -> Generator[Step, Out
     return Recognition(f"its register 0x{register:04X} {says}")
 
 
-def _timeouts(asking: Asking) -> tuple[float | None, ...]:
+def _timeouts(asking: IdentityQuery) -> tuple[float | None, ...]:
     return (None, 2 * asking.timeout, PATIENT)
 
 
-def _values_fit(block: Block, spot: Spot, asking: Asking) -> Generator[Step, Outcome, Recognition]:
+def _values_fit(block: Block, spot: Endpoint, asking: IdentityQuery) -> Generator[Step, Outcome, Recognition]:
     """Read a block of values `READS` times; the first answer that is none of such a device decides."""
     spoilt = answered = 0
     exception: int | None = None
@@ -124,7 +124,7 @@ def _values_fit(block: Block, spot: Spot, asking: Asking) -> Generator[Step, Out
     return Recognition(f"it {how} its values at 0x{block.address:04X}")
 
 
-def one_alone(spot: Spot, silent: Spot, asking: Asking) -> Generator[Step, Outcome, Look]:
+def one_alone(spot: Endpoint, silent: Endpoint, asking: IdentityQuery) -> Generator[Step, Outcome, Look]:
     """Find out whether one sensor is at a place, not two (rules 2 and 3); `silent` is a slave id that nobody has."""
     value = asking.profile.values[0]
     block = next(block for block in asking.profile.reads() if value in block.values)
@@ -142,7 +142,7 @@ def one_alone(spot: Spot, silent: Spot, asking: Asking) -> Generator[Step, Outco
     return (yield from _take_turns(value, block, numbers, spot, asking))
 
 
-def _whose(silent: Spot, asking: Asking) -> Generator[Step, Outcome, Look]:
+def _whose(silent: Endpoint, asking: IdentityQuery) -> Generator[Step, Outcome, Look]:
     """Find out whether what was received behind a read came from the place that was to be silent."""
     for _ in range(READS - 1):
         reply = yield from asking.values(silent, QUICK)
@@ -152,7 +152,7 @@ def _whose(silent: Spot, asking: Asking) -> Generator[Step, Outcome, Look]:
 
 
 def _take_turns(
-    value: Value, block: Block, numbers: list[float], spot: Spot, asking: Asking
+    value: Value, block: Block, numbers: list[float], spot: Endpoint, asking: IdentityQuery
 ) -> Generator[Step, Outcome, Look]:
     """Read it more often where the `numbers` so far jump there and back; find out whether that goes on."""
     if jumps(value, numbers) < READS - 1:
@@ -167,7 +167,9 @@ def _take_turns(
     return Look(twins=f"its values jump there and back between {numbers[0]:g} and {numbers[1]:g} {value.unit}")
 
 
-def _measured(value: Value, block: Block, spot: Spot, asking: Asking) -> Generator[Step, Outcome, Look | float]:
+def _measured(
+    value: Value, block: Block, spot: Endpoint, asking: IdentityQuery
+) -> Generator[Step, Outcome, Look | float]:
     """Return the value; a `Look` that ends it where there is none."""
     exception: int | None = None
     for timeout in _timeouts(asking):

@@ -14,12 +14,12 @@ from math import inf
 from typing import Any
 
 from lfs10d.line.jobs.job import Hold
-from lfs10d.line.jobs.procedure import Aside, Step
+from lfs10d.line.jobs.procedure import Await, Step
 from lfs10d.reconfiguration.procedures.baudrate import (
     FIRST_PAUSE,
-    Ended,
-    RateVerdict,
-    Sensor,
+    BaudrateEnding,
+    BaudrateReport,
+    RateSensor,
     found_at,
     restored,
     written_back,
@@ -50,7 +50,7 @@ class Twins:
 
 
 def look_back(
-    sensors: Sequence[Sensor], rate: int, other: int, where: dict[str, int | None], *, own: int
+    sensors: Sequence[RateSensor], rate: int, other: int, where: dict[str, int | None], *, own: int
 ) -> Generator[Step, Any, dict[str, int | None]]:
     """Look once for each sensor after a change of rate that was cut short, at the line's `own` rate first.
 
@@ -66,8 +66,8 @@ def look_back(
 
 
 def put_back(
-    sensors: Sequence[Sensor], rate: int, other: int, where: dict[str, int | None]
-) -> Generator[Step, Any, RateVerdict]:
+    sensors: Sequence[RateSensor], rate: int, other: int, where: dict[str, int | None]
+) -> Generator[Step, Any, BaudrateReport]:
     """Bring those of these sensors that were found to `rate`; the verdict speaks of all in `where`.
 
     One that answers at the `other` rate too is two sensors: that goes aside, and it counts as being there.
@@ -78,13 +78,13 @@ def put_back(
         where[sensor.name] = yield from restored(sensor, rate, other)
         if where[sensor.name] == rate and (yield from sensor.asking.who(sensor.at(other))).answers:
             where[sensor.name] = other
-            yield Aside(Twins(sensor.name))
+            yield Await(Twins(sensor.name))
     names = tuple(name for name, at in where.items() if at != rate)
-    return RateVerdict(Ended.UNVERIFIED if names else Ended.ROLLED_BACK, dict(where), names)
+    return BaudrateReport(BaudrateEnding.UNVERIFIED if names else BaudrateEnding.ROLLED_BACK, dict(where), names)
 
 
 def await_lost(
-    sensors: Sequence[Sensor],
+    sensors: Sequence[RateSensor],
     rate: int,
     other: int,
     where: Mapping[str, int | None],
@@ -93,7 +93,7 @@ def await_lost(
     pause: float,
     longest_pause: float,
     tell_at: float,
-) -> Generator[Step, Any, tuple[Sensor, ...]]:
+) -> Generator[Step, Any, tuple[RateSensor, ...]]:
     """Return the first of these sensors that can be put back, however long it takes; nothing is written.
 
     They are asked after `pause` s, twice that ... up to `longest_pause`, at the line's `own` rate first, but where each
@@ -104,11 +104,11 @@ def await_lost(
     while True:
         now = sensors[0].asking.clock.now
         if now >= tell_at:
-            yield Aside(StillLost())
+            yield Await(StillLost())
             tell_at = inf
         yield Hold(now + pause)
         pause = min(2 * pause, longest_pause)
-        found: list[Sensor] = []
+        found: list[RateSensor] = []
         turn, rest = divmod(rounds, PATIENT_EVERY)
         for sensor in sensors:
             for n, asked in enumerate(_first(where[sensor.name] or own, rate, other)):
@@ -128,8 +128,8 @@ def _first(own: int, *rates: int) -> tuple[int, ...]:
 
 
 def await_power(
-    sensors: Sequence[Sensor], old: int, to: int, *, longest_pause: float
-) -> Generator[Step, Any, RateVerdict]:
+    sensors: Sequence[RateSensor], old: int, to: int, *, longest_pause: float
+) -> Generator[Step, Any, BaudrateReport]:
     """Ask sensors that want a power cycle at the new rate until all have come up there; each goes aside.
 
     So does, once, each that is two.
@@ -144,11 +144,11 @@ def await_power(
                 continue
             if not (yield from sensor.asking.who(sensor.at(old))).answers:
                 missing.remove(sensor)
-                yield Aside(CameUp(sensor.name))
+                yield Await(CameUp(sensor.name))
             elif sensor.name not in twins:
                 twins.add(sensor.name)
-                yield Aside(Twins(sensor.name))
+                yield Await(Twins(sensor.name))
         if missing:
             yield Hold(missing[0].asking.clock.now + pause)
             pause = min(2 * pause, longest_pause)
-    return RateVerdict(Ended.MOVED, {sensor.name: to for sensor in sensors})
+    return BaudrateReport(BaudrateEnding.MOVED, {sensor.name: to for sensor in sensors})

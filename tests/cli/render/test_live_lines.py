@@ -6,12 +6,12 @@ from datetime import UTC
 from typing import Any
 
 from lfs10d.cli.render.live_lines import LiveLines, health
-from lfs10d.cli.render.live_state import Live
-from lfs10d.cli.render.live_table import Source
+from lfs10d.cli.render.live_state import LiveState
+from lfs10d.cli.render.live_table import DataSource
 
 WALL = 1_795_298_000.0
-HERE = Source("live from broker localhost:1883", alive=True)
-GONE = Source("NOT LIVE: the daemon is offline", alive=False)
+HERE = DataSource("live from broker localhost:1883", alive=True)
+GONE = DataSource("NOT LIVE: the daemon is offline", alive=False)
 
 
 def status(seq: int = 1, value: float | None = 4.5, **keys: Any) -> dict[str, Any]:  # noqa: ANN401 - any JSON
@@ -36,11 +36,11 @@ class Pipe:
     """Gives a status after the other and keeps the lines."""
 
     def __init__(self) -> None:
-        self.live = Live("line0")
+        self.live = LiveState("line0")
         self.lines = LiveLines(UTC)
         self.data: list[dict[str, Any]] = []
 
-    def read(self, told: dict[str, Any], source: Source = HERE) -> list[str]:
+    def read(self, told: dict[str, Any], source: DataSource = HERE) -> list[str]:
         self.live.read(told, now=1.0)
         news = list(self.lines.news(self.live, source, now=1.0, wall=WALL))
         self.data += [data for _, data in news if data is not None]

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.cli.render.live_state import LATE_AFTER, MOVES_WITHIN, STANDS_OUT, Device, Live
-from lfs10d.cli.render.live_table import Source, screen
+from lfs10d.cli.render.live_state import LATE_AFTER, MOVES_WITHIN, STANDS_OUT, LiveState, ShownDevice
+from lfs10d.cli.render.live_table import DataSource, screen
 
 WALL = 1_795_298_000.0
 
@@ -19,7 +19,7 @@ class Heard:
     """A view from MQTT with a clock; our wall clock is `ahead` s ahead of the daemon's."""
 
     def __init__(self, *names: str, ahead: float = 0.0) -> None:
-        self.live = Live("line0")
+        self.live = LiveState("line0")
         self.now = 100.0
         self.ahead = ahead
         self.seqs: dict[str, int] = {}
@@ -54,7 +54,7 @@ class Heard:
         }
         self.tell(f"device/{name}/{leaf}", {**sample, **keys}, old=old)
 
-    def device(self, name: str) -> Device:
+    def device(self, name: str) -> ShownDevice:
         return self.live.devices[name]
 
     def age(self, name: str) -> float | None:
@@ -84,7 +84,7 @@ def test_what_is_retained_may_come_in_any_order() -> None:
 
 
 def test_nothing_is_known_before_a_list_of_devices() -> None:
-    live = Live("line0")
+    live = LiveState("line0")
     live.heard("line/state", {"port": "/dev/x"}, old=True, now=0, wall=0)
     assert not live.known
     live.heard("devices", [], old=True, now=0, wall=0)
@@ -270,7 +270,7 @@ def status(**device: Any) -> dict[str, Any]:  # noqa: ANN401 - any JSON
 
 
 def test_the_status_file_says_all_that_mqtt_says() -> None:
-    live = Live("line0")
+    live = LiveState("line0")
     live.read(status(), now=10.0)
     (device,) = live.devices.values()
     assert (device.name, device.slave, device.label, device.online, device.good) == ("a", 2, "Mast", True, True)
@@ -280,7 +280,7 @@ def test_the_status_file_says_all_that_mqtt_says() -> None:
 
 
 def test_what_moves_and_comes_and_goes_is_seen_in_the_status_file_too() -> None:
-    live = Live("line0")
+    live = LiveState("line0")
     for step, value in enumerate((1.0, 1.0, 6.0)):
         live.read(status(values={"wind_speed": value}, seq=step), now=10.0 + step)
     assert [device.name for device in live.movers(12.0)] == ["a"]
@@ -289,14 +289,14 @@ def test_what_moves_and_comes_and_goes_is_seen_in_the_status_file_too() -> None:
 
 
 def test_the_same_status_read_twice_is_one_sample() -> None:
-    live = Live("line0")
+    live = LiveState("line0")
     for now in (10.0, 10.5, 11.0):
         live.read(status(), now=now)
     assert len(live.devices["a"].trail) == 0
 
 
 def test_a_device_that_never_answered_has_no_age() -> None:
-    live = Live("line0")
+    live = LiveState("line0")
     live.read(status(age_s=None, values={"wind_speed": None}, quality="bad", error="timeout"), now=1.0)
     assert live.age(live.devices["a"], WALL) is None
 
@@ -323,11 +323,11 @@ def test_whatever_comes_in_can_be_shown(messages: list[tuple[str, Any, bool]], w
     heard = Heard("a")
     for topic, payload, old in messages:
         heard.tell(topic, payload, old=old)
-    file = Live("line0")
+    file = LiveState("line0")
     file.read({**status(), **written}, now=1.0)
     file.read({**status(**written), "line": written}, now=2.0)
     for live in (heard.live, file):
-        for line in screen(live, Source("live", alive=True), (80, 24), now=heard.now, wall=heard.wall):
+        for line in screen(live, DataSource("live", alive=True), (80, 24), now=heard.now, wall=heard.wall):
             text = "".join(piece for piece, _ in line)
             assert text.isprintable()
             assert len(text) <= 80

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.cli.render.live_state import Live
-from lfs10d.cli.render.live_table import Line, Source, age_text, header, rows, screen, table
+from lfs10d.cli.render.live_state import LiveState
+from lfs10d.cli.render.live_table import DataSource, Line, age_text, header, rows, screen, table
 
 WALL = 1_795_298_000.0
-HERE = Source("live from broker localhost:1883", alive=True)
-GONE = Source("NOT LIVE: the daemon is offline", alive=False)
+HERE = DataSource("live from broker localhost:1883", alive=True)
+GONE = DataSource("NOT LIVE: the daemon is offline", alive=False)
 
 
 def entry(name: str, slave: int, **keys: Any) -> dict[str, Any]:  # noqa: ANN401 - any JSON
@@ -41,8 +41,8 @@ def bad(name: str, slave: int, error: str | None = "timeout", **keys: Any) -> di
     return entry(name, slave, **{**nothing, "error": error, "online": False, **keys})
 
 
-def live(*entries: dict[str, Any], **line: Any) -> Live:  # noqa: ANN401 - plain data of any shape
-    shown = Live("line0")
+def live(*entries: dict[str, Any], **line: Any) -> LiveState:  # noqa: ANN401 - plain data of any shape
+    shown = LiveState("line0")
     shape = {"port": "/dev/ttyUSB0", "baudrate": 9600, "databits": 8, "parity": "none", "stopbits": 1, "open": True}
     status = {"ts": round(WALL * 1000), "line": {**shape, "load_pct": 34.5, "polls_per_s": 12.0, **line}}
     shown.read({**status, "devices": list(entries)}, now=0.0)
@@ -66,7 +66,7 @@ def texts(lines: list[Line]) -> list[str]:
     return [text(line) for line in lines]
 
 
-def states(*entries: dict[str, Any], source: Source = HERE) -> list[str]:
+def states(*entries: dict[str, Any], source: DataSource = HERE) -> list[str]:
     return [row.state for row in rows(live(*entries), source, now=0.0, wall=WALL, zone=UTC)]
 
 
@@ -204,7 +204,7 @@ def test_what_the_line_does_beside_polling_is_told() -> None:
 
 
 def test_a_line_of_which_nothing_is_known_has_a_header_too() -> None:
-    assert texts(header(Live("line0"), HERE, 80)) == ["line0: ?", HERE.words]
+    assert texts(header(LiveState("line0"), HERE, 80)) == ["line0: ?", HERE.words]
 
 
 def test_a_long_header_is_wrapped_at_words() -> None:

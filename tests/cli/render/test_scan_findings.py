@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from lfs10d.cli.options import LineOptions
-from lfs10d.cli.render.scan_findings import Asked, lasting_name, plain, remarks, row, snippet, usual_rate, what
+from lfs10d.cli.render.scan_findings import ScanRequest, lasting_name, plain, remarks, row, snippet, usual_rate, what
 from lfs10d.config.loader import load
-from lfs10d.line.jobs.identification import Finding
+from lfs10d.line.jobs.identification import FoundDevice
 from lfs10d.modbus.frames import Framing
 from lfs10d.profiles.library import load_profile
 
@@ -17,8 +17,8 @@ LFS10, LD_E = (load_profile(name, relative_to=Path()) for name in ("lfs10", "ld-
 RTU = LineOptions("/dev/ttyUSB0", "none", 8, 1, Framing.RTU, None)
 
 
-def sensor(slave: int, baudrate: int = 9600, *, suspect: bool = False, duplicate: bool = False) -> Finding:
-    return Finding(
+def sensor(slave: int, baudrate: int = 9600, *, suspect: bool = False, duplicate: bool = False) -> FoundDevice:
+    return FoundDevice(
         slave,
         baudrate,
         answers=True,
@@ -31,7 +31,7 @@ def sensor(slave: int, baudrate: int = 9600, *, suspect: bool = False, duplicate
     )
 
 
-STRANGER = Finding(9, 9600, answers=True, rtt=0.02, exception=2)
+STRANGER = FoundDevice(9, 9600, answers=True, rtt=0.02, exception=2)
 
 
 def test_a_row_says_id_rate_time_device_and_value() -> None:
@@ -39,25 +39,28 @@ def test_a_row_says_id_rate_time_device_and_value() -> None:
 
 
 def test_a_bare_count_has_no_unit() -> None:
-    assert what(Finding(3, 9600, answers=True, profile=LD_E, values={"displacement": 7})).endswith("sensor, 7")
+    assert what(FoundDevice(3, 9600, answers=True, profile=LD_E, values={"displacement": 7})).endswith("sensor, 7")
 
 
 @pytest.mark.parametrize(
     ("finding", "text"),
     [
         (STRANGER, "unknown device, answers function 03 (exception 02 illegal register address)"),
-        (Finding(9, 9600, answers=True, exception=99), "unknown device, answers function 03 (exception 63 of its own)"),
         (
-            Finding(9, 9600, answers=True, exception=1),
+            FoundDevice(9, 9600, answers=True, exception=99),
+            "unknown device, answers function 03 (exception 63 of its own)",
+        ),
+        (
+            FoundDevice(9, 9600, answers=True, exception=1),
             "unknown device, refuses function 03 (exception 01 illegal function)",
         ),
-        (Finding(9, 9600, answers=True), "unknown device, answers function 03"),
-        (Finding(9, 9600, duplicate=True), "something that gives no right answer"),
-        (Finding(9, 9600, answers=True, profile=LFS10), "LFS10 wind speed sensor, no believable value"),
+        (FoundDevice(9, 9600, answers=True), "unknown device, answers function 03"),
+        (FoundDevice(9, 9600, duplicate=True), "something that gives no right answer"),
+        (FoundDevice(9, 9600, answers=True, profile=LFS10), "LFS10 wind speed sensor, no believable value"),
         (sensor(9, duplicate=True), "LFS10 wind speed sensor"),
     ],
 )
-def test_what_it_is_is_told_as_far_as_it_is_known(finding: Finding, text: str) -> None:
+def test_what_it_is_is_told_as_far_as_it_is_known(finding: FoundDevice, text: str) -> None:
     assert what(finding) == text
 
 
@@ -66,37 +69,37 @@ def test_what_it_is_is_told_as_far_as_it_is_known(finding: Finding, text: str) -
     [
         (sensor(3), []),
         (sensor(1), ["the factory id"]),
-        (Finding(1, 9600, answers=True), []),
-        (Finding(3, 9600, spoilt=2, tries=5), ["2 of 5 answers garbled"]),
+        (FoundDevice(1, 9600, answers=True), []),
+        (FoundDevice(3, 9600, spoilt=2, tries=5), ["2 of 5 answers garbled"]),
         (
-            Finding(3, 9600, spoilt=4, tries=5, duplicate=True),
+            FoundDevice(3, 9600, spoilt=4, tries=5, duplicate=True),
             ["DUPLICATE? 4 of 5 answers garbled: two sensors with this id?"],
         ),
         (sensor(250, suspect=True), ["SUSPECT: others answer too, so it may be no sensor of its own"]),
-        (Finding(255, 9600, suspect=True, id_register=2), ["SUSPECT: probably sensor 2, which answers 255 too"]),
-        (Finding(3, 9600, id_register=7), ["its id register holds 7: is the DIP switch set?"]),
+        (FoundDevice(255, 9600, suspect=True, id_register=2), ["SUSPECT: probably sensor 2, which answers 255 too"]),
+        (FoundDevice(3, 9600, id_register=7), ["its id register holds 7: is the DIP switch set?"]),
     ],
 )
-def test_remarks_tell_what_a_newcomer_should_know(finding: Finding, texts: list[str]) -> None:
+def test_remarks_tell_what_a_newcomer_should_know(finding: FoundDevice, texts: list[str]) -> None:
     assert list(remarks(finding)) == texts
 
 
 def test_nothing_is_timed_that_never_answered() -> None:
-    assert row(Finding(9, 9600, duplicate=True))[2] == "-"
-    assert plain(Finding(9, 9600, duplicate=True))["rtt_ms"] is None
+    assert row(FoundDevice(9, 9600, duplicate=True))[2] == "-"
+    assert plain(FoundDevice(9, 9600, duplicate=True))["rtt_ms"] is None
 
 
 def test_the_refusal_of_a_known_device_is_no_news() -> None:
-    known = Finding(3, 9600, answers=True, profile=LD_E, exception=2)
+    known = FoundDevice(3, 9600, answers=True, profile=LD_E, exception=2)
     assert plain(known)["exception_code"] is None
     assert plain(STRANGER)["exception_code"] == 2
 
 
 def test_the_snippet_is_a_valid_file_that_polls_what_can_be_polled(tmp_path: Path) -> None:
     ascii_line = LineOptions("/dev/ttyUSB0", "even", 7, 2, Framing.ASCII, 0.5)
-    device = Finding(4, 19200, answers=True, profile=LD_E)
+    device = FoundDevice(4, 19200, answers=True, profile=LD_E)
     file = tmp_path / "lfs10d.yaml"
-    file.write_text("\n".join(snippet([device, Finding(5, 19200, answers=True)], ascii_line, tmp_path)))
+    file.write_text("\n".join(snippet([device, FoundDevice(5, 19200, answers=True)], ascii_line, tmp_path)))
     config = load(file).config
     assert (config.line.baudrate, config.line.parity, config.line.databits) == (19200, "even", 7)
     assert (config.line.stopbits, config.line.framing) == (2, "ascii")
@@ -105,8 +108,8 @@ def test_the_snippet_is_a_valid_file_that_polls_what_can_be_polled(tmp_path: Pat
 
 def test_a_profile_of_ones_own_is_named_by_its_file_and_another_check_by_its_key() -> None:
     eh600 = load_profile("eh600", relative_to=Path())
-    found = [Finding(4, 9600, answers=True, profile=eh600), Finding(5, 9600, answers=True, profile=LD_E)]
-    lines = list(snippet(found, RTU, Path("/nowhere"), Asked("sum", {"ld-e": "my, laser.yaml"})))
+    found = [FoundDevice(4, 9600, answers=True, profile=eh600), FoundDevice(5, 9600, answers=True, profile=LD_E)]
+    lines = list(snippet(found, RTU, Path("/nowhere"), ScanRequest("sum", {"ld-e": "my, laser.yaml"})))
     assert "  - {id: 4, profile: eh600, checksum: sum}" in lines
     assert '  - {id: 5, profile: "my, laser.yaml", checksum: sum}' in lines
 
@@ -136,7 +139,7 @@ def test_without_anybody_to_poll_the_list_is_empty() -> None:
 def test_the_rate_is_the_one_of_most_and_the_slower_of_equals() -> None:
     assert usual_rate([sensor(1), sensor(2, 19200), sensor(3, 19200)]) == 19200
     assert usual_rate([sensor(2, 19200), sensor(1)]) == 9600
-    assert usual_rate([Finding(9, 19200, duplicate=True)]) == 9600
+    assert usual_rate([FoundDevice(9, 19200, duplicate=True)]) == 9600
 
 
 def test_an_adapter_is_called_by_the_name_that_lasts(tmp_path: Path) -> None:

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from lfs10d.command import Answer
-from lfs10d.commands.admission import Admission, Answered, Ticket
+from lfs10d.command import Result
+from lfs10d.commands.admission import Admission, Admitted, Answered
 from lfs10d.commands.handlers.registry import REQUESTS
 from tests.support.context import FILE, Ask, Asked, FakePowers
 
@@ -26,13 +26,13 @@ def powers(tmp_path: Path) -> FakePowers:
 def ask(powers: FakePowers) -> Ask:
     """Return the door with every class allowed."""
 
-    def ask(name: str, payload: str = "{}") -> Answer:
+    def ask(name: str, payload: str = "{}") -> Result:
         forms = {name: request.form for name, request in REQUESTS.items()}
         door = Admission[None](forms, frozenset({"polling", "sensors", "registers"}))
         verdict = door.admit(name, payload.encode(), retained=False, whence=None, now=0.0)
         if isinstance(verdict, Answered):
             return verdict.answer
-        assert isinstance(verdict, Ticket)
+        assert isinstance(verdict, Admitted)
         return asyncio.run(REQUESTS[name].perform(verdict.parameters, powers, verdict.call))
 
     return ask

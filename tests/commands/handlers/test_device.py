@@ -9,14 +9,14 @@ from typing import Any
 import pytest
 
 from lfs10d import profiles
-from lfs10d.command import Call
+from lfs10d.command import Command
 from lfs10d.commands.handlers.device import NewDevice
 from lfs10d.commands.handlers.registry import REQUESTS
-from lfs10d.commands.reads import Inquiry
+from lfs10d.commands.reads import ReadResult
 from lfs10d.config.changes import Place
 from lfs10d.config.changes_file import FILE_NAME
 from lfs10d.config.models import SlaveConfig
-from lfs10d.line.jobs.ping import Knock
+from lfs10d.line.jobs.ping import Ping
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Fault, FaultCode
 from tests.support.context import Ask, Asked, FakePowers
@@ -26,7 +26,7 @@ BAD = {"device": "mast-top", "wind_speed": None, "error": "timeout"}
 
 
 def test_a_reading_is_answered_with_its_sample(ask: Ask, powers: FakePowers) -> None:
-    powers.inquiry = Inquiry(GOOD, None)
+    powers.inquiry = ReadResult(GOOD, None)
     answer = ask("device/read", '{"device":"mast-top"}')
     assert (answer.status, answer.data, answer.error()) == ("ok", GOOD, None)
     assert powers.done == ["read mast-top"]
@@ -42,14 +42,14 @@ def test_a_reading_is_answered_with_its_sample(ask: Ask, powers: FakePowers) -> 
 def test_silence_is_a_timeout_and_everything_else_a_line_error(
     ask: Ask, powers: FakePowers, fault: Fault, code: str
 ) -> None:
-    powers.inquiry = Inquiry(BAD, fault)
+    powers.inquiry = ReadResult(BAD, fault)
     answer = ask("device/read", '{"device":"mast-top"}')
     assert (answer.status, answer.data) == ("failed", BAD)
     assert answer.error() == {"code": code, "message": f"mast-top: {fault.message}", "param": None}
 
 
 def test_an_exception_is_told_with_its_code(ask: Ask, powers: FakePowers) -> None:
-    powers.inquiry = Inquiry(BAD, Fault(FaultCode.EXCEPTION, "refused", exception_code=2))
+    powers.inquiry = ReadResult(BAD, Fault(FaultCode.EXCEPTION, "refused", exception_code=2))
     error = ask("device/read", '{"device":"mast-top"}').error()
     assert error is not None
     assert (error["code"], error["exception_code"]) == ("line_error", 2)
@@ -214,9 +214,9 @@ def test_of_two_that_are_added_at_once_one_is(powers: FakePowers, asked: Asked) 
     powers.at = {9}
     knock = powers.knock
 
-    async def slow(slave: int, profile: Profile) -> Knock:
+    async def slow(slave: int, profile: Profile) -> Ping:
         powers.knock = knock  # type: ignore[method-assign]  # the other request is not asked again
-        answer = await REQUESTS["device/add"].perform(NewDevice(slave=9, name="first"), powers, Call())
+        answer = await REQUESTS["device/add"].perform(NewDevice(slave=9, name="first"), powers, Command())
         assert answer.status == "ok"
         return await knock(slave, profile)
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from lfs10d.command import Answer
+from lfs10d.command import Result
 from lfs10d.line.jobs.register_access import End
 from lfs10d.modbus.frames import ReadRegisters, WriteRegister
 from lfs10d.profiles.library import builtin_names
@@ -50,7 +50,7 @@ def _devices(powers: FakePowers) -> None:
     powers.came = {"end": End.DONE, "registers": (7,), "before": 1, "sent": True}
 
 
-def told(ask: Ask, name: str, **parameters: Any) -> Answer:  # noqa: ANN401  # as JSON has it
+def told(ask: Ask, name: str, **parameters: Any) -> Result:  # noqa: ANN401  # as JSON has it
     return ask(f"register/{name}", json.dumps(parameters))
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from lfs10d.config.changes import Place
-from lfs10d.line.jobs.identification import Finding
+from lfs10d.line.jobs.identification import FoundDevice
 from lfs10d.profiles.library import load_profile
 from tests.support.context import Ask, Asked, FakePowers
 
@@ -55,8 +55,8 @@ def test_a_second_scan_waits(asked: Asked, powers: FakePowers) -> None:
     assert asked("line/scan") == ("rejected", ("busy", None))
 
 
-def found(slave: int, baudrate: int = 9600, **facts: Any) -> Finding:  # noqa: ANN401 - as Finding has them
-    return Finding(slave, baudrate, answers=True, **{"profile": LFS10, "rtt": 0.0213, **facts})
+def found(slave: int, baudrate: int = 9600, **facts: Any) -> FoundDevice:  # noqa: ANN401 - as Finding has them
+    return FoundDevice(slave, baudrate, answers=True, **{"profile": LFS10, "rtt": 0.0213, **facts})
 
 
 def test_each_who_was_found_is_told_with_what_is_known_of_it(asked: Asked, powers: FakePowers) -> None:

@@ -7,7 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from lfs10d.line.jobs.identification import Finding, Interview, first_read, rate_fits, speaks, spoilt, strangers
+from lfs10d.line.jobs.identification import (
+    FoundDevice,
+    Identification,
+    first_read,
+    rate_fits,
+    speaks,
+    spoilt,
+    strangers,
+)
 from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
 from lfs10d.profiles.library import builtin_names, load_profile
@@ -59,10 +67,10 @@ def interview(
     slave: int = 3,
     profiles: Sequence[Profile] = PROFILES,
     first: Outcome | None = None,
-) -> tuple[Finding | None, list[ReadRegisters]]:
+) -> tuple[FoundDevice | None, list[ReadRegisters]]:
     """Hold an interview with a device; return what was found, and what was asked."""
     asked: list[ReadRegisters] = []
-    conversation = Interview(Finding(slave, 9600), profiles, CODEC, first).converse()
+    conversation = Identification(FoundDevice(slave, 9600), profiles, CODEC, first).converse()
     try:
         request = next(conversation)
         while True:
@@ -91,7 +99,7 @@ def lfs10(slave: int = 3, wind: tuple[int, int] = WIND) -> Callable[[ReadRegiste
 def test_an_lfs10_is_recognised_by_its_id_its_value_and_its_rate() -> None:
     finding, asked = interview(lfs10())
     assert asked == [ReadRegisters(3, 5, 1), ReadRegisters(3, 1, 2), ReadRegisters(3, 4, 1)]
-    assert finding == Finding(
+    assert finding == FoundDevice(
         3, 9600, answers=True, rtt=0.02, profile=LFS10, values={"wind_speed": 12.99}, id_register=3
     )
 
@@ -176,7 +184,7 @@ def test_other_devices_are_recognised_by_their_values(profile: Profile, content:
 
 def test_a_device_that_refuses_everything_is_there_but_unknown() -> None:
     finding, asked = interview(registers({}))
-    assert finding == Finding(3, 9600, answers=True, rtt=0.02, exception=2)
+    assert finding == FoundDevice(3, 9600, answers=True, rtt=0.02, exception=2)
     assert len(asked) == len(PROFILES)
 
 
@@ -185,7 +193,7 @@ def test_profiles_whose_ids_it_cannot_have_are_not_tried() -> None:
     assert asked == [ReadRegisters(250, 5, 1)]
     finding, asked = interview(registers({0: 7}), slave=250, profiles=[LD_E])
     assert asked == [ReadRegisters(250, 0, 1)]
-    assert finding == Finding(250, 9600, answers=True, rtt=0.02)
+    assert finding == FoundDevice(250, 9600, answers=True, rtt=0.02)
 
 
 def test_silence_is_asked_three_times_and_then_nobody_is_there() -> None:
@@ -262,7 +270,7 @@ def noise(count: int) -> Callable[[ReadRegisters], Outcome]:
 def test_noise_alone_is_a_device_only_if_it_hardly_ever_fails_to_come() -> None:
     assert interview(noise(3), profiles=[LFS10])[0] is None
     finding, _ = interview(noise(4), profiles=[LFS10])
-    assert finding == Finding(3, 9600, spoilt=4, tries=5, duplicate=True)
+    assert finding == FoundDevice(3, 9600, spoilt=4, tries=5, duplicate=True)
 
 
 def test_an_answer_that_may_be_an_older_ones_is_not_believed() -> None:
@@ -288,7 +296,7 @@ def test_a_wrong_frame_of_the_slave_is_an_answer_and_no_noise() -> None:
     assert speaks(wrong, CODEC)
     assert not spoilt(wrong, CODEC)
     finding, _ = interview(lambda asked: outcome(asked, code=FaultCode.MALFORMED, heard=longer), profiles=[LD_E])
-    assert finding == Finding(3, 9600, answers=True)
+    assert finding == FoundDevice(3, 9600, answers=True)
 
 
 def test_our_own_echo_is_no_answer() -> None:

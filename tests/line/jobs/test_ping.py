@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from lfs10d.line.jobs.job import Ask, Done, Later
-from lfs10d.line.jobs.ping import Knock
+from lfs10d.line.jobs.job import Ask, Done, Requeue
+from lfs10d.line.jobs.ping import Ping
 from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
 from lfs10d.profiles.library import load_profile
@@ -29,8 +29,8 @@ class Door:
     """A knock at slave 5 and what comes of it."""
 
     def __init__(self) -> None:
-        self.told: list[Knock] = []
-        self.knock = Knock(5, LFS10, CODEC, self.told.append)
+        self.told: list[Ping] = []
+        self.knock = Ping(5, LFS10, CODEC, self.told.append)
         self.timeouts: list[float] = []
 
     def hear(self, *faults: Fault | None) -> bool:
@@ -42,7 +42,7 @@ class Door:
             assert isinstance(ask.request, ReadRegisters)
             self.timeouts.append(ask.timeout)
             following = self.knock.heard(outcome(ask.request, (5,) if fault is None else None, fault), 1.0)
-        assert following in (Done(), Later(1.0))
+        assert following in (Done(), Requeue(1.0))
         assert self.told == ([self.knock] if following == Done() else [])
         return following == Done()
 
@@ -54,7 +54,7 @@ def test_the_register_of_the_slave_id_is_asked_and_nothing_written() -> None:
 
 def test_a_device_without_one_is_asked_for_its_first_values() -> None:
     block = LD_E.reads()[0]
-    ask = Knock(5, LD_E, CODEC, lambda _: None).ask(0.0)
+    ask = Ping(5, LD_E, CODEC, lambda _: None).ask(0.0)
     assert ask.request == ReadRegisters(5, block.address, block.count, block.function)
 
 

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from lfs10d.line.device import Device, DeviceSpec, PollRules
-from lfs10d.line.jobs.job import Ask, Done, Hold, Later
+from lfs10d.line.jobs.job import Ask, Done, Hold, Requeue
 from lfs10d.line.jobs.poll import Poll
 from lfs10d.modbus.exchange import LateAnswer
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
-from lfs10d.modbus.pending import Unanswered
+from lfs10d.modbus.pending import PendingRequests
 from lfs10d.profiles.library import load_profile
-from lfs10d.reading import Errand, Fault, FaultCode
+from lfs10d.reading import Fault, FaultCode, Purpose
 from tests.support.outcomes import ended
 
 RTU = Codec(Framing.RTU)
@@ -28,8 +28,8 @@ PLAIN = ended(WIND)
 class Rig:
     """A device on a line, and a poll of it."""
 
-    def __init__(self, errand: Errand = Errand.POLL, *, profile: str = "lfs10", retries: int = 1) -> None:
-        self.unanswered = Unanswered()
+    def __init__(self, errand: Purpose = Purpose.POLL, *, profile: str = "lfs10", retries: int = 1) -> None:
+        self.unanswered = PendingRequests()
         chosen = load_profile(profile, relative_to=Path())
         self.device = Device(DeviceSpec("mast", 1, chosen, RTU, 1.0), PollRules(retries=retries), 1)
         self.device.answered()
@@ -55,7 +55,7 @@ class Rig:
         late: tuple[ReadRegisters, ...] = (),
         ambiguous: bool = False,
         heard: bytes = b"",
-    ) -> Later | Done:
+    ) -> Requeue | Done:
         """Ask and hear; remembered by the line as in the schedule."""
         request = self.asks(now)
         fault = None if code is None else Fault(code, "", 2 if code is FaultCode.EXCEPTION else None)
@@ -74,7 +74,7 @@ class Rig:
         )
         self.unanswered.settled(outcome, RTU, 0.2, now + 0.02)
         following = self.poll.heard(outcome, now + 0.02)
-        assert isinstance(following, Later | Done)
+        assert isinstance(following, Requeue | Done)
         return following
 
 
@@ -90,7 +90,7 @@ def test_values_that_do_not_fit_into_one_read_take_several() -> None:
     rig = Rig(profile="fuling-dzb")
     blocks = DZB.reads()
     for block in blocks[:-1]:
-        assert rig.hears(0.0, (0,) * block.count) == Later(0.0)
+        assert rig.hears(0.0, (0,) * block.count) == Requeue(0.0)
     assert rig.hears(0.0, (0,) * blocks[-1].count) == Done()
     assert rig.poll.good is not None
     assert set(rig.poll.good) == set(DZB.value_names)
@@ -98,9 +98,9 @@ def test_values_that_do_not_fit_into_one_read_take_several() -> None:
 
 def test_after_silence_the_retry_asks_the_barrier_first_and_the_value_when_nothing_can_linger() -> None:
     rig = Rig()
-    assert rig.hears(0.0, code=FaultCode.TIMEOUT) == Later(0.02)
+    assert rig.hears(0.0, code=FaultCode.TIMEOUT) == Requeue(0.02)
     assert rig.asks(0.1) == WHO
-    assert rig.hears(0.1, (1,)) == Later(0.02)
+    assert rig.hears(0.1, (1,)) == Requeue(0.02)
     assert rig.poll.ask(0.2) == Hold(1.0)
     assert rig.asks(1.0) == WIND
     assert rig.hears(1.0, VALUE) == Done()
@@ -119,7 +119,7 @@ def test_after_broken_bytes_the_value_is_asked_right_behind_the_barrier() -> Non
 def test_a_fault_of_the_line_is_tried_again_so_often_as_allowed(code: FaultCode) -> None:
     rig = Rig(retries=2)
     for now in (0.0, 2.0):
-        assert rig.hears(now, code=code) == Later(now + 0.02)
+        assert rig.hears(now, code=code) == Requeue(now + 0.02)
     assert rig.hears(4.0, code=code) == Done()
     assert rig.poll.fault is not None
     assert rig.poll.fault.code is code
@@ -163,7 +163,7 @@ def test_the_fault_of_a_bad_value_shows_the_last_bytes_that_were_heard() -> None
 def test_a_refused_barrier_will_do_unless_the_refusal_may_be_an_older_ones() -> None:
     rig = Rig()
     rig.hears(0.0, code=FaultCode.CRC)
-    assert rig.hears(0.1, code=FaultCode.EXCEPTION) == Later(0.02)
+    assert rig.hears(0.1, code=FaultCode.EXCEPTION) == Requeue(0.02)
     assert rig.asks(0.2) == WIND
     rig = Rig()
     rig.hears(0.0, code=FaultCode.TIMEOUT)
@@ -174,9 +174,9 @@ def test_a_refused_barrier_will_do_unless_the_refusal_may_be_an_older_ones() -> 
 
 
 def test_a_probe_begins_with_the_barrier_and_is_never_tried_again() -> None:
-    rig = Rig(Errand.PROBE)
+    rig = Rig(Purpose.PROBE)
     assert rig.asks() == WHO
-    assert rig.hears(0.0, (1,)) == Later(0.0)
+    assert rig.hears(0.0, (1,)) == Requeue(0.0)
     assert rig.asks(0.1) == WIND
     assert rig.hears(0.1, VALUE) == Done()
     rig.begin()
@@ -184,7 +184,7 @@ def test_a_probe_begins_with_the_barrier_and_is_never_tried_again() -> None:
 
 
 def test_a_probe_waits_as_probes_do_and_a_poll_as_was_learned() -> None:
-    rig = Rig(Errand.PROBE)
+    rig = Rig(Purpose.PROBE)
     for _ in range(20):
         rig.device.turnarounds.learn(0.01)
     rig.device.failed(Fault(FaultCode.TIMEOUT, ""), 0.0)
@@ -206,7 +206,7 @@ def test_without_a_barrier_the_slave_is_left_alone() -> None:
     rig.hears(0.0, code=FaultCode.TIMEOUT)
     assert rig.poll.ask(0.2) == Hold(1.0)
     assert rig.asks(1.0) == WIND
-    rig.errand = Errand.PROBE
+    rig.errand = Purpose.PROBE
     rig.begin()
     assert rig.asks(1.0) == WIND
 
@@ -241,7 +241,7 @@ def test_one_that_sleeps_is_woken_by_its_barrier_and_that_is_no_failed_attempt()
     rig = Rig(retries=0)
     sleeper(rig, 2)
     assert rig.asks(5.0) == WHO
-    assert rig.hears(5.0, code=FaultCode.TIMEOUT) == Later(0.0)
+    assert rig.hears(5.0, code=FaultCode.TIMEOUT) == Requeue(0.0)
     rig.device.gap.exchanged(5.0, 5.2, spoke=False, silent=True)
     assert rig.asks(5.21) == WIND
     assert isinstance(rig.hears(5.21, VALUE), Done)
@@ -252,7 +252,7 @@ def test_where_asking_again_has_helped_once_it_is_tried_and_counts_as_a_failed_a
     rig = Rig(retries=0)
     sleeper(rig, 1)
     assert rig.asks(5.0) == WIND
-    assert rig.hears(5.0, code=FaultCode.TIMEOUT) == Later(0.0)
+    assert rig.hears(5.0, code=FaultCode.TIMEOUT) == Requeue(0.0)
     assert rig.poll.failed_attempts == [FaultCode.TIMEOUT]
     rig.device.gap.exchanged(5.0, 5.2, spoke=False, silent=True)
     assert rig.hears(5.21, code=FaultCode.TIMEOUT) == Done()
@@ -263,4 +263,4 @@ def test_a_poll_wakes_its_device_three_times_at_most() -> None:
     rig = Rig(retries=0)
     sleeper(rig, 2)
     outcomes = [rig.hears(now, code=FaultCode.TIMEOUT) for now in (5.0, 10.0, 15.0, 20.0)]
-    assert outcomes == [Later(0.0)] * 3 + [Done()]
+    assert outcomes == [Requeue(0.0)] * 3 + [Done()]

@@ -9,9 +9,9 @@ import pytest
 from lfs10d.line.device import Device, DeviceSpec, PollRules
 from lfs10d.line.jobs.poll import Poll, tell, tell_lost
 from lfs10d.modbus.frames import Codec, Framing
-from lfs10d.modbus.pending import Unanswered
+from lfs10d.modbus.pending import PendingRequests
 from lfs10d.profiles.library import load_profile
-from lfs10d.reading import Errand, Fault, FaultCode
+from lfs10d.reading import Fault, FaultCode, Purpose
 
 GONE = Fault(FaultCode.PORT_LOST, "gone")
 
@@ -23,13 +23,13 @@ def device() -> Device:
     return Device(spec, PollRules(), 1, overruns=2)
 
 
-def a_poll(device: Device, errand: Errand, request: int | None = None) -> Poll:
-    return Poll(device, Unanswered(), due=0.0, errand=errand, request=request)
+def a_poll(device: Device, errand: Purpose, request: int | None = None) -> Poll:
+    return Poll(device, PendingRequests(), due=0.0, errand=errand, request=request)
 
 
 def test_a_good_poll(device: Device) -> None:
     device.answered()
-    poll = a_poll(device, Errand.REQUEST, 7)
+    poll = a_poll(device, Purpose.REQUEST, 7)
     poll.values, poll.rtt, poll.at = {"wind_speed": 12.99}, 0.02, 5.0
     poll.failed_attempts.append(FaultCode.CRC)
     reading = tell(poll)
@@ -40,7 +40,7 @@ def test_a_good_poll(device: Device) -> None:
 
 
 def test_a_failed_probe(device: Device) -> None:
-    poll = a_poll(device, Errand.PROBE)
+    poll = a_poll(device, Purpose.PROBE)
     poll.fault = Fault(FaultCode.TIMEOUT, "no answer")
     reading = tell(poll)
     assert (reading.values, reading.fault, reading.probe, reading.requests) == (None, poll.fault, True, ())
@@ -48,6 +48,6 @@ def test_a_failed_probe(device: Device) -> None:
 
 def test_the_loss_of_the_port_answers_the_requests_for_this_device(device: Device) -> None:
     other = Device(device.spec, PollRules(), 2)
-    polls = [a_poll(device, Errand.REQUEST, 7), a_poll(other, Errand.REQUEST, 8), a_poll(device, Errand.POLL)]
+    polls = [a_poll(device, Purpose.REQUEST, 7), a_poll(other, Purpose.REQUEST, 8), a_poll(device, Purpose.POLL)]
     reading = tell_lost(device, GONE, 9.0, polls)
     assert (reading.at, reading.values, reading.fault, reading.requests) == (9.0, None, GONE, (7,))

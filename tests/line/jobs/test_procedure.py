@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from lfs10d.line.jobs.job import Again, Ask, Done, Hold, Later
-from lfs10d.line.jobs.procedure import SLICE, Aside, Course, LineLostError, Now, Over, Step
+from lfs10d.line.jobs.job import Ask, Continue, Done, Hold, Requeue
+from lfs10d.line.jobs.procedure import SLICE, Await, Finished, LineLostError, Procedure, ProcedureClock, Step
 from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
-from lfs10d.reading import Errand
+from lfs10d.reading import Purpose
 
 RTU = Codec(Framing.RTU)
 WHO = ReadRegisters(3, 5, 1)
@@ -20,10 +20,10 @@ HERE = Ask(WHO, RTU, 0.2)
 THERE = Ask(WHO, RTU, 0.1, None, 19200)
 
 
-def course(steps: Generator[Step, Any, Any], clock: Now | None = None) -> tuple[Course, list[object]]:
+def course(steps: Generator[Step, Any, Any], clock: ProcedureClock | None = None) -> tuple[Procedure, list[object]]:
     """Return a course of these steps on a line at 9600, and what it tells."""
     told: list[object] = []
-    return Course(steps, clock or Now(), lambda _, what: told.append(what), line_rate=9600), told
+    return Procedure(steps, clock or ProcedureClock(), lambda _, what: told.append(what), line_rate=9600), told
 
 
 def steps_of(*steps: Step, result: object = "end") -> Generator[Step, Any, Any]:
@@ -39,26 +39,26 @@ def answer(heard: Callable[..., Outcome]) -> Outcome:
 
 def test_unless_told_otherwise_it_is_a_change_that_takes_a_third_of_the_line_and_no_slave_id_for_itself() -> None:
     made, _ = course(steps_of(HERE))
-    assert (made.errand, made.share, made.excludes) == (Errand.CHANGE, 0.3, frozenset())
+    assert (made.errand, made.share, made.excludes) == (Purpose.CHANGE, 0.3, frozenset())
 
 
 def test_it_is_what_it_is_told_to_be() -> None:
-    made = Course(
+    made = Procedure(
         steps_of(HERE),
-        Now(),
+        ProcedureClock(),
         lambda _, __: None,
         line_rate=9600,
         excludes=frozenset({3}),
         share=0.1,
-        errand=Errand.PROBE,
+        errand=Purpose.PROBE,
     )
-    assert (made.errand, made.share, made.excludes) == (Errand.PROBE, 0.1, frozenset({3}))
+    assert (made.errand, made.share, made.excludes) == (Purpose.PROBE, 0.1, frozenset({3}))
 
 
 def test_a_question_is_asked_again_until_its_outcome_came_and_the_outcome_reaches_the_course(answer: Outcome) -> None:
     sent: list[object] = []
     times: list[float] = []
-    clock = Now()
+    clock = ProcedureClock()
 
     def steps() -> Generator[Step, Any, None]:
         sent.append((yield HERE))
@@ -68,7 +68,7 @@ def test_a_question_is_asked_again_until_its_outcome_came_and_the_outcome_reache
 
     made, _ = course(steps(), clock)
     assert made.ask(1.0) == made.ask(2.0) == HERE
-    assert made.heard(answer, 3.0) == Later(3.0)
+    assert made.heard(answer, 3.0) == Requeue(3.0)
     assert sent == [answer]
     assert made.ask(3.5) == Hold(9.0)
     made.ask(9.0)
@@ -91,8 +91,8 @@ def test_what_goes_aside_is_told_once_and_the_course_goes_on_with_what_came_of_i
     sent: list[object] = []
 
     def steps() -> Generator[Step, Any, None]:
-        sent.append((yield Aside("intent")))
-        sent.append((yield Aside("second")))
+        sent.append((yield Await("intent")))
+        sent.append((yield Await("second")))
         yield HERE
 
     made, told = course(steps())
@@ -109,11 +109,11 @@ def test_what_goes_aside_is_told_once_and_the_course_goes_on_with_what_came_of_i
 def test_what_is_answered_at_once_is_not_waited_for() -> None:
     told: list[object] = []
 
-    def at_once(made: Course, what: object) -> None:
+    def at_once(made: Procedure, what: object) -> None:
         told.append(what)
         made.go_on()
 
-    made = Course(steps_of(Aside("intent"), HERE), Now(), at_once, line_rate=9600)
+    made = Procedure(steps_of(Await("intent"), HERE), ProcedureClock(), at_once, line_rate=9600)
     assert made.ask(1.0) == HERE
     assert told == ["intent"]
 
@@ -121,32 +121,32 @@ def test_what_is_answered_at_once_is_not_waited_for() -> None:
 def test_it_is_over_only_when_its_end_was_taken_care_of(answer: Outcome) -> None:
     made, told = course(steps_of(HERE, result="moved"))
     made.ask(1.0)
-    assert made.heard(answer, 1.1) == Later(1.1)
+    assert made.heard(answer, 1.1) == Requeue(1.1)
     assert made.ask(1.2) == made.ask(1.3) == Hold()
-    assert told == [Over("moved")]
+    assert told == [Finished("moved")]
     made.go_on()
     assert made.ask(1.4) == Done()
     assert made.heard(answer, 1.5) == Done()
-    assert told == [Over("moved")]
+    assert told == [Finished("moved")]
 
 
 def test_at_another_rate_it_goes_on_at_once_for_a_quarter_of_a_second(answer: Outcome) -> None:
     made, _ = course(steps_of(*[THERE] * 9))
     made.ask(1.0)
-    assert made.heard(answer, 1.05) == Again()
+    assert made.heard(answer, 1.05) == Continue()
     made.ask(1.05)
-    assert made.heard(answer, 1.0 + SLICE - THERE.timeout) == Again()
+    assert made.heard(answer, 1.0 + SLICE - THERE.timeout) == Continue()
     made.ask(1.15)
-    assert made.heard(answer, 1.151) == Later(1.151)
+    assert made.heard(answer, 1.151) == Requeue(1.151)
     made.ask(1.4)
-    assert made.heard(answer, 1.4 + SLICE - THERE.timeout) == Again()
+    assert made.heard(answer, 1.4 + SLICE - THERE.timeout) == Continue()
 
 
 @pytest.mark.parametrize("following", [HERE, Ask(WHO, RTU, 0.1, None, 4800), Hold(2.0)])
 def test_a_stay_at_another_rate_ends_where_what_follows_does_not_belong_there(answer: Outcome, following: Step) -> None:
     made, _ = course(steps_of(THERE, following))
     made.ask(1.0)
-    assert made.heard(answer, 1.01) == Later(1.01)
+    assert made.heard(answer, 1.01) == Requeue(1.01)
 
 
 @pytest.mark.parametrize("rate", [None, 9600])
@@ -156,7 +156,7 @@ def test_at_the_lines_own_rate_others_may_have_the_line_between_two_questions(
     own = Ask(WHO, RTU, 0.1, None, rate)
     made, _ = course(steps_of(own, own))
     made.ask(1.0)
-    assert made.heard(answer, 1.01) == Later(1.01)
+    assert made.heard(answer, 1.01) == Requeue(1.01)
 
 
 def test_halted_it_sends_nothing_and_tells_nothing(answer: Outcome) -> None:
@@ -177,7 +177,7 @@ def test_an_outcome_it_did_not_ask_for_ends_it_without_harm(answer: Outcome) -> 
 
 @pytest.mark.parametrize("begun", [False, True])
 def test_where_the_port_is_lost_the_course_says_what_that_means(begun: bool) -> None:  # noqa: FBT001  # a case
-    clock = Now()
+    clock = ProcedureClock()
 
     def steps() -> Generator[Step, Any, object]:
         try:
@@ -191,7 +191,7 @@ def test_where_the_port_is_lost_the_course_says_what_that_means(begun: bool) -> 
         made.ask(1.0)
     made.cut_off(2.0)
     made.cut_off(3.0)
-    assert told == [Over("lost at 2.0")]
+    assert told == [Finished("lost at 2.0")]
     assert made.ask(4.0) == Done()
 
 
@@ -199,7 +199,7 @@ def test_a_course_that_does_not_care_is_over_without_a_result() -> None:
     made, told = course(steps_of(HERE))
     made.ask(1.0)
     made.cut_off(2.0)
-    assert told == [Over(None)]
+    assert told == [Finished(None)]
 
 
 def test_a_port_lost_after_the_end_changes_nothing_about_it(answer: Outcome) -> None:
@@ -208,12 +208,12 @@ def test_a_port_lost_after_the_end_changes_nothing_about_it(answer: Outcome) -> 
     made.heard(answer, 1.1)
     made.cut_off(1.2)
     assert made.ask(1.3) == Hold()
-    assert told == [Over("moved")]
+    assert told == [Finished("moved")]
 
 
 def test_a_question_that_belongs_behind_the_one_before_it_is_asked_at_once(answer: Outcome) -> None:
     made, _ = course(steps_of(HERE, replace(HERE, at_once=True), HERE))
     assert made.ask(1.0) == HERE
-    assert made.heard(answer, 1.1) == Again()
+    assert made.heard(answer, 1.1) == Continue()
     assert made.ask(1.1) == replace(HERE, at_once=True)
-    assert made.heard(answer, 1.2) == Later(1.2)
+    assert made.heard(answer, 1.2) == Requeue(1.2)

@@ -12,7 +12,7 @@ from lfs10d.line.device import DeviceSpec, PollRules
 from lfs10d.line.jobs.job import Hold
 from lfs10d.line.jobs.register_access import DIFFERING, ECHO_READS, VERIFY_WITHIN, Access, End, Target
 from lfs10d.line.poller import Poller
-from lfs10d.line.scheduler import Schedule
+from lfs10d.line.scheduler import Scheduler
 from lfs10d.modbus.bus import Bus, LineRules
 from lfs10d.modbus.exchange import Echo
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters, WriteRegister
@@ -20,7 +20,7 @@ from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.modbus.request import Request
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
-from lfs10d.reading import Errand, Event, Exchanged, Fault, FaultCode, Reading
+from lfs10d.reading import Event, Exchanged, Fault, FaultCode, Purpose, Reading
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.port import SimulatedPort, VirtualClock, run
 from lfs10d.simulator.registers import blueprint_of
@@ -51,7 +51,7 @@ class Rig:
         self.line = SimulatedLine([self.vane], seed=1)
         self.port = SimulatedPort(self.line, self.clock, PortSettings("/dev/sim"), echo=self.adapter_echoes)
         self.bus = Bus(self.port, LineRules(echo=self.echo), self.clock)
-        self.schedule = Schedule(self.bus.line_timing, 0.0)
+        self.schedule = Scheduler(self.bus.line_timing, 0.0)
         self.poller = Poller(self.bus, self.schedule, self.events.extend, self.clock)
         if self.polled:
             self.poller.replace([DeviceSpec("vane", 7, VANE, RTU, 0.25)], PollRules())
@@ -87,7 +87,7 @@ class Rig:
 
     @property
     def exchanges(self) -> list[Exchanged]:
-        return [each for each in self.events if isinstance(each, Exchanged) and each.errand is Errand.REQUEST]
+        return [each for each in self.events if isinstance(each, Exchanged) and each.errand is Purpose.REQUEST]
 
     @property
     def writes(self) -> list[bytes]:
@@ -328,7 +328,7 @@ def test_nobody_polls_the_slave_between_a_write_and_its_verification() -> None:
     begun = len(rig.events)
     rig.vane.ail("slow_flash", delay=1.0)
     rig.do(write(10))
-    assert {each.errand for each in rig.events[begun:] if isinstance(each, Exchanged)} == {Errand.REQUEST}
+    assert {each.errand for each in rig.events[begun:] if isinstance(each, Exchanged)} == {Purpose.REQUEST}
     rig.vane.heal()
     rig.pass_time(1.0)
     assert [each.fault for each in rig.events if isinstance(each, Reading)][-1] is None

@@ -10,19 +10,19 @@ from pathlib import Path
 import pytest
 
 from lfs10d.line.device import DeviceSpec, PollRules
-from lfs10d.line.jobs.identification import Finding
-from lfs10d.line.jobs.job import Again, Ask, Done, Later
+from lfs10d.line.jobs.identification import FoundDevice
+from lfs10d.line.jobs.job import Ask, Continue, Done, Requeue
 from lfs10d.line.jobs.scan import SLICE, Scan
-from lfs10d.line.jobs.scan_plan import Search
+from lfs10d.line.jobs.scan_plan import ScanPlan
 from lfs10d.line.poller import Poller
-from lfs10d.line.scheduler import Schedule
+from lfs10d.line.scheduler import Scheduler
 from lfs10d.modbus.bus import Bus, LineRules
 from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.library import builtin_names, load_profile
-from lfs10d.reading import Errand, Event, Exchanged, FaultCode, PortChanged
+from lfs10d.reading import Event, Exchanged, FaultCode, PortChanged, Purpose
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.line_faults import babble, second_master, stray
 from lfs10d.simulator.port import SimulatedPort, VirtualClock, run
@@ -37,8 +37,8 @@ LONGEST = 400.0
 """Virtual seconds after which a scan counts as endless."""
 
 
-def search(ids: Iterable[int], rates: Iterable[int] = (9600,), *, timeout: float = 0.1) -> Search:
-    return Search(tuple(ids), tuple(LineTiming.of(rate) for rate in rates), RTU, PROFILES, timeout=timeout)
+def search(ids: Iterable[int], rates: Iterable[int] = (9600,), *, timeout: float = 0.1) -> ScanPlan:
+    return ScanPlan(tuple(ids), tuple(LineTiming.of(rate) for rate in rates), RTU, PROFILES, timeout=timeout)
 
 
 def line_of(*sensors: Sensor | int) -> SimulatedLine:
@@ -69,7 +69,7 @@ class Scanned:
     def __post_init__(self) -> None:
         self.port = SimulatedPort(self.line, self.clock, PortSettings("/dev/sim"), echo=self.echo, latency=self.latency)
         bus = Bus(self.port, LineRules(), self.clock)
-        self.schedule = Schedule(bus.line_timing, 0.0)
+        self.schedule = Scheduler(bus.line_timing, 0.0)
         self.poller = Poller(bus, self.schedule, self.events.extend, self.clock)
         self.poller.submit(self.scan)
 
@@ -96,7 +96,7 @@ def scanned(line: SimulatedLine, ids: Iterable[int] = ALL, rates: Iterable[int] 
     return done
 
 
-def by_id(scan: Scan) -> dict[int, Finding]:
+def by_id(scan: Scan) -> dict[int, FoundDevice]:
     return {finding.slave: finding for finding in scan.found}
 
 
@@ -353,7 +353,7 @@ def test_the_loss_of_the_port_ends_it_with_what_was_found() -> None:
 
 def beside_polls(share: float, rates: tuple[int, ...]) -> Scanned:
     """Scan for ten seconds with a share of a line on which one sensor is polled every 100 ms."""
-    looked_for = Search(
+    looked_for = ScanPlan(
         tuple(range(20, 200)), tuple(LineTiming.of(rate) for rate in rates), RTU, PROFILES, line_rate=9600, share=share
     )
     running = Scanned(line_of(1), Scan(looked_for))
@@ -363,7 +363,7 @@ def beside_polls(share: float, rates: tuple[int, ...]) -> Scanned:
 
 
 def taken(running: Scanned) -> float:
-    return sum(event.at - event.asked for event in running.exchanges if event.errand is Errand.SCAN)
+    return sum(event.at - event.asked for event in running.exchanges if event.errand is Purpose.SCAN)
 
 
 @pytest.mark.parametrize("rate", [9600, 19200])
@@ -373,14 +373,14 @@ def test_beside_polls_it_takes_its_share_of_the_line_and_no_more(rate: int) -> N
 
 def test_at_the_lines_own_rate_polls_come_between_any_two_questions() -> None:
     errands = [event.errand for event in beside_polls(0.3, (9600,)).exchanges]
-    assert (Errand.SCAN, Errand.SCAN) not in set(pairwise(errands))
+    assert (Purpose.SCAN, Purpose.SCAN) not in set(pairwise(errands))
 
 
 def test_another_rate_is_spoken_in_slices_and_never_for_one_exchange() -> None:
     running = beside_polls(0.3, (19200,))
     slices: list[list[Exchanged]] = [[]]
     for event in running.exchanges:
-        if event.errand is Errand.SCAN:
+        if event.errand is Purpose.SCAN:
             slices[-1].append(event)
         elif slices[-1]:
             slices.append([])
@@ -393,20 +393,20 @@ def test_another_rate_is_spoken_in_slices_and_never_for_one_exchange() -> None:
 
 def test_polls_beside_a_scan_lose_nothing() -> None:
     running = beside_polls(0.3, (19200,))
-    polls = [event for event in running.exchanges if event.errand is Errand.POLL]
+    polls = [event for event in running.exchanges if event.errand is Purpose.POLL]
     assert len(polls) > 50
     assert {event.fault for event in polls} == {None}
 
 
 def test_a_slice_is_claimed_only_where_another_exchange_fits() -> None:
-    scan = Scan(Search((1, 2, 3), (LineTiming.of(19200),), RTU, PROFILES, line_rate=9600, share=0.3))
+    scan = Scan(ScanPlan((1, 2, 3), (LineTiming.of(19200),), RTU, PROFILES, line_rate=9600, share=0.3))
     first = scan.ask(0.0)
     assert isinstance(first, Ask)
     assert first.baudrate == 19200
     silent = _silence(first)
-    assert isinstance(scan.heard(silent, 0.11), Again)
+    assert isinstance(scan.heard(silent, 0.11), Continue)
     assert isinstance(scan.ask(0.11), Ask)
-    assert isinstance(scan.heard(silent, 0.22), Later)
+    assert isinstance(scan.heard(silent, 0.22), Requeue)
 
 
 def _silence(ask: Ask) -> Outcome:
@@ -415,7 +415,7 @@ def _silence(ask: Ask) -> Outcome:
     kept: list[Outcome] = []
     heard = running.scan.heard
 
-    def keep(outcome: Outcome, now: float) -> Again | Later | Done:
+    def keep(outcome: Outcome, now: float) -> Continue | Requeue | Done:
         kept.append(outcome)
         return heard(outcome, now)
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.line.jobs.scan_plan import LAST_TIMEOUT, Search, ids_of
+from lfs10d.line.jobs.scan_plan import LAST_TIMEOUT, ScanPlan, ids_of
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.library import load_profile
@@ -17,8 +17,8 @@ LFS10 = load_profile("lfs10", relative_to=Path())
 SLOW, FAST = LineTiming.of(9600), LineTiming.of(19200)
 
 
-def search(ids: tuple[int, ...], *, share: float = 1.0) -> Search:
-    return Search(ids, (SLOW, FAST), Codec(Framing.RTU), (LFS10,), share=share)
+def search(ids: tuple[int, ...], *, share: float = 1.0) -> ScanPlan:
+    return ScanPlan(ids, (SLOW, FAST), Codec(Framing.RTU), (LFS10,), share=share)
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,7 @@ def test_there_is_no_round_without_ids() -> None:
 
 
 def test_all_ids_at_one_rate_take_about_an_eighth_of_a_second_each() -> None:
-    whole = Search(tuple(range(1, 256)), (SLOW,), Codec(Framing.RTU), (LFS10,))
+    whole = ScanPlan(tuple(range(1, 256)), (SLOW,), Codec(Framing.RTU), (LFS10,))
     assert 255 * 0.1 < whole.expected < 255 * 0.125
 
 

@@ -14,7 +14,7 @@ from lfs10d.outbox.losses import Loss
 from lfs10d.outbox.store.database import Limits
 from lfs10d.outbox.store.row import DamagedError
 from lfs10d.outbox.store.sample_file import SampleFile, runs
-from lfs10d.system.clock import ClockState
+from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry.publication import Sample
 from tests.support.rows import BOOT, ROOMY, START, entries, sample
 

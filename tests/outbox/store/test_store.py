@@ -16,7 +16,7 @@ import pytest
 
 from lfs10d.outbox.losses import Loss
 from lfs10d.outbox.store.sample_file import SampleFile
-from lfs10d.outbox.store.store import ASIDE_MOST, SMALLEST, Aside, Store, StoreError
+from lfs10d.outbox.store.store import ASIDE_MOST, SMALLEST, FileSetAside, Store, StoreError
 from lfs10d.system.disk import Disk, SystemFiles
 from lfs10d.telemetry.publication import Sample
 from tests.support.rows import BOOT, ROOMY, START, entries, sample
@@ -89,7 +89,7 @@ def test_text_in_its_place_is_put_aside_whole_and_reported(store: Store) -> None
     keep(store, sample(1))
     aside = store.path.with_name(f"backlog.db.corrupt-{BOOT}")
     assert aside.read_text() == "not a database " * 1000
-    assert list(store.reports) == [Aside(aside, "is damaged: file is not a database")]
+    assert list(store.reports) == [FileSetAside(aside, "is damaged: file is not a database")]
     assert kept(store) == [1]
 
 

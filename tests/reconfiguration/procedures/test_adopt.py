@@ -7,17 +7,17 @@ from typing import Any
 import pytest
 
 from lfs10d.modbus.frames import ReadRegisters, WriteRegister
-from lfs10d.reconfiguration.journal import Spot
-from lfs10d.reconfiguration.procedures.adopt import Adopted, Newcomer, adopt
-from lfs10d.reconfiguration.procedures.readdress import Ending, Verdict, Write
+from lfs10d.reconfiguration.journal import Endpoint
+from lfs10d.reconfiguration.procedures.adopt import AdoptReport, AdoptWish, adopt
+from lfs10d.reconfiguration.procedures.readdress import IdWrite, ReaddressEnding, ReaddressReport
 from lfs10d.reconfiguration.procedures.recognition import READS
 from tests.support.sensors import Mimic, Pretence
 
-WISH = Newcomer(1, (2, 3), 9600, (9600, 19200))
-AT_9600, AT_19200 = Spot(slave=1, baudrate=9600), Spot(slave=1, baudrate=19200)
+WISH = AdoptWish(1, (2, 3), 9600, (9600, 19200))
+AT_9600, AT_19200 = Endpoint(slave=1, baudrate=9600), Endpoint(slave=1, baudrate=19200)
 
 
-def adopted(pretence: Pretence, wish: Newcomer = WISH, *, echo_known: bool = True) -> Adopted:
+def adopted(pretence: Pretence, wish: AdoptWish = WISH, *, echo_known: bool = True) -> AdoptReport:
     return pretence.carry_out(adopt(wish, pretence.asking(), lambda: echo_known))
 
 
@@ -33,14 +33,14 @@ def questions_before_the_first_write(pretence: Pretence) -> int:
 
 def test_one_at_the_lines_rate_gets_the_first_free_id(pretence: Pretence) -> None:
     pretence.sensor(1)
-    assert adopted(pretence) == Adopted(Verdict(Ending.MOVED, 2), AT_9600, 2)
+    assert adopted(pretence) == AdoptReport(ReaddressReport(ReaddressEnding.MOVED, 2), AT_9600, 2)
     assert pretence.writes == [WriteRegister(1, 5, 2)]
-    assert pretence.aside == [Write(AT_9600, Spot(slave=2, baudrate=9600), 1)]
+    assert pretence.aside == [IdWrite(AT_9600, Endpoint(slave=2, baudrate=9600), 1)]
 
 
 def test_one_at_another_rate_is_brought_to_the_lines_first(pretence: Pretence) -> None:
     pretence.sensor(1, baudrate=19200)
-    assert adopted(pretence) == Adopted(Verdict(Ending.MOVED, 2), AT_19200, 2)
+    assert adopted(pretence) == AdoptReport(ReaddressReport(ReaddressEnding.MOVED, 2), AT_19200, 2)
     assert pretence.writes == [WriteRegister(1, 4, 1), WriteRegister(1, 5, 2)]
     assert len(pretence.aside) == 1
 
@@ -55,37 +55,37 @@ def test_an_id_at_which_anything_is_heard_at_any_rate_is_passed_over(pretence: P
 def test_where_no_id_is_free_nothing_is_written(pretence: Pretence) -> None:
     pretence.sensor(1)
     pretence.noise.update({(2, 9600), (3, 19200)})
-    assert adopted(pretence) == Adopted(Verdict(Ending.TAKEN, at=9600), AT_9600, 2)
-    nobody = Newcomer(1, (), 9600, (9600,))
-    assert adopted(pretence, nobody) == Adopted(Verdict(Ending.TAKEN, at=9600), AT_9600, None)
+    assert adopted(pretence) == AdoptReport(ReaddressReport(ReaddressEnding.TAKEN, at=9600), AT_9600, 2)
+    nobody = AdoptWish(1, (), 9600, (9600,))
+    assert adopted(pretence, nobody) == AdoptReport(ReaddressReport(ReaddressEnding.TAKEN, at=9600), AT_9600, None)
     assert pretence.writes == []
 
 
 def test_without_a_newcomer_there_is_nothing_to_do(pretence: Pretence) -> None:
-    assert adopted(pretence) == Adopted(Verdict(Ending.ABSENT))
+    assert adopted(pretence) == AdoptReport(ReaddressReport(ReaddressEnding.ABSENT))
 
 
 def test_two_newcomers_at_two_rates_are_left_alone(pretence: Pretence) -> None:
     pretence.sensor(1)
     pretence.sensor(1, baudrate=19200)
-    assert adopted(pretence) == Adopted(Verdict(Ending.BOTH, at=9600), AT_9600)
+    assert adopted(pretence) == AdoptReport(ReaddressReport(ReaddressEnding.BOTH, at=9600), AT_9600)
     assert pretence.writes == []
 
 
 def test_two_at_one_rate_are_told_by_their_winds(pretence: Pretence) -> None:
     pretence.sensor(1)
     pretence.sensor(1, wind=(0, 0))
-    assert adopted(pretence) == Adopted(Verdict(Ending.BOTH, 1, at=9600), AT_9600)
+    assert adopted(pretence) == AdoptReport(ReaddressReport(ReaddressEnding.BOTH, 1, at=9600), AT_9600)
 
 
 def test_garbage_at_the_factory_id_is_no_newcomer(pretence: Pretence) -> None:
     pretence.noise.add((1, 19200))
-    assert adopted(pretence) == Adopted(Verdict(Ending.BOTH, at=19200), AT_19200)
+    assert adopted(pretence) == AdoptReport(ReaddressReport(ReaddressEnding.BOTH, at=19200), AT_19200)
 
 
 def test_without_knowing_how_the_adapter_echoes_nothing_is_written(pretence: Pretence) -> None:
     pretence.sensor(1)
-    assert adopted(pretence, echo_known=False) == Adopted(Verdict(Ending.DEAF), AT_9600, 2)
+    assert adopted(pretence, echo_known=False) == AdoptReport(ReaddressReport(ReaddressEnding.DEAF), AT_9600, 2)
     assert pretence.writes == []
 
 
@@ -93,56 +93,58 @@ def test_reads_that_teach_the_echo_are_enough(pretence: Pretence) -> None:
     pretence.sensor(1)
     before = questions_before_the_first_write(pretence)
     steps = adopt(WISH, pretence.asking(), lambda: len(pretence.asked) >= before)
-    assert pretence.carry_out(steps).verdict.ending is Ending.MOVED
+    assert pretence.carry_out(steps).verdict.ending is ReaddressEnding.MOVED
 
 
 def test_a_newcomer_that_is_gone_meanwhile_is_not_written_to(pretence: Pretence) -> None:
     sensor = pretence.sensor(1)
     pretence.later.append((2.0, lambda: setattr(sensor, "silent", True)))
-    assert adopted(pretence) == Adopted(Verdict(Ending.ABSENT), AT_9600, 2)
+    assert adopted(pretence) == AdoptReport(ReaddressReport(ReaddressEnding.ABSENT), AT_9600, 2)
     assert pretence.writes == []
 
 
 def test_nothing_is_written_where_the_intent_cannot_be_kept(pretence: Pretence) -> None:
     pretence.sensor(1)
     pretence.answer = "the disk is full"
-    assert adopted(pretence) == Adopted(Verdict(Ending.UNWRITTEN, why="the disk is full"), AT_9600, 2)
+    assert adopted(pretence) == AdoptReport(
+        ReaddressReport(ReaddressEnding.UNWRITTEN, why="the disk is full"), AT_9600, 2
+    )
     assert pretence.writes == []
 
 
 def test_a_port_lost_before_the_write_is_told_as_that(pretence: Pretence) -> None:
     pretence.sensor(1)
     pretence.lost_at = 1
-    assert adopted(pretence) == Adopted(Verdict(Ending.LOST_BEFORE))
+    assert adopted(pretence) == AdoptReport(ReaddressReport(ReaddressEnding.LOST_BEFORE))
 
 
 def test_a_port_lost_after_the_write_leaves_the_change_open(pretence: Pretence) -> None:
     pretence.sensor(1)
     pretence.lost_at = questions_before_the_first_write(pretence) + 1
-    assert adopted(pretence) == Adopted(Verdict(Ending.NOWHERE, stays_open=True), AT_9600, 2)
+    assert adopted(pretence) == AdoptReport(ReaddressReport(ReaddressEnding.NOWHERE, stays_open=True), AT_9600, 2)
 
 
 @pytest.mark.parametrize(
     ("manner", "verdict"),
     [
-        ("stores", Verdict(Ending.PENDING)),
-        ("vanishes", Verdict(Ending.NOWHERE, stays_open=True)),
-        ("refuses", Verdict(Ending.REFUSED, exception=3)),
-        ("refuses_and_stores", Verdict(Ending.REFUSED, exception=3)),
+        ("stores", ReaddressReport(ReaddressEnding.PENDING)),
+        ("vanishes", ReaddressReport(ReaddressEnding.NOWHERE, stays_open=True)),
+        ("refuses", ReaddressReport(ReaddressEnding.REFUSED, exception=3)),
+        ("refuses_and_stores", ReaddressReport(ReaddressEnding.REFUSED, exception=3)),
     ],
 )
 def test_one_that_does_not_come_to_the_lines_rate_keeps_its_id(
-    pretence: Pretence, manner: str, verdict: Verdict
+    pretence: Pretence, manner: str, verdict: ReaddressReport
 ) -> None:
     pretence.sensor(1, baudrate=19200, manner=manner)
-    assert adopted(pretence) == Adopted(verdict, AT_19200, 2, at_rate=False)
+    assert adopted(pretence) == AdoptReport(verdict, AT_19200, 2, at_rate=False)
     assert {write.address for write in pretence.writes} == {4}
 
 
 def test_two_newcomers_that_part_when_brought_to_the_lines_rate_are_told(pretence: Pretence) -> None:
     sensors = [pretence.sensor(1, baudrate=19200), pretence.sensor(1, baudrate=19200, manner="stores")]
     found = adopted(pretence)
-    assert (found.verdict.ending, found.verdict.stays_open, found.at_rate) == (Ending.BOTH, False, False)
+    assert (found.verdict.ending, found.verdict.stays_open, found.at_rate) == (ReaddressEnding.BOTH, False, False)
     assert [sensor.baudrate for sensor in sensors] == [19200, 19200]
 
 
@@ -157,7 +159,7 @@ def test_two_newcomers_that_part_when_brought_to_the_lines_rate_are_told(pretenc
 def test_a_device_that_is_not_recognised_is_not_written_to(pretence: Pretence, facts: dict[str, Any], why: str) -> None:
     pretence.sensor(1, baudrate=19200, **facts)
     found = adopted(pretence)
-    assert (found.verdict.ending, found.verdict.why, found.verdict.at) == (Ending.UNRECOGNISED, why, 19200)
+    assert (found.verdict.ending, found.verdict.why, found.verdict.at) == (ReaddressEnding.UNRECOGNISED, why, 19200)
     assert pretence.writes == pretence.aside == []
 
 
@@ -174,13 +176,15 @@ class Changing(Mimic):
 def test_two_that_show_only_after_one_was_recognised_are_not_written_to(pretence: Pretence) -> None:
     pretence.sensors.append(Changing(1))
     found = adopted(pretence)
-    assert (found.verdict.ending, found.to) == (Ending.TWINS, 2)
+    assert (found.verdict.ending, found.to) == (ReaddressEnding.TWINS, 2)
     assert pretence.writes == []
 
 
 def test_a_newcomer_that_is_gone_before_the_write_is_not_written_to(pretence: Pretence) -> None:
     sensor = pretence.sensor(1)
-    assert pretence.carry_out(adopt(WISH, pretence.asking(), lambda: vanish(sensor))).verdict == Verdict(Ending.ABSENT)
+    assert pretence.carry_out(adopt(WISH, pretence.asking(), lambda: vanish(sensor))).verdict == ReaddressReport(
+        ReaddressEnding.ABSENT
+    )
     assert pretence.writes == []
 
 
@@ -193,7 +197,7 @@ def test_one_that_came_at_a_rate_without_a_code_is_brought_back_to_it(pretence: 
     sensors = [pretence.sensor(1, baudrate=4800), pretence.sensor(1, baudrate=4800, manner="stores")]
     for sensor in sensors:
         sensor.codes = {0: 4800, 1: 9600, 2: 19200}
-    found = adopted(pretence, Newcomer(1, (2,), 9600, (9600, 4800, 19200)))
-    assert (found.verdict.ending, found.verdict.stays_open) == (Ending.BOTH, False)
+    found = adopted(pretence, AdoptWish(1, (2,), 9600, (9600, 4800, 19200)))
+    assert (found.verdict.ending, found.verdict.stays_open) == (ReaddressEnding.BOTH, False)
     assert [sensor.baudrate for sensor in sensors] == [4800, 4800]
     assert WriteRegister(1, 4, 0) in pretence.writes

@@ -13,10 +13,10 @@ from lfs10d.profiles.library import load_profile
 from lfs10d.reconfiguration.procedures.baudrate import (
     ROLL_BACK,
     UNTOUCHED,
-    Ended,
-    RateVerdict,
+    BaudrateEnding,
+    BaudrateReport,
+    RateSensor,
     RateWish,
-    Sensor,
     WriteRates,
     change_rate,
     restored,
@@ -38,14 +38,14 @@ slave_id: {register: 5, source: none}
 """
 
 
-def line(pretence: Pretence, *manners: str) -> tuple[Sensor, ...]:
+def line(pretence: Pretence, *manners: str) -> tuple[RateSensor, ...]:
     """Put sensors of these manners on the line, as `s1`, `s2` ..., and return how they are asked."""
     for slave, manner in enumerate(manners, 1):
         pretence.sensor(slave, manner=manner)
-    return tuple(Sensor(f"s{slave}", slave, pretence.asking()) for slave in range(1, len(manners) + 1))
+    return tuple(RateSensor(f"s{slave}", slave, pretence.asking()) for slave in range(1, len(manners) + 1))
 
 
-def changed(pretence: Pretence, *manners: str, echo_known: bool = True, **wish: Any) -> RateVerdict:  # noqa: ANN401  # passed on
+def changed(pretence: Pretence, *manners: str, echo_known: bool = True, **wish: Any) -> BaudrateReport:  # noqa: ANN401  # passed on
     sensors = line(pretence, *manners)
     return pretence.carry_out(change_rate(RateWish(sensors, *UP, **wish), lambda: echo_known))
 
@@ -55,17 +55,17 @@ def changed(pretence: Pretence, *manners: str, echo_known: bool = True, **wish: 
 
 def test_sensors_that_obey_are_moved_one_after_the_other(pretence: Pretence) -> None:
     verdict = changed(pretence, "obeys", "obeys")
-    assert verdict == RateVerdict(Ended.MOVED, {"s1": 19200, "s2": 19200})
+    assert verdict == BaudrateReport(BaudrateEnding.MOVED, {"s1": 19200, "s2": 19200})
     assert pretence.writes == [WriteRegister(1, 4, 2), WriteRegister(2, 4, 2)]
     assert pretence.aside == [WriteRates()]
 
 
 def test_a_line_without_sensors_is_moved_at_once(pretence: Pretence) -> None:
-    assert changed(pretence, echo_known=False) == RateVerdict(Ended.MOVED)
+    assert changed(pretence, echo_known=False) == BaudrateReport(BaudrateEnding.MOVED)
 
 
 def test_a_dry_run_looks_and_writes_nothing(pretence: Pretence) -> None:
-    assert changed(pretence, "obeys", dry_run=True) == RateVerdict(Ended.FREE)
+    assert changed(pretence, "obeys", dry_run=True) == BaudrateReport(BaudrateEnding.FREE)
     assert pretence.writes == pretence.aside == []
 
 
@@ -73,37 +73,37 @@ def test_nothing_is_written_unless_every_sensor_answers(pretence: Pretence) -> N
     sensors = line(pretence, "obeys", "obeys", "obeys")
     pretence.sensors[1].silent = pretence.sensors[2].silent = True
     verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True))
-    assert verdict == RateVerdict(Ended.ABSENT, names=("s2", "s3"))
+    assert verdict == BaudrateReport(BaudrateEnding.ABSENT, names=("s2", "s3"))
     assert pretence.writes == []
 
 
 def test_nor_where_it_is_not_known_how_the_adapter_echoes(pretence: Pretence) -> None:
-    assert changed(pretence, "obeys", "obeys", echo_known=False) == RateVerdict(Ended.DEAF)
+    assert changed(pretence, "obeys", "obeys", echo_known=False) == BaudrateReport(BaudrateEnding.DEAF)
     assert len(pretence.asked) == 2 + ECHO_READS
 
 
 def test_reads_that_teach_the_echo_are_enough(pretence: Pretence) -> None:
     sensors = line(pretence, "obeys")
     steps = change_rate(RateWish(sensors, *UP), lambda: len(pretence.asked) >= 4)
-    assert pretence.carry_out(steps).ended is Ended.MOVED
+    assert pretence.carry_out(steps).ended is BaudrateEnding.MOVED
 
 
 def test_nor_where_the_intent_cannot_be_kept(pretence: Pretence) -> None:
     pretence.answer = "the disk is full"
     verdict = changed(pretence, "obeys")
-    assert verdict == RateVerdict(Ended.UNWRITTEN, why="the disk is full")
+    assert verdict == BaudrateReport(BaudrateEnding.UNWRITTEN, why="the disk is full")
     assert verdict.ended in UNTOUCHED
     assert pretence.writes == []
 
 
 def test_a_port_lost_before_the_first_write_is_told_as_that(pretence: Pretence) -> None:
     pretence.lost_at = 0
-    assert changed(pretence, "obeys") == RateVerdict(Ended.LOST_BEFORE)
+    assert changed(pretence, "obeys") == BaudrateReport(BaudrateEnding.LOST_BEFORE)
 
 
 def test_a_port_lost_after_it_leaves_every_place_unknown(pretence: Pretence) -> None:
     pretence.lost_at = 3
-    assert changed(pretence, "obeys", "obeys") == RateVerdict(Ended.UNVERIFIED, {"s1": None, "s2": None})
+    assert changed(pretence, "obeys", "obeys") == BaudrateReport(BaudrateEnding.UNVERIFIED, {"s1": None, "s2": None})
     assert len(pretence.writes) == 1
 
 
@@ -112,13 +112,17 @@ def test_a_port_lost_after_it_leaves_every_place_unknown(pretence: Pretence) -> 
 
 @pytest.mark.parametrize(
     ("manner", "ended", "exception", "writes"),
-    [("ignores", Ended.CANARY, None, [2]), ("stores", Ended.CANARY, None, [2, 1]), ("refuses", Ended.REFUSED, 3, [2])],
+    [
+        ("ignores", BaudrateEnding.CANARY, None, [2]),
+        ("stores", BaudrateEnding.CANARY, None, [2, 1]),
+        ("refuses", BaudrateEnding.REFUSED, 3, [2]),
+    ],
 )
 def test_a_first_sensor_that_does_not_move_is_put_back_and_nobody_else_is_touched(
-    pretence: Pretence, manner: str, ended: Ended, exception: int | None, writes: list[int]
+    pretence: Pretence, manner: str, ended: BaudrateEnding, exception: int | None, writes: list[int]
 ) -> None:
     verdict = changed(pretence, manner, "obeys")
-    assert verdict == RateVerdict(ended, {"s1": 9600, "s2": 9600}, ("s1",), exception)
+    assert verdict == BaudrateReport(ended, {"s1": 9600, "s2": 9600}, ("s1",), exception)
     assert pretence.writes == [WriteRegister(1, 4, code) for code in writes]
 
 
@@ -127,7 +131,7 @@ def test_a_first_sensor_that_cannot_be_put_back_is_told_as_unverified(pretence: 
     stubborn = pretence.sensors[0]
     pretence.later.append((4.0, lambda: setattr(stubborn, "manner", "ignores")))
     verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True))
-    assert verdict == RateVerdict(Ended.UNVERIFIED, {"s1": None}, ("s1",))
+    assert verdict == BaudrateReport(BaudrateEnding.UNVERIFIED, {"s1": None}, ("s1",))
 
 
 # -- back
@@ -135,13 +139,13 @@ def test_a_first_sensor_that_cannot_be_put_back_is_told_as_unverified(pretence: 
 
 def test_if_a_later_one_stays_those_moved_are_moved_back(pretence: Pretence) -> None:
     verdict = changed(pretence, "obeys", "ignores", "obeys")
-    assert verdict == RateVerdict(Ended.ROLLED_BACK, {"s1": 9600, "s2": 9600, "s3": 9600})
+    assert verdict == BaudrateReport(BaudrateEnding.ROLLED_BACK, {"s1": 9600, "s2": 9600, "s3": 9600})
     assert [write.slave for write in pretence.writes] == [1, 2, 1]
 
 
 def test_if_the_first_is_found_nowhere_it_is_looked_for_for_a_minute(pretence: Pretence) -> None:
     verdict = changed(pretence, "vanishes", "obeys")
-    assert verdict == RateVerdict(Ended.UNVERIFIED, {"s1": None, "s2": 9600}, ("s1",))
+    assert verdict == BaudrateReport(BaudrateEnding.UNVERIFIED, {"s1": None, "s2": 9600}, ("s1",))
     assert ROLL_BACK < pretence.clock.now < ROLL_BACK + 20.0
 
 
@@ -154,7 +158,7 @@ def test_one_that_comes_back_within_that_minute_is_moved_back_too(pretence: Pret
 
     pretence.later.append((20.0, back))
     verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True))
-    assert verdict == RateVerdict(Ended.ROLLED_BACK, {"s1": 9600, "s2": 9600})
+    assert verdict == BaudrateReport(BaudrateEnding.ROLLED_BACK, {"s1": 9600, "s2": 9600})
 
 
 # -- with a power cycle
@@ -162,18 +166,18 @@ def test_one_that_comes_back_within_that_minute_is_moved_back_too(pretence: Pret
 
 def test_with_a_power_cycle_all_are_written_and_those_that_wait_are_told(pretence: Pretence) -> None:
     verdict = changed(pretence, "stores", "obeys", "stores", power_cycle=True)
-    assert verdict == RateVerdict(Ended.PENDING, {"s1": 9600, "s2": 19200, "s3": 9600}, ("s1", "s3"))
+    assert verdict == BaudrateReport(BaudrateEnding.PENDING, {"s1": 9600, "s2": 19200, "s3": 9600}, ("s1", "s3"))
     assert len(pretence.writes) == 3
 
 
 def test_with_a_power_cycle_those_that_obey_at_once_are_moved(pretence: Pretence) -> None:
-    assert changed(pretence, "obeys", power_cycle=True) == RateVerdict(Ended.MOVED, {"s1": 19200})
+    assert changed(pretence, "obeys", power_cycle=True) == BaudrateReport(BaudrateEnding.MOVED, {"s1": 19200})
 
 
 @pytest.mark.parametrize("manner", ["ignores", "refuses", "refuses_and_stores"])
 def test_with_a_power_cycle_one_that_does_not_take_the_rate_has_all_put_back(pretence: Pretence, manner: str) -> None:
     verdict = changed(pretence, "stores", manner, "stores", power_cycle=True)
-    assert verdict == RateVerdict(Ended.ROLLED_BACK, {"s1": 9600, "s2": 9600, "s3": 9600})
+    assert verdict == BaudrateReport(BaudrateEnding.ROLLED_BACK, {"s1": 9600, "s2": 9600, "s3": 9600})
     assert 3 not in {write.slave for write in pretence.writes}
 
 
@@ -195,16 +199,16 @@ def test_a_sensor_is_brought_to_a_rate_and_its_register_too(
     pretence: Pretence, facts: dict[str, Any], at: int | None, writes: list[int]
 ) -> None:
     pretence.sensor(1, **facts)
-    sensor = Sensor("s1", 1, pretence.asking())
+    sensor = RateSensor("s1", 1, pretence.asking())
     assert pretence.carry_out(restored(sensor, 9600, 19200)) == at
     assert [write.value for write in pretence.writes] == writes
 
 
 def test_a_sensor_whose_profile_has_no_register_of_the_rate_has_no_code(pretence: Pretence, tmp_path: Path) -> None:
     (tmp_path / "bare.yaml").write_text(BARE)
-    bare = Sensor("x", 1, pretence.asking(load_profile("bare.yaml", relative_to=tmp_path)))
+    bare = RateSensor("x", 1, pretence.asking(load_profile("bare.yaml", relative_to=tmp_path)))
     assert (bare.register, bare.code(9600)) == (-1, -1)
-    known = Sensor("x", 1, pretence.asking())
+    known = RateSensor("x", 1, pretence.asking())
     assert (known.register, known.code(9600), known.code(19200)) == (4, 1, 2)
 
 
@@ -215,7 +219,7 @@ def test_one_that_answers_at_both_rates_since_the_write_is_two_and_all_are_moved
     sensors = line(pretence, "obeys", "obeys")
     pretence.sensor(2, manner="stores")
     verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True))
-    assert verdict == RateVerdict(Ended.TWINS, {"s1": 9600, "s2": 9600}, ("s2",))
+    assert verdict == BaudrateReport(BaudrateEnding.TWINS, {"s1": 9600, "s2": 9600}, ("s2",))
     assert [sensor.baudrate for sensor in pretence.sensors] == [9600] * 3
 
 
@@ -223,7 +227,7 @@ def test_the_one_of_two_that_stayed_forgets_the_rate_it_stored(pretence: Pretenc
     sensors = line(pretence, "stores")
     pretence.sensor(1)
     verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True))
-    assert verdict.ended is Ended.TWINS
+    assert verdict.ended is BaudrateEnding.TWINS
     assert [sensor.stored.get(4, 1) for sensor in pretence.sensors] == [1, 1]
 
 
@@ -231,7 +235,7 @@ def test_so_with_a_power_cycle(pretence: Pretence) -> None:
     sensors = line(pretence, "stores")
     pretence.sensor(1)
     verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP, power_cycle=True), lambda: True))
-    assert verdict == RateVerdict(Ended.TWINS, {"s1": 9600}, ("s1",))
+    assert verdict == BaudrateReport(BaudrateEnding.TWINS, {"s1": 9600}, ("s1",))
     assert [(sensor.baudrate, sensor.stored.get(4, 1)) for sensor in pretence.sensors] == [(9600, 1)] * 2
 
 
@@ -240,7 +244,7 @@ def test_one_that_was_deaf_while_its_twin_was_brought_back_is_looked_for_once_mo
     deaf = pretence.sensor(1, baudrate=19200, silent=True)
     pretence.later.append((12.0, partial(vars(deaf).update, silent=False)))
     verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True))
-    assert verdict == RateVerdict(Ended.ROLLED_BACK, {"s1": 9600, "s2": 9600})
+    assert verdict == BaudrateReport(BaudrateEnding.ROLLED_BACK, {"s1": 9600, "s2": 9600})
     assert [sensor.baudrate for sensor in pretence.sensors] == [9600] * 3
 
 
@@ -248,7 +252,7 @@ def test_a_first_sensor_that_stays_has_the_others_forget_what_they_stored_before
     sensors = line(pretence, "stores", "stores", "obeys")
     pretence.sensors[1].stored[4] = 2
     verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP, stored=frozenset({"s1", "s2"})), lambda: True))
-    assert verdict == RateVerdict(Ended.CANARY, dict.fromkeys(("s1", "s2", "s3"), 9600), ("s1",))
+    assert verdict == BaudrateReport(BaudrateEnding.CANARY, dict.fromkeys(("s1", "s2", "s3"), 9600), ("s1",))
     assert [sensor.stored.get(4, 1) for sensor in pretence.sensors] == [1, 1, 1]
     assert 3 not in {write.slave for write in pretence.writes}
 
@@ -257,4 +261,4 @@ def test_one_of_them_that_cannot_be_made_to_forget_is_told(pretence: Pretence) -
     sensors = line(pretence, "stores", "ignores")
     pretence.sensors[1].stored[4] = 2
     verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP, stored=frozenset({"s2"})), lambda: True))
-    assert (verdict.ended, verdict.names) == (Ended.UNVERIFIED, ("s2",))
+    assert (verdict.ended, verdict.names) == (BaudrateEnding.UNVERIFIED, ("s2",))

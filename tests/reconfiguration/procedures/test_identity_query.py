@@ -12,13 +12,13 @@ from lfs10d.modbus.exchange import LateAnswer, Outcome
 from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
 from lfs10d.profiles.library import load_profile, parse_profile
 from lfs10d.reading import FaultCode
-from lfs10d.reconfiguration.journal import Spot
-from lfs10d.reconfiguration.procedures.identity_query import PATIENT, QUICK, Reply, quiet
+from lfs10d.reconfiguration.journal import Endpoint
+from lfs10d.reconfiguration.procedures.identity_query import PATIENT, QUICK, IdentityReply, quiet
 from tests.support.sensors import Pretence
 
 RTU = Codec(Framing.RTU)
-HERE = Spot(slave=3, baudrate=9600)
-ELSEWHERE = Spot(slave=3, baudrate=19200)
+HERE = Endpoint(slave=3, baudrate=9600)
+ELSEWHERE = Endpoint(slave=3, baudrate=19200)
 WHO, WIND = ReadRegisters(3, 5, 1), ReadRegisters(3, 1, 2)
 NARROW = """
 name: narrow
@@ -41,7 +41,7 @@ def test_a_profile_without_a_register_of_the_id_cannot_be_asked(pretence: Preten
 
 def test_who_answers_says_its_id(pretence: Pretence) -> None:
     pretence.sensor(3)
-    assert pretence.carry_out(pretence.asking().who(HERE)) == Reply(answers=True, register=3)
+    assert pretence.carry_out(pretence.asking().who(HERE)) == IdentityReply(answers=True, register=3)
     assert pretence.asked == [Ask(WHO, RTU, QUICK)]
 
 
@@ -59,23 +59,23 @@ def test_another_register_can_be_asked(pretence: Pretence) -> None:
 
 def test_values_say_nothing_of_the_id(pretence: Pretence) -> None:
     pretence.sensor(3)
-    assert pretence.carry_out(pretence.asking().values(HERE)) == Reply(answers=True)
+    assert pretence.carry_out(pretence.asking().values(HERE)) == IdentityReply(answers=True)
     assert pretence.requests == [WIND]
 
 
 def test_silence_noise_and_a_refusal_are_told_apart(pretence: Pretence) -> None:
     assert pretence.carry_out(pretence.asking().who(HERE)).silent
     pretence.noise.add((4, 9600))
-    noise = pretence.carry_out(pretence.asking().who(Spot(slave=4, baudrate=9600)))
-    assert noise == Reply(noise=True)
+    noise = pretence.carry_out(pretence.asking().who(Endpoint(slave=4, baudrate=9600)))
+    assert noise == IdentityReply(noise=True)
     assert not noise.silent
     pretence.sensor(5, exception=2)
-    refusal = pretence.carry_out(pretence.asking().who(Spot(slave=5, baudrate=9600)))
-    assert refusal == Reply(answers=True, exception=2)
+    refusal = pretence.carry_out(pretence.asking().who(Endpoint(slave=5, baudrate=9600)))
+    assert refusal == IdentityReply(answers=True, exception=2)
     assert not refusal.silent
 
 
-def reply_to(pretence: Pretence, outcome: Outcome) -> tuple[Reply, float]:
+def reply_to(pretence: Pretence, outcome: Outcome) -> tuple[IdentityReply, float]:
     """Return what is made of one outcome, and how long the next question waits."""
     asking = pretence.asking()
     steps = asking.who(HERE)
@@ -83,22 +83,22 @@ def reply_to(pretence: Pretence, outcome: Outcome) -> tuple[Reply, float]:
     with pytest.raises(StopIteration) as end:
         steps.send(outcome)
     reply = end.value.value
-    assert isinstance(reply, Reply)
+    assert isinstance(reply, IdentityReply)
     return reply, asking.timeout
 
 
 def test_a_refusal_that_may_be_an_older_ones_is_no_answer(pretence: Pretence, heard: Callable[..., Outcome]) -> None:
     reply, _ = reply_to(pretence, heard(WHO, exception=2, ambiguous=True))
-    assert reply == Reply(noise=True)
+    assert reply == IdentityReply(noise=True)
 
 
 def test_a_second_frame_behind_the_answer_is_noise_and_a_few_bytes_are_not(
     pretence: Pretence, heard: Callable[..., Outcome]
 ) -> None:
     reply, _ = reply_to(pretence, heard(WHO, answer=(3,), unsolicited=5))
-    assert reply == Reply(answers=True, noise=True, register=3)
+    assert reply == IdentityReply(answers=True, noise=True, register=3)
     reply, _ = reply_to(pretence, heard(WHO, answer=(3,), unsolicited=4))
-    assert reply == Reply(answers=True, register=3)
+    assert reply == IdentityReply(answers=True, register=3)
 
 
 @pytest.mark.parametrize(("turnaround", "timeout"), [(0.1, QUICK), (0.101, PATIENT), (None, QUICK)])
@@ -120,7 +120,7 @@ def test_after_silence_the_values_go_first_and_then_the_silence_is_waited_out(pr
     asking = pretence.asking()
     assert pretence.carry_out(asking.who(HERE)).silent
     pretence.sensor(3)
-    assert pretence.carry_out(asking.who(HERE)) == Reply(answers=True, register=3)
+    assert pretence.carry_out(asking.who(HERE)) == IdentityReply(answers=True, register=3)
     assert pretence.requests == [WHO, WIND, WHO]
     assert pretence.clock.now >= 1.0
 
@@ -194,21 +194,21 @@ def test_so_is_one_whose_answer_came_while_another_was_asked(pretence: Pretence,
     late = LateAnswer(WHO, 0.4)
     pretence.unanswered.settled(heard(ReadRegisters(9, 1, 2), late=(late,)), RTU, QUICK, 1.0)
     pretence.carry_out(pretence.asking().who(HERE))
-    pretence.carry_out(pretence.asking().who(Spot(slave=9, baudrate=9600)))
+    pretence.carry_out(pretence.asking().who(Endpoint(slave=9, baudrate=9600)))
     assert [ask.timeout for ask in pretence.asked if ask.request == WHO] == [PATIENT]
     assert pretence.asked[-1].timeout == QUICK
 
 
 def test_listening_asks_a_silent_place_behind_the_exchange_before(pretence: Pretence) -> None:
-    silent = Spot(slave=9, baudrate=9600)
-    assert pretence.carry_out(pretence.asking().listen(silent, 0.3, 3)) == (Reply(), False)
+    silent = Endpoint(slave=9, baudrate=9600)
+    assert pretence.carry_out(pretence.asking().listen(silent, 0.3, 3)) == (IdentityReply(), False)
     assert pretence.asked == [Ask(ReadRegisters(9, 1, 2), RTU, 0.3, at_once=True)]
 
 
 def test_a_second_block_of_values_can_be_asked(pretence: Pretence) -> None:
     pretence.sensor(3)
     block = load_profile("fuling-dzb", relative_to=Path()).reads()[1]
-    pretence.carry_out(pretence.asking().values(Spot(slave=4, baudrate=9600), block=block))
+    pretence.carry_out(pretence.asking().values(Endpoint(slave=4, baudrate=9600), block=block))
     assert pretence.requests == [ReadRegisters(4, 0x5000, 2)]
 
 
@@ -220,4 +220,4 @@ def test_a_rate_without_a_code_is_known_by_what_the_register_held(pretence: Pret
     assert knowing.profile.baudrate is not None
     assert knowing.profile.baudrate.codes == {9600: 1, 19200: 2, 4800: 7}
     assert knowing.clock is asking.clock
-    assert pretence.carry_out(knowing.values(Spot(slave=3, baudrate=9600))).silent
+    assert pretence.carry_out(knowing.values(Endpoint(slave=3, baudrate=9600))).silent

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from lfs10d.reconfiguration.journal import Spot
+from lfs10d.reconfiguration.journal import Endpoint
 from lfs10d.reconfiguration.procedures.locate import locate
 from tests.support.sensors import Pretence
 
-FILE, LAST = Spot(slave=3, baudrate=9600), Spot(slave=7, baudrate=19200)
+FILE, LAST = Endpoint(slave=3, baudrate=9600), Endpoint(slave=7, baudrate=19200)
 
 
 def test_the_first_place_at_which_somebody_answers_is_taken(pretence: Pretence) -> None:

@@ -17,8 +17,8 @@ from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import ReadRegisters
 from lfs10d.profiles.library import parse_profile
 from lfs10d.reading import FaultCode
-from lfs10d.reconfiguration.journal import Spot
-from lfs10d.reconfiguration.procedures.identity_query import QUICK, Reply
+from lfs10d.reconfiguration.journal import Endpoint
+from lfs10d.reconfiguration.procedures.identity_query import QUICK, IdentityReply
 from lfs10d.reconfiguration.procedures.recognition import (
     CROSSINGS,
     LEAST,
@@ -32,8 +32,8 @@ from lfs10d.reconfiguration.procedures.recognition import (
 )
 from tests.support.sensors import CODEC, LFS10, Mimic, Pretence, heard
 
-HERE, SILENT = Spot(slave=3, baudrate=9600), Spot(slave=9, baudrate=9600)
-SAYS_3 = Reply(answers=True, register=3)
+HERE, SILENT = Endpoint(slave=3, baudrate=9600), Endpoint(slave=9, baudrate=9600)
+SAYS_3 = IdentityReply(answers=True, register=3)
 WIND = LFS10.values[0]
 VANE = parse_profile(
     """
@@ -76,7 +76,7 @@ def blowing(pretence: Pretence, numbers: Iterable[float]) -> Look:
     return look(pretence)
 
 
-def recognition(pretence: Pretence, identity: Reply = SAYS_3) -> Recognition:
+def recognition(pretence: Pretence, identity: IdentityReply = SAYS_3) -> Recognition:
     return pretence.carry_out(recognised(HERE, identity, pretence.asking()))
 
 
@@ -92,11 +92,13 @@ def test_a_sensor_is_recognised_by_its_id_its_values_and_the_register_of_its_rat
 @pytest.mark.parametrize(
     ("identity", "why"),
     [
-        (Reply(answers=True, exception=2), "it refuses register 0x0005 (exception 02)"),
-        (Reply(answers=True, register=700), "its register 0x0005 says 700, not 3"),
+        (IdentityReply(answers=True, exception=2), "it refuses register 0x0005 (exception 02)"),
+        (IdentityReply(answers=True, register=700), "its register 0x0005 says 700, not 3"),
     ],
 )
-def test_one_whose_id_register_says_otherwise_is_not_asked_more(pretence: Pretence, identity: Reply, why: str) -> None:
+def test_one_whose_id_register_says_otherwise_is_not_asked_more(
+    pretence: Pretence, identity: IdentityReply, why: str
+) -> None:
     pretence.sensor(3)
     assert recognition(pretence, identity) == Recognition(why)
     assert pretence.asked == []

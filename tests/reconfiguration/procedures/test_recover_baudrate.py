@@ -7,7 +7,7 @@ from math import inf
 
 import pytest
 
-from lfs10d.reconfiguration.procedures.baudrate import Ended, RateVerdict, Sensor
+from lfs10d.reconfiguration.procedures.baudrate import BaudrateEnding, BaudrateReport, RateSensor
 from lfs10d.reconfiguration.procedures.recover_baudrate import (
     CameUp,
     StillLost,
@@ -22,11 +22,13 @@ from tests.support.sensors import Pretence
 UP = (9600, 19200)
 
 
-def sensors_of(pretence: Pretence, *slaves: int) -> list[Sensor]:
-    return [Sensor(f"s{slave}", slave, pretence.asking()) for slave in slaves]
+def sensors_of(pretence: Pretence, *slaves: int) -> list[RateSensor]:
+    return [RateSensor(f"s{slave}", slave, pretence.asking()) for slave in slaves]
 
 
-def put(pretence: Pretence, *slaves: int, own: int = 9600, where: dict[str, int | None] | None = None) -> RateVerdict:
+def put(
+    pretence: Pretence, *slaves: int, own: int = 9600, where: dict[str, int | None] | None = None
+) -> BaudrateReport:
     """Look for the sensors, and put back what was found."""
     where = {} if where is None else where
     sensors = sensors_of(pretence, *slaves)
@@ -60,7 +62,7 @@ def test_one_that_has_stored_the_other_rate_is_written_back_before_anybody_is_wa
     pretence.sensor(2, baudrate=19200)
     pretence.sensor(3, manner="stores", stored={4: 2})
     verdict = put(pretence, 1, 2, 3)
-    assert verdict == RateVerdict(Ended.UNVERIFIED, {"s1": None, "s2": 9600, "s3": 9600}, ("s1",))
+    assert verdict == BaudrateReport(BaudrateEnding.UNVERIFIED, {"s1": None, "s2": 9600, "s3": 9600}, ("s1",))
     assert (pretence.writes[0].slave, pretence.writes[0].value) == (3, 1)
     asked = [(ask.request.slave, ask.baudrate) for ask in pretence.asked]
     assert asked[:2] == [(1, None), (1, 19200)], "once at each rate, the line's own first"
@@ -70,7 +72,7 @@ def test_one_that_has_stored_the_other_rate_is_written_back_before_anybody_is_wa
 def test_a_verdict_speaks_of_those_that_were_found_before_too(pretence: Pretence) -> None:
     pretence.sensor(2)
     assert put(pretence, 2, where={"s1": None, "s2": None}).names == ("s1",)
-    assert put(pretence, 2, where={"s1": 9600, "s2": None}).ended is Ended.ROLLED_BACK
+    assert put(pretence, 2, where={"s1": 9600, "s2": None}).ended is BaudrateEnding.ROLLED_BACK
 
 
 def test_a_lost_one_is_waited_for_however_long_it_takes_and_nothing_is_written(pretence: Pretence) -> None:
@@ -106,7 +108,7 @@ def test_one_that_is_put_back_while_another_of_its_id_stays_is_two_and_counts_as
     stays = pretence.sensor(1, baudrate=19200, manner="stores")
     where: dict[str, int | None] = {"s1": 19200}
     verdict = pretence.carry_out(put_back(sensors_of(pretence, 1), *UP, where))
-    assert verdict == RateVerdict(Ended.UNVERIFIED, {"s1": 19200}, ("s1",))
+    assert verdict == BaudrateReport(BaudrateEnding.UNVERIFIED, {"s1": 19200}, ("s1",))
     assert pretence.aside == [Twins("s1")]
 
     def power_up() -> None:
@@ -136,11 +138,11 @@ def test_one_that_waits_for_its_power_cycle_to_come_back_is_waited_for_and_not_w
 def test_each_sensor_that_comes_up_at_the_new_rate_is_told_and_the_end_is_when_all_have(pretence: Pretence) -> None:
     for slave in (1, 2):
         pretence.sensor(slave)
-    sensors = [Sensor(f"s{slave}", slave, pretence.asking()) for slave in (1, 2)]
+    sensors = [RateSensor(f"s{slave}", slave, pretence.asking()) for slave in (1, 2)]
     for at, sensor in zip((30.0, 100.0), pretence.sensors, strict=True):
         pretence.later.append((at, partial(setattr, sensor, "baudrate", 19200)))
     verdict = pretence.carry_out(await_power(sensors, *UP, longest_pause=4.0))
-    assert verdict == RateVerdict(Ended.MOVED, {"s1": 19200, "s2": 19200})
+    assert verdict == BaudrateReport(BaudrateEnding.MOVED, {"s1": 19200, "s2": 19200})
     assert pretence.aside == [CameUp("s1"), CameUp("s2")]
     assert pretence.clock.now < 100.0 + 6.0
     assert pretence.writes == []
@@ -150,8 +152,8 @@ def test_one_that_answers_at_both_rates_is_two_and_is_awaited_until_the_other_ha
     pretence.sensor(1, baudrate=19200)
     stays = pretence.sensor(1)
     pretence.later.append((30.0, partial(setattr, stays, "baudrate", 19200)))
-    sensors = [Sensor("s1", 1, pretence.asking())]
+    sensors = [RateSensor("s1", 1, pretence.asking())]
     verdict = pretence.carry_out(await_power(sensors, *UP, longest_pause=4.0))
-    assert verdict == RateVerdict(Ended.MOVED, {"s1": 19200})
+    assert verdict == BaudrateReport(BaudrateEnding.MOVED, {"s1": 19200})
     assert pretence.aside == [Twins("s1"), CameUp("s1")]
     assert pretence.clock.now >= 30.0

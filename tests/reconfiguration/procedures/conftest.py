@@ -1,7 +1,4 @@
-"""A line full of sensors as a course meets it: questions go in, outcomes come out, time is a number.
-
-It knows no bytes; how each sensor takes a write is set in the test.
-"""
+"""Fixtures: a line that answers a procedure exchange by exchange."""
 
 from __future__ import annotations
 
