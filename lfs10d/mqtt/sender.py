@@ -1,4 +1,4 @@
-"""Carries letters from the outbox to a connection, and the broker's answers back.
+"""Carries items from the outbox to a connection, and the broker's answers back.
 
 Serialising is done here, once per message, in slices: the loop has others to serve.
 """
@@ -17,7 +17,7 @@ from lfs10d.mqtt.encoding import array, encode, packet_size
 from lfs10d.mqtt.messages import Accepted
 from lfs10d.mqtt.reasons import NO_MATCHING_SUBSCRIBERS, REFUSED_FROM, Disconnect, reason_in_words
 from lfs10d.mqtt.topics import Topics
-from lfs10d.outbox.backlog import ARRAY_BYTES
+from lfs10d.outbox.backlog import BATCH_BYTES
 from lfs10d.outbox.items import HistoryBatch, LiveSample, LossNotice, Message, OutboxItem, Retained
 from lfs10d.outbox.outbox import IN_FLIGHT_MOST, Outbox
 from lfs10d.outbox.refusals import Refusal, refusal_of
@@ -26,11 +26,11 @@ from lfs10d.telemetry import publication
 
 log = logging.getLogger(__name__)
 
-LETTERS_AT_ONCE = 4
-"""Letters handed to paho in one go of the loop, about 50 us each."""
+ITEMS_AT_ONCE = 4
+"""Items handed to paho in one go of the loop, about 50 us each."""
 
 SAMPLES_AT_ONCE = 16
-"""Samples of a history array serialised in one go; a whole array would take a millisecond."""
+"""Samples of a history batch serialised in one go; a whole batch would take a millisecond."""
 
 ACKNOWLEDGED_WITHIN = 60.0
 """Seconds after which a broker that answers pings but acknowledges nothing is given up."""
@@ -47,7 +47,7 @@ NOT_AUTHORIZED = 0x87
 class _Sent:
     """One message on its way, the `number`th of this connection: `size` bytes of payload, sent `at` (monotonic s)."""
 
-    letter: OutboxItem
+    item: OutboxItem
     at: float
     size: int
     qos: int
@@ -56,9 +56,9 @@ class _Sent:
 
 @dataclass(slots=True)
 class _Assembly:
-    """A history array that is being serialised; `size` is its bytes so far, `most` its greatest."""
+    """A history batch that is being serialised; `size` is its bytes so far, `most` its greatest."""
 
-    letter: HistoryBatch
+    item: HistoryBatch
     most: int
     parts: list[bytes] = field(default_factory=list)
     size: int = 1
@@ -124,7 +124,7 @@ class Sender:
         """What the broker may have got last: topics under `B`, each with the bytes of its largest message."""
         found: dict[str, int] = {}
         for each in (*self._sent.values(), *self._unproved):
-            found[each.letter.topic] = max(each.size, found.get(each.letter.topic, 0))
+            found[each.item.topic] = max(each.size, found.get(each.item.topic, 0))
         return found
 
     @property
@@ -156,7 +156,7 @@ class Sender:
         else:
             self._unproved.append(sent)  # it was written, that is all
         if reason < REFUSED_FROM:
-            self._outbox.settled(sent.letter, self._now(), heard=reason != NO_MATCHING_SUBSCRIBERS)
+            self._outbox.on_ack(sent.item, self._now(), heard=reason != NO_MATCHING_SUBSCRIBERS)
         else:
             self._refused(sent, reason)
         congested = self._outbox.congested(self._now())
@@ -176,20 +176,20 @@ class Sender:
         """Note that the broker took this message, and all before it, without ending the connection."""
         suspects = self._outbox.suspects
         self._acknowledged = max(self._acknowledged, acknowledged.number)
-        suspects.acknowledged(acknowledged.letter.topic, acknowledged.size)
+        suspects.acknowledged(acknowledged.item.topic, acknowledged.size)
         while self._unproved and self._unproved[0].number < acknowledged.number:
             proved = self._unproved.popleft()
-            suspects.acknowledged(proved.letter.topic, proved.size)
+            suspects.acknowledged(proved.item.topic, proved.size)
 
     def _refused(self, sent: _Sent, reason: int) -> None:
-        letter, refusal = sent.letter, refusal_of(reason)
-        topic, words = self._topics.full(letter.topic), reason_in_words(reason)
+        item, refusal = sent.item, refusal_of(reason)
+        topic, words = self._topics.full(item.topic), reason_in_words(reason)
         if refusal is Refusal.UNFIT:
-            if self._outbox.unfit(letter):
+            if self._outbox.unfit(item):
                 log.warning(
                     "the broker refuses a message of %d bytes to %s: %s; it is dropped", sent.size, topic, words
                 )
-        elif self._outbox.refused(letter, reason, self._now()):
+        elif self._outbox.refused(item, reason, self._now()):
             again = "in a second, then less often" if refusal is Refusal.LATER else "after the next connect or a reload"
             log.warning("the broker refuses %s: %s; it is tried again %s", topic, words, again)
 
@@ -212,31 +212,31 @@ class Sender:
 
     def _send_a_few(self) -> bool:
         """Send up to `LETTERS_AT_ONCE`; return whether nothing more may go now."""
-        for _ in range(LETTERS_AT_ONCE):
-            letter = self._outbox.next(self._now(), past=self._assembly is None)
-            if letter is None:
+        for _ in range(ITEMS_AT_ONCE):
+            item = self._outbox.next(self._now(), batch=self._assembly is None)
+            if item is None:
                 return True
-            if isinstance(letter, HistoryBatch):
-                self._assembly = _Assembly(letter, self._room(letter))
-                asyncio.get_running_loop().call_soon(self._assemble, letter)
+            if isinstance(item, HistoryBatch):
+                self._assembly = _Assembly(item, self._room(item))
+                asyncio.get_running_loop().call_soon(self._assemble, item)
             else:
-                self._send_encoded(letter)
+                self._send_encoded(item)
         return False
 
-    def _send_encoded(self, letter: Retained | Message | LiveSample | LossNotice) -> None:
-        if isinstance(letter, LossNotice):
-            loss = letter.loss
+    def _send_encoded(self, item: Retained | Message | LiveSample | LossNotice) -> None:
+        if isinstance(item, LossNotice):
+            loss = item.loss
             payload = publication.dropped(
                 loss.device, loss.boot, loss.from_seq, loss.to_seq, count=loss.count, ts=self._epoch_ms()
             ).payload
         else:
-            payload = letter.publication.payload
+            payload = item.publication.payload
         try:
             encoded = self._encode(payload)
         except (TypeError, ValueError) as error:
-            self._unfit(letter, f"cannot be written as JSON: {error}")
+            self._unfit(item, f"cannot be written as JSON: {error}")
         else:
-            self._send(letter, encoded)
+            self._send(item, encoded)
 
     def _encode(self, payload: publication.Payload) -> bytes:
         """Return the bytes of a payload: a sample and the state that shows it are one object, and encoded once."""
@@ -244,58 +244,58 @@ class Sender:
             self._encoded = payload, encode(payload)
         return self._encoded[1]
 
-    def _room(self, letter: HistoryBatch) -> int:
-        """Return how many bytes the payload of an array may have."""
+    def _room(self, item: HistoryBatch) -> int:
+        """Return how many bytes the payload of a batch may have."""
         accepted = self._accepted
         if accepted is None or accepted.maximum_packet_size is None:
-            return ARRAY_BYTES
-        around = packet_size(self._topics.full(letter.topic), b"", version=accepted.version)
+            return BATCH_BYTES
+        around = packet_size(self._topics.full(item.topic), b"", version=accepted.version)
         # The remaining length may take three bytes more than that of an empty payload.
-        return min(ARRAY_BYTES, accepted.maximum_packet_size - around - 3)
+        return min(BATCH_BYTES, accepted.maximum_packet_size - around - 3)
 
-    def _assemble(self, letter: HistoryBatch) -> None:
+    def _assemble(self, item: HistoryBatch) -> None:
         assembly = self._assembly
-        if assembly is None or assembly.letter is not letter:
+        if assembly is None or assembly.item is not item:
             return  # the connection is another one now, and the samples wait again
         parts = assembly.parts
-        for kept in letter.samples[len(parts) : len(parts) + SAMPLES_AT_ONCE]:
-            part = encode(kept.sample.payload(self._line, historical=True))
+        for queued in item.samples[len(parts) : len(parts) + SAMPLES_AT_ONCE]:
+            part = encode(queued.sample.payload(self._line, historical=True))
             assembly.size += len(part) + 1  # the comma, or the bracket behind it
             if parts and assembly.size > assembly.most:
-                letter = self._outbox.shorten(letter, len(parts))
+                item = self._outbox.shorten(item, len(parts))
                 break
             parts.append(part)
-        if len(parts) < len(letter.samples):
-            asyncio.get_running_loop().call_soon(self._assemble, letter)
+        if len(parts) < len(item.samples):
+            asyncio.get_running_loop().call_soon(self._assemble, item)
         else:
             self._assembly = None
-            self._send(letter, array(parts))
+            self._send(item, array(parts))
 
-    def _send(self, letter: OutboxItem, payload: bytes) -> None:
+    def _send(self, item: OutboxItem, payload: bytes) -> None:
         if self._connection is None or self._accepted is None:
             return
-        topic = self._topics.full(letter.topic)
+        topic = self._topics.full(item.topic)
         retain, qos, correlation = False, 1, None
-        if not isinstance(letter, HistoryBatch | LossNotice):
-            retain, qos = letter.publication.retain, letter.publication.qos
-        if isinstance(letter, Message):
-            correlation = letter.correlation
-        if self._outbox.suspects.goes_alone(letter.topic):
+        if not isinstance(item, HistoryBatch | LossNotice):
+            retain, qos = item.publication.retain, item.publication.qos
+        if isinstance(item, Message):
+            correlation = item.correlation
+        if self._outbox.suspects.goes_alone(item.topic):
             qos = 1  # its acknowledgement clears it
         limit = self._accepted.maximum_packet_size
         if limit is not None:
             size = packet_size(topic, payload, version=self._accepted.version, qos=qos, correlation=correlation)
             if size > limit:
-                self._unfit(letter, f"{size} bytes are more than the {limit} that the broker takes")
+                self._unfit(item, f"{size} bytes are more than the {limit} that the broker takes")
                 return
         mid = self._connection.publish(topic, payload, qos=qos, retain=retain, correlation=correlation)
         if mid is not None:  # else it is under way until `lost`, which follows
             self._number += 1
-            self._sent[mid] = _Sent(letter, self._now(), len(payload), qos, self._number)
+            self._sent[mid] = _Sent(item, self._now(), len(payload), qos, self._number)
 
-    def _unfit(self, letter: OutboxItem, why: str) -> None:
-        if self._outbox.unfit(letter):
-            log.warning("not sent to %s: %s", self._topics.full(letter.topic), why)
+    def _unfit(self, item: OutboxItem, why: str) -> None:
+        if self._outbox.unfit(item):
+            log.warning("not sent to %s: %s", self._topics.full(item.topic), why)
         self.wake()
 
     def _set_alarm(self) -> None:
@@ -319,7 +319,7 @@ class Sender:
         if oldest is not None and self._now() - oldest.at >= ACKNOWLEDGED_WITHIN:
             # A broker acknowledges in order: what it acknowledged something later than, it has swallowed.
             swallowed = (sent for sent in self._sent.values() if sent.number < self._acknowledged)
-            self._swallowed = {sent.letter.topic: sent.size for sent in swallowed}
+            self._swallowed = {sent.item.topic: sent.size for sent in swallowed}
             self._stuck()
         else:
             self.wake()

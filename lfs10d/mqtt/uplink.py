@@ -2,7 +2,7 @@
 
 After a connect: subscribe to requests and to our own availability; every retained topic; when the broker has
 them all, availability `online`; then live samples; then clear the retained topics that nobody stands behind any
-more; 10 s later the past. Nothing here blocks. Decisions are made in `Outbox`, `Reconnect` and `Sweep` (in `Cleanup`).
+more; 10 s later the backlog. Nothing here blocks. `Outbox`, `Reconnect` and `OrphanSearch` decide.
 """
 
 from __future__ import annotations
@@ -67,74 +67,74 @@ class Uplink:
     ) -> None:
         self._topics = Topics(base)
         self._burst = burst
-        self._clearing = Cleanup(self._topics, stands_behind=stands_behind, clear=self._clear_orphans)
+        self._cleanup = Cleanup(self._topics, stands_behind=stands_behind, clear=self._clear_orphans)
         self._requested = requested
         self._retained_requests = RetainedRequests(self._ask_for_retained_requests)
         self._changed = changed
         self._announced = announced
         self._announcing = False
-        self._link = BrokerClient(
+        self._client = BrokerClient(
             settings,
             self,
             will=Will(self._topics.availability, OFFLINE.encode()),
-            explained=lambda: self._dispatch.explains_end,
+            explained=lambda: self._sender.explains_end,
             connect=connect,
         )
         self._outbox = Outbox(detection=2.0 * settings.keepalive)
         line = base.rpartition("/")[2]
-        self._dispatch = Sender(self._outbox, self._topics, line, epoch_ms=epoch_ms, stuck=self._acknowledges_nothing)
+        self._sender = Sender(self._outbox, self._topics, line, epoch_ms=epoch_ms, stuck=self._acknowledges_nothing)
         self._subscription: int | None = None
         self._farewell: int | None = None
         self._leaving = False
         self._progress = asyncio.Event()
         self._drop_told = False
         self._epoch_ms = epoch_ms
-        self._stowage: Spooler | None = None
-        self._earlier: RetainedReader | None = None
+        self._spooler: Spooler | None = None
+        self._retained_reader: RetainedReader | None = None
         self.requests_denied = False
         """The broker refused the subscription to requests: none will come over this connection."""
 
     @property
     def connected(self) -> bool:
         """The broker has accepted us."""
-        return self._link.standing is not None
+        return self._client.standing is not None
 
     @property
     def version(self) -> Version | None:
         """The version of MQTT that is spoken; None while not connected."""
-        return self._link.version
+        return self._client.version
 
     @property
     def place(self) -> str:
         """The node that is connected or tried next, as messages name it: `broker localhost:1883`."""
-        return self._link.settings.place
+        return self._client.settings.place
 
     @property
     def duplicate(self) -> bool:
         """Another client takes our id away: `duplicate_client`."""
-        return self._link.duplicate
+        return self._client.duplicate
 
     @property
     def backlog(self) -> telemetry.BacklogStats:
         """What waits, for `line/stats`."""
-        return self._outbox.backlog
+        return self._outbox.stats
 
     async def start(self) -> None:
         """Begin to connect; what is published before waits."""
-        if self._stowage is not None:
-            self._stowage.start()
-        self._link.start()
+        if self._spooler is not None:
+            self._spooler.start()
+        self._client.start()
 
     def keep_in(self, store: Store, troubled: Callable[[str | None], None]) -> None:
         """Keep on disk what the broker does not take; to be called before `start`.
 
         `troubled` is told why that is not possible, and None when it is again.
         """
-        self._stowage = Spooler(
+        self._spooler = Spooler(
             self._outbox,
             store,
             epoch_ms=self._epoch_ms,
-            wake=self._dispatch.wake,
+            wake=self._sender.wake,
             troubled=troubled,
             tell=lambda event: self.publish([event]),
         )
@@ -144,17 +144,17 @@ class Uplink:
 
         `told` is given what was found, and the burst waits for it; at most 5 s for what the broker says.
         """
-        self._earlier = RetainedReader(self._topics, wanted, told)
+        self._retained_reader = RetainedReader(self._topics, wanted, told)
 
     def send_samples(self, *, telemetry: bool) -> None:
         """Take whether samples are sent: `telemetry`, and as `history` what waits; the rest is sent in any case."""
         self._outbox.telemetry = telemetry
-        self._dispatch.wake()
+        self._sender.wake()
 
     def limit(self, limits: Limits) -> None:
         """Take other limits for what is kept on disk."""
-        if self._stowage is not None:
-            self._stowage.limit(limits)
+        if self._spooler is not None:
+            self._spooler.limit(limits)
 
     def synchronised(self) -> None:
         """Note that the wall clock is right now: what waits is given the time it should have had."""
@@ -170,22 +170,22 @@ class Uplink:
     def _correct(self, clock: ClockState) -> None:
         shift = self._shift(asyncio.get_running_loop().time())
         self._outbox.correct(shift, clock)
-        if self._stowage is not None:
-            self._stowage.correct(shift, clock)
+        if self._spooler is not None:
+            self._spooler.correct(shift, clock)
 
     def _shift(self, now: float) -> int:
         """Return the wall clock less the monotonic one, in ms."""
         return self._epoch_ms() - round(now * 1000)
 
     def _poke(self) -> None:
-        if self._stowage is not None:
-            self._stowage.poke()
+        if self._spooler is not None:
+            self._spooler.poke()
 
     async def stop(self) -> None:
         """Send what waits, say `offline`, disconnect, keep the rest; at most 1.9 s, whatever broker and disk do."""
         await self._part()
-        if self._stowage is not None:
-            await self._stowage.stop(KEEP_WITHIN)
+        if self._spooler is not None:
+            await self._spooler.stop(KEEP_WITHIN)
 
     async def reload(self, settings: BrokerSettings | None = None) -> None:
         """Try again what the broker refused, clear what nobody stands behind; connect anew if given settings."""
@@ -193,9 +193,9 @@ class Uplink:
         if settings is not None:
             await self._part()
             self._leaving = False
-            self._link.renew(settings)
+            self._client.renew(settings)
             return
-        self._clearing.wanted = True
+        self._cleanup.wanted = True
         if refused:
             self.republish()
         else:
@@ -205,7 +205,7 @@ class Uplink:
         """Send every retained topic once more."""
         if self.connected:
             self._outbox.burst(self._burst(), _ONLINE)
-            self._dispatch.wake()
+            self._sender.wake()
 
     def publish(self, publications: Iterable[Publication]) -> None:
         """Send these, or keep them while the broker is away."""
@@ -217,15 +217,15 @@ class Uplink:
         if self._outbox.dropped > dropped and not self._drop_told:
             self._drop_told = True
             log.warning("more samples wait for the broker than there is room for: the oldest are dropped")
-        self._dispatch.wake()
-        if self._outbox.past.away or self._outbox.past.spill_due() is not None:
+        self._sender.wake()
+        if self._outbox.backlog.away or self._outbox.backlog.spill_due() is not None:
             self._poke()
 
     def respond(self, topic: str, payload: telemetry.Payload, correlation: bytes | None = None) -> None:
         """Answer a request on `topic` (under `B`), by MQTT 5 with its Correlation Data."""
         response = Publication(topic, payload, PublicationKind.RESPONSE, retain=False, qos=1)
         self._outbox.add(response, asyncio.get_running_loop().time(), correlation=correlation)
-        self._dispatch.wake()
+        self._sender.wake()
 
     def clear_retained(self, topic: str) -> None:
         """Clear a retained topic under `B`, a retained request for example."""
@@ -237,13 +237,13 @@ class Uplink:
         loop = asyncio.get_running_loop()
         self._leaving = True
         await self._until(lambda: self._outbox.idle, loop.time() + DRAIN_WITHIN)
-        standing = self._link.standing
+        standing = self._client.standing
         if standing is not None:
             self._farewell = standing.publish(self._topics.availability, OFFLINE.encode(), retain=True)
             await self._until(lambda: self._farewell is None, loop.time() + FAREWELL_WITHIN)
             if self.connected and self._farewell is None:
-                self._outbox.past.part()
-        await self._link.leave(LEAVE_WITHIN)
+                self._outbox.backlog.part()
+        await self._client.leave(LEAVE_WITHIN)
 
     async def _until(self, reached: Callable[[], bool], deadline: float) -> None:
         try:
@@ -254,36 +254,36 @@ class Uplink:
         except TimeoutError:
             log.debug("the broker does not answer in time")
 
-    # Events of the link
+    # Events of the client
 
     def accepted(self, accepted: Accepted) -> None:
         """Read what an earlier life published, if that is wanted; then subscribe, and send the burst."""
-        standing = self._link.standing
-        if standing is not None and self._earlier is not None and not self._earlier.over:
-            self._earlier.begin(standing, partial(self._begin, accepted))
+        standing = self._client.standing
+        if standing is not None and self._retained_reader is not None and not self._retained_reader.over:
+            self._retained_reader.begin(standing, partial(self._begin, accepted))
         else:
             self._begin(accepted)
 
     def _begin(self, accepted: Accepted) -> None:
-        standing = self._link.standing
+        standing = self._client.standing
         if standing is None:
             return
-        self._dispatch.connected(standing, accepted)
+        self._sender.connected(standing, accepted)
         self._subscription = standing.subscribe([Filter(self._topics.requests), Filter(self._topics.availability)])
         self.requests_denied = False
         self._outbox.burst(self._burst(), _ONLINE)
-        self._announcing = self._clearing.wanted = True
-        self._dispatch.wake()
+        self._announcing = self._cleanup.wanted = True
+        self._sender.wake()
         self._poke()
         self._changed()
 
     def ended(self, ended: Disconnect) -> None:
         """Keep what is not acknowledged."""
         log.debug("%s", ended.message)
-        self._dispatch.lost(ended)
-        if self._earlier is not None:
-            self._earlier.lost()
-        self._clearing.lost()
+        self._sender.lost(ended)
+        if self._retained_reader is not None:
+            self._retained_reader.lost()
+        self._cleanup.lost()
         self._retained_requests.lost()
         self._farewell = None
         self._drop_told = False
@@ -295,8 +295,8 @@ class Uplink:
         """Send on."""
         if mid == self._farewell:
             self._farewell = None
-        self._dispatch.acknowledged(mid, reason)
-        if self._outbox.past.stored.rows:
+        self._sender.acknowledged(mid, reason)
+        if self._outbox.backlog.spool.rows:
             self._poke()
         if self._outbox.announced:
             if self._announcing:
@@ -307,8 +307,8 @@ class Uplink:
 
     def subscribed(self, mid: int, reasons: tuple[int, ...]) -> None:
         """Complain once about requests that will never come."""
-        if self._earlier is not None:
-            self._earlier.subscribed(mid, reasons)
+        if self._retained_reader is not None:
+            self._retained_reader.subscribed(mid, reasons)
         if mid == self._subscription:
             self.requests_denied = bool(reasons) and reasons[0] >= REFUSED_FROM
             for topic, reason in zip((self._topics.requests, self._topics.availability), reasons, strict=False):
@@ -322,9 +322,9 @@ class Uplink:
             if message.payload == OFFLINE.encode() and not self._leaving:
                 self._heard_offline()
             return
-        if self._earlier is not None:
-            self._earlier.arrived(message)
-        if self._clearing.heard(message):
+        if self._retained_reader is not None:
+            self._retained_reader.arrived(message)
+        if self._cleanup.heard(message):
             return
         request = inbound(message, self._topics)
         if request is not None:
@@ -332,7 +332,7 @@ class Uplink:
             self._requested(request)
 
     def _ask_for_retained_requests(self) -> None:
-        if (standing := self._link.standing) is not None:
+        if (standing := self._client.standing) is not None:
             standing.subscribe([Filter(self._topics.requests)])
 
     def _heard_offline(self) -> None:
@@ -340,16 +340,16 @@ class Uplink:
         if self._outbox.announced:
             self.publish([_ONLINE])
         else:
-            self._link.missed()
+            self._client.missed()
 
     def _acknowledges_nothing(self) -> None:
-        self._link.drop("acknowledges nothing any more")
+        self._client.drop("acknowledges nothing any more")
 
     # What is left over
 
     def _clear_if_out(self) -> None:
-        if self._clearing.wanted and self._outbox.retained_out:
-            self._clearing.begin(self._link.standing)
+        if self._cleanup.wanted and self._outbox.retained_out:
+            self._cleanup.begin(self._client.standing)
 
     def _clear_orphans(self, topics: Iterable[str]) -> None:
         self.publish(telemetry.retained(topic, None) for topic in topics)

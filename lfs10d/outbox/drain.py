@@ -1,22 +1,22 @@
 """How much of the window the history takes: more the longer its backlog does not shrink. Pure.
 
-At level 1 one array is under way at a time, and the history has the weight of the live samples. Where the backlog has
-not shrunk from one look to the next though arrays were full, the level doubles, and with it the weight, up to 8, and a
-quarter, a half or all of the window may be arrays. Where an array took all that waited of its device, more would not
+At level 1 one batch is under way at a time, and the history has the weight of the live samples. Where the backlog has
+not shrunk from one look to the next though batches were full, the level doubles, and with it the weight, up to 8, and a
+quarter, a half or all of the window may be batches. Where a batch took all that waited of its device, more would not
 carry more, and the level is halved.
 
-Several arrays under way fill the buffers of a slow link, and live samples wait behind them: hence no more than needed.
+Several batches under way fill the buffers of a slow link, and live samples wait behind them: hence no more than needed.
 """
 
 from __future__ import annotations
 
 LEVEL_MOST = 8
-"""At this weight three quarters of the messages are arrays even where everything else waits too."""
+"""At this weight three quarters of the messages are batches even where everything else waits too."""
 
 LOOK_EVERY = 5.0
 """Seconds from one look at the backlog to the next, at least."""
 
-LOOK_ARRAYS = 4
+LOOK_BATCHES = 4
 """Arrays settled between two looks, at least: one more or less must not decide."""
 
 
@@ -31,26 +31,26 @@ class Drain:
         self._depth: int | None = None
         self._full = False
 
-    def arrays(self, window: int) -> int:
-        """Return how many arrays may be under way where `window` messages may."""
+    def batches(self, window: int) -> int:
+        """Return how many batches may be under way where `window` messages may."""
         return 1 if self.level == 1 else max(1, window * self.level // LEVEL_MOST)
 
     def begin(self, now: float) -> None:
-        """Begin at level 1: the past was opened."""
+        """Begin at level 1: the backlog was opened."""
         self.level = 1
         self._again(now, None)
 
     def taken(self, *, full: bool) -> None:
-        """Note that an array was taken; `full`: more of its device waits."""
+        """Note that a batch was taken; `full`: more of its device waits."""
         self._full = full
 
-    def settled(self, now: float) -> bool:
-        """Note that an array is settled; return True if `look` is to follow."""
+    def on_ack(self, now: float) -> bool:
+        """Note that a batch is settled; return True if `look` is to follow."""
         self._settled += 1
-        return now >= self._look_at and self._settled >= LOOK_ARRAYS
+        return now >= self._look_at and self._settled >= LOOK_BATCHES
 
     def look(self, now: float, depth: int) -> None:
-        """Take how many samples of the past wait, and decide."""
+        """Take how many samples of the backlog wait, and decide."""
         if not self._full:
             self.level = max(1, self.level // 2)
         elif self._depth is not None and depth >= self._depth:

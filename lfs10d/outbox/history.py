@@ -33,7 +33,7 @@ class QueuedSample:
 
     @property
     def key(self) -> Key:
-        """Device and boot: one history array holds samples of one key."""
+        """Device and boot: one history batch holds samples of one key."""
         return self.sample.device, self.sample.boot
 
     def at(self, shift: int, clock: ClockState = "synced") -> QueuedSample:
@@ -50,15 +50,15 @@ class QueuedSample:
 NONE: AbstractSet[str] = frozenset()
 
 
-def _seq(kept: QueuedSample) -> int:
-    return kept.sample.seq
+def _seq(queued: QueuedSample) -> int:
+    return queued.sample.seq
 
 
 @dataclass(slots=True)
 class History:
     """What waits; `len()` counts the samples. No sample is put here while it stands here already."""
 
-    _shelves: dict[Key, list[QueuedSample]] = field(default_factory=dict)
+    _queues: dict[Key, list[QueuedSample]] = field(default_factory=dict)
     _count: int = 0
     _repeated: int = 0
 
@@ -67,75 +67,75 @@ class History:
 
     def __contains__(self, key: Key) -> bool:
         """Tell whether a sample of this device and boot waits."""
-        return key in self._shelves
+        return key in self._queues
 
-    def add(self, kept: QueuedSample) -> None:
+    def add(self, queued: QueuedSample) -> None:
         """Put one sample in its place."""
-        shelf = self._shelves.setdefault(kept.key, [])
-        if shelf and _seq(shelf[-1]) > _seq(kept):
-            insort(shelf, kept, key=_seq)
+        queue = self._queues.setdefault(queued.key, [])
+        if queue and _seq(queue[-1]) > _seq(queued):
+            insort(queue, queued, key=_seq)
         else:
-            shelf.append(kept)
+            queue.append(queued)
         self._count += 1
-        self._repeated += kept.repeated
+        self._repeated += queued.repeated
 
     def extend(self, many: Iterable[QueuedSample]) -> None:
         """Put several in their places."""
-        for kept in many:
-            self.add(kept)
+        for queued in many:
+            self.add(queued)
 
     def put_back(self, taken: tuple[QueuedSample, ...]) -> None:
         """Put back samples of one key that were taken last: before all others of it, if that is their place."""
-        shelf = self._shelves.get(taken[0].key)
-        if shelf is None or _seq(taken[-1]) > _seq(shelf[0]):
+        queue = self._queues.get(taken[0].key)
+        if queue is None or _seq(taken[-1]) > _seq(queue[0]):
             self.extend(taken)
             return
-        shelf[:0] = taken
+        queue[:0] = taken
         self._count += len(taken)
-        self._repeated += sum(kept.repeated for kept in taken)
+        self._repeated += sum(queued.repeated for queued in taken)
 
     def waits(self, passed_over: AbstractSet[str] = NONE) -> bool:
         """Tell whether a sample waits of a device that is not `passed_over`."""
-        return any(device not in passed_over for device, _ in self._shelves)
+        return any(device not in passed_over for device, _ in self._queues)
 
     def take(self, most: int, passed_over: AbstractSet[str] = NONE) -> tuple[QueuedSample, ...]:
         """Take up to `most` samples of the key that holds the oldest, in order of seq; () where none waits.
 
         Those of devices that are `passed_over` stay.
         """
-        keys = [key for key in self._shelves if key[0] not in passed_over]
+        keys = [key for key in self._queues if key[0] not in passed_over]
         if not keys:
             return ()
-        key = min(keys, key=lambda each: self._shelves[each][0].since)
-        shelf = self._shelves[key]
-        taken = tuple(shelf[:most])
-        del shelf[:most]
-        if not shelf:
-            del self._shelves[key]
+        key = min(keys, key=lambda each: self._queues[each][0].since)
+        queue = self._queues[key]
+        taken = tuple(queue[:most])
+        del queue[:most]
+        if not queue:
+            del self._queues[key]
         self._count -= len(taken)
-        self._repeated -= sum(kept.repeated for kept in taken)
+        self._repeated -= sum(queued.repeated for queued in taken)
         return taken
 
     def evict(self) -> QueuedSample | None:
         """Make room: drop all that were acknowledged before (None), else take the oldest (None: none waits)."""
         if not self._repeated:
             return next(iter(self.take(1)), None)
-        shelves = {key: [kept for kept in shelf if not kept.repeated] for key, shelf in self._shelves.items()}
-        self._shelves = {key: shelf for key, shelf in shelves.items() if shelf}
+        queues = {key: [queued for queued in queue if not queued.repeated] for key, queue in self._queues.items()}
+        self._queues = {key: queue for key, queue in queues.items() if queue}
         self._count -= self._repeated
         self._repeated = 0
         return None
 
     def correct(self, shift: int, clock: ClockState = "synced") -> None:
         """Give all the time that the clock tells now, as `QueuedSample.at` does."""
-        for shelf in self._shelves.values():
-            shelf[:] = [kept.at(shift, clock) for kept in shelf]
+        for queue in self._queues.values():
+            queue[:] = [queued.at(shift, clock) for queued in queue]
 
     def clear(self) -> None:
         """Forget all."""
-        self._shelves.clear()
+        self._queues.clear()
         self._count = self._repeated = 0
 
     def oldest(self) -> QueuedSample | None:
         """Return the one that waits longest, None where none waits."""
-        return min((shelf[0] for shelf in self._shelves.values()), key=lambda kept: kept.since, default=None)
+        return min((queue[0] for queue in self._queues.values()), key=lambda queued: queued.since, default=None)

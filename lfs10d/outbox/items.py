@@ -1,6 +1,6 @@
-"""The letters of the outbox: what one message on its way to the broker is made of. Pure values.
+"""The items of the outbox: what one message on its way to the broker is made of. Pure values.
 
-Topics are under `B`. Two letters are never equal, whatever they say: each is one message.
+Topics are under `B`. Two items are never equal, whatever they say: each is one message.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class LiveSample:
     """A sample while it is young."""
 
     publication: Publication
-    kept: QueuedSample
+    queued: QueuedSample
 
     @property
     def topic(self) -> str:
@@ -78,11 +78,11 @@ class LossNotice:
 OutboxItem: TypeAlias = Retained | Message | LiveSample | HistoryBatch | LossNotice
 
 
-def samples_of(letter: OutboxItem) -> tuple[QueuedSample, ...]:
-    """Return the samples a letter carries."""
-    match letter:
-        case LiveSample(kept=kept):
-            return (kept,)
+def samples_of(item: OutboxItem) -> tuple[QueuedSample, ...]:
+    """Return the samples an item carries."""
+    match item:
+        case LiveSample(queued=queued):
+            return (queued,)
         case HistoryBatch(samples=samples):
             return samples
         case _:

@@ -24,12 +24,12 @@ class LiveQueue:
     def add(self, live: LiveSample) -> None:
         """Put a new sample behind those of its device."""
         self._waiting[live] = None
-        self._devices.setdefault(live.kept.sample.device, deque()).append(live)
+        self._devices.setdefault(live.queued.sample.device, deque()).append(live)
 
     def put_back(self, live: LiveSample) -> None:
         """Put a sample that did not arrive before all others."""
         self._waiting = {live: None, **self._waiting}
-        self._devices.setdefault(live.kept.sample.device, deque()).appendleft(live)
+        self._devices.setdefault(live.queued.sample.device, deque()).appendleft(live)
 
     def take(self) -> LiveSample | None:
         """Take the sample whose turn it is, None where none waits."""
@@ -48,7 +48,7 @@ class LiveQueue:
         live = self.oldest()
         if live is not None:
             del self._waiting[live]
-            device = live.kept.sample.device
+            device = live.queued.sample.device
             self._devices[device].remove(live)  # its first
             if not self._devices[device]:
                 del self._devices[device]

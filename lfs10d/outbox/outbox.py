@@ -2,30 +2,30 @@
 
 The rules (contract, section 3):
 
-1. Classes by weight (`turns`): changes of retained topics, responses and events, and live samples 8 each; the past 8,
-   and more while its backlog does not shrink (`drain`); refreshes of retained topics (newer figures, nothing else) 4;
+1. Classes by weight (`turns`): changes of retained topics, responses and events, and live samples 8 each; the backlog
+   8, and more while it does not shrink (`drain`); refreshes of retained topics (newer figures, nothing else) 4;
    traces, and what clears a retained topic, 1. The first three go before the others until the window was full; then
    all go in turn until nothing waits: each class goes on, and refreshes come less often. Within a class the oldest
    goes first; live samples device by device.
 2. Of a retained topic only the newest version waits, and no second version goes while the first is under way.
    After a connect the whole burst goes first, and everything else only after that, but for no longer than 10 s; its
    `last` (availability) goes when all of it is settled.
-3. A sample that is older than 3 s when its turn comes belongs to the past, whose rules are in `past`.
-4. A letter leaves for ever when it is settled (PUBACK). A connection lost puts all that was under way back.
+3. A sample that is older than 3 s when its turn comes belongs to the backlog, whose rules are in `past`.
+4. An item leaves for ever when it is settled (PUBACK). A connection lost puts all that was under way back.
 5. At most `capacity` samples wait in memory. Beyond that those go first that are only repeated, then the oldest,
    which are declared.
 6. What the broker refuses waits, and its topic is passed over until it is tried again, see `refusals`; the others go
-   on. Only a message that is wrong in itself is dead; an array is first cut smaller. A dead sample is declared like
+   on. Only a message that is wrong in itself is dead; a batch is first cut smaller. A dead sample is declared like
    an evicted one.
 7. What ends the connection each time is found (`suspects`), and treated like that, for an hour.
 
 ====================  =========================  ============================  ====================  ===============
-letter                settled                    connection lost               refused               unfit
+item                settled                    connection lost               refused               unfit
 ====================  =========================  ============================  ====================  ===============
 `Retained`            gone                       gone (the burst renews it),   the newest waits      gone
                                                  a clearing one waits again
 `Message`             gone                       waits again (QoS 0: gone)     waits (trace: gone)   gone
-`LiveSample`                kept 10 s for a second     waits again                   waits with the past   declared
+`LiveSample`                kept 10 s for a second     waits again                   waits with the backlog   declared
                       sending
 `HistoryBatch`               as `LiveSample`        waits again                   waits again           cut or declared
 `LossNotice`         gone                       waits again                   waits again           waits again
@@ -62,15 +62,15 @@ MESSAGES_MOST = 1000
 """Responses and events that wait while the broker is away; and traces while it is slow."""
 
 IN_FLIGHT_MOST = 20
-"""Letters under way; mosquitto's own default for `max_inflight_messages`."""
+"""Items under way; mosquitto's own default for `max_inflight_messages`."""
 
 BURST_FIRST = 10.0
 """Seconds for which a burst keeps everything else back; what follows in turn then is no smaller for it."""
 
-CHANGES, MESSAGES, LIVE, PAST, REFRESHES, TRACES, CLEARINGS = range(7)
+CHANGES, MESSAGES, LIVE, HISTORY, REFRESHES, TRACES, CLEARINGS = range(7)
 """The classes, as `Turns` numbers them."""
 
-FIRST_CLASSES = PAST
+FIRST_CLASSES = HISTORY
 """Those below go before the others while the window has room for all."""
 
 WEIGHT = 8
@@ -86,7 +86,7 @@ class Outbox:
         self._capacity = capacity
         self._window = 0  # 0: not connected
         self._under_way: dict[OutboxItem, float] = {}  # since when
-        self._retention = RetainedQueue()
+        self._retained = RetainedQueue()
         self._messages: deque[Message] = deque(maxlen=MESSAGES_MOST)
         self._live = LiveQueue()
         self._traces: deque[Message] = deque(maxlen=MESSAGES_MOST)
@@ -101,20 +101,20 @@ class Outbox:
         self.suspects = Suspects()
         """What may have ended the last connection."""
         self.telemetry = True
-        """False: samples are not taken, and what waits of the past stays where it is."""
-        self.past = Backlog(capacity=capacity, detection=detection)
+        """False: samples are not taken, and what waits of the backlog stays where it is."""
+        self.backlog = Backlog(capacity=capacity, detection=detection)
         """What is no longer live."""
         self._classes: dict[int, Callable[[float], OutboxItem | None]] = {
-            CHANGES: lambda _now: self._retention.next_change(self._refused),
+            CHANGES: lambda _now: self._retained.next_change(self._refused),
             MESSAGES: lambda _now: self._next_message(self._messages),
             LIVE: lambda _now: self._next_live(),
-            PAST: self._next_past,
-            REFRESHES: lambda _now: self._retention.next_refresh(self._refused),
+            HISTORY: self._next_history,
+            REFRESHES: lambda _now: self._retained.next_refresh(self._refused),
             TRACES: lambda _now: self._next_message(self._traces),
-            CLEARINGS: lambda _now: self._retention.next_clearing(self._refused),
+            CLEARINGS: lambda _now: self._retained.next_clearing(self._refused),
         }
         self._turns = Turns(len(self._classes))
-        self._past_may_go = True
+        self._batch_may_go = True
         self._narrow = False  # the window was full, and not everything has gone since
 
     # What comes in
@@ -133,7 +133,7 @@ class Outbox:
             self.age(now)
             self._make_room()
         elif publication.kind is PublicationKind.RETAINED:
-            if (self._window or publication.payload is None) and self._retention.add(publication):
+            if (self._window or publication.payload is None) and self._retained.add(publication):
                 self._displaced(now)
         elif publication.kind is PublicationKind.TRACE:
             if self._window:
@@ -148,16 +148,16 @@ class Outbox:
 
     def burst(self, publications: Iterable[Publication], last: Publication) -> None:
         """Send all retained topics, then `last`, then everything else."""
-        self._retention.burst(publications, last)
+        self._retained.burst(publications, last)
 
     # What happens to the connection
 
     def connected(self, now: float, *, window: int = IN_FLIGHT_MOST) -> None:
-        """Begin to send: at most `window` letters under way at once. `burst` is to follow."""
+        """Begin to send: at most `window` items under way at once. `burst` is to follow."""
         self._window = window
         self._burst_until = None
         self._congestion.connected()
-        self.past.connected(now, window)
+        self.backlog.connected(now, window)
         self._lift(self._refusals.connected(now))
 
     def lost(self, now: float, culprit: Culprit | None = None, *, denied: bool = False) -> None:
@@ -168,65 +168,65 @@ class Outbox:
         self._window = 0
         self._alone = None
         self._traces.clear()
-        self._retention.lost()
-        self.past.lost(now)
+        self._retained.lost()
+        self.backlog.lost(now)
         under_way, self._under_way = list(self._under_way), {}
         if culprit is not None:
             under_way = self._condemn(culprit, under_way, now, denied=denied)
-        for letter in reversed(under_way):
-            self._put_back(letter)
+        for item in reversed(under_way):
+            self._put_back(item)
         self._make_room()
 
     def _condemn(self, culprit: Culprit, under_way: list[OutboxItem], now: float, *, denied: bool) -> list[OutboxItem]:
         """Do away with what ended the connection; return what else was under way."""
-        guilty = [letter for letter in under_way if letter.topic == culprit.topic]
-        arrays = [letter for letter in guilty if isinstance(letter, HistoryBatch) and len(letter.samples) > 1]
-        if arrays and not denied:
-            self.past.cut_for(arrays[0], now + BANNED_FOR)
+        guilty = [item for item in under_way if item.topic == culprit.topic]
+        batches = [item for item in guilty if isinstance(item, HistoryBatch) and len(item.samples) > 1]
+        if batches and not denied:
+            self.backlog.cut_for(batches[0], now + BANNED_FOR)
             self.suspects.cut(culprit)
             return under_way
         self._refusals.ban(culprit.topic, now)
-        for letter in guilty:
-            if isinstance(letter, LiveSample):
-                self.past.history.add(letter.kept)
-            elif isinstance(letter, HistoryBatch) and not denied:
-                self.past.dead(letter)
-            elif isinstance(letter, HistoryBatch | LossNotice):
-                self.past.put_back(letter)
-        return [letter for letter in under_way if letter.topic != culprit.topic]
+        for item in guilty:
+            if isinstance(item, LiveSample):
+                self.backlog.history.add(item.queued)
+            elif isinstance(item, HistoryBatch) and not denied:
+                self.backlog.dead(item)
+            elif isinstance(item, HistoryBatch | LossNotice):
+                self.backlog.put_back(item)
+        return [item for item in under_way if item.topic != culprit.topic]
 
-    def _put_back(self, letter: OutboxItem) -> None:
-        match letter:
+    def _put_back(self, item: OutboxItem) -> None:
+        match item:
             case Retained():
-                self._retention.put_back(letter)
+                self._retained.put_back(item)
             case Message(publication=publication):
                 if publication.qos and len(self._messages) < MESSAGES_MOST:
-                    self._messages.appendleft(letter)
+                    self._messages.appendleft(item)
             case LiveSample():
-                self._live.put_back(letter)
+                self._live.put_back(item)
             case _:
-                self.past.put_back(letter)
+                self.backlog.put_back(item)
 
     # What goes out
 
-    def next(self, now: float, *, past: bool = True) -> OutboxItem | None:
+    def next(self, now: float, *, batch: bool = True) -> OutboxItem | None:
         """Take what goes next; it is under way until settled, refused, unfit or lost. None: nothing goes now.
 
-        `past`: the array before is on its way, so that another may follow.
+        `batch`: the batch before is on its way, so that another may follow.
         """
         if self._alone is not None:
             return self._next_alone()
         if len(self._under_way) >= self._window:
             self._narrow = True
             return None
-        self._past_may_go = past
-        letter = self._next(now)
-        if letter is None:
+        self._batch_may_go = batch
+        item = self._next(now)
+        if item is None:
             return None
-        self._under_way[letter] = now
-        if not self.suspects.goes_alone(letter.topic):
-            return letter
-        self._alone, self._alone_went = letter, False
+        self._under_way[item] = now
+        if not self.suspects.goes_alone(item.topic):
+            return item
+        self._alone, self._alone_went = item, False
         return self._next_alone()
 
     def _next_alone(self) -> OutboxItem | None:
@@ -239,23 +239,23 @@ class Outbox:
     def _next(self, now: float) -> OutboxItem | None:
         self._lift_due(now)
         if self._keeps_back(now):
-            retained = self._retention.next_change(self._refused)
-            if retained is not None or self._retention.first:
+            retained = self._retained.next_change(self._refused)
+            if retained is not None or self._retained.first:
                 return retained
         self.age(now)
         for number in self._turns.order(first=None if self._narrow else FIRST_CLASSES):
-            letter = self._classes[number](now)
-            if letter is None:
+            item = self._classes[number](now)
+            if item is None:
                 self._turns.passed(number)
             else:
                 self._turns.went(number, self._weight(number))
-                return letter
+                return item
         self._narrow = False
         return None
 
     def _keeps_back(self, now: float) -> bool:
         """Tell whether nothing but the burst may go now."""
-        if not self._retention.first:
+        if not self._retained.first:
             self._burst_until = None
             return False
         if self._burst_until is None:
@@ -264,40 +264,40 @@ class Outbox:
 
     def _weight(self, number: int) -> int:
         """Return the weight of a class; what is left of a burst has as much as samples and past together."""
-        bursting = self._retention.first
+        bursting = self._retained.first
         if number == CHANGES:
             return 2 * WEIGHT if bursting else WEIGHT
-        if number == PAST:
-            return WEIGHT if bursting else WEIGHT * self.past.drain.level
+        if number == HISTORY:
+            return WEIGHT if bursting else WEIGHT * self.backlog.drain.level
         if number in (MESSAGES, LIVE):
             return WEIGHT
         return REFRESH_WEIGHT if number == REFRESHES else LEAST_WEIGHT
 
     def _next_message(self, queue: deque[Message]) -> OutboxItem | None:
         while queue:
-            letter = queue.popleft()
-            if letter.topic not in self._refused:
-                return letter
-            self._wait_for_topic(letter)
+            item = queue.popleft()
+            if item.topic not in self._refused:
+                return item
+            self._wait_for_topic(item)
         return None
 
     def _next_live(self) -> OutboxItem | None:
-        while (letter := self._live.take()) is not None:
-            if letter.topic not in self._refused:
-                return letter
-            self._wait_for_topic(letter)
+        while (item := self._live.take()) is not None:
+            if item.topic not in self._refused:
+                return item
+            self._wait_for_topic(item)
         return None
 
-    def _next_past(self, now: float) -> OutboxItem | None:
+    def _next_history(self, now: float) -> OutboxItem | None:
         self._repeat(now)
-        return self.past.next(now, self._refused) if self._past_may_go and self.telemetry else None
+        return self.backlog.next(now, self._refused) if self._batch_may_go and self.telemetry else None
 
-    def _wait_for_topic(self, letter: Message | LiveSample) -> None:
-        """Let a letter wait until its topic is passed over no longer; a sample may go with the past."""
-        if isinstance(letter, LiveSample):
-            self.past.history.add(letter.kept)
-        elif letter.publication.kind is not PublicationKind.TRACE:
-            self._passed_over.append(letter)
+    def _wait_for_topic(self, item: Message | LiveSample) -> None:
+        """Let an item wait until its topic is passed over no longer; a sample may go with the backlog."""
+        if isinstance(item, LiveSample):
+            self.backlog.history.add(item.queued)
+        elif item.publication.kind is not PublicationKind.TRACE:
+            self._passed_over.append(item)
 
     def _lift_due(self, now: float) -> None:
         due = self._refusals.due()
@@ -308,81 +308,81 @@ class Outbox:
         """Try these topics again."""
         if not topics:
             return
-        self._retention.lifted(topics)
+        self._retained.lifted(topics)
         again = [message for message in self._passed_over if message.topic in topics]
         self._messages.extendleft(reversed(again))
         self._passed_over = deque((each for each in self._passed_over if each.topic not in topics), MESSAGES_MOST)
-        self.past.lifted()
+        self.backlog.lifted()
 
     @property
     def waits(self) -> bool:
         """Something may go, now or later; False: nothing before something is added."""
         if self._alone is not None:
             return True
-        return bool(self._retention or self._messages or self._live or self._traces) or self.due() is not None
+        return bool(self._retained or self._messages or self._live or self._traces) or self.due() is not None
 
     def due(self) -> float | None:
         """Return when `next` may have something though nothing happens before; None: not by time alone."""
         if self._alone is not None or len(self._under_way) >= self._window:
             return None
-        times = (self.past.due(self._refused) if self.telemetry else None, self._refusals.due())
+        times = (self.backlog.due(self._refused) if self.telemetry else None, self._refusals.due())
         return min((each for each in times if each is not None), default=None)
 
     # What became of it
 
-    def settled(self, letter: OutboxItem, now: float, *, heard: bool = True) -> None:
+    def on_ack(self, item: OutboxItem, now: float, *, heard: bool = True) -> None:
         """Note that the broker has it; `heard`: it did not say that nobody listens."""
-        if isinstance(letter, LiveSample | HistoryBatch):
-            self._congestion.answered(now - self._under_way[letter])
-        self._over(letter)
-        self._refusals.accepted(letter.topic)
+        if isinstance(item, LiveSample | HistoryBatch):
+            self._congestion.answered(now - self._under_way[item])
+        self._over(item)
+        self._refusals.accepted(item.topic)
         self._repeat(now)
-        self.past.settled(letter, now, heard=heard)
+        self.backlog.on_ack(item, now, heard=heard)
 
     def congested(self, now: float) -> Congested | None:
         """Return once what the window carries, where that is less than what is published."""
         return self._congestion.report(now, self._window)
 
-    def refused(self, letter: OutboxItem, reason: int, now: float) -> bool:
+    def refused(self, item: OutboxItem, reason: int, now: float) -> bool:
         """Note that the broker refused it, not as `UNFIT` (`refusals`); return True if its topic is to be reported."""
-        self._over(letter)
-        told = self._refusals.refused(letter.topic, reason, now)
-        match letter:
+        self._over(item)
+        told = self._refusals.refused(item.topic, reason, now)
+        match item:
             case Retained():
-                self._retention.refused(letter)
+                self._retained.refused(item)
             case Message() | LiveSample():
-                self._wait_for_topic(letter)
+                self._wait_for_topic(item)
             case HistoryBatch():
-                self.past.refused(letter)
+                self.backlog.refused(item)
             case _:
-                self.past.put_back(letter)
+                self.backlog.put_back(item)
         self._make_room()
         return told
 
-    def unfit(self, letter: OutboxItem) -> bool:
+    def unfit(self, item: OutboxItem) -> bool:
         """Note that it can never be sent as it is; return True if its topic is to be reported.
 
-        An array is cut in two and waits again, and so do the arrays after it on this connection.
+        A batch is cut in two and waits again, and so do the batches after it on this connection.
         """
-        self._over(letter)
-        if isinstance(letter, HistoryBatch) and len(letter.samples) > 1:
-            self.past.cut(letter)
+        self._over(item)
+        if isinstance(item, HistoryBatch) and len(item.samples) > 1:
+            self.backlog.cut(item)
             return False
-        self.past.dead(letter)
-        if letter.topic in self._unfit:
+        self.backlog.dead(item)
+        if item.topic in self._unfit:
             return False
-        self._unfit.add(letter.topic)
+        self._unfit.add(item.topic)
         return True
 
     def passes_over(self, topic: str) -> bool:
         """Tell whether nothing is sent to a topic now, because the broker refuses it."""
         return topic in self._refused
 
-    def shorten(self, array: HistoryBatch, count: int) -> HistoryBatch:
-        """Return an array of its first `count` samples, under way in its place; the others wait again."""
-        shorter = self.past.shorten(array, count)
-        self._under_way = {shorter if letter is array else letter: at for letter, at in self._under_way.items()}
-        if self._alone is array:
+    def shorten(self, batch: HistoryBatch, count: int) -> HistoryBatch:
+        """Return a batch of its first `count` samples, under way in its place; the others wait again."""
+        shorter = self.backlog.shorten(batch, count)
+        self._under_way = {shorter if item is batch else item: at for item, at in self._under_way.items()}
+        if self._alone is batch:
             self._alone = shorter
         return shorter
 
@@ -390,21 +390,21 @@ class Outbox:
         """Try again what was refused before, and report anew; return True if a topic was refused."""
         lifted = self._refusals.reload(now)
         self._unfit.clear()
-        self.past.reload()
+        self.backlog.reload()
         self._lift(lifted)
         return bool(lifted)
 
-    def _over(self, letter: OutboxItem) -> None:
-        del self._under_way[letter]
-        if letter is self._alone:
+    def _over(self, item: OutboxItem) -> None:
+        del self._under_way[item]
+        if item is self._alone:
             self._alone = None
-        if isinstance(letter, Retained):
-            self._retention.over(letter)
-        self.past.over(letter)
+        if isinstance(item, Retained):
+            self._retained.over(item)
+        self.backlog.over(item)
 
     def _repeat(self, now: float) -> None:
-        """Let what may have been lost at the broker wait once more, from the moment the past is opened."""
-        if self.past.repeat(now):
+        """Let what may have been lost at the broker wait once more, from the moment the backlog is opened."""
+        if self.backlog.repeat(now):
             self._make_room()
 
     # What waits
@@ -412,17 +412,17 @@ class Outbox:
     @property
     def announced(self) -> bool:
         """We are connected, and the burst and its `last` are settled."""
-        return self._window > 0 and self._retention.announced
+        return self._window > 0 and self._retained.announced
 
     @property
     def retained_out(self) -> bool:
         """We are `announced`, and no version of a retained topic waits: who asks the broker now finds the newest."""
-        return self.announced and not self._retention
+        return self.announced and not self._retained
 
     @property
     def idle(self) -> bool:
-        """Nothing is under way, and nothing but the past waits."""
-        return not (self._under_way or self._retention or self._messages or self._live)
+        """Nothing is under way, and nothing but the backlog waits."""
+        return not (self._under_way or self._retained or self._messages or self._live)
 
     @property
     def under_way(self) -> tuple[OutboxItem, ...]:
@@ -432,62 +432,62 @@ class Outbox:
     @property
     def depth(self) -> int:
         """Samples that wait or are under way, those in the store included."""
-        return self._in_memory() + self.past.stored.depth
+        return self._in_memory() + self.backlog.spool.depth
 
     @property
     def dropped(self) -> int:
         """Samples that were lost since the start, declared or not."""
-        return self.past.losses.total
+        return self.backlog.losses.total
 
     @property
-    def backlog(self) -> BacklogStats:
+    def stats(self) -> BacklogStats:
         """What `line/stats` says of it."""
-        oldest_ts = self.past.stored.oldest()
+        oldest_ts = self.backlog.spool.oldest()
         if oldest_ts is None:
             under_way = chain.from_iterable(self._under_way_alone())
-            waiting = [*under_way, *self.past.waiting(), *self._oldest_live()]
-            first = min(waiting, key=lambda kept: kept.since, default=None)
+            waiting = [*under_way, *self.backlog.waiting(), *self._oldest_live()]
+            first = min(waiting, key=lambda queued: queued.since, default=None)
             oldest_ts = first.sample.ts if first else None
         return BacklogStats(self.depth, oldest_ts, self.dropped)
 
     def _in_memory(self) -> int:
         """Return how many samples are in memory alone."""
-        return len(self._live) + len(self.past) + sum(len(samples) for samples in self._under_way_alone())
+        return len(self._live) + len(self.backlog) + sum(len(samples) for samples in self._under_way_alone())
 
     def _under_way_alone(self) -> Iterator[tuple[QueuedSample, ...]]:
-        """Return the samples under way that are not in the store, letter by letter: all of one are, or none is."""
-        for letter in self._under_way:
-            samples = samples_of(letter)
+        """Return the samples under way that are not in the store, item by item: all of one are, or none is."""
+        for item in self._under_way:
+            samples = samples_of(item)
             if samples and samples[0].row is None:
                 yield samples
 
     def _oldest_live(self) -> list[QueuedSample]:
         first = self._live.oldest()
-        return [] if first is None else [first.kept]
+        return [] if first is None else [first.queued]
 
     def next_old(self) -> float | None:
         """Return when the oldest live sample becomes history; None: there is none."""
         first = self._live.oldest()
-        return None if first is None else first.kept.since + LIVE_FOR
+        return None if first is None else first.queued.since + LIVE_FOR
 
     def age(self, now: float) -> None:
-        """Let live samples that are too old for it wait with the past."""
-        while (live := self._live.oldest()) is not None and now - live.kept.since > LIVE_FOR:
+        """Let live samples that are too old for it wait with the backlog."""
+        while (live := self._live.oldest()) is not None and now - live.queued.since > LIVE_FOR:
             self._live.take_oldest()
-            self.past.history.add(live.kept)
+            self.backlog.history.add(live.queued)
             self._displaced(now)
 
     def _make_room(self) -> None:
-        history = self.past.history
+        history = self.backlog.history
         while self._in_memory() > self._capacity and (history or self._live):
             live = None if history else self._live.take_oldest()
-            kept = history.evict() if live is None else live.kept
-            if kept is not None:
-                self.past.losses.add(kept.sample)
+            queued = history.evict() if live is None else live.queued
+            if queued is not None:
+                self.backlog.losses.add(queued.sample)
 
     def not_spilled(self, now: float) -> None:
         """Let what the store could not take wait in memory, as far as there is room."""
-        self.past.not_spilled(now)
+        self.backlog.not_spilled(now)
         self._make_room()
 
     # The clock
@@ -495,14 +495,14 @@ class Outbox:
     def correct(self, shift: int, clock: ClockState = "synced") -> None:
         """Give what waits the time that the clock tells now, as `QueuedSample.at` does; `shift` as in `add`."""
         self._live.change(lambda live: _corrected(live, shift, clock))
-        self.past.correct(shift, clock)
+        self.backlog.correct(shift, clock)
 
 
 def _corrected(live: LiveSample, shift: int, clock: ClockState) -> LiveSample:
-    kept = live.kept.at(shift, clock)
+    queued = live.queued.at(shift, clock)
     payload = live.publication.payload
-    if kept is live.kept or not isinstance(payload, dict):
+    if queued is live.queued or not isinstance(payload, dict):
         return live
-    sample = kept.sample
+    sample = queued.sample
     told = {**payload, "ts": sample.ts, "time": iso_time(sample.ts), "clock": sample.clock}
-    return LiveSample(replace(live.publication, payload=told, sample=sample), kept)
+    return LiveSample(replace(live.publication, payload=told, sample=sample), queued)

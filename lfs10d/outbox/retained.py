@@ -48,35 +48,35 @@ class RetainedQueue:
         self._wait(Retained(publication))
         return replaced
 
-    def _wait(self, letter: Retained) -> None:
-        topic, queue = letter.topic, self._changes
-        if letter.publication.payload is None:
+    def _wait(self, item: Retained) -> None:
+        topic, queue = item.topic, self._changes
+        if item.publication.payload is None:
             queue = self._clearings
-        elif letter.publication.refresh and topic not in self._changes:
+        elif item.publication.refresh and topic not in self._changes:
             queue = self._refreshes
         for other in (self._changes, self._refreshes, self._clearings):
             if other is not queue:
                 other.pop(topic, None)
-        queue[topic] = letter
+        queue[topic] = item
 
     def burst(self, publications: Iterable[Publication], last: Publication) -> None:
         """Take all topics, then `last`: within a burst a refresh is a change, for `last` waits for it."""
         for publication in publications:
-            letter = Retained(publication)
+            item = Retained(publication)
             if publication.payload is None:
-                self._wait(letter)
+                self._wait(item)
             else:
                 self._refreshes.pop(publication.topic, None)
                 self._clearings.pop(publication.topic, None)
-                self._changes[publication.topic] = letter
+                self._changes[publication.topic] = item
                 self._burst.add(publication.topic)
         self._last = self._closing = Retained(last)
 
     def next_change(self, refused: AbstractSet[str]) -> Retained | None:
         """Take the change, or the `last` of the burst, that goes next; topics the broker refuses are passed over."""
-        letter = self._take(self._changes, refused)
-        if letter is not None:
-            return letter
+        item = self._take(self._changes, refused)
+        if item is not None:
+            return item
         if self._burst or self._last is None or self._last.topic in self._under_way:
             return None
         last, self._last = self._last, None
@@ -112,19 +112,19 @@ class RetainedQueue:
         for topic in topics & self._passed_over.keys():
             self._wait_unless_newer(self._passed_over.pop(topic))
 
-    def refused(self, letter: Retained) -> None:
+    def refused(self, item: Retained) -> None:
         """Let what the broker refused wait until its topic is tried again, unless a newer version does."""
-        self._wait_unless_newer(letter)
+        self._wait_unless_newer(item)
 
-    def _wait_unless_newer(self, letter: Retained) -> None:
-        if not any(letter.topic in queue for queue in (self._changes, self._refreshes, self._clearings)):
-            self._wait(letter)
+    def _wait_unless_newer(self, item: Retained) -> None:
+        if not any(item.topic in queue for queue in (self._changes, self._refreshes, self._clearings)):
+            self._wait(item)
 
-    def over(self, letter: Retained) -> None:
-        """Note that a letter is no longer under way, settled or dead."""
-        self._under_way.discard(letter.topic)
-        self._burst.discard(letter.topic)
-        if letter is self._closing:
+    def over(self, item: Retained) -> None:
+        """Note that an item is no longer under way, settled or dead."""
+        self._under_way.discard(item.topic)
+        self._burst.discard(item.topic)
+        if item is self._closing:
             self._closing = None
 
     def lost(self) -> None:
@@ -138,7 +138,7 @@ class RetainedQueue:
             topic: each for topic, each in self._passed_over.items() if each.publication.payload is None
         }
 
-    def put_back(self, letter: Retained) -> None:
+    def put_back(self, item: Retained) -> None:
         """Let a clearing that was under way wait again, unless a newer version does."""
-        if letter.publication.payload is None:
-            self._wait_unless_newer(letter)
+        if item.publication.payload is None:
+            self._wait_unless_newer(item)

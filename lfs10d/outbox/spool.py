@@ -1,7 +1,7 @@
 """The part of the backlog that lies in the store, as far as the outbox must know it. Pure.
 
 What is in the store is older than what waits in memory, so it goes first: a page is taken into memory, leaves in
-arrays, and is followed by the next. A row stays in the store until its array is acknowledged, and 10 s longer: if
+batches, and is followed by the next. A row stays in the store until its batch is acknowledged, and 10 s longer: if
 the connection is lost in that time it is read and sent once more. Nothing of a page is put back after a loss.
 """
 
@@ -16,7 +16,7 @@ from lfs10d.outbox.history import History, QueuedSample
 from lfs10d.outbox.store.sample_file import StoredRow
 
 PAGE_ROWS = 3200
-"""Samples of a page: for up to 32 devices its arrays are full."""
+"""Samples of a page: for up to 32 devices its batches are full."""
 
 AGAIN_WITHIN = 10.0
 """Seconds before a loss of the connection whose acknowledgements are not believed (contract, section 3)."""
@@ -113,7 +113,7 @@ class Spool:
 
     # Out
 
-    def settled(self, rows: Iterable[int], now: float) -> None:
+    def on_ack(self, rows: Iterable[int], now: float) -> None:
         """Note that the broker has these."""
         self._acknowledged.append((now, tuple(rows)))
 

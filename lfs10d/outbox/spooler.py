@@ -63,8 +63,8 @@ class Spooler:
         self._first_opening = True
 
     @property
-    def _past(self) -> Backlog:
-        return self._outbox.past
+    def _backlog(self) -> Backlog:
+        return self._outbox.backlog
 
     def start(self) -> None:
         """Open the store, and begin."""
@@ -97,7 +97,7 @@ class Spooler:
         self._poked.set()
 
     def correct(self, shift: int, clock: ClockState = "synced") -> None:
-        """Give the samples of this boot the time that the clock tells now, as `Kept.at` does."""
+        """Give the samples of this boot the time that the clock tells now, as `QueuedSample.at` does."""
         self._right = (shift, clock)
         self.poke()
 
@@ -108,7 +108,7 @@ class Spooler:
 
     @property
     def _in_memory(self) -> int:
-        return self._outbox.depth - self._past.stored.depth
+        return self._outbox.depth - self._backlog.spool.depth
 
     def _now(self) -> float:
         return asyncio.get_running_loop().time()
@@ -141,14 +141,14 @@ class Spooler:
             return float("-inf"), self._take_limits
         if self._right is not None:
             return float("-inf"), self._correct
-        spill, page, release = self._past.spill_due(), self._past.page_due(), self._past.stored.release_due()
+        spill, page, release = self._backlog.spill_due(), self._backlog.page_due(), self._backlog.spool.release_due()
         choices: list[tuple[float, Callable[[], Awaitable[None]]]] = [
             (never if page is None else page, self._take_page),
             (never if release is None else release, self._release),
         ]
         if self._store.open_for_more:
             choices.append((never if spill is None else spill, self._spill))
-            old = self._outbox.next_old() if self._past.away else None
+            old = self._outbox.next_old() if self._backlog.away else None
             choices.append((self._losses_due, self._release))
             if spill is None and old is not None:
                 choices.append((max(old + NOTICED, self._now() + NOTICED), self._nothing))
@@ -156,7 +156,7 @@ class Spooler:
 
     @property
     def _losses_changed(self) -> bool:
-        return tuple(self._past.undeclared()) != self._store.losses
+        return tuple(self._backlog.undeclared()) != self._store.losses
 
     @property
     def _losses_due(self) -> float:
@@ -177,7 +177,7 @@ class Spooler:
             self._opened = False
             self._open_at = self._now() + SPILL_EVERY
             self._tell_trouble(f"{error}; {FULL_DISK}")
-        self._past.stored.told(self._store.rows, self._store.oldest_ts)
+        self._backlog.spool.told(self._store.rows, self._store.oldest_ts)
         while self._store.reports:
             report = self._store.reports.popleft()
             log.warning("the backlog %s %s; it is put aside as %s", self._store.path, report.reason, report.path.name)
@@ -202,16 +202,16 @@ class Spooler:
     async def _open(self) -> None:
         losses = await self._thread.call(self._store.open)
         self._opened = True
-        stored = self._past.stored
-        stored.told(self._store.rows, self._store.oldest_ts)
+        spool = self._backlog.spool
+        spool.told(self._store.rows, self._store.oldest_ts)
         if self._first_opening:
             self._first_opening = False
             for loss in losses:
-                self._past.losses.restore(loss)
-            if stored.rows:
-                log.info("%d samples of before wait for the broker in %s", stored.rows, self._store.path)
-        stored.more = stored.rows > 0
-        if self._past.spill_due() is None:
+                self._backlog.losses.restore(loss)
+            if spool.rows:
+                log.info("%d samples of before wait for the broker in %s", spool.rows, self._store.path)
+        spool.more = spool.rows > 0
+        if self._backlog.spill_due() is None:
             self._works()
 
     async def _take_limits(self) -> None:
@@ -227,42 +227,42 @@ class Spooler:
             self._right = None
 
     async def _spill(self) -> None:
-        stored = self._past.stored
-        entries = [StoreEntry(kept.sample, kept.shift or 0, kept.repeated) for kept in self._past.spill()]
+        spool = self._backlog.spool
+        entries = [StoreEntry(queued.sample, queued.shift or 0, queued.repeated) for queued in self._backlog.spill()]
         try:
             evicted = await self._thread.call(
                 self._store.append,
                 entries,
-                losses=self._past.undeclared(),
+                losses=self._backlog.undeclared(),
                 now=self._epoch_ms(),
                 mono=round(self._now() * 1000),
-                beyond=self._past.beyond,
-                delivered=stored.delivered,
+                beyond=self._backlog.beyond,
+                delivered=spool.delivered,
             )
         except StoreError:
             self._outbox.not_spilled(self._now())
             raise
-        stored.told(self._store.rows, self._store.oldest_ts)
-        self._past.spilled(evicted, self._now())
+        spool.told(self._store.rows, self._store.oldest_ts)
+        self._backlog.spilled(evicted, self._now())
         self._works()
         if evicted:
             log.warning("the backlog on disk has reached store.max_size or store.max_age: the oldest samples go")
         self._wake()
 
     async def _take_page(self) -> None:
-        stored = self._past.stored
-        turn = stored.turn
-        rows = await self._thread.call(self._store.read, stored.after, PAGE_ROWS)
-        if turn == stored.turn:
-            stored.take_page(rows, PAGE_ROWS)
+        spool = self._backlog.spool
+        turn = spool.turn
+        rows = await self._thread.call(self._store.read, spool.after, PAGE_ROWS)
+        if turn == spool.turn:
+            spool.take_page(rows, PAGE_ROWS)
             if self._right is not None:
-                stored.page.correct(*self._right)
+                spool.page.correct(*self._right)
             self._wake()
 
     async def _release(self) -> None:
-        rows = self._past.stored.releasing(self._now())
-        await self._thread.call(self._store.delete, rows, losses=self._past.undeclared())
-        self._past.stored.deleted(rows)
+        rows = self._backlog.spool.releasing(self._now())
+        await self._thread.call(self._store.delete, rows, losses=self._backlog.undeclared())
+        self._backlog.spool.deleted(rows)
         self._works()
 
     # The end
@@ -273,9 +273,9 @@ class Spooler:
         try:
             if not self._opened:
                 await self._open()
-            while self._store.open_for_more and self._past.spill_at_last():
+            while self._store.open_for_more and self._backlog.spill_at_last():
                 await self._spill()
-            while self._past.stored.letting_go or self._losses_changed:
+            while self._backlog.spool.letting_go or self._losses_changed:
                 await self._release()
             await self._thread.call(self._store.close)
         except StoreError as error:

@@ -1,4 +1,4 @@
-"""The link finds, keeps and leaves a broker, and says in words why it cannot."""
+"""The client finds, keeps and leaves a broker, and says in words why it cannot."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ PATIENCE = 10.0
 
 
 class Witness:
-    """Keeps what a link tells."""
+    """Keeps what a client tells."""
 
     def __init__(self) -> None:
         self.told: list[str] = []
@@ -80,22 +80,22 @@ def settings_of(port: int, **changes: object) -> BrokerSettings:
 
 
 @contextlib.asynccontextmanager
-async def linked(settings: BrokerSettings) -> AsyncIterator[tuple[BrokerClient, Witness]]:
-    """Give a link that has begun, and leave at the end."""
+async def connecting(settings: BrokerSettings) -> AsyncIterator[tuple[BrokerClient, Witness]]:
+    """Give a client that has begun, and leave at the end."""
     witness = Witness()
-    link = BrokerClient(settings, witness, chance=lambda: 1.0)
-    link.start()
+    client = BrokerClient(settings, witness, chance=lambda: 1.0)
+    client.start()
     try:
-        yield link, witness
+        yield client, witness
     finally:
-        await link.leave(1.0)
+        await client.leave(1.0)
 
 
 async def refusal(settings: BrokerSettings) -> str:
     """Return what a person is told when no connection can be made."""
-    async with linked(settings) as (link, _):
+    async with connecting(settings) as (client, _):
         with pytest.raises(BrokerError) as caught:
-            await link.opened(PATIENCE)
+            await client.opened(PATIENCE)
         return str(caught.value)
 
 
@@ -104,11 +104,11 @@ async def refusal(settings: BrokerSettings) -> str:
 
 def test_messages_go_and_come_with_all_that_belongs_to_them(mosquitto: Mosquitto) -> None:
     async def scenario() -> None:
-        async with linked(settings_of(mosquitto.port)) as (link, witness):
-            accepted = await link.opened(PATIENCE)
-            assert accepted is await link.opened(PATIENCE)
+        async with connecting(settings_of(mosquitto.port)) as (client, witness):
+            accepted = await client.opened(PATIENCE)
+            assert accepted is await client.opened(PATIENCE)
             assert accepted.version is Version.V5
-            connection = link.standing
+            connection = client.standing
             assert connection is not None
             subscription = connection.subscribe([Filter("in/#"), Filter("in/too", qos=0)])
             await witness.until(lambda: subscription in witness.subscriptions)
@@ -150,9 +150,9 @@ def test_what_is_published_under_the_cork_goes_by_one_segment_when_it_is_taken_o
             come.set()
 
     async def scenario() -> None:
-        async with serving(answer) as port, linked(settings_of(port)) as (link, _):
-            await link.opened(PATIENCE)
-            connection = link.standing
+        async with serving(answer) as port, connecting(settings_of(port)) as (client, _):
+            await client.opened(PATIENCE)
+            connection = client.standing
             assert connection is not None
             connection.cork(on=True)
             for number in range(3):
@@ -173,7 +173,7 @@ def test_a_topic_that_is_no_utf_8_is_passed_over(serving: Serving, caplog: pytes
     broker = answering(b"\x30\x05\x00\x02\xc3\x28\x00", b"\x30\x04\x00\x01t\x00")
 
     async def scenario() -> None:
-        async with serving(broker) as port, linked(settings_of(port)) as (_, witness):
+        async with serving(broker) as port, connecting(settings_of(port)) as (_, witness):
             await witness.until(lambda: bool(witness.messages))
             assert [each.topic for each in witness.messages] == ["t"]
 
@@ -186,7 +186,7 @@ def test_garbage_from_a_broker_ends_the_connection_and_no_more(
     serving: Serving, garbage: bytes, caplog: pytest.LogCaptureFixture
 ) -> None:
     async def scenario() -> None:
-        async with serving(answering(garbage)) as port, linked(settings_of(port)) as (_, witness):
+        async with serving(answering(garbage)) as port, connecting(settings_of(port)) as (_, witness):
             await witness.until(lambda: "ended" in witness.told)
 
     asyncio.run(scenario())
@@ -197,7 +197,7 @@ def test_a_reason_code_that_nobody_knows_is_an_answer_like_any_other(serving: Se
     broker = answering(b"\x40\x03\x00\x01\x95", b"\x40\x03\x00\x02\xf7", b"\xe0\x01\xd3")
 
     async def scenario() -> None:
-        async with serving(broker) as port, linked(settings_of(port)) as (_, witness):
+        async with serving(broker) as port, connecting(settings_of(port)) as (_, witness):
             await witness.until(lambda: bool(witness.endings))
             [ended] = witness.endings[:1]
             assert (ended.ending, ended.reason, ended.by_message) == (DisconnectReason.LOST, 0xD3, True)
@@ -220,7 +220,7 @@ def test_a_broker_that_answers_no_ping_is_given_up(serving: Serving, said: bytes
 
     async def scenario() -> None:
         keepalive = 1 if len(said) == 5 else 60
-        async with serving(answer) as port, linked(settings_of(port, keepalive=keepalive)) as (_, witness):
+        async with serving(answer) as port, connecting(settings_of(port, keepalive=keepalive)) as (_, witness):
             await witness.until(lambda: "ended" in witness.told)
 
     asyncio.run(scenario())
@@ -229,8 +229,8 @@ def test_a_broker_that_answers_no_ping_is_given_up(serving: Serving, said: bytes
 
 def test_a_quiet_connection_is_kept_by_pings(mosquitto: Mosquitto) -> None:
     async def scenario() -> None:
-        async with linked(settings_of(mosquitto.port, keepalive=1)) as (link, witness):
-            await link.opened(PATIENCE)
+        async with connecting(settings_of(mosquitto.port, keepalive=1)) as (client, witness):
+            await client.opened(PATIENCE)
             await asyncio.sleep(3.5)  # three times as long as a broker may wait
             assert witness.told == ["accepted"]
 
@@ -239,12 +239,12 @@ def test_a_quiet_connection_is_kept_by_pings(mosquitto: Mosquitto) -> None:
 
 def test_a_lost_connection_comes_back(mosquitto: Mosquitto, caplog: pytest.LogCaptureFixture) -> None:
     async def scenario() -> None:
-        async with linked(settings_of(mosquitto.port)) as (link, witness):
-            await link.opened(PATIENCE)
+        async with connecting(settings_of(mosquitto.port)) as (client, witness):
+            await client.opened(PATIENCE)
             mosquitto.kill()
             await witness.until(lambda: "ended" in witness.told)
-            assert link.standing is None
-            assert link.version is None
+            assert client.standing is None
+            assert client.version is None
             mosquitto.start()
             await witness.until(lambda: witness.told == ["accepted", "ended", "accepted"])
 
@@ -259,9 +259,9 @@ def test_a_lost_connection_comes_back(mosquitto: Mosquitto, caplog: pytest.LogCa
 
 def test_a_dropped_connection_is_made_anew(mosquitto: Mosquitto) -> None:
     async def scenario() -> None:
-        async with linked(settings_of(mosquitto.port)) as (link, witness):
-            await link.opened(PATIENCE)
-            link.drop("of no use")
+        async with connecting(settings_of(mosquitto.port)) as (client, witness):
+            await client.opened(PATIENCE)
+            client.drop("of no use")
             assert [ended.message for ended in witness.endings] == [f"broker 127.0.0.1:{mosquitto.port}: of no use"]
             await witness.until(lambda: len(witness.acceptances) == 2)
 
@@ -278,8 +278,8 @@ def test_a_broker_that_was_away_for_long_has_us_back_within_3_s(
     """As many attempts as fit into 10 min fail, in a second: only the return is in real time."""
 
     async def scenario() -> None:
-        async with linked(settings_of(mosquitto.port)) as (link, witness):
-            await link.opened(PATIENCE)
+        async with connecting(settings_of(mosquitto.port)) as (client, witness):
+            await client.opened(PATIENCE)
             monkeypatch.setattr("lfs10d.mqtt.reconnect.AWAY_EVERY", 0.01)
             mosquitto.kill()
             await witness.until(lambda: "ended" in witness.told)
@@ -299,18 +299,18 @@ def test_of_several_nodes_the_one_that_accepts_us_is_kept_until_it_is_gone(
     first, second = ("127.0.0.1", mosquitto.port), ("127.0.0.1", second_mosquitto.port)
 
     async def scenario() -> None:
-        async with linked(settings_of(unused_port, others=(first, second))) as (link, witness):
-            await link.opened(PATIENCE)
-            assert link.settings.port == mosquitto.port
+        async with connecting(settings_of(unused_port, others=(first, second))) as (client, witness):
+            await client.opened(PATIENCE)
+            assert client.settings.port == mosquitto.port
             mosquitto.kill()
             await witness.until(lambda: len(witness.acceptances) == 2)
-            assert link.settings.port == second_mosquitto.port
+            assert client.settings.port == second_mosquitto.port
             mosquitto.start()
             await asyncio.sleep(1.5)
-            assert link.settings.port == second_mosquitto.port
+            assert client.settings.port == second_mosquitto.port
             second_mosquitto.kill()
             await witness.until(lambda: len(witness.acceptances) == 3)
-            assert link.settings.port == mosquitto.port
+            assert client.settings.port == mosquitto.port
 
     caplog.set_level(logging.INFO, "lfs10d.mqtt.broker_client")
     asyncio.run(scenario())
@@ -326,9 +326,9 @@ def test_of_several_nodes_the_one_that_accepts_us_is_kept_until_it_is_gone(
 def test_a_verb_gives_up_when_no_node_accepts_it(unused_port: int) -> None:
     async def scenario() -> None:
         settings = settings_of(unused_port, others=(("localhost", unused_port),))
-        async with linked(settings) as (link, _):
+        async with connecting(settings) as (client, _):
             with pytest.raises(BrokerError, match=f"broker localhost:{unused_port}: connection refused"):
-                await link.opened(PATIENCE)
+                await client.opened(PATIENCE)
 
     asyncio.run(scenario())
 
@@ -342,15 +342,15 @@ def test_a_broker_that_refuses_5_is_spoken_to_in_3_1_1_with_one_warning(
 ) -> None:
     async def scenario() -> None:
         old_broker.refusal = refused_by
-        async with old_broker.running() as port, linked(settings_of(port)) as (link, witness):
-            assert (await link.opened(PATIENCE)).version is Version.V311
-            connection = link.standing
+        async with old_broker.running() as port, connecting(settings_of(port)) as (client, witness):
+            assert (await client.opened(PATIENCE)).version is Version.V311
+            connection = client.standing
             assert connection is not None
             mid = connection.publish("t", b"x", correlation=b"ignored")
             subscription = connection.subscribe([Filter("in")])
             await witness.until(lambda: mid in witness.acknowledgements and subscription in witness.subscriptions)
             assert old_broker.published == [("t", b"x")]
-            link.drop("for the test")
+            client.drop("for the test")
             await witness.until(lambda: len(witness.acceptances) == 2)
         assert old_broker.levels == [5, 4, 5, 4]
 
@@ -361,8 +361,8 @@ def test_a_broker_that_refuses_5_is_spoken_to_in_3_1_1_with_one_warning(
 def test_3_1_1_is_spoken_at_once_where_configured(old_broker: OldBroker, caplog: pytest.LogCaptureFixture) -> None:
     async def scenario() -> None:
         settings = {"version": Version.V311}
-        async with old_broker.running() as port, linked(settings_of(port, **settings)) as (link, _):
-            await link.opened(PATIENCE)
+        async with old_broker.running() as port, connecting(settings_of(port, **settings)) as (client, _):
+            await client.opened(PATIENCE)
         assert old_broker.levels == [4]
 
     asyncio.run(scenario())
@@ -374,9 +374,9 @@ def test_a_broker_that_tells_of_the_takeover_is_believed_at_once(
 ) -> None:
     async def scenario() -> None:
         broker = answering(b"\xe0\x02\x8e\x00")
-        async with serving(broker) as port, linked(settings_of(port)) as (link, witness):
+        async with serving(broker) as port, connecting(settings_of(port)) as (client, witness):
             await witness.until(lambda: "ended" in witness.told)
-            assert link.duplicate
+            assert client.duplicate
 
     asyncio.run(scenario())
     assert "another client has connected with our client id" in caplog.text
@@ -405,9 +405,9 @@ def test_the_password_is_read_at_each_connect(
 
     async def scenario() -> None:
         settings = settings_of(mosquitto.port, username="gate", password=lambda: Secret(next(passwords)))
-        async with linked(settings) as (link, witness):
+        async with connecting(settings) as (client, witness):
             with pytest.raises(BrokerError, match="not authorized: check"):
-                await link.opened(PATIENCE)
+                await client.opened(PATIENCE)
             await witness.until(lambda: bool(witness.acceptances))
 
     asyncio.run(scenario())
@@ -439,9 +439,9 @@ def test_tls_with_the_right_authority_connects(mosquitto: Mosquitto, authority: 
 
     async def scenario() -> None:
         settings = settings_of(mosquitto.port, host="localhost", tls=Tls(ca=authority.ca))
-        async with linked(settings) as (link, witness):
-            await link.opened(PATIENCE)
-            connection = link.standing
+        async with connecting(settings) as (client, witness):
+            await client.opened(PATIENCE)
+            connection = client.standing
             assert connection is not None
             mid = connection.publish("t", b"x" * 100_000)
             await witness.until(lambda: mid in witness.acknowledgements)
@@ -455,8 +455,8 @@ def test_tls_with_a_certificate_of_our_own_connects(mosquitto: Mosquitto, author
 
     async def scenario() -> None:
         tls = Tls(authority.ca, certificate, key)
-        async with linked(settings_of(mosquitto.port, host="localhost", tls=tls)) as (link, _):
-            await link.opened(PATIENCE)
+        async with connecting(settings_of(mosquitto.port, host="localhost", tls=tls)) as (client, _):
+            await client.opened(PATIENCE)
 
     asyncio.run(scenario())
 
@@ -539,12 +539,12 @@ def black_hole() -> Iterator[int]:
 def test_a_host_that_swallows_everything_holds_up_neither_the_loop_nor_the_end() -> None:
     async def scenario(port: int) -> float:
         witness = Witness()
-        link = BrokerClient(settings_of(port), witness)
-        link.start()
+        client = BrokerClient(settings_of(port), witness)
+        client.start()
         began = time.monotonic()
         with pytest.raises(BrokerError, match=r"no answer within 0\.2 s"):
-            await link.opened(0.2)
-        await link.leave(1.0)
+            await client.opened(0.2)
+        await client.leave(1.0)
         return time.monotonic() - began
 
     with black_hole() as port:
@@ -559,9 +559,9 @@ def test_what_is_given_up_before_it_was_open_never_speaks_to_the_broker(mosquitt
         return Secret("x")
 
     async def scenario() -> None:
-        link = BrokerClient(settings_of(mosquitto.port, username="gate", password=password), Witness())
-        link.start()
-        await link.leave(1.0)
+        client = BrokerClient(settings_of(mosquitto.port, username="gate", password=password), Witness())
+        client.start()
+        await client.leave(1.0)
         given_up.set()
         for each in threading.enumerate():
             if each.name.startswith(("connect", "paho")):
@@ -573,14 +573,14 @@ def test_what_is_given_up_before_it_was_open_never_speaks_to_the_broker(mosquitt
 
 def test_waiters_are_all_told_and_a_late_one_is_told_no_more(mosquitto: Mosquitto) -> None:
     async def scenario() -> None:
-        link = BrokerClient(settings_of(mosquitto.port), Witness())
+        client = BrokerClient(settings_of(mosquitto.port), Witness())
         with pytest.raises(BrokerError):
-            await link.opened(0.0)
-        early = asyncio.create_task(link.opened(PATIENCE))
+            await client.opened(0.0)
+        early = asyncio.create_task(client.opened(PATIENCE))
         await asyncio.sleep(0)
-        link.start()
-        assert await early is await link.opened(PATIENCE)
-        await link.leave(1.0)
+        client.start()
+        assert await early is await client.opened(PATIENCE)
+        await client.leave(1.0)
 
     asyncio.run(scenario())
 
@@ -596,10 +596,10 @@ def test_a_server_that_says_nothing_holds_up_nothing_either(serving: Serving) ->
             gone.set()
 
         async with serving(silent) as port:
-            link = BrokerClient(settings_of(port), Witness())
-            link.start()
+            client = BrokerClient(settings_of(port), Witness())
+            client.start()
             await asyncio.wait_for(heard.wait(), PATIENCE)
-            await link.leave(1.0)
+            await client.leave(1.0)
             await asyncio.wait_for(gone.wait(), PATIENCE)
 
     asyncio.run(scenario())

@@ -43,7 +43,7 @@ def test_what_json_does_not_have_is_refused(number: float) -> None:
 
 
 @given(st.lists(st.dictionaries(st.text(max_size=3), st.integers(), max_size=3), max_size=5))
-def test_an_array_of_encoded_elements_is_the_encoded_array(elements: list[dict[str, object]]) -> None:
+def test_a_batch_of_encoded_elements_is_the_encoded_batch(elements: list[dict[str, object]]) -> None:
     assert json.loads(array(encode(each) for each in elements)) == elements
 
 

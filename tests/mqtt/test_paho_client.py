@@ -48,13 +48,13 @@ class Taker:
     """Takes what a connection tells, and subscribes."""
 
     def __init__(self) -> None:
-        self.link: BrokerClient
+        self.client: BrokerClient
         self.messages: list[Incoming] = []
         self.endings: list[Disconnect] = []
         self.come = asyncio.Event()
 
     def accepted(self, _: Accepted) -> None:
-        standing = self.link.standing
+        standing = self.client.standing
         assert standing is not None
         standing.subscribe([Filter("t")])
 
@@ -119,8 +119,8 @@ def test_a_payload_of_any_size_comes_cut_is_acknowledged_and_followed_by_the_nex
     async def scenario() -> None:
         async with serving(answer) as port:
             taker = Taker()
-            taker.link = BrokerClient(BrokerSettings("127.0.0.1", port, "me", version), taker)
-            taker.link.start()
+            taker.client = BrokerClient(BrokerSettings("127.0.0.1", port, "me", version), taker)
+            taker.client.start()
             with contextlib.suppress(TimeoutError):
                 await taker.until(lambda: len(taker.messages) == 3 or bool(taker.endings))
             assert not taker.endings
@@ -129,7 +129,7 @@ def test_a_payload_of_any_size_comes_cut_is_acknowledged_and_followed_by_the_nex
             assert sizes == [LARGEST_PACKET - variable, LARGEST_PACKET - variable, 5]
             async with asyncio.timeout(5.0):
                 await done.wait()
-            await taker.link.leave(0.1)
+            await taker.client.leave(0.1)
 
     asyncio.run(scenario())
     for mid in (1, 2, 3):
@@ -160,11 +160,11 @@ def test_why_a_connection_ended_is_told(serving: Serving, bytes_said: bytes, wor
     async def scenario() -> None:
         async with serving(answer) as port:
             taker = Taker()
-            taker.link = BrokerClient(BrokerSettings("127.0.0.1", port, "me"), taker)
-            taker.link.start()
+            taker.client = BrokerClient(BrokerSettings("127.0.0.1", port, "me"), taker)
+            taker.client.start()
             await taker.until(lambda: bool(taker.endings))
             assert taker.endings[0].message.startswith(f"broker 127.0.0.1:{port}: {words}")
-            await taker.link.leave(0.1)
+            await taker.client.leave(0.1)
 
     asyncio.run(scenario())
 
@@ -186,8 +186,8 @@ def test_a_retained_message_of_qos_0_comes_whole_with_properties_or_without(serv
     async def scenario() -> None:
         async with serving(answer) as port:
             taker = Taker()
-            taker.link = BrokerClient(BrokerSettings("127.0.0.1", port, "me", version), taker)
-            taker.link.start()
+            taker.client = BrokerClient(BrokerSettings("127.0.0.1", port, "me", version), taker)
+            taker.client.start()
             await taker.until(lambda: bool(taker.endings))
             assert taker.messages == [
                 Incoming("t", b"hi", retained=True),
@@ -195,7 +195,7 @@ def test_a_retained_message_of_qos_0_comes_whole_with_properties_or_without(serv
                 Incoming("t", b"", retained=True),
             ]
             assert "malformed" in taker.endings[0].message
-            await taker.link.leave(0.1)
+            await taker.client.leave(0.1)
 
     asyncio.run(scenario())
 

@@ -1,4 +1,4 @@
-"""Letters reach a connection in slices, and the broker's answers reach the outbox; in virtual time."""
+"""Items reach a connection in slices, and the broker's answers reach the outbox; in virtual time."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ import pytest
 from lfs10d.mqtt.connection import Connection
 from lfs10d.mqtt.messages import Accepted
 from lfs10d.mqtt.reasons import NO_MATCHING_SUBSCRIBERS, Disconnect, DisconnectReason, reason_in_words
-from lfs10d.mqtt.sender import ACKNOWLEDGED_WITHIN, LETTERS_AT_ONCE, SAMPLES_AT_ONCE, Sender
+from lfs10d.mqtt.sender import ACKNOWLEDGED_WITHIN, ITEMS_AT_ONCE, SAMPLES_AT_ONCE, Sender
 from lfs10d.mqtt.settings import Version
 from lfs10d.mqtt.topics import Topics
-from lfs10d.outbox.backlog import ARRAY_BYTES, PAST_AFTER
+from lfs10d.outbox.backlog import BATCH_BYTES, HISTORY_AFTER
 from lfs10d.outbox.outbox import Outbox
 from lfs10d.telemetry.publication import Publication, PublicationKind, Sample, event, retained
 
@@ -73,13 +73,13 @@ class Wire:
 
 
 class Desk:
-    """A dispatch between an outbox and a wire, connected, its burst settled."""
+    """A sender between an outbox and a wire, connected, its burst settled."""
 
     def __init__(self, *, limit: int | None = None, receive_maximum: int = 65_535) -> None:
         self.outbox = Outbox()
         self.wire = Wire()
         self.stuck = 0
-        self.dispatch = Sender(self.outbox, Topics("b/line0"), "line0", epoch_ms=lambda: 7, stuck=self._stuck)
+        self.sender = Sender(self.outbox, Topics("b/line0"), "line0", epoch_ms=lambda: 7, stuck=self._stuck)
         self.accepted = Accepted(Version.V5, receive_maximum, limit)
 
     def _stuck(self) -> None:
@@ -87,14 +87,14 @@ class Desk:
 
     async def connect(self) -> None:
         connection: Connection = self.wire  # type: ignore[assignment]  # as much of one as is used
-        self.dispatch.connected(connection, self.accepted)
+        self.sender.connected(connection, self.accepted)
         self.outbox.burst([], ONLINE)
         await self.turn()
         self.acknowledge()
 
     async def turn(self, times: int = 50) -> None:
         """Let the loop turn without time passing."""
-        self.dispatch.wake()
+        self.sender.wake()
         for _ in range(times):
             await asyncio.sleep(0)
         assert not self.wire.corked, "what is handed over goes"
@@ -102,12 +102,12 @@ class Desk:
     def acknowledge(self, reason: int = 0) -> None:
         """Answer everything that was handed over."""
         for mid in range(1, len(self.wire.sent) + 1):
-            self.dispatch.acknowledged(mid, reason)
+            self.sender.acknowledged(mid, reason)
 
     def accept(self, topic: str) -> None:
         """Acknowledge what was handed over for one topic last."""
         mid = max(mid for mid, each in enumerate(self.topics, 1) if each == f"b/line0/{topic}")
-        self.dispatch.acknowledged(mid, 0)
+        self.sender.acknowledged(mid, 0)
 
     def add(self, *publications: Publication) -> None:
         for publication in publications:
@@ -135,12 +135,12 @@ def test_a_sample_that_nobody_listened_to_after_the_first_connect_goes_once_more
         desk.acknowledge()
         await asyncio.sleep(11.0)
         history = [json.loads(payload) for topic, payload, *_ in desk.wire.sent if topic.endswith("/history")]
-        assert [[one["seq"] for one in array] for array in history] == [[1]]
+        assert [[one["seq"] for one in batch] for batch in history] == [[1]]
 
     in_virtual_time(scenario())
 
 
-def test_a_letter_goes_with_its_topic_qos_retain_flag_and_correlation() -> None:
+def test_an_item_goes_with_its_topic_qos_retain_flag_and_correlation() -> None:
     async def scenario() -> None:
         desk = Desk()
         await desk.connect()
@@ -158,18 +158,18 @@ def test_a_letter_goes_with_its_topic_qos_retain_flag_and_correlation() -> None:
     in_virtual_time(scenario())
 
 
-def test_a_few_letters_go_in_one_turn_of_the_loop() -> None:
+def test_a_few_items_go_in_one_turn_of_the_loop() -> None:
     async def scenario() -> None:
         desk = Desk()
         await desk.connect()
         desk.add(*(sample(seq) for seq in range(1, 11)))
         before = len(desk.wire.sent)
-        desk.dispatch.wake()
+        desk.sender.wake()
         counts = [len(desk.wire.sent) - before]
         for _ in range(2):
             await asyncio.sleep(0)
             counts.append(len(desk.wire.sent) - before)
-        assert counts == [LETTERS_AT_ONCE, 2 * LETTERS_AT_ONCE, 10]
+        assert counts == [ITEMS_AT_ONCE, 2 * ITEMS_AT_ONCE, 10]
 
     in_virtual_time(scenario())
 
@@ -186,13 +186,13 @@ def test_no_more_is_under_way_than_the_broker_receives(receive_maximum: int, win
     in_virtual_time(scenario())
 
 
-def test_an_array_is_serialised_in_slices_and_goes_by_itself_when_its_time_has_come() -> None:
+def test_a_batch_is_serialised_in_slices_and_goes_by_itself_when_its_time_has_come() -> None:
     async def scenario() -> None:
         desk = Desk()
         desk.add(*(sample(seq) for seq in range(1, 101)))
         await asyncio.sleep(5.0)
         await desk.connect()
-        await asyncio.sleep(PAST_AFTER - 0.1)
+        await asyncio.sleep(HISTORY_AFTER - 0.1)
         assert desk.topics == ["b/line0/availability"]
         await asyncio.sleep(0.2)
         await desk.turn(2 + 100 // SAMPLES_AT_ONCE)
@@ -201,23 +201,23 @@ def test_an_array_is_serialised_in_slices_and_goes_by_itself_when_its_time_has_c
         assert [each["seq"] for each in told] == list(range(1, len(told) + 1))
         assert all(each["historical"] for each in told)
         size = len(desk.wire.sent[1][1])
-        assert ARRAY_BYTES - size / len(told) < size <= ARRAY_BYTES
+        assert BATCH_BYTES - size / len(told) < size <= BATCH_BYTES
         for _ in range(20):
             await asyncio.sleep(0.2)
             desk.acknowledge()
         rest = [json.loads(payload) for topic, payload, *_ in desk.wire.sent if topic.endswith("history")]
-        assert [each["seq"] for array in rest for each in array] == list(range(1, 101))
+        assert [each["seq"] for batch in rest for each in batch] == list(range(1, 101))
 
     in_virtual_time(scenario())
 
 
-def test_live_samples_pass_an_array_that_is_still_being_serialised() -> None:
+def test_live_samples_pass_a_batch_that_is_still_being_serialised() -> None:
     async def scenario() -> None:
         desk = Desk()
         desk.add(*(sample(seq) for seq in range(1, 101)))
         await asyncio.sleep(5.0)
         await desk.connect()
-        await asyncio.sleep(PAST_AFTER)
+        await asyncio.sleep(HISTORY_AFTER)
         await desk.turn(1)
         desk.add(sample(101))
         await desk.turn()
@@ -226,15 +226,15 @@ def test_live_samples_pass_an_array_that_is_still_being_serialised() -> None:
     in_virtual_time(scenario())
 
 
-def test_an_array_whose_connection_is_lost_while_it_is_serialised_waits_again() -> None:
+def test_a_batch_whose_connection_is_lost_while_it_is_serialised_waits_again() -> None:
     async def scenario() -> None:
         desk = Desk()
         desk.add(*(sample(seq) for seq in range(1, 101)))
         await asyncio.sleep(5.0)
         await desk.connect()
-        await asyncio.sleep(PAST_AFTER)
+        await asyncio.sleep(HISTORY_AFTER)
         await desk.turn(1)
-        desk.dispatch.lost(LOST)
+        desk.sender.lost(LOST)
         await desk.turn()
         assert desk.topics == ["b/line0/availability"]
         assert desk.outbox.depth == 100
@@ -242,7 +242,7 @@ def test_an_array_whose_connection_is_lost_while_it_is_serialised_waits_again() 
     in_virtual_time(scenario())
 
 
-def test_arrays_too_large_for_the_broker_are_cut_until_they_fit() -> None:
+def test_batches_too_large_for_the_broker_are_cut_until_they_fit() -> None:
     async def scenario() -> None:
         desk = Desk(limit=2000)
         desk.add(*(sample(seq) for seq in range(1, 41)))
@@ -252,7 +252,7 @@ def test_arrays_too_large_for_the_broker_are_cut_until_they_fit() -> None:
             await asyncio.sleep(0.5)
             desk.acknowledge()
         told = [json.loads(payload) for topic, payload, *_ in desk.wire.sent if topic.endswith("history")]
-        assert [each["seq"] for array in told for each in array] == list(range(1, 41))
+        assert [each["seq"] for batch in told for each in batch] == list(range(1, 41))
         assert all(len(payload) < 2000 for _, payload, *_ in desk.wire.sent)
         assert desk.outbox.depth == 0
 
@@ -266,7 +266,7 @@ def test_what_is_lost_is_declared_with_the_wall_clock() -> None:
         desk.add(sample(1))
         await desk.turn()
         desk.acknowledge(0x99)
-        await asyncio.sleep(PAST_AFTER + 1)
+        await asyncio.sleep(HISTORY_AFTER + 1)
         assert json.loads(desk.wire.sent[-1][1]) == {
             "v": 1, "type": "dropped", "ts": 7, "device": "a", "boot": "k", "from_seq": 1, "to_seq": 1, "count": 1,
         }  # fmt: skip
@@ -295,7 +295,7 @@ def test_what_the_connection_does_not_take_any_more_waits_for_the_next() -> None
         desk.wire.gone = True
         desk.add(sample(1))
         await desk.turn()
-        desk.dispatch.lost(LOST)
+        desk.sender.lost(LOST)
         desk.wire.gone = False
         await desk.connect()
         await desk.turn()
@@ -308,7 +308,7 @@ def test_an_answer_to_nothing_is_passed_over() -> None:
     async def scenario() -> None:
         desk = Desk()
         await desk.connect()
-        desk.dispatch.acknowledged(4711, 0x87)
+        desk.sender.acknowledged(4711, 0x87)
         assert desk.outbox.announced
 
     in_virtual_time(scenario())
@@ -319,10 +319,10 @@ def test_an_answer_to_nothing_is_passed_over() -> None:
 
 async def again(desk: Desk, ended: Disconnect) -> None:
     """End the connection and make another, on which nothing but the burst is acknowledged yet."""
-    desk.dispatch.lost(ended)
+    desk.sender.lost(ended)
     desk.wire = Wire()
     connection: Connection = desk.wire  # type: ignore[assignment]  # as much of one as is used
-    desk.dispatch.connected(connection, desk.accepted)
+    desk.sender.connected(connection, desk.accepted)
     desk.outbox.burst([], ONLINE)
     await desk.turn()
     desk.accept("availability")
@@ -368,7 +368,7 @@ def test_what_was_under_way_at_two_ends_is_named_with_its_size_and_the_rest_goes
         for _ in range(2):
             desk.add(event("scan_progress", 0))
             await desk.turn()
-            assert desk.dispatch.under_way.keys() == {"event"}
+            assert desk.sender.under_way.keys() == {"event"}
             await again(desk, BY_MESSAGE)
         desk.add(event("scan_progress", 0), sample(1))
         await desk.turn()
@@ -382,20 +382,20 @@ def test_what_was_under_way_at_two_ends_is_named_with_its_size_and_the_rest_goes
     )
 
 
-def test_an_array_that_ends_connections_is_sent_in_smaller_parts(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_batch_that_ends_connections_is_sent_in_smaller_parts(caplog: pytest.LogCaptureFixture) -> None:
     async def scenario() -> None:
         desk = Desk()
         desk.add(*(sample(seq) for seq in range(1, 9)))
         await asyncio.sleep(5.0)
         await desk.connect()
         for _ in range(3):
-            await asyncio.sleep(PAST_AFTER + 0.1)
+            await asyncio.sleep(HISTORY_AFTER + 0.1)
             await again(desk, BY_MESSAGE)
         for _ in range(40):
             await asyncio.sleep(0.5)
             desk.acknowledge()
         told = [json.loads(payload) for topic, payload, *_ in desk.wire.sent if topic.endswith("history")]
-        assert [[each["seq"] for each in array] for array in told] == [[1, 2], [3, 4], [5, 6], [7, 8]]
+        assert [[each["seq"] for each in batch] for batch in told] == [[1, 2], [3, 4], [5, 6], [7, 8]]
         assert desk.outbox.dropped == 0
 
     in_virtual_time(scenario())
@@ -411,12 +411,12 @@ def test_a_denied_publication_is_found_though_others_were_under_way(caplog: pyte
         burst = [retained(topic, {}) for topic in ("info", "devices", "device/a/state")]
         for ends in range(2):
             desk.wire.sent.clear()
-            desk.dispatch.connected(connection, desk.accepted)
+            desk.sender.connected(connection, desk.accepted)
             desk.outbox.burst(burst, ONLINE)
             await desk.turn()
             assert len(desk.wire.sent) == (3, 1)[ends], "after the first end each goes alone"
-            desk.dispatch.lost(DENIED)
-        desk.dispatch.connected(connection, desk.accepted)
+            desk.sender.lost(DENIED)
+        desk.sender.connected(connection, desk.accepted)
         desk.outbox.burst(burst, ONLINE)
         for _ in range(4):
             await desk.turn()
@@ -437,7 +437,7 @@ def test_a_message_of_qos_0_that_ends_connections_is_found(caplog: pytest.LogCap
             desk.add(retained("device/a/stats", {}, qos=0))
             await desk.turn()
             desk.accept("device/a/stats")  # it was written
-            assert desk.dispatch.explains_end is explained
+            assert desk.sender.explains_end is explained
             await again(desk, BY_MESSAGE)
         desk.outbox.reload(0.0)
         desk.outbox.suspects.ended({"device/a/stats": 2}, certain=True)
@@ -455,12 +455,12 @@ def test_a_message_of_qos_0_is_cleared_by_the_acknowledgement_of_a_later_one() -
         await desk.connect()
         desk.add(retained("device/a/stats", {}, qos=0))
         await desk.turn()
-        desk.dispatch.acknowledged(2, 0)
-        assert desk.dispatch.under_way == {"device/a/stats": 2}
+        desk.sender.acknowledged(2, 0)
+        assert desk.sender.under_way == {"device/a/stats": 2}
         desk.add(sample(1))
         await desk.turn()
-        desk.dispatch.acknowledged(3, 0)
-        assert desk.dispatch.under_way == {}
+        desk.sender.acknowledged(3, 0)
+        assert desk.sender.under_way == {}
 
     in_virtual_time(scenario())
 
@@ -498,7 +498,7 @@ def test_a_connection_that_the_network_ends_accuses_nobody() -> None:
     in_virtual_time(scenario())
 
 
-def test_a_sample_larger_than_an_array_may_be_goes_alone() -> None:
+def test_a_sample_larger_than_a_batch_may_be_goes_alone() -> None:
     async def scenario() -> None:
         desk = Desk(limit=2000)
         long = Sample("a", "k", 1, 0, "synced", None, {}, (), "bad", "x" * 1700, None)
@@ -511,6 +511,6 @@ def test_a_sample_larger_than_an_array_may_be_goes_alone() -> None:
             await asyncio.sleep(0.5)
             desk.acknowledge()
         told = [json.loads(payload) for topic, payload, *_ in desk.wire.sent if topic.endswith("history")]
-        assert [[each["seq"] for each in array] for array in told] == [[1], [2]]
+        assert [[each["seq"] for each in batch] for batch in told] == [[1], [2]]
 
     in_virtual_time(scenario())

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 
-from lfs10d.outbox.backlog import ARRAY_MOST, PAST_AFTER, SAMPLE_EVERY, TURN_EVERY
+from lfs10d.outbox.backlog import BATCH_MOST, HISTORY_AFTER, SAMPLE_EVERY, TURN_EVERY
 from lfs10d.outbox.drain import LEVEL_MOST
 from lfs10d.outbox.items import HistoryBatch, LiveSample, Message, OutboxItem, Retained, samples_of
 from lfs10d.outbox.outbox import BURST_FIRST, IN_FLIGHT_MOST, LEAST_WEIGHT, REFRESH_WEIGHT, WEIGHT, Outbox
@@ -22,7 +22,7 @@ from lfs10d.telemetry.publication import Publication, PublicationKind, Sample
 
 ONLINE = publication.retained("availability", "online")
 WEIGHTS = 3 * WEIGHT + WEIGHT * LEVEL_MOST + REFRESH_WEIGHT + 2 * LEAST_WEIGHT
-"""The sum of all weights at the highest level of the past."""
+"""The sum of all weights at the highest level of the backlog."""
 
 
 def sample(device: str, seq: int) -> Publication:
@@ -43,7 +43,7 @@ class Uplink:
     devices: int
     interval: float = 1.0
     events_every: float = 5.0
-    array_most: int = ARRAY_MOST
+    batch_most: int = BATCH_MOST
     outbox: Outbox = field(default_factory=lambda: Outbox(capacity=1_000_000))
     now: float = 0.0
     seqs: dict[str, int] = field(default_factory=dict)
@@ -74,7 +74,7 @@ class Uplink:
     def connect(self, burst: int = 4) -> None:
         """Connect; the burst has this many topics of each device."""
         self.outbox.connected(self.now, window=min(self.window, IN_FLIGHT_MOST))
-        self.outbox.past._array_most = self.array_most
+        self.outbox.backlog._batch_most = self.batch_most
         topics = [publication.device_topic(device, f"leaf{leaf}") for device in self.seqs for leaf in range(burst)]
         self.outbox.burst([publication.retained(topic, {}) for topic in topics], ONLINE)
 
@@ -116,26 +116,26 @@ class Uplink:
                 self.outbox.add(publication.event("scan_progress", 0), self.now)
 
     def _send(self) -> None:
-        while (letter := self.outbox.next(self.now)) is not None:
-            heapq.heappush(self.acknowledgements, (self.now + self.round_trip, next(self._numbers), letter))
+        while (item := self.outbox.next(self.now)) is not None:
+            heapq.heappush(self.acknowledgements, (self.now + self.round_trip, next(self._numbers), item))
         under_way = self.outbox.under_way
         assert len(under_way) <= min(self.window, IN_FLIGHT_MOST)
         self.most_under_way = max(self.most_under_way, sum(isinstance(each, HistoryBatch) for each in under_way))
 
-    def _acknowledge(self, letter: OutboxItem) -> None:
-        self.outbox.settled(letter, self.now)
+    def _acknowledge(self, item: OutboxItem) -> None:
+        self.outbox.on_ack(item, self.now)
         if self.outbox.congested(self.now) is not None:
             self.warned.append(self.now)
-        topic = letter.topic
-        self.events += isinstance(letter, Message)
+        topic = item.topic
+        self.events += isinstance(item, Message)
         if topic in self.asked:
             self.changes[topic] = max(self.changes.get(topic, 0.0), self.now - self.asked.pop(topic))
         self.longest[topic] = max(self.longest.get(topic, 0.0), self.now - self.last.get(topic, self.now))
         self.last[topic] = self.now
-        for kept in samples_of(letter):
-            seqs = self.arrived[kept.sample.device]
-            self.twice += kept.sample.seq in seqs
-            seqs.add(kept.sample.seq)
+        for queued in samples_of(item):
+            seqs = self.arrived[queued.sample.device]
+            self.twice += queued.sample.seq in seqs
+            seqs.add(queued.sample.seq)
 
     @property
     def rate(self) -> float:
@@ -181,7 +181,7 @@ def test_no_class_and_no_device_waits_longer_than_its_bound(round_trip: float, w
     seconds = max(30.0, 1.2 * states + 10.0)
     uplink = Uplink(round_trip, window, devices, interval=max(0.25, seconds * devices / POLLS))
     uplink.connect(burst=0)
-    uplink.run(PAST_AFTER)
+    uplink.run(HISTORY_AFTER)
     uplink.last = dict.fromkeys(uplink.last, uplink.now)
     uplink.longest.clear()
     uplink.change("line/error")
@@ -190,9 +190,9 @@ def test_no_class_and_no_device_waits_longer_than_its_bound(round_trip: float, w
     for device in uplink.seqs:
         for leaf, bound in ((publication.STATE, states), (publication.TELEMETRY, live)):
             topic = publication.device_topic(device, leaf)
-            since = uplink.now - uplink.last.get(topic, PAST_AFTER)
+            since = uplink.now - uplink.last.get(topic, HISTORY_AFTER)
             assert max(uplink.longest.get(topic, 0.0), since) <= bound + 2 * uplink.interval + uplink.round_trip, topic
-    since = uplink.now - uplink.last.get(publication.EVENT, PAST_AFTER)
+    since = uplink.now - uplink.last.get(publication.EVENT, HISTORY_AFTER)
     assert max(since, uplink.longest[publication.EVENT]) <= wait.of(WEIGHT, 2) + uplink.events_every + round_trip
 
 
@@ -200,17 +200,17 @@ def test_no_class_and_no_device_waits_longer_than_its_bound(round_trip: float, w
     ("round_trip", "window", "devices"),
     [(3.0, 1, 7), (3.0, 2, 16), (1.0, 3, 75), (0.2, 1, 32)],
 )
-def test_the_backlog_shrinks_where_arrays_in_three_quarters_of_the_window_carry_more_than_is_measured(
+def test_the_backlog_shrinks_where_batches_in_three_quarters_of_the_window_carry_more_than_is_measured(
     round_trip: float, window: int, devices: int
 ) -> None:
     """Arrays of 35 samples are what 8 KB holds."""
-    uplink = Uplink(round_trip, window, devices, array_most=35)
+    uplink = Uplink(round_trip, window, devices, batch_most=35)
     assert uplink.rate * 35 * 0.75 > devices
     for _ in range(60):  # a minute away
         for device in uplink.seqs:
             uplink.measure(device)
     uplink.connect(burst=0)
-    uplink.run(300.0)  # until the past has as much of the window as it needs
+    uplink.run(300.0)  # until the backlog has as much of the window as it needs
     depth = uplink.outbox.depth
     uplink.run(300.0)
     assert uplink.outbox.depth < max(depth, 36 * devices)
@@ -233,13 +233,13 @@ def test_everything_measured_arrives_within_seconds_and_one_warning_says_what_th
     assert len(uplink.warned) == 1
 
 
-def test_an_array_goes_every_two_seconds_whatever_the_round_trip() -> None:
+def test_a_batch_goes_every_two_seconds_whatever_the_round_trip() -> None:
     uplink = Uplink(3.0, 20, 20)
     for _ in range(10):
         for device in uplink.seqs:
             uplink.measure(device)
     uplink.connect(burst=0)
-    uplink.run(PAST_AFTER + 20 * TURN_EVERY + uplink.round_trip, measuring=False)
+    uplink.run(HISTORY_AFTER + 20 * TURN_EVERY + uplink.round_trip, measuring=False)
     arrived = [seqs for seqs in uplink.arrived.values() if seqs]
     assert len(arrived) == uplink.devices
     assert uplink.most_under_way == 2  # no more than that needs
@@ -264,13 +264,13 @@ def test_a_fast_device_takes_no_turns_from_a_slow_one() -> None:
     outbox.burst([], ONLINE)
     online = outbox.next(0.0)
     assert isinstance(online, Retained)
-    outbox.settled(online, 0.0)
+    outbox.on_ack(online, 0.0)
     for seq in (1, 2, 3):
         outbox.add(sample("fast", seq), 0.0)
     outbox.add(sample("slow", 1), 0.1)
     order = []
-    while isinstance(letter := outbox.next(0.2), LiveSample):
-        order.append(letter.kept.key[0])
+    while isinstance(item := outbox.next(0.2), LiveSample):
+        order.append(item.queued.key[0])
     assert order == ["fast", "slow", "fast", "fast"]
 
 
@@ -291,8 +291,8 @@ def test_a_thousand_samples_a_second_leave_at_most() -> None:
             uplink.measure(device)
     uplink.now = 60.0
     uplink.connect(burst=0)
-    uplink.run(PAST_AFTER + 5.0, measuring=False)
-    assert 4500 <= sum(map(len, uplink.arrived.values())) <= 5.0 / SAMPLE_EVERY + ARRAY_MOST
+    uplink.run(HISTORY_AFTER + 5.0, measuring=False)
+    assert 4500 <= sum(map(len, uplink.arrived.values())) <= 5.0 / SAMPLE_EVERY + BATCH_MOST
 
 
 def test_messages_go_in_turn_with_everything_else() -> None:

@@ -92,8 +92,8 @@ async def online(listener: Listener, times: int = 1) -> None:
 def seqs(listener: Listener, device: str = "a") -> set[int]:
     """Return the seqs heard of a device, live and as history."""
     live = [json.loads(each.payload) for each in listener.on(f"{B}/device/{device}/telemetry")]
-    past = [one for each in listener.on(f"{B}/device/{device}/history") for one in json.loads(each.payload)]
-    return {one["seq"] for one in live + past}
+    backlog = [one for each in listener.on(f"{B}/device/{device}/history") for one in json.loads(each.payload)]
+    return {one["seq"] for one in live + backlog}
 
 
 # Coming
@@ -174,7 +174,7 @@ def test_the_will_says_offline_when_there_is_no_clean_exit(mosquitto: Mosquitto)
         site = Site(mosquitto.port)
         async with running(site) as uplink:
             await online(listener)
-            uplink._link.drop("for the test")
+            uplink._client.drop("for the test")
             await online(listener, 2)
             assert [each.payload for each in listener.heard] == [b"online", b"offline", b"online"]
 
@@ -300,7 +300,7 @@ def test_another_client_with_our_id_is_not_fought(mosquitto: Mosquitto, caplog: 
 
 
 def swept(uplink: Uplink) -> bool:
-    return uplink.connected and not (uplink._clearing.under_way or uplink._clearing.wanted)
+    return uplink.connected and not (uplink._cleanup.under_way or uplink._cleanup.wanted)
 
 
 def test_retained_topics_of_devices_that_are_gone_are_cleared_and_nothing_else(mosquitto: Mosquitto) -> None:
@@ -421,7 +421,7 @@ def test_refused_subscriptions_are_told(old_broker: OldBroker, caplog: pytest.Lo
 
 
 def test_nothing_is_lost_when_the_broker_is_killed_and_comes_back(mosquitto: Mosquitto) -> None:
-    """Away for more than three seconds, without persistence; the subscriber is back before the past is opened."""
+    """Away for more than three seconds, without persistence; the subscriber is back before the backlog is opened."""
 
     async def scenario() -> None:
         listener = mosquitto.subscribe(f"{B}/#")
@@ -515,9 +515,9 @@ def test_a_reload_during_a_sweep_does_not_begin_another(mosquitto: Mosquitto) ->
     async def scenario() -> None:
         listener = mosquitto.subscribe(f"{B}/device/gone/#")
         async with running(Site(mosquitto.port)) as uplink:
-            await until(lambda: uplink._clearing.under_way, "the sweep after the connect")
+            await until(lambda: uplink._cleanup.under_way, "the sweep after the connect")
             await uplink.reload()
-            await until(lambda: not uplink._clearing.under_way, "its end")
+            await until(lambda: not uplink._cleanup.under_way, "its end")
             await until(lambda: not listener.heard[-1].payload, "cleared")
             assert len(listener.heard) == 2
 
@@ -588,12 +588,12 @@ def test_a_connection_that_is_lost_before_the_question_asks_nothing(mosquitto: M
 
 
 def test_while_a_backlog_on_disk_leaves_in_order_live_samples_stay_live(mosquitto: Mosquitto, tmp_path: Path) -> None:
-    """None of them waits until it is history, and all of the past comes once, oldest first."""
-    stored, live = 2500, 300
+    """None of them waits until it is history, and all of the backlog comes once, oldest first."""
+    spool, live = 2500, 300
     limits = Limits(size=10**9, age=10**12)
     store = Store(tmp_path, boot="k0000000", limits=limits)
-    kept = [sample(seq, "b").sample for seq in range(1, stored + 1)]
-    store.append([StoreEntry(each, 0) for each in kept if each is not None], losses=(), now=0, mono=0)
+    queued = [sample(seq, "b").sample for seq in range(1, spool + 1)]
+    store.append([StoreEntry(each, 0) for each in queued if each is not None], losses=(), now=0, mono=0)
     store.close()
 
     async def scenario() -> None:
@@ -601,14 +601,14 @@ def test_while_a_backlog_on_disk_leaves_in_order_live_samples_stay_live(mosquitt
         site = Site(mosquitto.port)
         site.uplink.keep_in(Store(tmp_path, boot="k0000001", limits=limits), lambda _: None)
         async with running(site) as uplink:
-            await until(lambda: uplink.backlog.depth == stored, "the store is opened")
+            await until(lambda: uplink.backlog.depth == spool, "the store is opened")
             await until(lambda: bool(listener.on(f"{B}/device/b/history")), "the past is open", within=20)
             for seq in range(1, live + 1):
                 uplink.publish([sample(seq)])
                 await asyncio.sleep(0.005)
             await until(lambda: uplink.backlog.depth == 0, "the end of the past")
-        past = [one["seq"] for each in listener.on(f"{B}/device/b/history") for one in json.loads(each.payload)]
-        assert past == list(range(1, stored + 1))
+        backlog = [one["seq"] for each in listener.on(f"{B}/device/b/history") for one in json.loads(each.payload)]
+        assert backlog == list(range(1, spool + 1))
         assert [json.loads(each.payload)["seq"] for each in listener.on(f"{B}/device/a/telemetry")] == [
             *range(1, live + 1)
         ]

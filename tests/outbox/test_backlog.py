@@ -1,4 +1,4 @@
-"""The past: what the store takes and gives back, in virtual time, with a store in memory beside it."""
+"""The backlog: what the store takes and gives back, in virtual time, with a store in memory beside it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from lfs10d.outbox.backlog import AWAY_AFTER, PAST_AFTER, SPILL_EVERY, SPILL_MOST
+from lfs10d.outbox.backlog import AWAY_AFTER, HISTORY_AFTER, SPILL_EVERY, SPILL_MOST
 from lfs10d.outbox.items import HistoryBatch, LiveSample, LossNotice, OutboxItem, samples_of
 from lfs10d.outbox.losses import DECLARED_EVERY, Loss
 from lfs10d.outbox.outbox import Outbox
@@ -48,7 +48,7 @@ class MemoryStore:
     def spill(self, outbox: Outbox, now: float) -> bool:
         """Do what is due; return True if something was."""
         outbox.age(now)
-        due = outbox.past.spill_due()
+        due = outbox.backlog.spill_due()
         if due is None or due > now:
             return False
         self.take(outbox, now)
@@ -56,72 +56,72 @@ class MemoryStore:
 
     def take(self, outbox: Outbox, now: float) -> None:
         """Take what waits in memory."""
-        past = outbox.past
-        kept = past.spill()
+        backlog = outbox.backlog
+        queued = backlog.spill()
         if self.broken:
             outbox.not_spilled(now)
             return
-        delivered, evicted = past.stored.delivered, []
-        for each in kept:
+        delivered, evicted = backlog.spool.delivered, []
+        for each in queued:
             self.rows[self.next] = StoredRow(self.next, each.sample, each.shift, each.repeated)
             self.next += 1
-        for number in [number for number in self.rows if number > past.beyond]:
+        for number in [number for number in self.rows if number > backlog.beyond]:
             if len(self.rows) <= self.room:
                 break
             row = self.rows.pop(number)
             if not row.repeated and number not in delivered:
                 evicted.append(Loss(row.sample.device, row.sample.boot, row.sample.seq, row.sample.seq, 1))
-        self.losses = (*past.undeclared(), *evicted)
+        self.losses = (*backlog.undeclared(), *evicted)
         self.tell(outbox)
-        past.spilled(tuple(evicted), now)
+        backlog.spilled(tuple(evicted), now)
 
     def page(self, outbox: Outbox, now: float, most: int = 7) -> bool:
         """Give a page if one is due; return True if one was."""
-        past = outbox.past
-        due = past.page_due()
+        backlog = outbox.backlog
+        due = backlog.page_due()
         if due is None or due > now or self.broken:
             return False
-        found = [row for number, row in sorted(self.rows.items()) if number > past.stored.after]
-        past.stored.take_page(found[:most], most)
+        found = [row for number, row in sorted(self.rows.items()) if number > backlog.spool.after]
+        backlog.spool.take_page(found[:most], most)
         return True
 
     def release(self, outbox: Outbox, now: float) -> None:
         """Delete what is due."""
-        due = outbox.past.stored.release_due()
+        due = outbox.backlog.spool.release_due()
         if due is None or due > now or self.broken:
             return
-        gone = outbox.past.stored.releasing(now)
+        gone = outbox.backlog.spool.releasing(now)
         for number in gone:
             self.rows.pop(number, None)
-        self.losses = tuple(outbox.past.undeclared())
-        outbox.past.stored.deleted(gone)
+        self.losses = tuple(outbox.backlog.undeclared())
+        outbox.backlog.spool.deleted(gone)
         self.tell(outbox)
 
     def tell(self, outbox: Outbox) -> None:
         """Tell what there is."""
         first = next((row.sample.ts for _, row in sorted(self.rows.items())), None)
-        outbox.past.stored.told(len(self.rows), first)
+        outbox.backlog.spool.told(len(self.rows), first)
 
     def opened(self, outbox: Outbox) -> None:
         """Begin with an outbox of the next life."""
         self.tell(outbox)
-        outbox.past.stored.more = bool(self.rows)
+        outbox.backlog.spool.more = bool(self.rows)
         for loss in self.losses:
-            outbox.past.losses.restore(loss)
+            outbox.backlog.losses.restore(loss)
 
 
 def connect(outbox: Outbox, now: float) -> None:
     outbox.connected(now)
     outbox.burst([], ONLINE)
     while not outbox.announced:
-        letter = outbox.next(now)
-        assert letter is not None
-        outbox.settled(letter, now)
+        item = outbox.next(now)
+        assert item is not None
+        outbox.on_ack(item, now)
 
 
-def seqs(letter: OutboxItem | None) -> list[int]:
-    assert letter is not None
-    return [kept.sample.seq for kept in samples_of(letter)]
+def seqs(item: OutboxItem | None) -> list[int]:
+    assert item is not None
+    return [queued.sample.seq for queued in samples_of(item)]
 
 
 def away(count: int, store: MemoryStore) -> Outbox:
@@ -145,11 +145,11 @@ def test_before_the_first_connect_what_is_older_than_three_seconds_is_kept_at_on
     assert store.spill(outbox, 3.1)
     outbox.add(sample(2), 3.1)
     outbox.age(7.0)
-    assert outbox.past.spill_due() == 3.1 + SPILL_EVERY
+    assert outbox.backlog.spill_due() == 3.1 + SPILL_EVERY
     assert not store.spill(outbox, 8.0)
     assert store.spill(outbox, 8.1)
     assert len(store.rows) == 2
-    assert outbox.backlog == BacklogStats(depth=2, oldest_ts=1000, dropped=0)
+    assert outbox.stats == BacklogStats(depth=2, oldest_ts=1000, dropped=0)
 
 
 def test_a_broker_that_is_back_within_three_seconds_costs_no_write() -> None:
@@ -158,7 +158,7 @@ def test_a_broker_that_is_back_within_three_seconds_costs_no_write() -> None:
     outbox.add(sample(1), 98.0)
     outbox.lost(100.0)
     outbox.age(102.9)
-    assert outbox.past.spill_due() == 100.0 + AWAY_AFTER
+    assert outbox.backlog.spill_due() == 100.0 + AWAY_AFTER
     connect(outbox, 102.95)
     assert not store.spill(outbox, 500.0)
 
@@ -167,9 +167,9 @@ def test_what_is_to_be_sent_again_is_kept_before_what_came_later() -> None:
     outbox, store = Outbox(), MemoryStore()
     connect(outbox, 0.0)
     outbox.add(sample(1), 20.0)
-    letter = outbox.next(20.0)
-    assert letter is not None
-    outbox.settled(letter, 20.0)
+    item = outbox.next(20.0)
+    assert item is not None
+    outbox.on_ack(item, 20.0)
     outbox.lost(21.0)
     outbox.add(sample(2), 21.0)
     assert store.spill(outbox, 25.0)
@@ -189,12 +189,12 @@ def test_while_one_commit_is_under_way_no_other_begins() -> None:
     outbox = Outbox()
     outbox.add(sample(1), 0.0)
     outbox.age(4.0)
-    outbox.past.spill()
+    outbox.backlog.spill()
     outbox.add(sample(2), 4.0)
     outbox.age(10.0)
-    assert outbox.past.spill_due() is None
+    assert outbox.backlog.spill_due() is None
     assert outbox.depth == 2
-    assert outbox.backlog.oldest_ts == 1000
+    assert outbox.stats.oldest_ts == 1000
 
 
 def test_what_the_store_cannot_take_waits_in_memory_and_is_tried_again_five_seconds_later() -> None:
@@ -216,7 +216,7 @@ def test_where_the_broker_is_too_slow_half_the_memory_is_the_most_that_waits_the
     for seq in range(1, 7):
         outbox.add(sample(seq), 0.0)
     assert store.spill(outbox, 4.0)
-    assert outbox.past.page_due() == -100.0 + PAST_AFTER
+    assert outbox.backlog.page_due() == -100.0 + HISTORY_AFTER
     assert store.page(outbox, 4.0)
     assert seqs(outbox.next(4.0)) == [1, 2, 3, 4, 5, 6]
 
@@ -224,12 +224,12 @@ def test_where_the_broker_is_too_slow_half_the_memory_is_the_most_that_waits_the
 # From the store
 
 
-def test_on_return_the_past_comes_from_the_store_first_and_then_from_memory() -> None:
+def test_on_return_the_backlog_comes_from_the_store_first_and_then_from_memory() -> None:
     store = MemoryStore()
     outbox = away(20, store)
     outbox.add(sample(21), 5.0)
     connect(outbox, 8.5)
-    assert outbox.past.page_due() == 18.5
+    assert outbox.backlog.page_due() == 18.5
     assert outbox.due() is None
     assert outbox.next(18.5) is None
     told: list[int] = []
@@ -239,10 +239,10 @@ def test_on_return_the_past_comes_from_the_store_first_and_then_from_memory() ->
         due = outbox.due()
         assert due is not None
         now = max(now, due)
-        array = outbox.next(now)
-        assert isinstance(array, HistoryBatch)
-        told += seqs(array)
-        outbox.settled(array, now)
+        batch = outbox.next(now)
+        assert isinstance(batch, HistoryBatch)
+        told += seqs(batch)
+        outbox.on_ack(batch, now)
     assert told == list(range(1, 22))
     assert outbox.depth == 0
     store.release(outbox, now + 20)
@@ -256,7 +256,7 @@ def test_a_loss_in_the_middle_sends_once_more_what_was_acknowledged_lately_and_t
     store.page(outbox, 110.0)
     first = outbox.next(110.0)
     assert isinstance(first, HistoryBatch)
-    outbox.settled(first, 110.0)
+    outbox.on_ack(first, 110.0)
     store.page(outbox, 110.0)
     assert seqs(outbox.next(110.2)) == list(range(8, 15))
     outbox.lost(111.0)
@@ -268,7 +268,7 @@ def test_a_loss_in_the_middle_sends_once_more_what_was_acknowledged_lately_and_t
     assert outbox.dropped == 0
 
 
-def test_an_array_of_the_store_that_is_too_large_is_cut_and_a_dead_sample_declared_and_let_go() -> None:
+def test_a_batch_of_the_store_that_is_too_large_is_cut_and_a_dead_sample_declared_and_let_go() -> None:
     store = MemoryStore()
     outbox = away(2, store)
     connect(outbox, 100.0)
@@ -280,16 +280,16 @@ def test_an_array_of_the_store_that_is_too_large_is_cut_and_a_dead_sample_declar
     assert isinstance(one, HistoryBatch)
     assert seqs(one) == [1]
     assert outbox.unfit(one)
-    declaration = outbox.next(110.0)
-    assert isinstance(declaration, LossNotice)
-    assert outbox.past.undeclared() == [Loss("a", "k2", 1, 1, 1)]
-    outbox.settled(declaration, 110.0)
+    notice = outbox.next(110.0)
+    assert isinstance(notice, LossNotice)
+    assert outbox.backlog.undeclared() == [Loss("a", "k2", 1, 1, 1)]
+    outbox.on_ack(notice, 110.0)
     assert seqs(outbox.next(110.2)) == [2]
     store.release(outbox, 110.2)
     assert list(store.rows) == [2]
 
 
-def test_samples_of_earlier_boots_come_first_and_never_in_one_array_with_others() -> None:
+def test_samples_of_earlier_boots_come_first_and_never_in_one_batch_with_others() -> None:
     store = MemoryStore()
     before = Outbox()
     for seq in (8, 9):
@@ -304,10 +304,10 @@ def test_samples_of_earlier_boots_come_first_and_never_in_one_array_with_others(
     store.page(outbox, 15.0)
     told = []
     for now in (15.0, 15.2):
-        array = outbox.next(now)
-        assert isinstance(array, HistoryBatch)
-        told.append([(kept.sample.boot, kept.sample.seq) for kept in array.samples])
-        outbox.settled(array, now)
+        batch = outbox.next(now)
+        assert isinstance(batch, HistoryBatch)
+        told.append([(queued.sample.boot, queued.sample.seq) for queued in batch.samples])
+        outbox.on_ack(batch, now)
     assert told == [[("k1", 8), ("k1", 9)], [("k2", 1)]]
 
 
@@ -315,12 +315,12 @@ def test_samples_of_earlier_boots_come_first_and_never_in_one_array_with_others(
 
 
 def heard_by_nobody(outbox: Outbox, now: float) -> None:
-    letter = outbox.next(now)
-    assert isinstance(letter, LiveSample)
-    outbox.settled(letter, now, heard=False)
+    item = outbox.next(now)
+    assert isinstance(item, LiveSample)
+    outbox.on_ack(item, now, heard=False)
 
 
-def test_what_nobody_listened_to_after_the_first_connect_of_a_life_goes_once_more_when_the_past_is_opened() -> None:
+def test_what_nobody_listened_to_after_the_first_connect_of_a_life_goes_once_more_when_the_backlog_is_opened() -> None:
     outbox = Outbox()
     connect(outbox, 0.0)
     outbox.add(sample(1), 1.0)
@@ -328,13 +328,13 @@ def test_what_nobody_listened_to_after_the_first_connect_of_a_life_goes_once_mor
     outbox.add(sample(2), 2.0)
     live = outbox.next(2.0)
     assert live is not None
-    outbox.settled(live, 2.0)
-    assert outbox.due() == PAST_AFTER
-    assert outbox.next(PAST_AFTER - 0.1) is None
-    array = outbox.next(PAST_AFTER)
-    assert isinstance(array, HistoryBatch)
-    assert [(kept.sample.seq, kept.repeated) for kept in array.samples] == [(1, True)]
-    outbox.settled(array, PAST_AFTER)
+    outbox.on_ack(live, 2.0)
+    assert outbox.due() == HISTORY_AFTER
+    assert outbox.next(HISTORY_AFTER - 0.1) is None
+    batch = outbox.next(HISTORY_AFTER)
+    assert isinstance(batch, HistoryBatch)
+    assert [(queued.sample.seq, queued.repeated) for queued in batch.samples] == [(1, True)]
+    outbox.on_ack(batch, HISTORY_AFTER)
     outbox.add(sample(3), 11.0)
     heard_by_nobody(outbox, 11.0)
     assert outbox.due() is None
@@ -348,10 +348,10 @@ def test_what_nobody_listened_to_goes_once_more_only_once_where_the_connection_i
     heard_by_nobody(outbox, 1.0)
     outbox.lost(2.0)
     connect(outbox, 3.0)
-    array = outbox.next(13.0)
-    assert seqs(array) == [1]
-    assert array is not None
-    outbox.settled(array, 13.0)
+    batch = outbox.next(13.0)
+    assert seqs(batch) == [1]
+    assert batch is not None
+    outbox.on_ack(batch, 13.0)
     assert outbox.next(30.0) is None
 
 
@@ -360,9 +360,9 @@ def test_what_nobody_listened_to_is_not_kept_on_disk_by_a_daemon_that_parts() ->
     connect(outbox, 0.0)
     outbox.add(sample(1), 1.0)
     heard_by_nobody(outbox, 1.0)
-    outbox.past.part()
+    outbox.backlog.part()
     outbox.lost(2.0)
-    assert not outbox.past.spill_at_last()
+    assert not outbox.backlog.spill_at_last()
 
 
 # The clock
@@ -372,13 +372,13 @@ def test_a_clock_set_right_corrects_what_waits_wherever_it_waits_and_nothing_els
     outbox = Outbox()
     outbox.add(sample(1, clock="unsynced"), 0.0, shift=0)
     outbox.age(4.0)
-    outbox.past.spill()
+    outbox.backlog.spill()
     outbox.add(sample(2, clock="unsynced"), 4.0, shift=0)
     outbox.age(8.0)
     outbox.add(sample(3, clock="unsynced"), 8.0, shift=500)
     outbox.add(sample(4), 8.0, shift=7000)
     ours, earlier = sample_of(sample(9, clock="unsynced")), sample_of(sample(8))
-    outbox.past.stored.take_page(
+    outbox.backlog.spool.take_page(
         [StoredRow(1, ours, 0, repeated=False), StoredRow(2, earlier, None, repeated=False)], 9
     )
     outbox.correct(7000)
@@ -386,9 +386,9 @@ def test_a_clock_set_right_corrects_what_waits_wherever_it_waits_and_nothing_els
     connect(outbox, 8.1)
     live = [outbox.next(8.1), outbox.next(8.1)]
     told = []
-    for letter in live:
-        assert isinstance(letter, LiveSample)
-        payload = letter.publication.payload
+    for item in live:
+        assert isinstance(item, LiveSample)
+        payload = item.publication.payload
         assert isinstance(payload, dict)
         told.append((payload["seq"], payload["ts"], payload["time"], payload["clock"]))
     assert told == [
@@ -397,11 +397,11 @@ def test_a_clock_set_right_corrects_what_waits_wherever_it_waits_and_nothing_els
     ]
     page = outbox.next(20.0)
     assert page is not None
-    assert [(kept.sample.seq, kept.sample.ts) for kept in samples_of(page)] == [(8, 8000), (9, 16_000)]
-    outbox.settled(page, 20.0)
+    assert [(queued.sample.seq, queued.sample.ts) for queued in samples_of(page)] == [(8, 8000), (9, 16_000)]
+    outbox.on_ack(page, 20.0)
     memory = outbox.next(20.2)
     assert memory is not None
-    assert [(kept.sample.seq, kept.sample.ts, kept.sample.clock) for kept in samples_of(memory)][:2] == [
+    assert [(queued.sample.seq, queued.sample.ts, queued.sample.clock) for queued in samples_of(memory)][:2] == [
         (1, 8000, "synced"),
         (2, 9000, "synced"),
     ]
@@ -419,26 +419,26 @@ def test_parting_from_a_broker_that_has_answered_leaves_nothing_to_repeat() -> N
     outbox = Outbox()
     connect(outbox, 0.0)
     outbox.add(sample(1), 20.0)
-    letter = outbox.next(20.0)
-    assert letter is not None
-    outbox.settled(letter, 20.0)
-    outbox.past.part()
+    item = outbox.next(20.0)
+    assert item is not None
+    outbox.on_ack(item, 20.0)
+    outbox.backlog.part()
     outbox.lost(20.1)
-    assert not outbox.past.spill_at_last()
+    assert not outbox.backlog.spill_at_last()
 
 
 def test_what_is_still_to_be_repeated_is_kept_at_the_end() -> None:
     outbox, store = Outbox(), MemoryStore()
     connect(outbox, 0.0)
     outbox.add(sample(1), 20.0)
-    letter = outbox.next(20.0)
-    assert letter is not None
-    outbox.settled(letter, 20.0)
+    item = outbox.next(20.0)
+    assert item is not None
+    outbox.on_ack(item, 20.0)
     outbox.lost(20.1)
     connect(outbox, 21.0)
-    outbox.past.part()
+    outbox.backlog.part()
     outbox.lost(22.0)
-    assert outbox.past.spill_at_last()
+    assert outbox.backlog.spill_at_last()
     store.take(outbox, 22.0)
     assert [row.repeated for row in store.rows.values()] == [True]
 
@@ -455,14 +455,14 @@ def test_where_history_is_refused_the_store_keeps_it_and_the_others_go_on() -> N
     assert store.spill(outbox, 4.0)
     connect(outbox, 10.0)
     store.page(outbox, 20.0)  # both in one, and one row more after it
-    array = outbox.next(20.0)
-    assert isinstance(array, HistoryBatch)
-    assert outbox.refused(array, 0x87, 20.0)
+    batch = outbox.next(20.0)
+    assert isinstance(batch, HistoryBatch)
+    assert outbox.refused(batch, 0x87, 20.0)
     for now in (20.2, 20.4):
         other = outbox.next(now)
         assert isinstance(other, HistoryBatch)
         assert other.topic == "device/b/history"
-        outbox.settled(other, now)
+        outbox.on_ack(other, now)
         assert outbox.next(now + 0.1) is None
         store.page(outbox, now + 0.1)
     assert outbox.due() is None
@@ -492,12 +492,12 @@ def test_a_topic_that_is_tried_again_on_the_same_connection_gets_what_it_missed_
     assert store.spill(outbox, 4.0)
     connect(outbox, 10.0)
     store.page(outbox, 20.0, most=20)
-    array = outbox.next(20.0)
-    assert isinstance(array, HistoryBatch)
-    assert outbox.refused(array, QUOTA_EXCEEDED, 20.0)
+    batch = outbox.next(20.0)
+    assert isinstance(batch, HistoryBatch)
+    assert outbox.refused(batch, QUOTA_EXCEEDED, 20.0)
     other = outbox.next(20.2)
     assert isinstance(other, HistoryBatch)
-    outbox.settled(other, 20.2)
+    outbox.on_ack(other, 20.2)
     assert outbox.next(20.4) is None
     assert (outbox.due(), outbox.depth) == (21.0, 4)
     assert outbox.next(21.0) is None
@@ -505,14 +505,14 @@ def test_a_topic_that_is_tried_again_on_the_same_connection_gets_what_it_missed_
     last = outbox.next(21.2)
     assert isinstance(last, HistoryBatch)
     assert (last.topic, seqs(last)) == ("device/a/history", [1, 2, 3, 4])
-    outbox.settled(last, 21.2)
+    outbox.on_ack(last, 21.2)
     assert (outbox.next(22.0), outbox.depth) == (None, 0)
 
 
 def lost_three() -> Outbox:
     """Return a connected outbox that has lost three samples."""
     outbox = Outbox()
-    outbox.past.losses.restore(Loss("a", "k2", 1, 3, 3))
+    outbox.backlog.losses.restore(Loss("a", "k2", 1, 3, 3))
     connect(outbox, 10.0)
     return outbox
 
@@ -521,26 +521,26 @@ def test_what_would_be_refused_is_not_sent_and_waits() -> None:
     outbox = Outbox()
     outbox.add(sample(1), 0.0)
     connect(outbox, 10.0)
-    array = outbox.next(20.0)
-    assert isinstance(array, HistoryBatch)
-    assert outbox.refused(array, 0x87, 20.0)
+    batch = outbox.next(20.0)
+    assert isinstance(batch, HistoryBatch)
+    assert outbox.refused(batch, 0x87, 20.0)
     outbox.add(sample(4), 20.0)
     outbox.age(30.0)
     assert outbox.next(30.0) is None
-    assert (outbox.past.undeclared(), outbox.depth) == ([], 2)
+    assert (outbox.backlog.undeclared(), outbox.depth) == ([], 2)
 
 
-def test_where_events_are_refused_losses_wait_and_the_past_goes_on() -> None:
+def test_where_events_are_refused_losses_wait_and_the_backlog_goes_on() -> None:
     outbox = lost_three()
-    declaration = outbox.next(20.0)
-    assert isinstance(declaration, LossNotice)
-    assert outbox.refused(declaration, 0x87, 20.0)
+    notice = outbox.next(20.0)
+    assert isinstance(notice, LossNotice)
+    assert outbox.refused(notice, 0x87, 20.0)
     outbox.add(sample(1, "b"), 20.0)
     outbox.age(30.0)
     assert outbox.due() == 20.0
     assert seqs(outbox.next(30.0)) == [1]
     assert outbox.due() is None
-    assert outbox.past.undeclared() == [Loss("a", "k2", 1, 3, 3)]
+    assert outbox.backlog.undeclared() == [Loss("a", "k2", 1, 3, 3)]
 
 
 def test_losing_a_connection_that_never_was_is_no_new_absence() -> None:
@@ -553,80 +553,80 @@ def test_losing_a_connection_that_never_was_is_no_new_absence() -> None:
 def test_a_declaration_under_way_is_made_again_after_a_loss_and_kept_until_then() -> None:
     outbox = lost_three()
     assert isinstance(outbox.next(30.0), LossNotice)
-    assert outbox.past.undeclared() == [Loss("a", "k2", 1, 3, 3)]
+    assert outbox.backlog.undeclared() == [Loss("a", "k2", 1, 3, 3)]
     outbox.lost(31.0)
-    assert outbox.past.undeclared() == [Loss("a", "k2", 1, 3, 3)]
+    assert outbox.backlog.undeclared() == [Loss("a", "k2", 1, 3, 3)]
     connect(outbox, 32.0)
     assert isinstance(outbox.next(42.0), LossNotice)
 
 
-def test_an_array_of_memory_that_is_too_large_is_cut() -> None:
+def test_a_batch_of_memory_that_is_too_large_is_cut() -> None:
     outbox = Outbox()
     for seq in (1, 2, 3, 4):
         outbox.add(sample(seq), 0.0)
     connect(outbox, 10.0)
-    array = outbox.next(20.0)
-    assert isinstance(array, HistoryBatch)
-    assert not outbox.unfit(array)
+    batch = outbox.next(20.0)
+    assert isinstance(batch, HistoryBatch)
+    assert not outbox.unfit(batch)
     assert seqs(outbox.next(20.0)) == [1, 2]
 
 
-def test_an_array_that_ended_its_connection_leaves_shorter_ones_after_it_for_a_time_or_until_a_reload() -> None:
+def test_a_batch_that_ended_its_connection_leaves_shorter_ones_after_it_for_a_time_or_until_a_reload() -> None:
     outbox, lengths = Outbox(), []
     for seq in (1, 2, 3, 4):
         outbox.add(sample(seq), 0.0)
     for now in (10.0, 30.0, 100.0, 130.0, 160.0):
         connect(outbox, now)
-        array = outbox.next(now + 10.0)
-        assert isinstance(array, HistoryBatch)
-        lengths.append(len(array.samples))
+        batch = outbox.next(now + 10.0)
+        assert isinstance(batch, HistoryBatch)
+        lengths.append(len(batch.samples))
         if now == 10.0:
-            outbox.past.cut_for(array, 90.0)
+            outbox.backlog.cut_for(batch, 90.0)
         if now == 100.0:
-            outbox.past.cut_for(array, 1000.0)
+            outbox.backlog.cut_for(batch, 1000.0)
         if now == 130.0:
-            outbox.past.reload()
+            outbox.backlog.reload()
         outbox.lost(now + 11.0)
     assert lengths == [4, 2, 4, 2, 4]
 
 
-def test_an_array_of_the_store_is_shortened_and_refused_without_a_loss() -> None:
+def test_a_batch_of_the_store_is_shortened_and_refused_without_a_loss() -> None:
     store = MemoryStore()
     outbox = away(5, store)
     connect(outbox, 10.0)
     store.page(outbox, 20.0)
-    array = outbox.next(20.0)
-    assert isinstance(array, HistoryBatch)
-    shorter = outbox.past.shorten(array, 2)
+    batch = outbox.next(20.0)
+    assert isinstance(batch, HistoryBatch)
+    shorter = outbox.backlog.shorten(batch, 2)
     assert seqs(shorter) == [1, 2]
-    outbox.past.refused(shorter)
-    outbox.past.over(shorter)
+    outbox.backlog.refused(shorter)
+    outbox.backlog.over(shorter)
     assert seqs(outbox.next(20.2)) == [1, 2, 3, 4, 5]
 
 
-def test_the_second_sending_is_due_when_the_past_is_opened() -> None:
+def test_the_second_sending_is_due_when_the_backlog_is_opened() -> None:
     outbox = Outbox()
     connect(outbox, 0.0)
     outbox.add(sample(1), 20.0)
-    letter = outbox.next(20.0)
-    assert letter is not None
-    outbox.settled(letter, 20.0)
+    item = outbox.next(20.0)
+    assert item is not None
+    outbox.on_ack(item, 20.0)
     outbox.lost(21.0)
     connect(outbox, 22.0)
-    assert outbox.due() == 22.0 + PAST_AFTER
+    assert outbox.due() == 22.0 + HISTORY_AFTER
     assert seqs(outbox.next(32.0)) == [1]
 
 
-def test_what_is_acknowledged_until_the_past_is_opened_goes_once_more_and_nothing_after() -> None:
+def test_what_is_acknowledged_until_the_backlog_is_opened_goes_once_more_and_nothing_after() -> None:
     outbox = Outbox()
     connect(outbox, 0.0)
     outbox.lost(50.0)
     connect(outbox, 60.0)
     for seq, now in ((1, 60.5), (2, 69.5), (3, 80.0)):
         outbox.add(sample(seq), now)
-        letter = outbox.next(now)
-        assert isinstance(letter, LiveSample)
-        outbox.settled(letter, now)
+        item = outbox.next(now)
+        assert isinstance(item, LiveSample)
+        outbox.on_ack(item, now)
     assert seqs(outbox.next(80.0)) == [1, 2]
 
 
@@ -634,26 +634,26 @@ def test_what_was_acknowledged_before_is_no_loss_when_its_second_sending_is_unfi
     outbox = Outbox()
     connect(outbox, 0.0)
     outbox.add(sample(1), 50.0)
-    letter = outbox.next(50.0)
-    assert letter is not None
-    outbox.settled(letter, 50.0)
+    item = outbox.next(50.0)
+    assert item is not None
+    outbox.on_ack(item, 50.0)
     outbox.lost(51.0)
     connect(outbox, 52.0)
     again = outbox.next(62.0)
     assert isinstance(again, HistoryBatch)
     assert outbox.unfit(again)
-    assert outbox.past.undeclared() == []
+    assert outbox.backlog.undeclared() == []
 
 
 def test_the_broker_is_away_until_it_is_there_and_when_it_is_gone() -> None:
     outbox = Outbox()
-    told = [outbox.past.away]
+    told = [outbox.backlog.away]
     connect(outbox, 0.0)
-    told.append(outbox.past.away)
+    told.append(outbox.backlog.away)
     outbox.lost(1.0)
-    told.append(outbox.past.away)
+    told.append(outbox.backlog.away)
     assert told == [True, False, True]
-    assert outbox.backlog == BacklogStats()
+    assert outbox.stats == BacklogStats()
 
 
 # Laws
@@ -727,7 +727,7 @@ class PastLaws(RuleBasedStateMachine):
     @rule(denied=st.booleans())
     def throw_out(self, denied: bool) -> None:  # noqa: FBT001 - drawn by hypothesis
         """End the connection for what is under way, as the broker does."""
-        sent = {letter.topic: 100 for letter in self.outbox.under_way}
+        sent = {item.topic: 100 for item in self.outbox.under_way}
         self.outbox.lost(self.now, self.outbox.suspects.ended(sent, certain=denied), denied=denied)
         self.losses_at.append(self.now)
         self.online = False
@@ -737,10 +737,10 @@ class PastLaws(RuleBasedStateMachine):
     def restart(self) -> None:
         """End in order while the broker is away, and begin anew."""
         self.outbox.age(float("inf"))
-        while self.outbox.past.spill_at_last():
+        while self.outbox.backlog.spill_at_last():
             self.store.take(self.outbox, self.now)
-        self.store.losses = tuple(self.outbox.past.undeclared())
-        gone = self.outbox.past.stored.releasing(self.now)
+        self.store.losses = tuple(self.outbox.backlog.undeclared())
+        gone = self.outbox.backlog.spool.releasing(self.now)
         for number in gone:
             self.store.rows.pop(number, None)
         self.begin()
@@ -748,33 +748,33 @@ class PastLaws(RuleBasedStateMachine):
     @precondition(lambda self: self.online)
     @rule(fate=st.sampled_from(["settled", "settled", "settled", "settled", "refused", "denied", "unfit", "nothing"]))
     def go(self, fate: str) -> None:
-        letter = self.outbox.next(self.now)
-        if letter is None or fate == "nothing":
+        item = self.outbox.next(self.now)
+        if item is None or fate == "nothing":
             return
         if fate == "refused":
-            self.outbox.refused(letter, QUOTA_EXCEEDED, self.now)
+            self.outbox.refused(item, QUOTA_EXCEEDED, self.now)
         elif fate == "denied":
-            self.outbox.refused(letter, NOT_AUTHORIZED, self.now)
+            self.outbox.refused(item, NOT_AUTHORIZED, self.now)
         elif fate == "unfit":
-            self.outbox.unfit(letter)
+            self.outbox.unfit(item)
         else:
-            self.settle(letter)
+            self.settle(item)
 
-    def settle(self, letter: OutboxItem) -> None:
-        if isinstance(letter, HistoryBatch):
-            kept = [(each.sample.boot, each.sample.seq) for each in letter.samples]
-            assert kept == sorted(set(kept))
-            assert len({each.key for each in letter.samples}) == 1
-        self.outbox.settled(letter, self.now)
-        for each in samples_of(letter):
+    def settle(self, item: OutboxItem) -> None:
+        if isinstance(item, HistoryBatch):
+            queued = [(each.sample.boot, each.sample.seq) for each in item.samples]
+            assert queued == sorted(set(queued))
+            assert len({each.key for each in item.samples}) == 1
+        self.outbox.on_ack(item, self.now)
+        for each in samples_of(item):
             key = (each.sample.device, each.sample.boot, each.sample.seq)
             self.delivered.setdefault(key, []).append(self.now)
-        if isinstance(letter, LossNotice):
-            self.declared.append(letter.loss)
+        if isinstance(item, LossNotice):
+            self.declared.append(item.loss)
 
     @invariant()
     def memory_is_bounded(self) -> None:
-        in_memory = self.outbox.depth - self.outbox.past.stored.depth
+        in_memory = self.outbox.depth - self.outbox.backlog.spool.depth
         assert in_memory <= self.CAPACITY + sum(len(samples_of(each)) for each in self.outbox.under_way)
         assert len(self.store.rows) <= self.ROOM + 7
 
@@ -783,18 +783,18 @@ class PastLaws(RuleBasedStateMachine):
         self.store.broken = False
         if not self.online:
             connect(self.outbox, self.now)
-        for letter in self.outbox.under_way:
-            self.settle(letter)
+        for item in self.outbox.under_way:
+            self.settle(item)
         self.outbox.reload(self.now)
-        self.now += PAST_AFTER + DECLARED_EVERY
+        self.now += HISTORY_AFTER + DECLARED_EVERY
         for _ in range(3000):
             self.keep()
             taken = self.outbox.next(self.now)
             if taken is not None:
                 self.settle(taken)
                 continue
-            due = [each for each in (self.outbox.due(), self.outbox.past.stored.release_due()) if each is not None]
-            if not due and self.outbox.past.page_due() is None:
+            due = [each for each in (self.outbox.due(), self.outbox.backlog.spool.release_due()) if each is not None]
+            if not due and self.outbox.backlog.page_due() is None:
                 break
             self.now = max([self.now, *due[:1]]) if self.outbox.due() is not None else self.now + 1.0
         assert self.outbox.depth == 0
@@ -812,8 +812,8 @@ class PastLaws(RuleBasedStateMachine):
             for before, after in pairwise(times):
                 # A loss between the two, not longer than 10 s and the time to notice it after the first; or a
                 # reconnect not longer than 10 s before the first.
-                lately = any(before - PAST_AFTER <= connected <= before for connected in self.connects_at[1:])
-                assert lately or any(before - PAST_AFTER - 13 <= lost <= after for lost in self.losses_at)
+                lately = any(before - HISTORY_AFTER <= connected <= before for connected in self.connects_at[1:])
+                assert lately or any(before - HISTORY_AFTER - 13 <= lost <= after for lost in self.losses_at)
 
 
 PastLaws.TestCase.settings = settings(max_examples=150, stateful_step_count=60, deadline=None)

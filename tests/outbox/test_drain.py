@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from lfs10d.outbox.drain import LEVEL_MOST, LOOK_ARRAYS, LOOK_EVERY, Drain
+from lfs10d.outbox.drain import LEVEL_MOST, LOOK_BATCHES, LOOK_EVERY, Drain
 
 
 def look(drain: Drain, now: float, depth: int, *, full: bool = True) -> int:
-    """Settle as many arrays as a look wants, and return the level after it."""
+    """Settle as many batches as a look wants, and return the level after it."""
     drain.taken(full=full)
-    for _ in range(LOOK_ARRAYS):
-        if drain.settled(now):
+    for _ in range(LOOK_BATCHES):
+        if drain.on_ack(now):
             drain.look(now, depth)
     return drain.level
 
@@ -30,7 +30,7 @@ def test_the_level_stays_while_the_backlog_shrinks() -> None:
     assert [look(drain, 5.0, 100), look(drain, 10.0, 100), look(drain, 15.0, 99), look(drain, 20.0, 98)] == [1, 2, 2, 2]
 
 
-def test_where_arrays_are_not_full_the_level_is_halved() -> None:
+def test_where_batches_are_not_full_the_level_is_halved() -> None:
     drain = Drain()
     drain.begin(0.0)
     for number in range(4):
@@ -38,13 +38,13 @@ def test_where_arrays_are_not_full_the_level_is_halved() -> None:
     assert [look(drain, 25.0 + 5.0 * number, 500, full=False) for number in range(4)] == [4, 2, 1, 1]
 
 
-def test_it_is_looked_at_after_five_seconds_and_four_arrays() -> None:
+def test_it_is_looked_at_after_five_seconds_and_four_batches() -> None:
     drain = Drain()
     drain.begin(0.0)
-    assert [drain.settled(1.0) for _ in range(6)] == [False] * 6
-    assert drain.settled(LOOK_EVERY)
+    assert [drain.on_ack(1.0) for _ in range(6)] == [False] * 6
+    assert drain.on_ack(LOOK_EVERY)
     drain.look(LOOK_EVERY, 1)
-    assert [drain.settled(2 * LOOK_EVERY) for _ in range(LOOK_ARRAYS)] == [False, False, False, True]
+    assert [drain.on_ack(2 * LOOK_EVERY) for _ in range(LOOK_BATCHES)] == [False, False, False, True]
 
 
 def test_another_connection_begins_at_level_one() -> None:
@@ -58,9 +58,9 @@ def test_another_connection_begins_at_level_one() -> None:
 
 
 @pytest.mark.parametrize(
-    ("level", "window", "arrays"), [(1, 20, 1), (2, 20, 5), (4, 20, 10), (8, 20, 20), (2, 1, 1), (8, 1, 1)]
+    ("level", "window", "batches"), [(1, 20, 1), (2, 20, 5), (4, 20, 10), (8, 20, 20), (2, 1, 1), (8, 1, 1)]
 )
-def test_arrays_under_way(level: int, window: int, arrays: int) -> None:
+def test_batches_under_way(level: int, window: int, batches: int) -> None:
     drain = Drain()
     drain.level = level
-    assert drain.arrays(window) == arrays
+    assert drain.batches(window) == batches

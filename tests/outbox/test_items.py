@@ -1,4 +1,4 @@
-"""A letter knows its topic and the samples it carries, and is equal to itself alone."""
+"""An item knows its topic and the samples it carries, and is equal to itself alone."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LIVE = Publication("device/mast-top/telemetry", {}, PublicationKind.SAMPLE, reta
 
 
 @pytest.mark.parametrize(
-    ("letter", "topic", "samples"),
+    ("item", "topic", "samples"),
     [
         (Retained(retained("line/state", {})), "line/state", ()),
         (Message(event("device_added", 0), b"c"), "event", ()),
@@ -25,12 +25,12 @@ LIVE = Publication("device/mast-top/telemetry", {}, PublicationKind.SAMPLE, reta
         (LossNotice(Loss("mast-top", "k3f9a2c7", 1, 2, 2)), "event", ()),
     ],
 )
-def test_each_letter_has_its_topic_and_its_samples(
-    letter: OutboxItem, topic: str, samples: tuple[QueuedSample, ...]
+def test_each_item_has_its_topic_and_its_samples(
+    item: OutboxItem, topic: str, samples: tuple[QueuedSample, ...]
 ) -> None:
-    assert (letter.topic, samples_of(letter)) == (topic, samples)
+    assert (item.topic, samples_of(item)) == (topic, samples)
 
 
-def test_two_letters_that_say_the_same_are_two_messages() -> None:
-    letters: list[OutboxItem] = [LiveSample(LIVE, KEPT), LiveSample(LIVE, KEPT)]
-    assert letters.index(letters[1]) == 1
+def test_two_items_that_say_the_same_are_two_messages() -> None:
+    items: list[OutboxItem] = [LiveSample(LIVE, KEPT), LiveSample(LIVE, KEPT)]
+    assert items.index(items[1]) == 1

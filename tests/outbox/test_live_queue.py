@@ -21,8 +21,8 @@ def live(device: str, seq: int, since: float = 0.0) -> LiveSample:
     )
 
 
-def told(letter: LiveSample | None) -> tuple[str, int] | None:
-    return None if letter is None else (letter.kept.sample.device, letter.kept.sample.seq)
+def told(item: LiveSample | None) -> tuple[str, int] | None:
+    return None if item is None else (item.queued.sample.device, item.queued.sample.seq)
 
 
 def everything(queue: LiveQueue) -> list[tuple[str, int] | None]:
@@ -66,10 +66,10 @@ def test_what_is_changed_keeps_its_turn() -> None:
     queue = LiveQueue()
     for device, seq in (("a", 1), ("a", 2), ("b", 1)):
         queue.add(live(device, seq, 1.0))
-    queue.change(lambda each: replace(each, kept=replace(each.kept, since=2.0)))
+    queue.change(lambda each: replace(each, queued=replace(each.queued, since=2.0)))
     oldest = queue.oldest()
     assert oldest is not None
-    assert oldest.kept.since == 2.0
+    assert oldest.queued.since == 2.0
     assert everything(queue) == [("a", 1), ("b", 1), ("a", 2)]
 
 

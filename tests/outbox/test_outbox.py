@@ -11,7 +11,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from lfs10d.outbox.backlog import ARRAY_MOST, PAST_AFTER, SAMPLE_EVERY, TURN_EVERY
+from lfs10d.outbox.backlog import BATCH_MOST, HISTORY_AFTER, SAMPLE_EVERY, TURN_EVERY
 from lfs10d.outbox.history import QueuedSample
 from lfs10d.outbox.items import HistoryBatch, LiveSample, LossNotice, Message, OutboxItem, Retained, samples_of
 from lfs10d.outbox.losses import DECLARED_EVERY, Loss
@@ -21,7 +21,7 @@ from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry import publication as telemetry
 from lfs10d.telemetry.publication import Publication, PublicationKind, Sample
 
-ARRAY_EVERY = ARRAY_MOST * SAMPLE_EVERY
+ARRAY_EVERY = BATCH_MOST * SAMPLE_EVERY
 NOT_AUTHORIZED = 0x87
 QUOTA_EXCEEDED = 0x97
 ONLINE = telemetry.retained("availability", "online")
@@ -44,15 +44,15 @@ def trace(number: int) -> Publication:
     return Publication("trace", {"n": number}, PublicationKind.TRACE, retain=False, qos=0)
 
 
-def seqs(letter: OutboxItem | None) -> list[int]:
-    assert letter is not None
-    return [kept.sample.seq for kept in samples_of(letter)]
+def seqs(item: OutboxItem | None) -> list[int]:
+    assert item is not None
+    return [queued.sample.seq for queued in samples_of(item)]
 
 
 def take(outbox: Outbox, now: float, kind: type[AnyLetter]) -> AnyLetter:
-    letter = outbox.next(now)
-    assert isinstance(letter, kind)
-    return letter
+    item = outbox.next(now)
+    assert isinstance(item, kind)
+    return item
 
 
 def connect(outbox: Outbox, now: float, burst: Iterable[Publication] = (), *, window: int = 20) -> None:
@@ -60,9 +60,9 @@ def connect(outbox: Outbox, now: float, burst: Iterable[Publication] = (), *, wi
     outbox.connected(now, window=window)
     outbox.burst(burst, ONLINE)
     while not outbox.announced:
-        letter = outbox.next(now)
-        assert letter is not None
-        outbox.settled(letter, now)
+        item = outbox.next(now)
+        assert item is not None
+        outbox.on_ack(item, now)
 
 
 def connected(now: float = 0.0, *, capacity: int = 10_000) -> Outbox:
@@ -89,15 +89,15 @@ def test_after_a_connect_the_burst_goes_first_and_online_when_all_of_it_is_settl
     first, second = take(outbox, 0.0, Retained), take(outbox, 0.0, Retained)
     assert [first.topic, second.topic] == ["device/a/state", "device/b/state"]
     assert outbox.next(0.0) is None
-    outbox.settled(second, 0.0)
+    outbox.on_ack(second, 0.0)
     assert outbox.next(0.0) is None
     assert not outbox.announced
-    outbox.settled(first, 0.0)
+    outbox.on_ack(first, 0.0)
     online = take(outbox, 0.0, Retained)
     assert online.publication is ONLINE
-    assert take(outbox, 0.0, LiveSample).kept.sample.seq == 1
+    assert take(outbox, 0.0, LiveSample).queued.sample.seq == 1
     assert not outbox.announced
-    outbox.settled(online, 0.0)
+    outbox.on_ack(online, 0.0)
     assert outbox.announced
 
 
@@ -159,9 +159,9 @@ def test_no_more_than_the_window_is_under_way() -> None:
     first = take(outbox, 0.0, LiveSample)
     take(outbox, 0.0, LiveSample)
     assert outbox.next(0.0) is None
-    outbox.settled(first, 0.0)
+    outbox.on_ack(first, 0.0)
     assert seqs(outbox.next(0.0)) == [3]
-    assert [seqs(letter) for letter in outbox.under_way] == [[2], [3]]
+    assert [seqs(item) for item in outbox.under_way] == [[2], [3]]
 
 
 # Retained topics
@@ -181,7 +181,7 @@ def test_no_second_version_goes_while_the_first_is_under_way() -> None:
     first = take(outbox, 0.0, Retained)
     outbox.add(state(2), 0.0)
     assert outbox.next(0.0) is None
-    outbox.settled(first, 0.0)
+    outbox.on_ack(first, 0.0)
     assert take(outbox, 0.0, Retained).publication.payload == {"version": 2}
 
 
@@ -191,7 +191,7 @@ def test_a_second_burst_waits_for_the_first_to_be_over() -> None:
     online = take(outbox, 0.0, Retained)
     outbox.burst([], ONLINE)
     assert outbox.next(0.0) is None
-    outbox.settled(online, 0.0)
+    outbox.on_ack(online, 0.0)
     assert take(outbox, 0.0, Retained).topic == "availability"
 
 
@@ -201,8 +201,8 @@ def test_while_the_broker_is_away_only_clearing_of_retained_topics_is_kept() -> 
     outbox.add(telemetry.retained("device/gone/state", None), 0.0)
     connect_letters = []
     outbox.connected(1.0)
-    while (letter := outbox.next(1.0)) is not None:
-        connect_letters.append(letter.topic)
+    while (item := outbox.next(1.0)) is not None:
+        connect_letters.append(item.topic)
     assert connect_letters == ["device/gone/state"]
 
 
@@ -234,50 +234,50 @@ def test_a_sample_older_than_three_seconds_is_history() -> None:
     assert seqs(take(outbox, LIVE_FOR + 0.05, HistoryBatch)) == [1]
 
 
-def test_the_past_is_opened_ten_seconds_after_a_connect() -> None:
+def test_the_backlog_is_opened_ten_seconds_after_a_connect() -> None:
     outbox = Outbox()
     outbox.add(sample(1), 0.0)
     connect(outbox, 100.0)
-    assert outbox.next(100.0 + PAST_AFTER - 0.01) is None
-    assert outbox.due() == 100.0 + PAST_AFTER
-    array = take(outbox, 100.0 + PAST_AFTER, HistoryBatch)
-    assert array.topic == "device/a/history"
+    assert outbox.next(100.0 + HISTORY_AFTER - 0.01) is None
+    assert outbox.due() == 100.0 + HISTORY_AFTER
+    batch = take(outbox, 100.0 + HISTORY_AFTER, HistoryBatch)
+    assert batch.topic == "device/a/history"
 
 
-def test_an_array_has_at_most_100_samples_of_one_device_in_order() -> None:
+def test_a_batch_has_at_most_100_samples_of_one_device_in_order() -> None:
     outbox = Outbox()
     for seq in range(1, 151):
         outbox.add(sample(seq, "a"), 0.0)
         outbox.add(sample(seq, "b"), 0.0)
     connect(outbox, 50.0)
-    now, arrays = 60.0, []
+    now, batches = 60.0, []
     while outbox.depth:
-        letter = take(outbox, now, HistoryBatch)
-        assert len({kept.sample.device for kept in letter.samples}) == 1
-        arrays.append((letter.topic, seqs(letter)))
-        outbox.settled(letter, now)
+        item = take(outbox, now, HistoryBatch)
+        assert len({queued.sample.device for queued in item.samples}) == 1
+        batches.append((item.topic, seqs(item)))
+        outbox.on_ack(item, now)
         now += ARRAY_EVERY
-    assert sorted(len(each) for _, each in arrays) == [50, 50, ARRAY_MOST, ARRAY_MOST]
+    assert sorted(len(each) for _, each in batches) == [50, 50, BATCH_MOST, BATCH_MOST]
     for device in "ab":
-        told = [seq for topic, each in arrays if topic == f"device/{device}/history" for seq in each]
+        told = [seq for topic, each in batches if topic == f"device/{device}/history" for seq in each]
         assert told == list(range(1, 151))
 
 
-def test_one_array_is_under_way_at_a_time_and_a_thousand_samples_leave_in_a_second() -> None:
+def test_one_batch_is_under_way_at_a_time_and_a_thousand_samples_leave_in_a_second() -> None:
     outbox = Outbox()
     for seq in range(1, 301):
         outbox.add(sample(seq), 0.0)
     connect(outbox, 50.0)
     first = take(outbox, 60.0, HistoryBatch)
     assert outbox.next(60.5) is None
-    assert outbox.due() == 60.0 + TURN_EVERY  # contract, section 3: one array at least every 2 s, whatever is under way
-    outbox.settled(first, 60.05)
+    assert outbox.due() == 60.0 + TURN_EVERY  # contract, section 3: one batch at least every 2 s, whatever is under way
+    outbox.on_ack(first, 60.05)
     assert outbox.next(60.05) is None
     assert outbox.due() == 60.0 + ARRAY_EVERY
     assert isinstance(outbox.next(60.0 + ARRAY_EVERY), HistoryBatch)
 
 
-def test_live_samples_go_before_the_past() -> None:
+def test_live_samples_go_before_the_backlog() -> None:
     outbox = Outbox()
     outbox.add(sample(1), 0.0)
     connect(outbox, 50.0)
@@ -301,7 +301,7 @@ def test_what_is_under_way_when_the_connection_is_lost_waits_again_in_order() ->
     assert [seqs(outbox.next(0.2)) for _ in range(3)] == [[1], [2], [3]]
 
 
-def test_an_array_under_way_when_the_connection_is_lost_waits_again() -> None:
+def test_a_batch_under_way_when_the_connection_is_lost_waits_again() -> None:
     outbox = Outbox()
     outbox.add(sample(1), 0.0)
     connect(outbox, 10.0)
@@ -311,16 +311,16 @@ def test_an_array_under_way_when_the_connection_is_lost_waits_again() -> None:
     assert seqs(outbox.next(32.0)) == [1]
 
 
-def test_an_unfit_array_is_declared_but_for_what_was_acknowledged_before() -> None:
+def test_an_unfit_batch_is_declared_but_for_what_was_acknowledged_before() -> None:
     outbox = connected(now=-100.0)
     outbox.add(sample(1), 0.0)
-    outbox.settled(take(outbox, 0.0, LiveSample), 0.0)
+    outbox.on_ack(take(outbox, 0.0, LiveSample), 0.0)
     outbox.lost(1.0)
     outbox.add(sample(2), 1.0)
     connect(outbox, 10.0)
-    array = take(outbox, 20.0, HistoryBatch)
-    assert seqs(array) == [1, 2]
-    assert not outbox.unfit(array)
+    batch = take(outbox, 20.0, HistoryBatch)
+    assert seqs(batch) == [1, 2]
+    assert not outbox.unfit(batch)
     for seq in (1, 2):
         one = take(outbox, 20.0 + seq, HistoryBatch)
         assert seqs(one) == [seq]
@@ -340,9 +340,9 @@ def test_messages_under_way_wait_again_in_order_and_traces_do_not() -> None:
     outbox.add(trace(3), 0.2)
     connect(outbox, 1.0)
     told = []
-    while (letter := outbox.next(1.0)) is not None:
-        assert isinstance(letter, Message)
-        told.append(letter.publication)
+    while (item := outbox.next(1.0)) is not None:
+        assert isinstance(item, Message)
+        told.append(item.publication)
     assert told == [telemetry.event(f"e{number}", 0) for number in range(3)]
 
 
@@ -373,15 +373,15 @@ def test_what_was_acknowledged_around_a_loss_goes_once_more_ten_seconds_after_th
     outbox = connected(now=-100.0)
     for seq, now in ((1, 0.0), (2, 15.0), (3, 24.0)):
         outbox.add(sample(seq), now)
-        outbox.settled(take(outbox, now, LiveSample), now)
+        outbox.on_ack(take(outbox, now, LiveSample), now)
     outbox.lost(25.0)
     outbox.add(sample(4), 26.0)
     connect(outbox, 40.0)
     outbox.add(sample(5), 45.0)
-    outbox.settled(take(outbox, 45.0, LiveSample), 45.0)
-    array = take(outbox, 50.0, HistoryBatch)
-    assert seqs(array) == [2, 3, 4, 5]
-    outbox.settled(array, 50.0)
+    outbox.on_ack(take(outbox, 45.0, LiveSample), 45.0)
+    batch = take(outbox, 50.0, HistoryBatch)
+    assert seqs(batch) == [2, 3, 4, 5]
+    outbox.on_ack(batch, 50.0)
     assert outbox.next(51.0) is None
     assert outbox.depth == 0
 
@@ -389,7 +389,7 @@ def test_what_was_acknowledged_around_a_loss_goes_once_more_ten_seconds_after_th
 def test_there_is_no_second_sending_without_a_loss() -> None:
     outbox = connected(now=0.0)
     outbox.add(sample(1), 5.0)
-    outbox.settled(take(outbox, 5.0, LiveSample), 5.0)
+    outbox.on_ack(take(outbox, 5.0, LiveSample), 5.0)
     assert outbox.next(20.0) is None
     assert outbox.due() is None
 
@@ -397,17 +397,17 @@ def test_there_is_no_second_sending_without_a_loss() -> None:
 def test_the_second_sending_is_due_by_time_alone() -> None:
     outbox = connected(now=0.0)
     outbox.add(sample(1), 5.0)
-    outbox.settled(take(outbox, 5.0, LiveSample), 5.0)
+    outbox.on_ack(take(outbox, 5.0, LiveSample), 5.0)
     outbox.lost(6.0)
     connect(outbox, 7.0)
-    assert outbox.due() == 7.0 + PAST_AFTER
+    assert outbox.due() == 7.0 + HISTORY_AFTER
 
 
 def test_a_connection_found_dead_late_still_repeats_the_last_ten_seconds_it_acknowledged() -> None:
     outbox = connected(now=-100.0)
     for now in (0.0, 6.0):
         outbox.add(sample(int(now) + 1), now)
-        outbox.settled(take(outbox, now, LiveSample), now)
+        outbox.on_ack(take(outbox, now, LiveSample), now)
     outbox.lost(45.0)
     connect(outbox, 46.0)
     assert seqs(outbox.next(56.0)) == [1, 7]
@@ -417,7 +417,7 @@ def test_what_was_acknowledged_long_before_a_loss_does_not_go_again() -> None:
     outbox = Outbox(detection=40.0)
     connect(outbox, -100.0)
     outbox.add(sample(1), 0.0)
-    outbox.settled(take(outbox, 0.0, LiveSample), 0.0)
+    outbox.on_ack(take(outbox, 0.0, LiveSample), 0.0)
     outbox.lost(1000.0)
     connect(outbox, 1001.0)
     assert outbox.next(1011.0) is None
@@ -426,7 +426,7 @@ def test_what_was_acknowledged_long_before_a_loss_does_not_go_again() -> None:
 def test_a_second_loss_before_the_second_sending_forgets_nothing() -> None:
     outbox = connected(now=-100.0)
     outbox.add(sample(1), 0.0)
-    outbox.settled(take(outbox, 0.0, LiveSample), 0.0)
+    outbox.on_ack(take(outbox, 0.0, LiveSample), 0.0)
     outbox.lost(1.0)
     connect(outbox, 5000.0)
     outbox.lost(5001.0)
@@ -441,13 +441,13 @@ def test_beyond_the_capacity_the_oldest_is_dropped_and_declared_before_the_backl
     outbox = Outbox(capacity=3)
     for seq in range(1, 7):
         outbox.add(sample(seq), float(seq))
-    assert outbox.backlog == telemetry.BacklogStats(depth=3, oldest_ts=4000, dropped=3)
+    assert outbox.stats == telemetry.BacklogStats(depth=3, oldest_ts=4000, dropped=3)
     connect(outbox, 100.0)
     assert outbox.due() == 110.0
-    declaration = take(outbox, 110.0, LossNotice)
-    assert (declaration.topic, declaration.loss) == ("event", Loss("a", "k", 1, 3, 3))
+    notice = take(outbox, 110.0, LossNotice)
+    assert (notice.topic, notice.loss) == ("event", Loss("a", "k", 1, 3, 3))
     assert outbox.next(110.0) is None
-    outbox.settled(declaration, 110.0)
+    outbox.on_ack(notice, 110.0)
     assert seqs(outbox.next(110.0)) == [4, 5, 6]
 
 
@@ -462,7 +462,7 @@ def test_what_is_only_repeated_goes_first_and_is_no_loss() -> None:
     outbox = connected(now=-100.0, capacity=4)
     for seq in (1, 2):
         outbox.add(sample(seq), 0.0)
-        outbox.settled(take(outbox, 0.0, LiveSample), 0.0)
+        outbox.on_ack(take(outbox, 0.0, LiveSample), 0.0)
     outbox.lost(1.0)
     for seq in (3, 4, 5):
         outbox.add(sample(seq), 2.0)
@@ -502,10 +502,10 @@ def test_a_refused_topic_is_reported_once_and_its_samples_wait_for_history_until
     first, second = take(outbox, 0.0, LiveSample), take(outbox, 0.0, LiveSample)
     assert outbox.refused(first, NOT_AUTHORIZED, 0.0)
     assert not outbox.refused(second, NOT_AUTHORIZED, 0.0)
-    array = take(outbox, 0.0, HistoryBatch)
-    assert seqs(array) == [1, 2, 3]
+    batch = take(outbox, 0.0, HistoryBatch)
+    assert seqs(batch) == [1, 2, 3]
     assert outbox.dropped == 0
-    assert outbox.refused(array, NOT_AUTHORIZED, 0.0)
+    assert outbox.refused(batch, NOT_AUTHORIZED, 0.0)
     assert outbox.next(1.0) is None
     assert outbox.depth == 3
     assert outbox.reload(1.0)
@@ -532,7 +532,7 @@ def test_refused_history_waits_and_the_other_devices_go_on() -> None:
     outbox.add(sample(1, "b"), 50.1)
     other = take(outbox, 60.0, HistoryBatch)
     assert other.topic == "device/b/history"
-    outbox.settled(other, 60.0)
+    outbox.on_ack(other, 60.0)
     assert (outbox.next(61.0), outbox.dropped, outbox.depth) == (None, 0, 2)
 
 
@@ -572,7 +572,7 @@ def test_a_refused_event_topic_keeps_losses_for_the_reload() -> None:
     connect(outbox, 10.0)
     assert outbox.refused(take(outbox, 20.0, LossNotice), NOT_AUTHORIZED, 20.0)
     assert outbox.due() == 20.0
-    outbox.settled(take(outbox, 20.0, HistoryBatch), 20.0)
+    outbox.on_ack(take(outbox, 20.0, HistoryBatch), 20.0)
     assert outbox.next(200.0) is None
     assert outbox.reload(200.0)
     assert take(outbox, 200.0, LossNotice).loss.count == 1
@@ -583,16 +583,16 @@ def test_a_quota_is_asked_again_with_back_off_and_loses_nothing() -> None:
     outbox.add(sample(1), -10.0)
     now, told, tried = 0.0, [], []
     for _ in range(9):
-        array = take(outbox, now, HistoryBatch)
+        batch = take(outbox, now, HistoryBatch)
         tried.append(now)
-        told.append(outbox.refused(array, QUOTA_EXCEEDED, now))
+        told.append(outbox.refused(batch, QUOTA_EXCEEDED, now))
         assert outbox.next(now + 0.9) is None
         due = outbox.due()
         assert due is not None
         now = due
     assert tried == [0, 1, 3, 7, 15, 31, 63, 123, 183]
     assert told == [True, *[False] * 8]
-    outbox.settled(take(outbox, now, HistoryBatch), now)
+    outbox.on_ack(take(outbox, now, HistoryBatch), now)
     assert (outbox.depth, outbox.dropped) == (0, 0)
 
 
@@ -601,11 +601,11 @@ def test_a_live_sample_that_is_refused_goes_as_history_and_the_next_is_tried_liv
     outbox.add(sample(1), 0.0)
     assert outbox.refused(take(outbox, 0.0, LiveSample), QUOTA_EXCEEDED, 0.0)
     outbox.add(sample(2), 0.5)
-    array = take(outbox, 0.5, HistoryBatch)
-    assert seqs(array) == [1, 2]
-    outbox.settled(array, 0.5)
+    batch = take(outbox, 0.5, HistoryBatch)
+    assert seqs(batch) == [1, 2]
+    outbox.on_ack(batch, 0.5)
     outbox.add(sample(3), 1.0)
-    assert take(outbox, 1.0, LiveSample).kept.sample.seq == 3
+    assert take(outbox, 1.0, LiveSample).queued.sample.seq == 3
 
 
 def test_an_event_that_is_refused_waits_and_delays_no_response() -> None:
@@ -660,7 +660,7 @@ def test_what_clears_topics_goes_when_nothing_else_does() -> None:
 
 
 def under_way(outbox: Outbox) -> dict[str, int]:
-    return {letter.topic: 100 for letter in outbox.under_way}
+    return {item.topic: 100 for item in outbox.under_way}
 
 
 def end(outbox: Outbox, now: float, sent: dict[str, int], *, denied: bool = False) -> str | None:
@@ -670,14 +670,14 @@ def end(outbox: Outbox, now: float, sent: dict[str, int], *, denied: bool = Fals
     return None if culprit is None else culprit.topic
 
 
-def test_an_array_that_ends_two_connections_is_cut_over_connects_until_a_reload() -> None:
+def test_a_batch_that_ends_two_connections_is_cut_over_connects_until_a_reload() -> None:
     outbox, found = Outbox(), []
     for seq in range(1, 5):
         outbox.add(sample(seq), 0.0)
     for now in (100.0, 200.0, 300.0):
         connect(outbox, now)
-        array = take(outbox, now + PAST_AFTER, HistoryBatch)
-        found.append((len(array.samples), end(outbox, now + 20, under_way(outbox))))
+        batch = take(outbox, now + HISTORY_AFTER, HistoryBatch)
+        found.append((len(batch.samples), end(outbox, now + 20, under_way(outbox))))
     assert found == [(4, None), (4, "device/a/history"), (2, "device/a/history")]
     assert outbox.dropped == 0
     connect(outbox, 400.0)
@@ -693,14 +693,14 @@ def test_a_single_sample_that_ends_connections_is_declared_and_its_topic_rests_f
     outbox.add(sample(1), 0.0)
     for now in (100.0, 200.0):
         connect(outbox, now)
-        take(outbox, now + PAST_AFTER, HistoryBatch)
+        take(outbox, now + HISTORY_AFTER, HistoryBatch)
         end(outbox, now + 20, under_way(outbox))
     outbox.add(sample(2), 221.0)
     connect(outbox, 222.0)
-    outbox.settled(take(outbox, 222.0, LiveSample), 222.0)
-    declaration = take(outbox, 240.0, LossNotice)
-    assert declaration.loss == Loss("a", "k", 1, 1, 1)
-    outbox.settled(declaration, 240.0)
+    outbox.on_ack(take(outbox, 222.0, LiveSample), 222.0)
+    notice = take(outbox, 240.0, LossNotice)
+    assert notice.loss == Loss("a", "k", 1, 1, 1)
+    outbox.on_ack(notice, 240.0)
     assert outbox.passes_over("device/a/history")
     assert outbox.due() == 220.0 + BANNED_FOR
     assert seqs(outbox.next(220.0 + BANNED_FOR)) == [2]
@@ -718,12 +718,12 @@ def test_a_denied_topic_loses_nothing_whatever_was_under_way_there() -> None:
         outbox.next(10.0 * number + 11)
     assert (outbox.depth, outbox.dropped) == (2, 0)
     outbox.lost(40.0)
-    outbox.past.losses.restore(Loss("b", "k", 1, 1, 1))
+    outbox.backlog.losses.restore(Loss("b", "k", 1, 1, 1))
     connect(outbox, 41.0)
     take(outbox, 60.0, LossNotice)
     outbox.suspects.ended({"event": 9}, certain=True)
     assert end(outbox, 61.0, {"event": 9}, denied=True) == "event"
-    assert outbox.past.undeclared() == [Loss("b", "k", 1, 1, 1)]
+    assert outbox.backlog.undeclared() == [Loss("b", "k", 1, 1, 1)]
 
 
 def test_a_live_sample_that_ends_connections_goes_as_history() -> None:
@@ -766,7 +766,7 @@ def test_where_several_were_under_way_each_goes_alone_and_the_rest_comes_through
         outbox.burst(states, ONLINE)
     first = take(outbox, 3.0, Retained)
     assert (outbox.next(3.0), outbox.waits, outbox.due()) == (None, True, None)
-    outbox.settled(first, 3.0)
+    outbox.on_ack(first, 3.0)
     outbox.suspects.acknowledged(first.topic, 100)
     second = take(outbox, 3.0, Retained)
     assert second.topic == "device/b/state"
@@ -775,10 +775,10 @@ def test_where_several_were_under_way_each_goes_alone_and_the_rest_comes_through
     outbox.burst(states, ONLINE)
     told = []
     while not outbox.announced:
-        letter = outbox.next(4.0)
-        assert letter is not None
-        told.append(letter.topic)
-        outbox.settled(letter, 4.0)
+        item = outbox.next(4.0)
+        assert item is not None
+        told.append(item.topic)
+        outbox.on_ack(item, 4.0)
     assert told == ["device/a/state", "device/c/state", "availability"]
 
 
@@ -792,38 +792,38 @@ def test_what_goes_alone_waits_until_nothing_is_under_way() -> None:
     assert outbox.next(0.0) is None
     outbox.add(sample(2, "b"), 0.0)
     assert outbox.next(0.0) is None
-    outbox.settled(live, 0.0)
-    array = take(outbox, 0.0, HistoryBatch)
-    shorter = outbox.shorten(array, 1)
+    outbox.on_ack(live, 0.0)
+    batch = take(outbox, 0.0, HistoryBatch)
+    shorter = outbox.shorten(batch, 1)
     assert seqs(shorter) == [1]
     assert outbox.next(0.0) is None
-    outbox.settled(shorter, 0.0)
+    outbox.on_ack(shorter, 0.0)
     assert isinstance(outbox.next(0.0), LiveSample)
 
 
-def test_an_array_under_way_is_shortened_and_the_rest_goes_after_it() -> None:
+def test_a_batch_under_way_is_shortened_and_the_rest_goes_after_it() -> None:
     outbox = connected(now=-100.0)
     for seq in range(1, 6):
         outbox.add(sample(seq), 0.0)
-    array = take(outbox, 50.0, HistoryBatch)
-    shorter = outbox.shorten(array, 2)
+    batch = take(outbox, 50.0, HistoryBatch)
+    shorter = outbox.shorten(batch, 2)
     assert (seqs(shorter), outbox.under_way, outbox.depth) == ([1, 2], (shorter,), 5)
-    outbox.settled(shorter, 50.0)
+    outbox.on_ack(shorter, 50.0)
     assert seqs(outbox.next(51.0)) == [3, 4, 5]
 
 
 # What is too large
 
 
-def test_an_array_that_is_too_large_is_cut_until_it_fits() -> None:
+def test_a_batch_that_is_too_large_is_cut_until_it_fits() -> None:
     outbox = connected(now=-100.0)
     for seq in range(1, 6):
         outbox.add(sample(seq), 0.0)
     sizes, told = [], []
     for _ in range(3):
-        array = take(outbox, 50.0, HistoryBatch)
-        sizes.append(len(array.samples))
-        told.append(outbox.unfit(array))
+        batch = take(outbox, 50.0, HistoryBatch)
+        sizes.append(len(batch.samples))
+        told.append(outbox.unfit(batch))
     assert sizes == [5, 2, 1]
     assert told == [False, False, True]
     assert outbox.dropped == 1
@@ -843,27 +843,27 @@ def test_a_sample_that_is_too_large_is_declared_and_its_topic_reported_once() ->
 # What waits
 
 
-def test_idle_is_when_nothing_but_the_past_waits() -> None:
+def test_idle_is_when_nothing_but_the_backlog_waits() -> None:
     outbox = connected()
     idle = [outbox.idle]
     outbox.add(sample(1), 0.0)
     idle.append(outbox.idle)
     live = take(outbox, 0.0, LiveSample)
     idle.append(outbox.idle)
-    outbox.settled(live, 0.0)
+    outbox.on_ack(live, 0.0)
     idle.append(outbox.idle)
     assert idle == [True, False, False, True]
 
 
 def test_the_oldest_that_waits_is_told_wherever_it_waits() -> None:
     outbox = connected(now=-100.0)
-    assert outbox.backlog == telemetry.BacklogStats()
+    assert outbox.stats == telemetry.BacklogStats()
     outbox.add(sample(7), 0.0)
     outbox.add(sample(8), 5.0)
-    assert outbox.backlog == telemetry.BacklogStats(depth=2, oldest_ts=7000, dropped=0)
+    assert outbox.stats == telemetry.BacklogStats(depth=2, oldest_ts=7000, dropped=0)
     take(outbox, 5.0, LiveSample)
     take(outbox, 5.0, HistoryBatch)
-    assert outbox.backlog == telemetry.BacklogStats(depth=2, oldest_ts=7000, dropped=0)
+    assert outbox.stats == telemetry.BacklogStats(depth=2, oldest_ts=7000, dropped=0)
 
 
 def test_what_the_store_could_not_take_waits_in_memory_as_far_as_there_is_room() -> None:
@@ -871,9 +871,9 @@ def test_what_the_store_could_not_take_waits_in_memory_as_far_as_there_is_room()
     for seq in (1, 2):
         outbox.add(sample(seq), 0.0)
     outbox.age(4.0)
-    outbox.past.spill()
-    outbox.past.history.add(QueuedSample(sample_of(3), 4.0))
-    outbox.past.history.add(QueuedSample(sample_of(4), 4.0))
+    outbox.backlog.spill()
+    outbox.backlog.history.add(QueuedSample(sample_of(3), 4.0))
+    outbox.backlog.history.add(QueuedSample(sample_of(4), 4.0))
     outbox.not_spilled(4.0)
     assert (outbox.depth, outbox.dropped) == (3, 1)
 
@@ -886,9 +886,9 @@ def sample_of(seq: int) -> Sample:
 
 def test_what_lies_in_the_store_counts_and_is_the_oldest() -> None:
     outbox = Outbox()
-    outbox.past.stored.told(5, 77)
+    outbox.backlog.spool.told(5, 77)
     outbox.add(sample(6), 0.0)
-    assert outbox.backlog == telemetry.BacklogStats(depth=6, oldest_ts=77, dropped=0)
+    assert outbox.stats == telemetry.BacklogStats(depth=6, oldest_ts=77, dropped=0)
 
 
 def test_when_the_oldest_live_sample_grows_old_is_known() -> None:
@@ -971,35 +971,35 @@ class OutboxLaws(RuleBasedStateMachine):
 
     @rule()
     def take(self) -> None:
-        letter = self.outbox.next(self.now)
-        if letter is None:
+        item = self.outbox.next(self.now)
+        if item is None:
             return
         assert self.online
-        kept = samples_of(letter)
-        assert [each.sample.seq for each in kept] == sorted({each.sample.seq for each in kept})
-        assert len({each.key for each in kept}) <= 1
-        if isinstance(letter, LiveSample):
-            assert self.now - letter.kept.since <= LIVE_FOR
-        if isinstance(letter, HistoryBatch):
-            assert len(kept) <= ARRAY_MOST
+        queued = samples_of(item)
+        assert [each.sample.seq for each in queued] == sorted({each.sample.seq for each in queued})
+        assert len({each.key for each in queued}) <= 1
+        if isinstance(item, LiveSample):
+            assert self.now - item.queued.since <= LIVE_FOR
+        if isinstance(item, HistoryBatch):
+            assert len(queued) <= BATCH_MOST
 
     @precondition(lambda self: self.outbox.under_way)
     @rule(
         which=st.integers(0, 4), fate=st.sampled_from(["settled", "settled", "settled", "refused", "denied", "unfit"])
     )
     def answer(self, which: int, fate: str) -> None:
-        letter = self.outbox.under_way[which % len(self.outbox.under_way)]
+        item = self.outbox.under_way[which % len(self.outbox.under_way)]
         if fate == "settled":
-            self.outbox.settled(letter, self.now)
-            self.delivered |= {(each.sample.device, each.sample.seq) for each in samples_of(letter)}
-            if isinstance(letter, LossNotice):
-                self.declared.append(letter.loss)
+            self.outbox.on_ack(item, self.now)
+            self.delivered |= {(each.sample.device, each.sample.seq) for each in samples_of(item)}
+            if isinstance(item, LossNotice):
+                self.declared.append(item.loss)
         elif fate == "refused":
-            self.outbox.refused(letter, QUOTA_EXCEEDED, self.now)
+            self.outbox.refused(item, QUOTA_EXCEEDED, self.now)
         elif fate == "denied":
-            self.outbox.refused(letter, NOT_AUTHORIZED, self.now)
+            self.outbox.refused(item, NOT_AUTHORIZED, self.now)
         else:
-            self.outbox.unfit(letter)
+            self.outbox.unfit(item)
 
     @invariant()
     def bounds_hold(self) -> None:
@@ -1012,17 +1012,17 @@ class OutboxLaws(RuleBasedStateMachine):
         """Drain: then every sample was delivered or declared, and the declared count is right."""
         if not self.online:
             connect(self.outbox, self.now, window=self.WINDOW)
-        for letter in self.outbox.under_way:
-            self.outbox.settled(letter, self.now)
-            self.delivered |= {(each.sample.device, each.sample.seq) for each in samples_of(letter)}
-            if isinstance(letter, LossNotice):
-                self.declared.append(letter.loss)
+        for item in self.outbox.under_way:
+            self.outbox.on_ack(item, self.now)
+            self.delivered |= {(each.sample.device, each.sample.seq) for each in samples_of(item)}
+            if isinstance(item, LossNotice):
+                self.declared.append(item.loss)
         self.outbox.reload(self.now)
-        self.now += PAST_AFTER + DECLARED_EVERY
+        self.now += HISTORY_AFTER + DECLARED_EVERY
         for _ in range(1000):
             taken = self.outbox.next(self.now)
             if taken is not None:
-                self.outbox.settled(taken, self.now)
+                self.outbox.on_ack(taken, self.now)
                 self.delivered |= {(each.sample.device, each.sample.seq) for each in samples_of(taken)}
                 if isinstance(taken, LossNotice):
                     self.declared.append(taken.loss)
@@ -1051,9 +1051,9 @@ def test_a_backlog_of_any_length_leaves_whole(count: int) -> None:
         outbox.add(sample(seq), 0.0)
     connect(outbox, 50.0)
     now, told = 60.0, []
-    while (letter := outbox.next(now)) is not None:
-        told += seqs(letter)
-        outbox.settled(letter, now)
+    while (item := outbox.next(now)) is not None:
+        told += seqs(item)
+        outbox.on_ack(item, now)
         now += ARRAY_EVERY
     assert told == list(range(1, count + 1))
 
@@ -1064,10 +1064,10 @@ def test_it_says_whether_anything_waits() -> None:
     outbox.connected(0.0)
     outbox.burst([], ONLINE)
     told.append(outbox.waits)
-    letter = outbox.next(0.0)
-    assert letter is not None
+    item = outbox.next(0.0)
+    assert item is not None
     told.append(outbox.waits)
-    outbox.settled(letter, 0.0)
+    outbox.on_ack(item, 0.0)
     outbox.add(Publication("event", {}, PublicationKind.EVENT, retain=False, qos=1), 0.0)
     told.append(outbox.waits)
     assert told == [False, True, False, True]
@@ -1084,10 +1084,10 @@ def test_what_the_window_carries_is_told_once_where_states_are_replaced_before_t
     for second in range(60):
         outbox.add(sample(second + 1), float(second))
         outbox.add(refresh(second), float(second))
-        letter = outbox.next(float(second))
-        assert letter is not None
+        item = outbox.next(float(second))
+        assert item is not None
         outbox.add(refresh(second), float(second))
-        outbox.settled(letter, second + 0.9)
+        outbox.on_ack(item, second + 0.9)
         told.append(outbox.congested(second + 0.9))
     (congested,) = [each for each in told if each is not None]
     assert congested.window == 1
@@ -1102,11 +1102,11 @@ def test_once_the_window_was_full_refreshes_have_their_turn_until_nothing_waits(
     outbox.add(refresh(1), 0.0)
     kinds = []
     for _ in range(13):
-        letter = outbox.next(0.0)
-        assert letter is not None
-        kinds.append(type(letter))
+        item = outbox.next(0.0)
+        assert item is not None
+        kinds.append(type(item))
         assert outbox.next(0.0) is None
-        outbox.settled(letter, 0.0)
+        outbox.on_ack(item, 0.0)
     assert kinds.index(Retained) < 4
     assert outbox.next(0.0) is None
     outbox.add(refresh(2), 1.0)
@@ -1114,11 +1114,11 @@ def test_once_the_window_was_full_refreshes_have_their_turn_until_nothing_waits(
     assert isinstance(outbox.next(1.0), LiveSample)
 
 
-def test_no_array_is_taken_while_the_one_before_is_not_on_its_way() -> None:
+def test_no_batch_is_taken_while_the_one_before_is_not_on_its_way() -> None:
     outbox = Outbox()
     outbox.add(sample(1), 0.0)
     connect(outbox, 50.0)
-    assert outbox.next(60.0, past=False) is None
+    assert outbox.next(60.0, batch=False) is None
     assert isinstance(outbox.next(60.0), HistoryBatch)
 
 
@@ -1130,11 +1130,11 @@ def test_a_burst_that_lasts_takes_turns_with_the_rest_after_ten_seconds() -> Non
     for now in (0.0, 5.0, 9.9, 10.0, 10.1, 10.2):
         if now > 9.0:
             outbox.add(sample(int(10 * now)), now)
-        letter = outbox.next(now)
-        assert letter is not None
+        item = outbox.next(now)
+        assert item is not None
         assert outbox.next(now) is None
-        kinds.append(type(letter))
-        outbox.settled(letter, now)
+        kinds.append(type(item))
+        outbox.on_ack(item, now)
     assert kinds[:3] == [Retained] * 3
     assert LiveSample in kinds[3:]
     assert Retained in kinds[3:]

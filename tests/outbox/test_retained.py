@@ -96,11 +96,11 @@ def test_a_clearing_is_put_back_unless_a_newer_version_waits() -> None:
     retention.lost()
     retention.add(state(2, "back"))
     retention.add(publication.retained("again", None))
-    for letter in (gone, back, again):
-        retention.put_back(letter)
+    for item in (gone, back, again):
+        retention.put_back(item)
     waiting = [each and each.publication.payload for each in (retention.next_change(NONE), retention.next_change(NONE))]
     assert waiting == [{"version": 2}, None]
-    assert [letter and letter.topic for letter in (retention.next_clearing(NONE) for _ in range(3))] == [
+    assert [item and item.topic for item in (retention.next_clearing(NONE) for _ in range(3))] == [
         "again",
         "gone",
         None,
@@ -145,7 +145,7 @@ def test_what_is_passed_over_waits_in_its_newest_version_until_its_topic_is_trie
     retention.over(version)
     retention.add(state(3))
     retention.lifted(refused)
-    newest = [letter and letter.publication for letter in (retention.next_change(NONE) for _ in range(3))]
+    newest = [item and item.publication for item in (retention.next_change(NONE) for _ in range(3))]
     assert newest == [state(3), ONLINE, None]
     retention.next_change(frozenset({"gone"}))
     retention.lost()
@@ -158,8 +158,8 @@ def test_thousands_of_clearings_are_taken_in_linear_time() -> None:
         retention.add(publication.retained(f"device/{number}/state", None))
     under_way: list[Retained] = []
     begun = time.process_time()
-    while (letter := retention.next_clearing(NONE)) is not None:
-        under_way.append(letter)
+    while (item := retention.next_clearing(NONE)) is not None:
+        under_way.append(item)
         if len(under_way) == 20:
             retention.over(under_way.pop(0))
     assert time.process_time() - begun < 5.0, "a look at all that wait for each would take minutes"
@@ -232,8 +232,8 @@ def test_refreshes_of_a_burst_go_with_its_changes_and_before_its_last() -> None:
     retention.burst([publication.retained("stats", {}, qos=0, refresh=True), state(1)], ONLINE)
     told = []
     while not retention.announced:
-        letter = retention.next_change(NONE)
-        assert letter is not None
-        told.append(letter.topic)
-        retention.over(letter)
+        item = retention.next_change(NONE)
+        assert item is not None
+        told.append(item.topic)
+        retention.over(item)
     assert told == ["stats", "state", "availability"]

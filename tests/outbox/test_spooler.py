@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from lfs10d.outbox.backlog import PAST_AFTER, SPILL_EVERY
+from lfs10d.outbox.backlog import HISTORY_AFTER, SPILL_EVERY
 from lfs10d.outbox.items import HistoryBatch, samples_of
 from lfs10d.outbox.losses import Loss
 from lfs10d.outbox.outbox import Outbox
@@ -62,7 +62,7 @@ class Place:
     def __post_init__(self) -> None:
         self.outbox = Outbox()
         self.store = Store(self.folder, boot="k2", limits=self.limits)
-        self.stowage = Spooler(
+        self.spooler = Spooler(
             self.outbox,
             self.store,
             epoch_ms=lambda: self.epoch_ms,
@@ -79,14 +79,14 @@ class Place:
         """Measure."""
         for seq in range(first, last + 1):
             self.outbox.add(sample(seq, clock=clock), asyncio.get_running_loop().time(), shift=0)
-        self.stowage.poke()
+        self.spooler.poke()
 
     async def move(self, seconds: float) -> None:
         """Let time pass, and what is due then begin."""
         loop = asyncio.get_running_loop()
         assert isinstance(loop, MovedLoop)
         loop.moved += seconds
-        self.stowage.poke()
+        self.spooler.poke()
         for _ in range(5):
             await asyncio.sleep(0)
 
@@ -96,20 +96,20 @@ class Place:
         self.outbox.connected(now)
         self.outbox.burst([], ONLINE)
         while not self.outbox.announced:
-            letter = self.outbox.next(now)
-            assert letter is not None
-            self.outbox.settled(letter, now)
-        self.stowage.poke()
+            item = self.outbox.next(now)
+            assert item is not None
+            self.outbox.on_ack(item, now)
+        self.spooler.poke()
 
     def settle_next(self) -> list[int]:
         """Have the broker take what goes next; return its seqs."""
         now = asyncio.get_running_loop().time()
-        letter = self.outbox.next(now)
-        if letter is None:
+        item = self.outbox.next(now)
+        if item is None:
             return []
-        self.outbox.settled(letter, now)
-        self.stowage.poke()
-        return [kept.sample.seq for kept in samples_of(letter)]
+        self.outbox.on_ack(item, now)
+        self.spooler.poke()
+        return [queued.sample.seq for queued in samples_of(item)]
 
     def on_disk(self) -> list[int]:
         """Return the seqs that another life would find."""
@@ -130,11 +130,11 @@ async def until(claim: Callable[[], bool], what: str) -> None:
 @contextlib.asynccontextmanager
 async def working(place: Place) -> AsyncIterator[Place]:
     """Start and stop a stowage."""
-    place.stowage.start()
+    place.spooler.start()
     try:
         yield place
     finally:
-        await place.stowage.stop(PATIENCE)
+        await place.spooler.stop(PATIENCE)
 
 
 def play(scenario: Coroutine[None, None, None]) -> None:
@@ -149,10 +149,10 @@ def test_what_the_broker_does_not_take_goes_to_disk_and_from_there_to_the_broker
             place.add(1, 250)
             await place.move(3.5)
             await until(lambda: place.store.rows == 250, "the spill")
-            assert place.outbox.backlog == publication.BacklogStats(depth=250, oldest_ts=1000, dropped=0)
+            assert place.outbox.stats == publication.BacklogStats(depth=250, oldest_ts=1000, dropped=0)
             place.connect()
-            await place.move(PAST_AFTER)
-            await until(lambda: bool(place.outbox.past.stored.page), "the page")
+            await place.move(HISTORY_AFTER)
+            await until(lambda: bool(place.outbox.backlog.spool.page), "the page")
             told = place.settle_next()
             for _ in range(2):
                 await place.move(0.2)
@@ -176,11 +176,11 @@ def test_at_the_end_what_waits_is_on_disk_and_what_was_acknowledged_is_not(tmp_p
             await place.move(3.5)
             await until(lambda: place.store.rows == 150, "the spill")
             place.connect()
-            await place.move(PAST_AFTER)
-            await until(lambda: bool(place.outbox.past.stored.page), "the page")
+            await place.move(HISTORY_AFTER)
+            await until(lambda: bool(place.outbox.backlog.spool.page), "the page")
             assert place.settle_next() == list(range(1, 101))
             place.add(151, 160)
-            place.outbox.past.part()
+            place.outbox.backlog.part()
             place.outbox.lost(asyncio.get_running_loop().time())
         assert place.on_disk() == list(range(101, 161))
 
@@ -192,12 +192,12 @@ def test_what_waited_before_is_found_and_what_was_lost_is_declared(tmp_path: Pat
         before = Place(tmp_path)
         async with working(before):
             before.add(1, 3)
-            before.outbox.past.losses.restore(Loss("a", "k1", 1, 2, 2))
+            before.outbox.backlog.losses.restore(Loss("a", "k1", 1, 2, 2))
         place = Place(tmp_path)
         async with working(place):
             await until(lambda: place.outbox.depth == 3, "the backlog")
-            assert place.outbox.past.undeclared() == [Loss("a", "k1", 1, 2, 2)]
-            assert place.outbox.backlog.oldest_ts == 1000
+            assert place.outbox.backlog.undeclared() == [Loss("a", "k1", 1, 2, 2)]
+            assert place.outbox.stats.oldest_ts == 1000
 
     play(scenario())
 
@@ -208,12 +208,12 @@ def test_losses_that_stay_are_kept_within_five_seconds_and_forgotten_when_they_a
         async with working(place):
             await until((tmp_path / "backlog.db").exists, "the file")
             place.connect()
-            place.outbox.past.losses.restore(Loss("a", "k2", 1, 2, 2))
-            place.stowage.poke()
+            place.outbox.backlog.losses.restore(Loss("a", "k2", 1, 2, 2))
+            place.spooler.poke()
             await asyncio.sleep(0.1)
             await place.move(SPILL_EVERY + 0.1)
             await until(lambda: place.store.losses == (Loss("a", "k2", 1, 2, 2),), "the loss")
-            await place.move(PAST_AFTER)
+            await place.move(HISTORY_AFTER)
             assert place.settle_next() == []  # the declaration
             await asyncio.sleep(0.1)
             await place.move(SPILL_EVERY + 0.1)
@@ -296,18 +296,18 @@ def test_other_limits_and_a_clock_set_right_reach_the_disk_and_the_page(tmp_path
             await place.move(3.5)
             await until(lambda: place.store.rows == 2, "the spill")
             place.connect()
-            await place.move(PAST_AFTER)
-            place.stowage.correct(7000)
-            await until(lambda: bool(place.outbox.past.stored.page), "the page")
+            await place.move(HISTORY_AFTER)
+            place.spooler.correct(7000)
+            await until(lambda: bool(place.outbox.backlog.spool.page), "the page")
             place.outbox.correct(7000)
-            letter = place.outbox.next(asyncio.get_running_loop().time())
-            assert isinstance(letter, HistoryBatch)
-            assert [(kept.sample.ts, kept.sample.clock) for kept in letter.samples] == [
+            item = place.outbox.next(asyncio.get_running_loop().time())
+            assert isinstance(item, HistoryBatch)
+            assert [(queued.sample.ts, queued.sample.clock) for queued in item.samples] == [
                 (8000, "synced"),
                 (9000, "synced"),
             ]
             place.outbox.lost(asyncio.get_running_loop().time())
-            place.stowage.limit(replace(ROOMY, age=1))
+            place.spooler.limit(replace(ROOMY, age=1))
             place.epoch_ms = 10**9
             place.add(3, 3)
             await place.move(4)
@@ -339,10 +339,10 @@ def test_a_disk_that_hangs_does_not_hold_up_the_end(
     async def scenario() -> None:
         place = Place(tmp_path)
         monkeypatch.setattr(place.store, "open", lambda: let_go.wait(PATIENCE) and ())
-        place.stowage.start()
+        place.spooler.start()
         place.add(1, 3)
         began = time.monotonic()
-        await place.stowage.stop(0.05)
+        await place.spooler.stop(0.05)
         assert time.monotonic() - began < PATIENCE / 2
 
     play(scenario())
@@ -356,12 +356,12 @@ def test_a_mistake_of_ours_is_told_and_ends_nothing_else(
     async def scenario() -> None:
         place = Place(tmp_path)
         monkeypatch.setattr(place.store, "open", lambda: 1 // 0)
-        place.stowage.start()
+        place.spooler.start()
         await until(lambda: bool(place.troubles), "the trouble")
         assert place.troubles[0] is not None
         assert "until a restart" in place.troubles[0]
         monkeypatch.undo()
-        await place.stowage.stop(PATIENCE)
+        await place.spooler.stop(PATIENCE)
 
     play(scenario())
     assert "by a mistake of ours" in caplog.text

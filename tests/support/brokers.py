@@ -238,8 +238,8 @@ class Mosquitto:
         try:
             newcomer.publish("lfs10d-test/end", "x")
             newcomer.wait_for("lfs10d-test/end")
-            kept = {each.topic: each.payload for each in newcomer.heard if each.retain}  # others go on publishing
-            return {topic: payload for topic, payload in kept.items() if payload}
+            retained = {each.topic: each.payload for each in newcomer.heard if each.retain}  # others go on publishing
+            return {topic: payload for topic, payload in retained.items() if payload}
         finally:
             newcomer.close()
 
