@@ -195,7 +195,7 @@ class DaemonInMemory:
                 self.readings[event.device] += 1
                 if event.fault is None:
                     self.good[event.device] = event.at
-            published += self._station.heard(event, now)
+            published += self._station.on_event(event, now)
         self._publish(published)
 
     def _publish(self, publications: Iterable[Publication]) -> None:

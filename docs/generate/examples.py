@@ -76,9 +76,9 @@ class Story:
         self._samples: list[Sample] = []
         self._station = Station(_DAEMON, _LINE, (_MAST, _ROOF), _at(0), backlog=BacklogStats)
         self._note(self._station.burst(_at(0)))
-        self._note(self._station.heard(PortChanged(0.05, None), _at(0.05)))
+        self._note(self._station.on_event(PortChanged(0.05, None), _at(0.05)))
         counters = UartCounters(framing=0, parity=0, overrun=0, breaks=0)
-        self._note(self._station.heard(UartCounted(0.1, counters), _at(0.1)))
+        self._note(self._station.on_event(UartCounted(0.1, counters), _at(0.1)))
         for second in range(1, 31):
             self._poll(second)
             self._note(self._station.tick(_at(second + 0.5)))
@@ -97,7 +97,7 @@ class Story:
             online = 20 < second < 23 or second < 3  # noqa: PLR2004 - a made-up minute
             other = Reading("slave-3", at + 0.2, None, silence, rtt=None, online=online, response_timeout=0.05)
         for event in (asked, good, other):
-            self._note(self._station.heard(event, _at(event.at + 0.001)))
+            self._note(self._station.on_event(event, _at(event.at + 0.001)))
 
     def _note(self, publications: list[Publication]) -> None:
         for each in publications:

@@ -55,7 +55,9 @@ def bytes_a_day(sensors: int, *, telemetry: bool, state_every: float) -> tuple[i
             reading = Reading(device.name, now, values, None, 0.0182, online=True, response_timeout=0.2)
             instant = Instant(now, WALL + now, "synced")
             sent = [
-                each for each in station.heard(reading, instant) if telemetry or each.kind is not PublicationKind.SAMPLE
+                each
+                for each in station.on_event(reading, instant)
+                if telemetry or each.kind is not PublicationKind.SAMPLE
             ]
             if station.due() <= now:
                 sent += station.tick(instant)

@@ -33,8 +33,9 @@ from lfs10d.reconfiguration.adopt import AdoptRequest
 from lfs10d.reconfiguration.reconfiguration import Reconfiguration
 from lfs10d.system.clock import Instant
 from lfs10d.system.threads import run_in_thread
+from lfs10d.telemetry.line_state import PAUSED, POLLING
 from lfs10d.telemetry.publication import Publication, event
-from lfs10d.telemetry.station import PAUSED, POLLING, Station
+from lfs10d.telemetry.station import Station
 
 J = TypeVar("J", bound=Job)
 
@@ -162,7 +163,7 @@ class LineAccess:
         """Tell everybody what the line is busy with; None: with polling. While it is paused, nothing else is it."""
         if self._pausing.paused and activity != PAUSED:
             return
-        self._publish(self._station.acting(activity or POLLING, self._now()))
+        self._publish(self._station.on_activity(activity or POLLING, self._now()))
 
     async def baudrate(self, to: int, *, power_cycle: bool, dry_run: bool, call: Command) -> Result:
         """Move every sensor and the port to another rate."""

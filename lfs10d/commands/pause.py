@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable
 
-from lfs10d.telemetry.station import PAUSED
+from lfs10d.telemetry.line_state import PAUSED
 
 
 class LinePause:

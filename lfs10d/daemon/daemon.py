@@ -93,7 +93,7 @@ class Daemon:
         self._storage = Storage(state_directory, self._storage_told)
         self._signals = Signals(notifier, end=self._over.set, reload=self._reload, summary=self._summary)
         self._ticking: asyncio.TimerHandle | None = None
-        self._logbook = EventLog()
+        self._event_log = EventLog()
         self._start_report = StartReport()
         self._facts = DaemonInfo(
             version=__version__,
@@ -227,10 +227,10 @@ class Daemon:
         port, frames = self._line.port, log.isEnabledFor(logging.DEBUG)
         published: list[Publication] = []
         for event in events:
-            self._enter(self._logbook.happened(event, port=port.settings.path, notices=port.notices, frames=frames))
+            self._enter(self._event_log.on_event(event, port=port.settings.path, notices=port.notices, frames=frames))
             self._watch_start(event)
-            known = self._station.heard(event, now)
-            self._enter(self._logbook.published(known))
+            known = self._station.on_event(event, now)
+            self._enter(self._event_log.on_publications(known))
             published += [*known, *self._powers.heard(event, known, now)]
             if isinstance(event, Exchanged) or (isinstance(event, PortChanged) and event.fault is not None):
                 self._signals.ready()
@@ -246,14 +246,14 @@ class Daemon:
         """Report who answers after the port was opened."""
         report = self._start_report
         if isinstance(event, Reading):
-            report.heard(event)
+            report.on_reading(event)
             if report.due < inf:
                 self._report_start()
         elif isinstance(event, PortChanged):
             if event.fault is not None:
-                report.lost()
+                report.on_port_lost()
                 return
-            report.opened((slave.name for slave in self._running.now.polled.slaves if slave.enabled), event.at)
+            report.on_port_open((slave.name for slave in self._running.now.polled.slaves if slave.enabled), event.at)
             self._loop.call_at(event.at + WITHIN + TICK_SLACK, self._report_start)
 
     def _report_start(self) -> None:
@@ -384,7 +384,7 @@ class Daemon:
         """Tell of devices that are not polled, for their slave id is another's."""
         now = self._now()
         for reading in conflict_readings(conflicts, now.mono):
-            self._publish(self._station.heard(reading, now))
+            self._publish(self._station.on_event(reading, now))
 
     # -- the broker
 
@@ -397,7 +397,7 @@ class Daemon:
         if version is not None:
             self._facts = replace(self._facts, mqtt={"version": str(version)})
             self._publish(self._station.introduce(self._facts, now))
-            self._publish(self._station.admitting("denied" if self._uplink.requests_denied else "ok", now))
+            self._publish(self._station.on_requests("denied" if self._uplink.requests_denied else "ok", now))
         if self._uplink.duplicate:
             message = "another client has taken our client id; give every daemon an mqtt.client_id of its own"
             self._publish(self._station.line_failed(FaultCode.DUPLICATE_CLIENT, message, now))

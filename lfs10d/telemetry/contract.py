@@ -21,7 +21,7 @@ from lfs10d.telemetry.payloads import (
     Error,
     Event,
     Info,
-    LineState,
+    LineStatePayload,
     LineStats,
     Response,
     SamplePayload,
@@ -57,7 +57,7 @@ RISE = "rise, change of code, clear"
 OUTBOUND = (
     Outbound(publication.INFO, Info, retain=True, qos=1, when=CHANGE),
     Outbound(publication.DEVICES, list[DeviceEntry], retain=True, qos=1, when=CHANGE),
-    Outbound(publication.LINE_STATE, LineState, retain=True, qos=1, when=CHANGE),
+    Outbound(publication.LINE_STATE, LineStatePayload, retain=True, qos=1, when=CHANGE),
     Outbound(publication.LINE_ERROR, Error, retain=True, qos=1, when=RISE),
     Outbound(publication.LINE_STATS, LineStats, retain=True, qos=0, when="30 s"),
     Outbound(

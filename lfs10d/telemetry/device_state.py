@@ -50,6 +50,7 @@ class DeviceState:
     __slots__ = (
         "_alarm",
         "_boot",
+        "_counters",
         "_gap",
         "_last_good",
         "_line",
@@ -58,41 +59,44 @@ class DeviceState:
         "_state_from",
         "_telemetry",
         "_topics",
-        "facts",
+        "info",
         "online",
         "seq",
         "state_due",
-        "tally",
     )
 
-    def __init__(self, facts: DeviceInfo, *, line: str, boot: str, seq: int, now: Instant) -> None:
-        self.facts = facts
+    def __init__(self, info: DeviceInfo, *, line: str, boot: str, seq: int, now: Instant) -> None:
+        self.info = info
         self.seq = seq
         self.online = False
         self.state_due: float | None = None
         """Monotonic time at which a newer state than the one shown may be published; None: none waits."""
         self._line = line
         self._boot = boot
-        self._topics = {leaf: device_topic(facts.name, leaf) for leaf in (STATE, AVAILABILITY, ERROR, STATS)}
-        self._telemetry = device_topic(facts.name, TELEMETRY)
-        self._alarm = DeviceAlarm(facts.offline_after)
-        self._gap = facts.request_gap
-        self.tally = DeviceCounters(facts.response_timeout, facts.request_gap)
+        self._topics = {leaf: device_topic(info.name, leaf) for leaf in (STATE, AVAILABILITY, ERROR, STATS)}
+        self._telemetry = device_topic(info.name, TELEMETRY)
+        self._alarm = DeviceAlarm(info.offline_after)
+        self._gap = info.request_gap
+        self._counters = DeviceCounters(info.response_timeout, info.request_gap)
         self._last_good: float | None = None
         self._state_from = now.mono
-        code = FaultCode.STARTING if facts.enabled else FaultCode.DISABLED
+        code = FaultCode.STARTING if info.enabled else FaultCode.DISABLED
         self._sample = replace(self._form(0, now.ts(), now), error=code.value)
         self._payload = self._sample.payload(line)
 
-    def read(self, reading: Reading, now: Instant, *, masked: bool) -> list[Publication]:
-        """Take one reading; return what it makes known. `tally` has counted it already.
+    def on_reading(self, reading: Reading, now: Instant, *, masked: bool) -> tuple[list[Publication], float | None]:
+        """Take and count one reading; return what it changes, and the seconds since the poll before (see `polled`).
 
         `masked`: the port is lost, so that failures say nothing about the device.
         """
-        fault = reading.fault
         ts = now.ts(reading.at)
+        since_last = self._counters.polled(reading, ts)
+        return self._publish(reading, now, ts, masked=masked), since_last
+
+    def _publish(self, reading: Reading, now: Instant, ts: int, *, masked: bool) -> list[Publication]:
+        fault = reading.fault
         rested = self._rest(reading.request_gap)
-        if not self.facts.enabled:
+        if not self.info.enabled:
             self.seq += 1
             sample = self._form(self.seq, ts, now, reading)
             return [self._telling(sample, sample.payload(self._line)), *rested]
@@ -128,28 +132,28 @@ class DeviceState:
         ended = self._alarm.ended(now.ts())
         return [self._error()] if self._alarm.stands(None, now.ts()) or ended else []
 
-    def answered_twice(self, heard: AnsweredTwice, now: Instant) -> list[Publication]:
+    def on_answered_twice(self, heard: AnsweredTwice, now: Instant) -> list[Publication]:
         """Take that a second answer comes to each request, or no longer does."""
         ts = now.ts(heard.at)
         published = []
         if self._alarm.stands(heard.fault, ts):
             published.append(self._error())
             if heard.fault is not None:
-                facts = {"device": self.facts.name, "slave": heard.slave, "message": heard.fault.message}
+                facts = {"device": self.info.name, "slave": heard.slave, "message": heard.fault.message}
                 published.append(event("duplicate_id", ts, **facts))
         return published
 
-    def reconfigure(self, facts: DeviceInfo, now: Instant) -> list[Publication]:
+    def reconfigure(self, info: DeviceInfo, now: Instant) -> list[Publication]:
         """Take new facts about the same device on the same profile; return what changed."""
-        before, self.facts = self.facts, facts
-        self._alarm.rise_after = facts.offline_after
-        if facts.request_gap != before.request_gap:
-            self._gap = facts.request_gap
-        self._state_from = min(self._state_from, now.mono + facts.state_every)
+        before, self.info = self.info, info
+        self._alarm.rise_after = info.offline_after
+        if info.request_gap != before.request_gap:
+            self._gap = info.request_gap
+        self._state_from = min(self._state_from, now.mono + info.state_every)
         if self.state_due is not None:
             self.state_due = self._state_from
-        published = [self._config()] if facts.payload() != before.payload() else []
-        if before.enabled and not facts.enabled:
+        published = [self._config()] if info.payload() != before.payload() else []
+        if before.enabled and not info.enabled:
             published += self.disable(now)
         return published
 
@@ -171,18 +175,18 @@ class DeviceState:
 
     def stats(self, now: Instant) -> Publication:
         """Return the statistics."""
-        return retained(self._topics[STATS], self.tally.payload(now.ts()), qos=0, refresh=True)
+        return retained(self._topics[STATS], self._counters.payload(now.ts()), qos=0, refresh=True)
 
     def snapshot(self, now: Instant) -> dict[str, object]:
         """Return what a live view shows of this device; `age_s` is the age of the last good reading."""
-        facts, sample, last_good = self.facts, self._sample, self._last_good
+        info, sample, last_good = self.info, self._sample, self._last_good
         return {
-            "name": facts.name,
-            "slave": facts.slave,
-            "label": facts.label,
-            "profile": facts.profile,
-            "enabled": facts.enabled,
-            "interval": facts.interval,
+            "name": info.name,
+            "slave": info.slave,
+            "label": info.label,
+            "profile": info.profile,
+            "enabled": info.enabled,
+            "interval": info.interval,
             "online": self.online,
             "seq": sample.seq,
             "ts": sample.ts,
@@ -201,14 +205,14 @@ class DeviceState:
         if reading is not None:
             values, fault, rtt = reading.values, reading.fault, reading.rtt
         return Sample(
-            device=self.facts.name,
+            device=self.info.name,
             boot=self._boot,
             seq=seq,
             ts=ts,
             clock=now.clock,
             values=values,
-            units=self.facts.units,
-            names=self.facts.value_names,
+            units=self.info.units,
+            names=self.info.value_names,
             quality="bad" if values is None else "good",
             error=None if fault is None else fault.code.value,
             rtt_ms=None if values is None or rtt is None else round(rtt * 1000, 1),
@@ -239,7 +243,7 @@ class DeviceState:
     def _state(self, now: Instant, *, refresh: bool = False) -> Publication:
         """Return the newest state, which is then shown; `refresh`: quality and error are those shown before."""
         on_time = abs(now.mono - self._state_from) <= STATE_EARLY
-        self._state_from = (self._state_from if on_time else now.mono) + self.facts.state_every
+        self._state_from = (self._state_from if on_time else now.mono) + self.info.state_every
         self.state_due = None
         return retained(self._topics[STATE], self._payload, refresh=refresh)
 
@@ -250,7 +254,7 @@ class DeviceState:
         return retained(self._topics[ERROR], self._alarm.payload())
 
     def _config(self) -> Publication:
-        return retained(device_topic(self.facts.name, CONFIG), self.facts.payload(self._gap))
+        return retained(device_topic(self.info.name, CONFIG), self.info.payload(self._gap))
 
 
 RETAINED_LEAVES: Final = (STATE, CONFIG, AVAILABILITY, ERROR, STATS)

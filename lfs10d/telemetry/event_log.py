@@ -1,7 +1,7 @@
-"""What a person reads in the log of what happens on the line: each change of state once. Pure.
+"""Log entries for events of the line: each change of state once. Pure.
 
-A device is reported when its error rises or turns into another, and when it answers again. What the loss of the port
-does to the devices is one line, the port's.
+A device is logged when its error rises or changes its code, and when it answers again. The loss of the port is one
+entry for the line, none for its devices.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ class EventLog:
 
     def __init__(self) -> None:
         self._failing: dict[str, str] = {}
-        """The code last told, by device."""
+        """Error code logged last, by device."""
         self._rested: set[str] = set()
         """Devices whose learned rest was reported."""
 
-    def happened(self, event: Event, *, port: str, notices: Sequence[str], frames: bool) -> list[LogEntry]:
-        """Return what an event of the line thread says by itself; exchanges only where `frames` are wanted.
+    def on_event(self, event: Event, *, port: str, notices: Sequence[str], frames: bool) -> list[LogEntry]:
+        """Return the log entries of one event of the line thread; exchanges only where `frames` are wanted.
 
-        `port` is the path, `notices` what a person should know of the port that was opened.
+        `port` is the path, `notices` are warnings about the port that was opened.
         """
         if isinstance(event, PortChanged):
             if event.freed:
@@ -57,8 +57,8 @@ class EventLog:
             return [LogEntry(logging.DEBUG, f"slave {event.slave}: sent {event.sent.hex(' ')}, heard {heard}{fault}")]
         return []
 
-    def published(self, publications: Iterable[Publication]) -> list[LogEntry]:
-        """Return what a person should know of what one event made known."""
+    def on_publications(self, publications: Iterable[Publication]) -> list[LogEntry]:
+        """Return the log entries of the publications that one event caused."""
         entries: list[LogEntry] = []
         good: set[str] = set()
         for publication in publications:
@@ -74,6 +74,6 @@ class EventLog:
         return entries
 
     def _failed(self, device: str, error: Mapping[str, object]) -> LogEntry:
-        known = device in self._failing
+        logged = device in self._failing
         code = self._failing[device] = str(error["code"])
-        return LogEntry(logging.DEBUG if known else logging.WARNING, f"{device}: {code}: {error['message']}")
+        return LogEntry(logging.DEBUG if logged else logging.WARNING, f"{device}: {code}: {error['message']}")

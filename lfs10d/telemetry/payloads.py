@@ -119,7 +119,7 @@ class DeviceEntry(Payload):
     interval: float = Field(ge=0, description="s")
 
 
-class LineState(Payload):
+class LineStatePayload(Payload):
     """The line as it is used now."""
 
     v: Version

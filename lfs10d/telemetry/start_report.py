@@ -1,6 +1,7 @@
-"""One line of the log after the port was opened: how many devices answer, who is silent, who answers badly. Pure.
+"""One log entry after the port was opened: how many devices answer, which are silent, which answer badly. Pure.
 
-It is due when every device has answered or failed its polls of the start, at the latest `WITHIN` s after the opening.
+It is due when every device has answered or failed its polls of the start, `WITHIN` seconds after the
+opening at the latest.
 """
 
 from __future__ import annotations
@@ -13,11 +14,10 @@ from lfs10d.reading import PORT_CODES, SILENT_CODES, START_POLLS, Reading
 from lfs10d.telemetry.event_log import LogEntry
 
 WITHIN = 9.5
-"""The report comes at the latest so many s after the opening of the port."""
-
+"""Seconds after the opening of the port at which the report is made at the latest."""
 
 NAMED = 32
-"""So many devices are named."""
+"""Devices of one kind that are named."""
 
 
 def _some(names: Sequence[str]) -> str:
@@ -26,28 +26,28 @@ def _some(names: Sequence[str]) -> str:
 
 
 class StartReport:
-    """One opening of the port after the other; without one nothing is due."""
+    """The report on the start of polling; begun anew at each opening of the port."""
 
     def __init__(self) -> None:
         self.due = inf
-        """When the report is made at the latest, monotonic s."""
+        """Monotonic time of the report at the latest; infinite while none is due."""
         self._failures: dict[str, int] = {}
         self._waiting: set[str] = set()
         self._bad: dict[str, str] = {}
 
-    def opened(self, devices: Iterable[str], at: float) -> None:
-        """Begin anew: the port was opened at `at`, and these devices are polled."""
+    def on_port_open(self, devices: Iterable[str], at: float) -> None:
+        """Begin anew: the port was opened at the monotonic time `at`, and these devices are polled."""
         self._failures = dict.fromkeys(devices, 0)
         self._waiting = set(self._failures)
         self._bad = {}
         self.due = at + WITHIN if self._failures else inf
 
-    def lost(self) -> None:
+    def on_port_lost(self) -> None:
         """Report nothing: the port is lost."""
         self.due = inf
 
-    def heard(self, reading: Reading) -> None:
-        """Note a poll that is over."""
+    def on_reading(self, reading: Reading) -> None:
+        """Count a finished poll."""
         device, fault = reading.device, reading.fault
         if self.due == inf or device not in self._failures or (fault is not None and fault.code in PORT_CODES):
             return
@@ -63,7 +63,7 @@ class StartReport:
             self._waiting.discard(device)
 
     def entry(self, now: float) -> LogEntry | None:
-        """Return the line of the log if it is time for it; once for each opening."""
+        """Return the log entry if it is due; once for each opening."""
         if self.due == inf or (self._waiting and now < self.due):
             return None
         self.due = inf

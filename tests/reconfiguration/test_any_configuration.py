@@ -128,7 +128,7 @@ class Whole(Life):
         super()._heard(events)
         for event in events:
             now = self._instant()
-            self.powers.heard(event, self.station.heard(event, now), now)
+            self.powers.heard(event, self.station.on_event(event, now), now)
 
     async def _take(self, plan: ReloadPlan, before: Effective) -> None:
         now = self.running.now

@@ -7,9 +7,11 @@ from dataclasses import replace
 from typing import cast
 
 from lfs10d.reading import Fault, FaultCode, Reading
+from lfs10d.system.clock import Instant
 from lfs10d.system.clock_step import ClockState
+from lfs10d.telemetry.info import DaemonInfo, DeviceInfo, LineInfo
 from lfs10d.telemetry.publication import Payload, Publication
-from lfs10d.telemetry.station import DaemonInfo, DeviceInfo, Instant, LineInfo, Station
+from lfs10d.telemetry.station import Station
 
 WALL = 1_795_298_000.0
 DAEMON = DaemonInfo("0.1", "gw", "k3f9a2c7", "k3f9a2c6", "abc", 0, {"version": "5"}, ("store",))
@@ -77,5 +79,5 @@ def shown(of: Station, topic: str, at: float = 0) -> Payload:
 
 def ail(of: Station, device: str = "a", *, since: float = 0) -> list[str]:
     """Let a device fail until its error has risen."""
-    first = of.heard(failed(device, since, TIMEOUT), instant(since))
-    return topics(first + of.heard(failed(device, since + 1, TIMEOUT), instant(since + 1)))
+    first = of.on_event(failed(device, since, TIMEOUT), instant(since))
+    return topics(first + of.on_event(failed(device, since + 1, TIMEOUT), instant(since + 1)))

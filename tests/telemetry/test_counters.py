@@ -67,12 +67,12 @@ def reading(
     )
 
 
-def figures(tally: LineCounters, now: float = START + 30) -> Mapping[str, object]:
-    return tally.payload(now, ts=7, gap_required=0.0036458, backlog=BacklogStats(5, 3, 2))
+def figures(counters: LineCounters, now: float = START + 30) -> Mapping[str, object]:
+    return counters.payload(now, ts=7, gap_required=0.0036458, backlog=BacklogStats(5, 3, 2))
 
 
-def gaps(tally: LineCounters) -> dict[str, float | None]:
-    return cast("dict[str, float | None]", figures(tally)["gap_us"])
+def gaps(counters: LineCounters) -> dict[str, float | None]:
+    return cast("dict[str, float | None]", figures(counters)["gap_us"])
 
 
 @given(st.lists(st.floats(0, 1), min_size=1, max_size=50), st.integers(1, 100))
@@ -112,119 +112,119 @@ def test_an_idle_line_is_known_to_be_idle() -> None:
 
 
 def test_the_load_is_the_share_of_the_time_the_line_was_given_away() -> None:
-    tally = LineCounters(START)
+    counters = LineCounters(START)
     for number in range(600):
-        tally.exchanged(exchange(START + 0.05 * (number + 1), took=0.02))
-    payload = figures(tally)
+        counters.exchanged(exchange(START + 0.05 * (number + 1), took=0.02))
+    payload = figures(counters)
     assert payload["load_pct"] == pytest.approx(40, abs=1)
     assert payload["exchanges"] == 600
 
 
 def test_the_load_never_exceeds_the_line() -> None:
-    tally = LineCounters(START)
-    tally.exchanged(exchange(START + 0.1, took=5.0))
-    assert figures(tally, START + 1.5)["load_pct"] == 100.0
+    counters = LineCounters(START)
+    counters.exchanged(exchange(START + 0.1, took=5.0))
+    assert figures(counters, START + 1.5)["load_pct"] == 100.0
 
 
 def test_rates_are_of_the_last_half_minute_alone() -> None:
-    tally = LineCounters(START)
+    counters = LineCounters(START)
     for number in range(1000):
-        tally.polled(reading(START + 0.1 * number), 0.1)
-    assert figures(tally, START + 100)["polls_per_s"] == pytest.approx(10, abs=0.1)
-    assert figures(tally, START + 115)["polls_per_s"] == pytest.approx(5, abs=0.2)
-    assert figures(tally, START + 200)["polls_per_s"] == 0.0
+        counters.polled(reading(START + 0.1 * number), 0.1)
+    assert figures(counters, START + 100)["polls_per_s"] == pytest.approx(10, abs=0.1)
+    assert figures(counters, START + 115)["polls_per_s"] == pytest.approx(5, abs=0.2)
+    assert figures(counters, START + 200)["polls_per_s"] == 0.0
 
 
 def test_shortly_after_the_start_rates_are_of_the_time_since() -> None:
-    tally = LineCounters(START)
+    counters = LineCounters(START)
     for number in range(20):
-        tally.polled(reading(START + 0.1 * number), None)
-    assert figures(tally, START + 2)["polls_per_s"] == 10.0
+        counters.polled(reading(START + 0.1 * number), None)
+    assert figures(counters, START + 2)["polls_per_s"] == 10.0
 
 
 @pytest.mark.parametrize("since", [0.0, 5e-324, 0.9])
 def test_within_the_first_second_no_rate_is_known(since: float) -> None:
-    tally = LineCounters(0.0)
-    tally.exchanged(exchange(0.0))
-    tally.polled(reading(0.0), None)
-    payload = figures(tally, since)
+    counters = LineCounters(0.0)
+    counters.exchanged(exchange(0.0))
+    counters.polled(reading(0.0), None)
+    payload = figures(counters, since)
     assert (payload["load_pct"], payload["polls_per_s"]) == (None, None)
 
 
 def test_the_cycle_is_the_longest_time_between_two_polls_of_one_device() -> None:
-    tally = LineCounters(START)
+    counters = LineCounters(START)
     for apart in (0.3, 0.9, None, 0.5):
-        tally.polled(reading(START + 1), apart)
-    assert figures(tally)["cycle_s"] == 0.9
-    assert figures(tally, START + 60)["cycle_s"] is None
+        counters.polled(reading(START + 1), apart)
+    assert figures(counters)["cycle_s"] == 0.9
+    assert figures(counters, START + 60)["cycle_s"] is None
 
 
 def test_an_event_that_comes_in_late_joins_the_newest_second() -> None:
-    tally = LineCounters(START)
-    tally.polled(reading(START + 5), None)
-    tally.polled(reading(START + 3.9), None)
-    assert figures(tally, START + 10)["polls_per_s"] == 0.2
+    counters = LineCounters(START)
+    counters.polled(reading(START + 5), None)
+    counters.polled(reading(START + 3.9), None)
+    assert figures(counters, START + 10)["polls_per_s"] == 0.2
 
 
 def test_gaps_are_told_by_their_least_median_and_99th_percentile() -> None:
-    tally = LineCounters(START)
+    counters = LineCounters(START)
     for number in range(100):
-        tally.exchanged(exchange(START, gap=0.004 + number * 1e-5))
-    assert gaps(tally) == {"min": 4000.0, "p50": 4490.0, "p99": 4980.0}
+        counters.exchanged(exchange(START, gap=0.004 + number * 1e-5))
+    assert gaps(counters) == {"min": 4000.0, "p50": 4490.0, "p99": 4980.0}
 
 
 def test_the_least_gap_is_since_boot_and_the_others_of_the_last_thousand() -> None:
-    tally = LineCounters(START)
-    tally.exchanged(exchange(START, gap=0.0037))
+    counters = LineCounters(START)
+    counters.exchanged(exchange(START, gap=0.0037))
     for _ in range(1000):
-        tally.exchanged(exchange(START, gap=0.005))
-    assert gaps(tally) == {"min": 3700.0, "p50": 5000.0, "p99": 5000.0}
+        counters.exchanged(exchange(START, gap=0.005))
+    assert gaps(counters) == {"min": 3700.0, "p50": 5000.0, "p99": 5000.0}
 
 
 @pytest.mark.parametrize("errand", [Purpose.SCAN, Purpose.CHANGE])
 def test_gaps_at_other_rates_are_left_out(errand: Purpose) -> None:
-    tally = LineCounters(START)
-    tally.exchanged(exchange(START, gap=0.001, errand=errand))
-    tally.exchanged(exchange(START, gap=None))
-    assert gaps(tally) == {"min": None, "p50": None, "p99": None}
+    counters = LineCounters(START)
+    counters.exchanged(exchange(START, gap=0.001, errand=errand))
+    counters.exchanged(exchange(START, gap=None))
+    assert gaps(counters) == {"min": None, "p50": None, "p99": None}
 
 
 def test_a_line_at_another_rate_has_no_gaps_yet() -> None:
-    tally = LineCounters(START)
-    tally.exchanged(exchange(START, gap=0.0019))
-    tally.retimed()
-    tally.exchanged(exchange(START, gap=0.0040))
-    assert gaps(tally)["min"] == 4000.0
+    counters = LineCounters(START)
+    counters.exchanged(exchange(START, gap=0.0019))
+    counters.retimed()
+    counters.exchanged(exchange(START, gap=0.0040))
+    assert gaps(counters)["min"] == 4000.0
 
 
 def test_errors_count_every_attempt_of_a_poll_but_no_busy_device() -> None:
-    tally = LineCounters(START)
-    tally.polled(reading(START, failed=(FaultCode.CRC,)), None)
-    tally.polled(reading(START, TIMEOUT, failed=(FaultCode.CRC,)), None)
-    tally.polled(reading(START, BUSY), None)
-    assert figures(tally)["errors"] == {"crc": 2, "timeout": 1}
+    counters = LineCounters(START)
+    counters.polled(reading(START, failed=(FaultCode.CRC,)), None)
+    counters.polled(reading(START, TIMEOUT, failed=(FaultCode.CRC,)), None)
+    counters.polled(reading(START, BUSY), None)
+    assert figures(counters)["errors"] == {"crc": 2, "timeout": 1}
 
 
 def test_late_answers_are_counted_one_by_one_and_not_again_with_their_poll() -> None:
-    tally = LineCounters(START)
-    tally.exchanged(exchange(START, late=2))
-    tally.polled(reading(START, Fault(FaultCode.LATE, ""), failed=(FaultCode.LATE,)), None)
-    assert figures(tally)["errors"] == {"late": 2}
+    counters = LineCounters(START)
+    counters.exchanged(exchange(START, late=2))
+    counters.polled(reading(START, Fault(FaultCode.LATE, ""), failed=(FaultCode.LATE,)), None)
+    assert figures(counters)["errors"] == {"late": 2}
 
 
 def test_losses_of_the_port_and_missed_points_of_the_grid_are_counted() -> None:
-    tally = LineCounters(START)
-    tally.lost(FaultCode.PORT_BUSY)
-    tally.overran(3)
-    assert figures(tally)["errors"] == {"port_busy": 1, "overrun": 3}
+    counters = LineCounters(START)
+    counters.lost(FaultCode.PORT_BUSY)
+    counters.overran(3)
+    assert figures(counters)["errors"] == {"port_busy": 1, "overrun": 3}
 
 
 def test_unsolicited_bytes_uart_and_store_are_told() -> None:
-    tally = LineCounters(START)
-    tally.exchanged(exchange(START, unsolicited=4))
-    tally.exchanged(exchange(START, unsolicited=1))
-    tally.uart = UartCounters(framing=1, parity=2, overrun=3, breaks=4)
-    payload = figures(tally)
+    counters = LineCounters(START)
+    counters.exchanged(exchange(START, unsolicited=4))
+    counters.exchanged(exchange(START, unsolicited=1))
+    counters.uart = UartCounters(framing=1, parity=2, overrun=3, breaks=4)
+    payload = figures(counters)
     assert payload["unsolicited_bytes"] == 5
     assert payload["uart"] == {"framing": 1, "parity": 2, "overrun": 3, "break": 4}
     assert payload["store"] == {"depth": 5, "oldest_ts": 3, "dropped": 2}
@@ -249,19 +249,19 @@ def test_a_fixed_time_out_is_known_before_the_first_poll() -> None:
 
 
 def test_a_configured_rest_is_known_before_the_first_poll_and_a_learned_one_after_it() -> None:
-    tally = DeviceCounters(None, 0.1)
-    assert tally.payload(7)["request_gap_ms"] == 100.0
-    tally.polled(replace(reading(1.0), request_gap=0.4), 7)
-    assert tally.payload(7)["request_gap_ms"] == 400.0
+    counters = DeviceCounters(None, 0.1)
+    assert counters.payload(7)["request_gap_ms"] == 100.0
+    counters.polled(replace(reading(1.0), request_gap=0.4), 7)
+    assert counters.payload(7)["request_gap_ms"] == 400.0
 
 
 def test_a_device_s_polls_values_errors_and_times_are_told() -> None:
-    tally = DeviceCounters(None)
+    counters = DeviceCounters(None)
     for number in range(100):
-        tally.polled(reading(START + number, rtt=0.0101 + number / 1000), 5000 + number)
-    tally.polled(reading(START + 100, TIMEOUT, overruns=2), 6000)
-    tally.polled(reading(START + 101, BUSY), 6001)
-    assert tally.payload(7) == {
+        counters.polled(reading(START + number, rtt=0.0101 + number / 1000), 5000 + number)
+    counters.polled(reading(START + 100, TIMEOUT, overruns=2), 6000)
+    counters.polled(reading(START + 101, BUSY), 6001)
+    assert counters.payload(7) == {
         "v": 1,
         "ts": 7,
         "polls": 102,
@@ -275,31 +275,31 @@ def test_a_device_s_polls_values_errors_and_times_are_told() -> None:
 
 
 def test_a_good_reading_without_a_time_of_answer_spoils_no_percentile() -> None:
-    tally = DeviceCounters(None)
-    tally.polled(reading(START, rtt=None), 1)
-    assert (tally.payload(7)["good"], tally.payload(7)["rtt_ms"]) == (1, {"p50": None, "p95": None})
+    counters = DeviceCounters(None)
+    counters.polled(reading(START, rtt=None), 1)
+    assert (counters.payload(7)["good"], counters.payload(7)["rtt_ms"]) == (1, {"p50": None, "p95": None})
 
 
 def test_the_time_between_two_polls_is_told() -> None:
-    tally = DeviceCounters(None)
-    assert tally.polled(reading(START), 1) is None
-    assert tally.polled(reading(START + 0.5, TIMEOUT), 2) == 0.5
+    counters = DeviceCounters(None)
+    assert counters.polled(reading(START), 1) is None
+    assert counters.polled(reading(START + 0.5, TIMEOUT), 2) == 0.5
 
 
 def test_probes_are_polls_but_stand_apart() -> None:
-    tally = DeviceCounters(None)
-    tally.polled(reading(START), 1)
-    assert tally.polled(reading(START + 15, TIMEOUT, probe=True), 2) is None
-    assert tally.polled(reading(START + 30), 3) is None
-    assert tally.payload(7)["polls"] == 3
+    counters = DeviceCounters(None)
+    counters.polled(reading(START), 1)
+    assert counters.polled(reading(START + 15, TIMEOUT, probe=True), 2) is None
+    assert counters.polled(reading(START + 30), 3) is None
+    assert counters.payload(7)["polls"] == 3
 
 
 def test_a_lost_port_is_an_error_but_no_poll() -> None:
-    tally = DeviceCounters(None)
-    tally.polled(reading(START), 1)
-    assert tally.polled(reading(START + 1, LOST), 2) is None
-    assert tally.polled(reading(START + 9), 3) is None
-    assert (tally.payload(7)["polls"], tally.payload(7)["errors"]) == (2, {"port_lost": 1})
+    counters = DeviceCounters(None)
+    counters.polled(reading(START), 1)
+    assert counters.polled(reading(START + 1, LOST), 2) is None
+    assert counters.polled(reading(START + 9), 3) is None
+    assert (counters.payload(7)["polls"], counters.payload(7)["errors"]) == (2, {"port_lost": 1})
 
 
 def test_a_percentile_is_not_one_too_small_where_the_share_is_just_above_a_whole_number() -> None:
@@ -307,10 +307,10 @@ def test_a_percentile_is_not_one_too_small_where_the_share_is_just_above_a_whole
 
 
 def test_figures_are_told_to_a_tenth_of_their_unit() -> None:
-    tally = LineCounters(START)
+    counters = LineCounters(START)
     odd = 0.50000014
-    tally.exchanged(exchange(START + 1.0, gap=odd))
-    told = tally.payload(START + 30, ts=7, gap_required=odd, backlog=BacklogStats())
+    counters.exchanged(exchange(START + 1.0, gap=odd))
+    told = counters.payload(START + 30, ts=7, gap_required=odd, backlog=BacklogStats())
     assert told["gap_required_us"] == 500_000.1
     assert told["gap_us"] == {"min": 500_000.1, "p50": 500_000.1, "p99": 500_000.1}
     device = DeviceCounters(0.50014)
@@ -322,48 +322,48 @@ def test_figures_are_told_to_a_tenth_of_their_unit() -> None:
 
 
 def test_rates_are_told_in_tenths_of_a_percent_hundredths_of_a_poll_and_milliseconds() -> None:
-    tally = LineCounters(START)
-    tally.exchanged(exchange(START + 1.0, took=0.37037))
-    tally.polled(reading(START + 1.0), 1.23456)
-    rates = tally.rates(START + 3.0)
+    counters = LineCounters(START)
+    counters.exchanged(exchange(START + 1.0, took=0.37037))
+    counters.polled(reading(START + 1.0), 1.23456)
+    rates = counters.rates(START + 3.0)
     assert (rates.load_pct, rates.polls_per_s, rates.cycle_s) == (12.3, 0.33, 1.235)
 
 
 def test_a_load_of_half_the_time_is_half() -> None:
-    tally = LineCounters(START)
+    counters = LineCounters(START)
     for second in range(30):
-        tally.exchanged(exchange(START + second + 0.6, took=0.5))
-    assert tally.rates(START + 30).load_pct == pytest.approx(50.0, abs=0.1)
+        counters.exchanged(exchange(START + second + 0.6, took=0.5))
+    assert counters.rates(START + 30).load_pct == pytest.approx(50.0, abs=0.1)
 
 
 def test_within_the_first_second_the_cycle_is_known_and_after_it_the_rates() -> None:
-    tally = LineCounters(START)
-    tally.polled(reading(START + 0.5), 0.25)
-    assert tally.rates(START + 0.9).payload() == {"load_pct": None, "polls_per_s": None, "cycle_s": 0.25}
-    assert tally.rates(START + 1.0).polls_per_s == 1.0
+    counters = LineCounters(START)
+    counters.polled(reading(START + 0.5), 0.25)
+    assert counters.rates(START + 0.9).payload() == {"load_pct": None, "polls_per_s": None, "cycle_s": 0.25}
+    assert counters.rates(START + 1.0).polls_per_s == 1.0
 
 
 def test_the_events_of_one_second_are_kept_as_one() -> None:
-    tally = LineCounters(START)
+    counters = LineCounters(START)
     for n in range(1000):
-        tally.exchanged(exchange(START + n / 1001, took=0.0))
-    assert len(tally._seconds) == 1
+        counters.exchanged(exchange(START + n / 1001, took=0.0))
+    assert len(counters._seconds) == 1
 
 
 def test_of_gaps_only_the_last_thousand_are_kept() -> None:
-    tally = LineCounters(START)
+    counters = LineCounters(START)
     for gap in (0.5, 0.25):
         for n in range(1000):
-            tally.exchanged(exchange(START + n, gap=gap))
-    assert gaps(tally) == {"min": 250_000.0, "p50": 250_000.0, "p99": 250_000.0}
+            counters.exchanged(exchange(START + n, gap=gap))
+    assert gaps(counters) == {"min": 250_000.0, "p50": 250_000.0, "p99": 250_000.0}
 
 
 def test_of_answer_times_only_the_last_hundred_are_kept() -> None:
-    tally = DeviceCounters(None)
+    counters = DeviceCounters(None)
     for rtt in (0.5, 0.25):
         for n in range(100):
-            tally.polled(reading(START + n, rtt=rtt), 7)
-    assert tally.payload(7)["rtt_ms"] == {"p50": 250.0, "p95": 250.0}
+            counters.polled(reading(START + n, rtt=rtt), 7)
+    assert counters.payload(7)["rtt_ms"] == {"p50": 250.0, "p95": 250.0}
 
 
 def test_what_happens_twice_counts_twice() -> None:

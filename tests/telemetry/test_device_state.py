@@ -28,10 +28,10 @@ def instant(mono: float) -> Instant:
 
 
 class Watched:
-    """A standing with a hand on its clock: `poll` reads at a time in s and returns the leaves published."""
+    """A device and its clock: `poll` hands it a reading at a time in s and returns the leaves published."""
 
     def __init__(self, *, seq: int = 0) -> None:
-        self.standing = DeviceState(FACTS, line="line0", boot="k3f9a2c7", seq=seq, now=instant(0))
+        self.device = DeviceState(FACTS, line="line0", boot="k3f9a2c7", seq=seq, now=instant(0))
 
     def publish(
         self, at: float, outcome: float | Fault, *, online: bool | None = None, masked: bool = False
@@ -46,7 +46,7 @@ class Watched:
             online=fault is None if online is None else online,
             response_timeout=0.2,
         )
-        return self.standing.read(reading, instant(at), masked=masked)
+        return self.device.on_reading(reading, instant(at), masked=masked)[0]
 
     def poll(self, at: float, outcome: float | Fault, *, online: bool | None = None, masked: bool = False) -> list[str]:
         return leaves(self.publish(at, outcome, online=online, masked=masked))
@@ -54,7 +54,7 @@ class Watched:
     @property
     def shown(self) -> dict[str, object]:
         """Every retained payload now, by leaf."""
-        return {each.topic.split("/")[-1]: each.payload for each in self.standing.burst(instant(1e6))}
+        return {each.topic.split("/")[-1]: each.payload for each in self.device.burst(instant(1e6))}
 
 
 def leaves(published: Iterable[Publication]) -> list[str]:
@@ -74,8 +74,8 @@ def test_a_device_is_offline_and_without_a_value_until_its_first_answer() -> Non
 
 
 def test_a_device_disabled_from_the_start_says_so_and_has_no_sample() -> None:
-    standing = DeviceState(replace(FACTS, enabled=False), line="line0", boot="k3f9a2c7", seq=0, now=instant(0))
-    state, _, availability, error, _ = standing.burst(instant(1.0))
+    device = DeviceState(replace(FACTS, enabled=False), line="line0", boot="k3f9a2c7", seq=0, now=instant(0))
+    state, _, availability, error, _ = device.burst(instant(1.0))
     assert fields(state.payload, "wind_speed", "quality", "error", "seq") == (None, "bad", "disabled", 0)
     assert availability.payload == "offline"
     assert fields(error.payload, "active", "last_code") == (False, None)
@@ -106,14 +106,14 @@ def test_the_state_shows_the_newest_sample_once_a_second() -> None:
     watched.poll(0, 1.0)
     assert watched.poll(0.25, 2.0) == ["telemetry"]
     assert watched.poll(0.5, 3.0) == ["telemetry"]
-    due = watched.standing.state_due
+    due = watched.device.state_due
     assert due is not None
-    assert watched.standing.due_state(instant(due - 0.001)) is None
-    state = watched.standing.due_state(instant(due))
+    assert watched.device.due_state(instant(due - 0.001)) is None
+    state = watched.device.due_state(instant(due))
     assert state is not None
     assert fields(state.payload, "wind_speed", "seq") == (3.0, 3)
-    assert watched.standing.state_due is None
-    assert watched.standing.due_state(instant(10)) is None
+    assert watched.device.state_due is None
+    assert watched.device.due_state(instant(10)) is None
 
 
 @pytest.mark.parametrize("jitter", [0.005, -0.005])
@@ -149,7 +149,7 @@ def test_a_state_shown_because_of_a_change_waits_no_longer() -> None:
     watched.poll(0, 1.0)
     watched.poll(0.2, 2.0)
     watched.poll(0.4, TIMEOUT)
-    assert watched.standing.state_due is None
+    assert watched.device.state_due is None
 
 
 def test_an_error_rises_after_as_many_failures_as_make_it_offline_and_clears_with_one_value() -> None:
@@ -202,16 +202,16 @@ def test_while_masked_failures_are_not_held_against_the_device() -> None:
 
 def test_a_mask_is_published_only_where_there_was_an_error() -> None:
     watched = Watched()
-    assert watched.standing.mask(instant(0)) == []
+    assert watched.device.mask(instant(0)) == []
     watched.poll(0, TIMEOUT)
     watched.poll(1, TIMEOUT)
-    assert leaves(watched.standing.mask(instant(2))) == ["error"]
+    assert leaves(watched.device.mask(instant(2))) == ["error"]
 
 
 def test_disabling_is_one_sample_without_an_error() -> None:
     watched = Watched()
     watched.poll(0, 1.0)
-    published = watched.standing.reconfigure(replace(FACTS, enabled=False), instant(0.1))
+    published = watched.device.reconfigure(replace(FACTS, enabled=False), instant(0.1))
     assert leaves(published) == ["config", "telemetry", "state", "availability"]
     assert fields(published[1].payload, "seq", "error", "quality", "wind_speed", "rtt_ms") == (
         2,
@@ -228,19 +228,19 @@ def test_disabling_an_ailing_device_clears_its_error() -> None:
     watched = Watched()
     watched.poll(0, TIMEOUT)
     watched.poll(1, TIMEOUT)
-    published = watched.standing.reconfigure(replace(FACTS, enabled=False), instant(2))
+    published = watched.device.reconfigure(replace(FACTS, enabled=False), instant(2))
     assert leaves(published) == ["config", "telemetry", "state", "error"]
 
 
 def test_enabling_publishes_the_configuration_alone() -> None:
     watched = Watched()
-    watched.standing.reconfigure(replace(FACTS, enabled=False), instant(1))
-    assert leaves(watched.standing.reconfigure(FACTS, instant(2))) == ["config"]
+    watched.device.reconfigure(replace(FACTS, enabled=False), instant(1))
+    assert leaves(watched.device.reconfigure(FACTS, instant(2))) == ["config"]
 
 
 def test_what_is_not_shown_is_not_published() -> None:
     watched = Watched()
-    assert watched.standing.reconfigure(replace(FACTS, offline_after=1), instant(1)) == []
+    assert watched.device.reconfigure(replace(FACTS, offline_after=1), instant(1)) == []
     assert "error" in watched.poll(2, TIMEOUT)
 
 
@@ -250,21 +250,27 @@ def test_numbers_go_on_after_a_removal() -> None:
     assert fields(watched.publish(0, 1.0)[0].payload, "seq") == (42,)
 
 
-def test_statistics_count_what_the_tally_was_told() -> None:
+def test_each_reading_is_counted_in_the_statistics() -> None:
     watched = Watched()
-    reading = Reading("a", 1.0, {"wind_speed": 1.0}, None, 0.02, online=True, response_timeout=0.2)
-    watched.standing.tally.polled(reading, 77)
-    stats = watched.standing.stats(instant(2))
+    watched.publish(1.0, 1.0)
+    stats = watched.device.stats(instant(2))
     assert (stats.topic, stats.qos, stats.retain) == ("device/a/stats", 0, True)
-    assert fields(stats.payload, "polls", "last_good_ts") == (1, 77)
+    assert fields(stats.payload, "polls", "last_good_ts") == (1, instant(1.0).ts())
+
+
+def test_the_time_since_the_poll_before_is_returned_with_a_reading() -> None:
+    device = Watched().device
+    reading = Reading("a", 1.0, {"wind_speed": 1.0}, None, 0.02, online=True, response_timeout=0.2)
+    assert device.on_reading(reading, instant(1.0), masked=False)[1] is None
+    assert device.on_reading(replace(reading, at=1.5), instant(1.5), masked=False)[1] == 0.5
 
 
 def test_a_snapshot_tells_how_old_the_last_good_value_is() -> None:
     watched = Watched()
-    assert watched.standing.snapshot(instant(1))["age_s"] is None
+    assert watched.device.snapshot(instant(1))["age_s"] is None
     watched.poll(1, 12.34)
     watched.poll(2, TIMEOUT, online=True)
-    snapshot = watched.standing.snapshot(instant(4.04))
+    snapshot = watched.device.snapshot(instant(4.04))
     assert fields(snapshot, "name", "slave", "label", "online") == ("a", 3, "Mast", True)
     assert fields(snapshot, "values", "quality", "error", "age_s") == (
         {"wind_speed": None},
@@ -273,7 +279,7 @@ def test_a_snapshot_tells_how_old_the_last_good_value_is() -> None:
         3.0,
     )
     watched.poll(5, 9.5)
-    assert fields(watched.standing.snapshot(instant(5)), "values", "rtt_ms", "age_s") == (
+    assert fields(watched.device.snapshot(instant(5)), "values", "rtt_ms", "age_s") == (
         {"wind_speed": 9.5},
         18.2,
         0.0,
@@ -295,14 +301,17 @@ def test_a_state_may_come_a_little_early_and_no_earlier() -> None:
 
 def test_a_poll_that_a_request_wants_of_a_disabled_device_is_a_numbered_sample_and_nothing_else() -> None:
     watched = Watched()
-    watched.standing.reconfigure(replace(FACTS, enabled=False), instant(1))
+    watched.device.reconfigure(replace(FACTS, enabled=False), instant(1))
     shown = watched.shown
+    stats = shown.pop("stats")
     (sample,) = watched.publish(2, 7.5)
     assert (sample.topic, sample.sample is not None) == ("device/a/telemetry", True)
     assert cast("Mapping[str, object]", sample.payload)["wind_speed"] == 7.5
     assert cast("Mapping[str, object]", sample.payload)["seq"] == 2
     assert watched.poll(3, TIMEOUT) == ["telemetry"]
-    assert watched.shown == shown
+    now = watched.shown
+    assert (fields(stats, "polls"), fields(now.pop("stats"), "polls")) == ((0,), (2,))
+    assert now == shown
 
 
 def test_a_sample_says_whose_it_is_of_which_life_and_by_which_clock() -> None:
@@ -328,19 +337,19 @@ def test_a_sample_says_whose_it_is_of_which_life_and_by_which_clock() -> None:
 def test_before_the_first_poll_the_state_is_of_the_line_too_and_none_waits() -> None:
     watched = Watched()
     assert fields(watched.shown["state"], "line", "device", "boot") == ("line0", "a", "k3f9a2c7")
-    assert (Watched().standing.online, Watched().standing.state_due) == (False, None)
+    assert (Watched().device.online, Watched().device.state_due) == (False, None)
 
 
 def test_what_is_told_late_has_the_time_at_which_it_happened() -> None:
-    standing = Watched().standing
+    device = Watched().device
     reading = Reading("a", 10.0, {"wind_speed": 1.0}, None, 0.5, online=True, response_timeout=0.2)
-    (telemetry, *_) = standing.read(reading, instant(12.0), masked=False)
+    (telemetry, *_) = device.on_reading(reading, instant(12.0), masked=False)[0]
     assert fields(telemetry.payload, "ts", "rtt_ms") == (1_795_298_010_000, 500.0)
     fault = replace(reading, values=None, fault=TIMEOUT, rtt=None, online=False)
-    standing.read(replace(fault, at=13.0), instant(15.0), masked=False)
-    risen = standing.read(replace(fault, at=14.0), instant(16.0), masked=False)[-1]
+    device.on_reading(replace(fault, at=13.0), instant(15.0), masked=False)[0]
+    risen = device.on_reading(replace(fault, at=14.0), instant(16.0), masked=False)[0][-1]
     assert fields(risen.payload, "since", "last") == (1_795_298_013_000, 1_795_298_014_000)
-    cleared = standing.read(replace(reading, at=17.0), instant(19.0), masked=False)[-1]
+    cleared = device.on_reading(replace(reading, at=17.0), instant(19.0), masked=False)[0][-1]
     assert fields(cleared.payload, "active", "cleared") == (False, 1_795_298_017_000)
 
 
@@ -349,25 +358,25 @@ def test_an_error_taken_back_was_cleared_when_that_was_found(masked: bool) -> No
     watched = Watched()
     watched.poll(1.0, TIMEOUT)
     watched.poll(2.0, TIMEOUT)
-    published = watched.publish(3.0, LOST, masked=True) if masked else watched.standing.mask(instant(3.0))
+    published = watched.publish(3.0, LOST, masked=True) if masked else watched.device.mask(instant(3.0))
     assert fields(published[-1].payload, "cleared") == (1_795_298_003_000,)
 
 
 def test_a_good_reading_without_a_time_of_answer_has_none() -> None:
-    standing = Watched().standing
+    device = Watched().device
     reading = Reading("a", 1.0, {"wind_speed": 1.0}, None, None, online=True, response_timeout=0.2)
-    assert fields(standing.read(reading, instant(1.0), masked=False)[0].payload, "rtt_ms") == (None,)
+    assert fields(device.on_reading(reading, instant(1.0), masked=False)[0][0].payload, "rtt_ms") == (None,)
 
 
 def test_a_disabled_devices_requested_sample_is_of_the_line_too() -> None:
-    standing = DeviceState(replace(FACTS, enabled=False), line="line0", boot="k3f9a2c7", seq=0, now=instant(0))
+    device = DeviceState(replace(FACTS, enabled=False), line="line0", boot="k3f9a2c7", seq=0, now=instant(0))
     reading = Reading("a", 1.0, {"wind_speed": 1.0}, None, 0.02, online=False, response_timeout=0.2)
-    assert fields(standing.read(reading, instant(1.0), masked=False)[0].payload, "line") == ("line0",)
+    assert fields(device.on_reading(reading, instant(1.0), masked=False)[0][0].payload, "line") == ("line0",)
 
 
 def test_statistics_have_a_time_and_know_a_fixed_time_out_from_the_start() -> None:
-    standing = DeviceState(replace(FACTS, response_timeout=0.3), line="line0", boot="b", seq=0, now=instant(0))
-    assert fields(standing.stats(instant(5.0)).payload, "ts", "response_timeout_ms") == (1_795_298_005_000, 300.0)
+    device = DeviceState(replace(FACTS, response_timeout=0.3), line="line0", boot="b", seq=0, now=instant(0))
+    assert fields(device.stats(instant(5.0)).payload, "ts", "response_timeout_ms") == (1_795_298_005_000, 300.0)
 
 
 def test_the_configuration_is_that_of_the_facts() -> None:
@@ -375,15 +384,15 @@ def test_the_configuration_is_that_of_the_facts() -> None:
 
 
 def test_a_rest_that_was_learned_is_published_with_the_configuration_once() -> None:
-    standing = DeviceState(replace(FACTS, request_gap=0.1), line="line0", boot="b", seq=0, now=instant(0))
+    device = DeviceState(replace(FACTS, request_gap=0.1), line="line0", boot="b", seq=0, now=instant(0))
     rested = Reading("a", 1.0, {"wind_speed": 1.0}, None, 0.02, online=True, response_timeout=0.2, request_gap=0.4)
-    told = [leaves(standing.read(replace(rested, at=at), instant(at), masked=False)) for at in (1.0, 2.0)]
+    told = [leaves(device.on_reading(replace(rested, at=at), instant(at), masked=False)[0]) for at in (1.0, 2.0)]
     assert [("config" in each) for each in told] == [True, False]
-    shown = {each.topic: each.payload for each in standing.burst(instant(3.0))}
+    shown = {each.topic: each.payload for each in device.burst(instant(3.0))}
     assert fields(shown["device/a/config"], "request_gap") == (0.4,)
-    changed = standing.reconfigure(replace(FACTS, request_gap=0.5), instant(4.0))
+    changed = device.reconfigure(replace(FACTS, request_gap=0.5), instant(4.0))
     assert [fields(each.payload, "request_gap") for each in changed] == [(0.5,)]
-    kept = standing.reconfigure(replace(FACTS, request_gap=0.5, interval=9.0), instant(5.0))
+    kept = device.reconfigure(replace(FACTS, request_gap=0.5, interval=9.0), instant(5.0))
     assert [fields(each.payload, "request_gap", "interval") for each in kept] == [(0.5, 9.0)]
 
 
@@ -396,7 +405,7 @@ def test_a_state_just_at_its_early_time_is_shown() -> None:
 def test_a_snapshot_tells_everything_a_live_view_shows() -> None:
     watched = Watched()
     watched.publish(0.5, 12.34)
-    assert watched.standing.snapshot(instant(1.06)) == {
+    assert watched.device.snapshot(instant(1.06)) == {
         "name": "a",
         "slave": 3,
         "label": "Mast",
@@ -420,19 +429,19 @@ def test_an_id_answered_twice_is_an_event_and_an_error_beside_good_samples() -> 
     watched = Watched()
     watched.poll(1.0, 12.3)
     twice = AnsweredTwice(1.5, "a", 3, Fault(FaultCode.DUPLICATE_ID, "slave 3 is answered for twice"))
-    error, told = watched.standing.answered_twice(twice, instant(1.5))
+    error, told = watched.device.on_answered_twice(twice, instant(1.5))
     assert error.topic == "device/a/error"
     assert fields(error.payload, "active", "code") == (True, "duplicate_id")
     assert fields(told.payload, "type", "device", "slave") == ("duplicate_id", "a", 3)
-    assert watched.standing.answered_twice(twice, instant(1.6)) == []
+    assert watched.device.on_answered_twice(twice, instant(1.6)) == []
     watched.poll(3.0, 12.4)
     assert fields(watched.shown["state"], "quality", "error") == ("good", None)
     assert fields(watched.shown["error"], "code") == ("duplicate_id",)
     over = AnsweredTwice(9.0, "a", 3, None)
-    (cleared,) = watched.standing.answered_twice(over, instant(9.0))
+    (cleared,) = watched.device.on_answered_twice(over, instant(9.0))
     assert fields(cleared.payload, "active", "last_code") == (False, "duplicate_id")
-    watched.standing.answered_twice(twice, instant(10.0))
-    assert leaves(watched.standing.mask(instant(11.0))) == ["error"]
+    watched.device.on_answered_twice(twice, instant(10.0))
+    assert leaves(watched.device.mask(instant(11.0))) == ["error"]
     assert fields(watched.shown["error"], "active") == (False,)
 
 
@@ -442,25 +451,25 @@ def every(state_every: float) -> DeviceInfo:
 
 def test_the_state_comes_as_often_as_it_is_wanted_and_a_change_at_once() -> None:
     watched = Watched()
-    watched.standing.reconfigure(every(10.0), instant(0))
+    watched.device.reconfigure(every(10.0), instant(0))
     watched.poll(1.0, 5.0)
     seconds = [second for second in range(2, 32) if STATE in watched.poll(float(second), 5.0 + second)]
     assert seconds == [11, 21, 31]
     assert STATE in watched.poll(32.0, TIMEOUT)
     assert STATE in watched.poll(33.0, 4.0)
     assert STATE not in watched.poll(34.0, 4.0)
-    assert watched.standing.state_due == 43.0
+    assert watched.device.state_due == 43.0
 
 
 def test_a_shorter_pace_of_states_takes_effect_at_once() -> None:
     watched = Watched()
-    watched.standing.reconfigure(every(3600.0), instant(0))
+    watched.device.reconfigure(every(3600.0), instant(0))
     watched.poll(1.0, 5.0)
     watched.poll(2.0, 6.0)
-    assert watched.standing.state_due == 3601.0
-    watched.standing.reconfigure(every(2.0), instant(3.0))
-    assert watched.standing.state_due == 5.0
-    state = watched.standing.due_state(instant(5.0))
+    assert watched.device.state_due == 3601.0
+    watched.device.reconfigure(every(2.0), instant(3.0))
+    assert watched.device.state_due == 5.0
+    state = watched.device.due_state(instant(5.0))
     assert state is not None
     assert state.refresh
 
@@ -470,5 +479,5 @@ def test_only_newer_figures_are_a_refresh() -> None:
     said = [each for at, outcome in ((1.0, 5.0), (2.0, 5.1), (3.0, TIMEOUT)) for each in watched.publish(at, outcome)]
     states = [each.refresh for each in said if each.topic.endswith(STATE)]
     assert states == [False, True, False]
-    assert watched.standing.stats(instant(4.0)).refresh
-    assert not any(each.refresh for each in watched.standing.burst(instant(5.0))[:-1])
+    assert watched.device.stats(instant(4.0)).refresh
+    assert not any(each.refresh for each in watched.device.burst(instant(5.0))[:-1])

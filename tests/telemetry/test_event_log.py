@@ -30,48 +30,48 @@ def an_error(code: str | None, device: str = "mast") -> Publication:
 
 
 def test_a_failing_device_is_told_once_and_its_recovery_too() -> None:
-    book = EventLog()
+    log = EventLog()
 
-    assert not book.published([a_sample(good=False)])
-    risen = book.published([a_sample(good=False), an_error("timeout")])
-    turned = book.published([an_error("crc")])
-    well = book.published([a_sample(good=True), an_error(None)])
+    assert not log.on_publications([a_sample(good=False)])
+    risen = log.on_publications([a_sample(good=False), an_error("timeout")])
+    turned = log.on_publications([an_error("crc")])
+    well = log.on_publications([a_sample(good=True), an_error(None)])
 
     assert risen == [(logging.WARNING, "mast: timeout: no answer in 200 ms")]
     assert turned == [(logging.DEBUG, "mast: crc: no answer in 200 ms")]
     assert well == [(logging.INFO, "mast: answers well again after crc")]
-    assert not book.published([a_sample(good=True), an_error(None)])
+    assert not log.on_publications([a_sample(good=True), an_error(None)])
 
 
 def test_an_error_that_is_masked_is_no_recovery_and_may_rise_anew() -> None:
-    book = EventLog()
-    book.published([an_error("timeout")])
+    log = EventLog()
+    log.on_publications([an_error("timeout")])
 
-    assert not book.published([an_error(None)])
-    assert not book.published([a_sample(good=True, device="other"), an_error(None)])
-    assert book.published([an_error("timeout")])[0].level == logging.WARNING
+    assert not log.on_publications([an_error(None)])
+    assert not log.on_publications([a_sample(good=True, device="other"), an_error(None)])
+    assert log.on_publications([an_error("timeout")])[0].level == logging.WARNING
 
 
 def test_a_device_that_is_removed_is_forgotten() -> None:
-    book = EventLog()
-    book.published([an_error("timeout")])
+    log = EventLog()
+    log.on_publications([an_error("timeout")])
 
-    assert not book.published([retained(device_topic("mast", "error"), None)])
-    assert book.published([an_error("timeout")])[0].level == logging.WARNING
+    assert not log.on_publications([retained(device_topic("mast", "error"), None)])
+    assert log.on_publications([an_error("timeout")])[0].level == logging.WARNING
 
 
 def test_other_topics_say_nothing() -> None:
-    assert not EventLog().published([retained("line/error", {"active": True}), retained("info", {})])
+    assert not EventLog().on_publications([retained("line/error", {"active": True}), retained("info", {})])
 
 
 def test_the_port_is_told_with_what_one_should_know_of_it() -> None:
-    book = EventLog()
+    log = EventLog()
 
     lost = PortChanged(0.0, Fault(FaultCode.PORT_LOST, f"{PORT}: hung up"))
-    assert book.happened(lost, port=PORT, notices=(), frames=False) == [
+    assert log.on_event(lost, port=PORT, notices=(), frames=False) == [
         (logging.WARNING, f"{PORT}: hung up; tried again until it is back")
     ]
-    assert book.happened(PortChanged(0.0, None), port=PORT, notices=("no RS485 mode",), frames=False) == [
+    assert log.on_event(PortChanged(0.0, None), port=PORT, notices=("no RS485 mode",), frames=False) == [
         (logging.INFO, f"{PORT}: the port is open"),
         (logging.WARNING, "no RS485 mode"),
     ]
@@ -79,7 +79,7 @@ def test_the_port_is_told_with_what_one_should_know_of_it() -> None:
 
 def test_a_port_that_is_freed_on_request_is_no_warning() -> None:
     freed = PortChanged(0.0, Fault(FaultCode.PORT_LOST, "freed"), freed=True)
-    told = EventLog().happened(freed, port=PORT, notices=(), frames=False)
+    told = EventLog().on_event(freed, port=PORT, notices=(), frames=False)
     assert told == [(logging.INFO, f"{PORT}: freed for another program")]
 
 
@@ -95,19 +95,19 @@ def test_frames_are_told_at_debug_where_they_are_wanted(heard: bytes, fault: Fau
         at=1.0, asked=0.0, began=0.1, gap=0.004, slave=1, errand=Purpose.POLL, fault=fault, sent=b"\x01\x03\x00",
         heard=heard,
     )  # fmt: skip
-    book = EventLog()
+    log = EventLog()
 
-    assert book.happened(happened, port=PORT, notices=(), frames=True) == [(logging.DEBUG, words)]
-    assert not book.happened(happened, port=PORT, notices=(), frames=False)
+    assert log.on_event(happened, port=PORT, notices=(), frames=True) == [(logging.DEBUG, words)]
+    assert not log.on_event(happened, port=PORT, notices=(), frames=False)
 
 
 def test_a_learned_rest_is_told_once_with_what_to_set() -> None:
-    book = EventLog()
+    log = EventLog()
     plain = Reading("mast", 1.0, {"a": 1.0}, None, 0.02, online=True, response_timeout=0.2, request_gap=0.2)
     rested = replace(plain, request_gap=0.4, gap_learned=True)
 
     def told(reading: Reading) -> list[tuple[int, str]]:
-        return [*book.happened(reading, port=PORT, notices=(), frames=False)]
+        return [*log.on_event(reading, port=PORT, notices=(), frames=False)]
 
     assert not told(plain)
     ((level, text),) = told(rested)

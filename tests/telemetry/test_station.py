@@ -10,9 +10,10 @@ from typing import cast
 import pytest
 
 from lfs10d.reading import Exchanged, FaultCode, PortChanged, Purpose, UartCounted, UartCounters
+from lfs10d.system.clock import Instant
 from lfs10d.telemetry.contract import outbound
 from lfs10d.telemetry.publication import BacklogStats, Payload, PublicationKind
-from lfs10d.telemetry.station import Instant, Station
+from lfs10d.telemetry.station import Station
 from tests.support.stations import (
     DAEMON,
     LINE,
@@ -54,7 +55,7 @@ def test_a_burst_holds_every_retained_topic_once_and_the_line_before_the_devices
 
 def test_retention_and_quality_of_service_are_the_contract_s() -> None:
     running = station()
-    published = running.burst(instant(0)) + running.heard(good("a", 1), instant(1))
+    published = running.burst(instant(0)) + running.on_event(good("a", 1), instant(1))
     published += running.configure(LINE, [ONE_VALUE], instant(2))
     assert published
     for each in published:
@@ -78,8 +79,8 @@ def test_in_the_first_burst_of_a_boot_every_device_is_starting_without_a_value_o
 
 def test_a_later_burst_shows_the_newest_sample() -> None:
     running = station()
-    running.heard(good("a", 1), instant(1))
-    running.heard(good("a", 1.1), instant(1.1))
+    running.on_event(good("a", 1), instant(1))
+    running.on_event(good("a", 1.1), instant(1.1))
     assert fields(shown(running, "device/a/state", 1.2), "seq", "wind_speed") == (2, 12.34)
 
 
@@ -95,40 +96,40 @@ def test_every_device_counts_its_own_samples_from_one() -> None:
     numbers = [
         (each.sample.device, each.sample.seq)
         for device in ("a", "b", "a", "a", "b")
-        for each in running.heard(good(device, 1), instant(1))
+        for each in running.on_event(good(device, 1), instant(1))
         if each.sample is not None
     ]
     assert numbers == [("a", 1), ("b", 1), ("a", 2), ("a", 3), ("b", 2)]
 
 
 def test_a_sample_is_dated_when_its_answer_ended_not_when_it_is_published() -> None:
-    published = station().heard(good("a", 1.25), instant(1.5))
+    published = station().on_event(good("a", 1.25), instant(1.5))
     assert fields(published[0].payload, "ts") == (round((WALL + 1.25) * 1000),)
 
 
 @pytest.mark.parametrize("device", ["gone", "c"])
 def test_a_reading_of_a_device_unknown_or_disabled_is_passed_over(device: str) -> None:
     running = station(ONE_VALUE, replace(THIRD, enabled=False))
-    assert running.heard(good(device, 1), instant(1)) == []
+    assert running.on_event(good(device, 1), instant(1)) == []
     assert fields(shown(running, "line/stats", 10), "polls_per_s") == (0.0,)
 
 
 def test_an_exchange_changes_figures_alone() -> None:
     running = station()
     happened = Exchanged(1.0, 0.9, 0.9, 0.004, 2, Purpose.POLL, None, b"", b"", unsolicited=3)
-    assert running.heard(happened, instant(1)) == []
+    assert running.on_event(happened, instant(1)) == []
     assert fields(shown(running, "line/stats", 10), "exchanges", "unsolicited_bytes") == (1, 3)
 
 
 def test_the_driver_s_counters_are_passed_on() -> None:
     running = station()
-    assert running.heard(UartCounted(1, UartCounters(4, 3, 2, 1)), instant(1)) == []
+    assert running.on_event(UartCounted(1, UartCounters(4, 3, 2, 1)), instant(1)) == []
     assert fields(shown(running, "line/stats"), "uart") == ({"framing": 4, "parity": 3, "overrun": 2, "break": 1},)
 
 
 def test_an_overrun_is_counted_and_never_raised() -> None:
     running = station()
-    published = running.heard(replace(good("a", 1), overruns=4), instant(1))
+    published = running.on_event(replace(good("a", 1), overruns=4), instant(1))
     assert "device/a/error" not in topics(published)
     assert fields(shown(running, "line/stats"), "errors") == ({"overrun": 4},)
     assert fields(shown(running, "device/a/stats"), "errors") == ({"overrun": 4},)
@@ -137,7 +138,7 @@ def test_an_overrun_is_counted_and_never_raised() -> None:
 def test_the_cycle_is_measured_per_device() -> None:
     running = station()
     for device, at in (("a", 1.0), ("b", 1.4), ("a", 1.5), ("b", 2.2)):
-        running.heard(good(device, at), instant(at))
+        running.on_event(good(device, at), instant(at))
     assert fields(shown(running, "line/stats", 3), "cycle_s") == (0.8,)
 
 
@@ -146,14 +147,14 @@ def test_the_cycle_is_measured_per_device() -> None:
 
 def test_an_opened_port_is_shown_and_no_error() -> None:
     running = station()
-    assert topics(running.heard(PortChanged(1, None), instant(1))) == ["line/state"]
+    assert topics(running.on_event(PortChanged(1, None), instant(1))) == ["line/state"]
     assert fields(shown(running, "line/state"), "open") == (True,)
 
 
 def test_a_lost_port_is_one_error_of_the_line_at_once() -> None:
     running = station()
-    running.heard(PortChanged(1, None), instant(1))
-    assert topics(running.heard(PortChanged(2, LOST), instant(2))) == ["line/state", "line/error"]
+    running.on_event(PortChanged(1, None), instant(1))
+    assert topics(running.on_event(PortChanged(2, LOST), instant(2))) == ["line/state", "line/error"]
     assert fields(shown(running, "line/error"), "code", "message", "since") == (
         "port_lost",
         "absent: plug it in",
@@ -164,25 +165,25 @@ def test_a_lost_port_is_one_error_of_the_line_at_once() -> None:
 
 def test_another_fault_of_the_port_changes_the_error() -> None:
     running = station()
-    running.heard(PortChanged(1, LOST), instant(1))
-    assert topics(running.heard(PortChanged(2, LOCKED), instant(2))) == ["line/error"]
+    running.on_event(PortChanged(1, LOST), instant(1))
+    assert topics(running.on_event(PortChanged(2, LOCKED), instant(2))) == ["line/error"]
     assert fields(shown(running, "line/error"), "code", "also") == ("port_busy", [])
 
 
 def test_the_same_fault_of_the_port_again_is_nothing_new() -> None:
     running = station()
-    running.heard(PortChanged(1, LOST), instant(1))
-    assert running.heard(PortChanged(2, LOST), instant(2)) == []
+    running.on_event(PortChanged(1, LOST), instant(1))
+    assert running.on_event(PortChanged(2, LOST), instant(2)) == []
 
 
 def test_when_every_device_ails_and_the_port_goes_one_error_is_left() -> None:
     running = station()
     assert "device/a/error" in ail(running, "a")
     assert "device/b/error" in ail(running, "b")
-    published = running.heard(PortChanged(3, LOST), instant(3))
+    published = running.on_event(PortChanged(3, LOST), instant(3))
     assert topics(published) == ["line/error", "device/a/error", "device/b/error"]
     for device in ("a", "b"):
-        running.heard(failed(device, 3, LOST), instant(3))
+        running.on_event(failed(device, 3, LOST), instant(3))
         assert fields(shown(running, f"device/{device}/error"), "active", "last_code") == (False, "timeout")
         assert fields(shown(running, f"device/{device}/state"), "error") == ("port_lost",)
     assert fields(shown(running, "line/error"), "active") == (True,)
@@ -190,9 +191,9 @@ def test_when_every_device_ails_and_the_port_goes_one_error_is_left() -> None:
 
 def test_the_loss_of_the_port_is_no_poll_and_one_loss_for_the_line() -> None:
     running = station()
-    running.heard(PortChanged(1, LOST), instant(1))
+    running.on_event(PortChanged(1, LOST), instant(1))
     for device in ("a", "b"):
-        running.heard(failed(device, 1, LOST), instant(1))
+        running.on_event(failed(device, 1, LOST), instant(1))
     assert fields(shown(running, "line/stats", 10), "errors", "polls_per_s") == ({"port_lost": 1}, 0.0)
     assert fields(shown(running, "device/a/stats"), "polls", "errors") == (0, {"port_lost": 1})
 
@@ -200,31 +201,31 @@ def test_the_loss_of_the_port_is_no_poll_and_one_loss_for_the_line() -> None:
 def test_when_the_port_is_back_the_line_is_fine_and_devices_ail_by_the_same_rule() -> None:
     running = station()
     ail(running)
-    running.heard(PortChanged(3, LOST), instant(3))
-    running.heard(failed("a", 3, LOST), instant(3))
-    assert topics(running.heard(PortChanged(4, None), instant(4))) == ["line/state", "line/error"]
+    running.on_event(PortChanged(3, LOST), instant(3))
+    running.on_event(failed("a", 3, LOST), instant(3))
+    assert topics(running.on_event(PortChanged(4, None), instant(4))) == ["line/state", "line/error"]
     assert fields(shown(running, "line/error"), "active", "last_code") == (False, "port_lost")
-    assert "device/a/error" not in topics(running.heard(failed("a", 5, TIMEOUT), instant(5)))
-    assert "device/a/error" in topics(running.heard(failed("a", 6, TIMEOUT), instant(6)))
+    assert "device/a/error" not in topics(running.on_event(failed("a", 5, TIMEOUT), instant(5)))
+    assert "device/a/error" in topics(running.on_event(failed("a", 6, TIMEOUT), instant(6)))
 
 
 def test_a_pause_is_a_lost_port_without_an_error() -> None:
     running = station()
-    running.heard(PortChanged(0, None), instant(0))
+    running.on_event(PortChanged(0, None), instant(0))
     ail(running)
-    assert topics(running.acting("paused", instant(2))) == ["line/state", "device/a/error"]
-    assert topics(running.heard(PortChanged(2, LOST), instant(2))) == ["line/state"]
-    running.heard(failed("a", 2, LOST), instant(2))
+    assert topics(running.on_activity("paused", instant(2))) == ["line/state", "device/a/error"]
+    assert topics(running.on_event(PortChanged(2, LOST), instant(2))) == ["line/state"]
+    running.on_event(failed("a", 2, LOST), instant(2))
     assert fields(shown(running, "line/error"), "active") == (False,)
     assert fields(shown(running, "line/stats"), "errors") == ({"timeout": 2},)
-    assert topics(running.acting("polling", instant(9))) == ["line/state"]
-    assert topics(running.heard(PortChanged(9, None), instant(9))) == ["line/state"]
+    assert topics(running.on_activity("polling", instant(9))) == ["line/state"]
+    assert topics(running.on_event(PortChanged(9, None), instant(9))) == ["line/state"]
 
 
 def test_a_pause_takes_an_error_of_the_port_back() -> None:
     running = station()
-    running.heard(PortChanged(1, LOCKED), instant(1))
-    assert topics(running.acting("paused", instant(2))) == ["line/state", "line/error"]
+    running.on_event(PortChanged(1, LOCKED), instant(1))
+    assert topics(running.on_activity("paused", instant(2))) == ["line/state", "line/error"]
 
 
 # -- other facts --------------------------------------------------------------------------------------------------
@@ -232,15 +233,15 @@ def test_a_pause_takes_an_error_of_the_port_back() -> None:
 
 def test_what_the_line_is_busy_with_is_told_once() -> None:
     running = station()
-    assert topics(running.acting("scanning", instant(1))) == ["line/state"]
-    assert running.acting("scanning", instant(2)) == []
+    assert topics(running.on_activity("scanning", instant(1))) == ["line/state"]
+    assert running.on_activity("scanning", instant(2)) == []
     assert fields(shown(running, "line/state"), "activity") == ("scanning",)
 
 
 def test_refused_requests_are_told_once() -> None:
     running = station()
-    assert running.admitting("ok", instant(1)) == []
-    assert topics(running.admitting("denied", instant(1))) == ["line/state"]
+    assert running.on_requests("ok", instant(1)) == []
+    assert topics(running.on_requests("denied", instant(1))) == ["line/state"]
     assert fields(shown(running, "line/state"), "requests") == ("denied",)
 
 
@@ -302,9 +303,9 @@ def test_statistics_tell_what_waits_for_the_broker() -> None:
 def test_a_state_that_waits_is_published_when_its_time_comes() -> None:
     running = station()
     for at in (1.0, 1.25, 1.5):
-        running.heard(good("a", at), instant(at))
-    running.heard(good("b", 1.6), instant(1.6))
-    running.heard(good("b", 1.7), instant(1.7))
+        running.on_event(good("a", at), instant(at))
+    running.on_event(good("b", 1.6), instant(1.6))
+    running.on_event(good("b", 1.7), instant(1.7))
     assert running.due() == 2.0
     assert running.tick(instant(1.9)) == []
     published = running.tick(instant(2.0))
@@ -357,12 +358,12 @@ def test_a_renamed_device_is_one_removed_and_one_added() -> None:
 
 def test_the_key_of_a_sample_is_not_used_twice_when_a_device_comes_back() -> None:
     running = station()
-    running.heard(good("a", 1), instant(1))
-    running.heard(good("a", 2), instant(2))
+    running.on_event(good("a", 1), instant(1))
+    running.on_event(good("a", 2), instant(2))
     running.configure(LINE, [TWO_VALUES], instant(3))
     running.configure(LINE, [TWO_VALUES, ONE_VALUE], instant(4))
     assert fields(shown(running, "device/a/state"), "seq") == (0,)
-    assert fields(running.heard(good("a", 5), instant(5))[0].payload, "seq") == (3,)
+    assert fields(running.on_event(good("a", 5), instant(5))[0].payload, "seq") == (3,)
 
 
 def test_a_changed_option_changes_config_and_list() -> None:
@@ -379,7 +380,7 @@ def test_a_changed_time_out_is_no_matter_of_the_list() -> None:
 
 def test_disabling_is_one_sample_and_then_none() -> None:
     running = station()
-    running.heard(good("a", 1), instant(1))
+    running.on_event(good("a", 1), instant(1))
     published = running.configure(LINE, [replace(ONE_VALUE, enabled=False), TWO_VALUES], instant(2))
     assert topics(published) == [
         "device/a/config",
@@ -389,12 +390,12 @@ def test_disabling_is_one_sample_and_then_none() -> None:
         "devices",
     ]
     assert fields(published[1].payload, "error", "seq") == ("disabled", 2)
-    assert running.heard(good("a", 2.1), instant(2.1)) == []
+    assert running.on_event(good("a", 2.1), instant(2.1)) == []
 
 
 def test_a_device_on_another_profile_starts_anew_but_for_its_numbers() -> None:
     running = station()
-    running.heard(good("a", 1), instant(1))
+    running.on_event(good("a", 1), instant(1))
     turned = replace(ONE_VALUE, profile="ld-e", value_names=("displacement",), units={"displacement": "1"})
     published = running.configure(LINE, [turned, TWO_VALUES], instant(2))
     assert "event" not in topics(published)
@@ -402,12 +403,12 @@ def test_a_device_on_another_profile_starts_anew_but_for_its_numbers() -> None:
     assert "wind_speed" not in cast("Mapping[str, object]", state)
     assert fields(state, "displacement", "seq") == (None, 0)
     answer = replace(good("a", 3), values={"displacement": 53493})
-    assert fields(running.heard(answer, instant(3))[0].payload, "seq", "displacement") == (2, 53493)
+    assert fields(running.on_event(answer, instant(3))[0].payload, "seq", "displacement") == (2, 53493)
 
 
 def test_another_rate_is_shown_and_its_gaps_are_measured_anew() -> None:
     running = station()
-    running.heard(Exchanged(1, 1, 1, 0.0037, 2, Purpose.POLL, None, b"", b""), instant(1))
+    running.on_event(Exchanged(1, 1, 1, 0.0037, 2, Purpose.POLL, None, b"", b""), instant(1))
     faster = replace(LINE, baudrate=19200, gap_required=0.0018229)
     assert topics(running.configure(faster, [ONE_VALUE, TWO_VALUES], instant(2))) == ["line/state"]
     stats = shown(running, "line/stats")
@@ -416,7 +417,7 @@ def test_another_rate_is_shown_and_its_gaps_are_measured_anew() -> None:
 
 def test_another_port_keeps_the_gaps() -> None:
     running = station()
-    running.heard(Exchanged(1, 1, 1, 0.0037, 2, Purpose.POLL, None, b"", b""), instant(1))
+    running.on_event(Exchanged(1, 1, 1, 0.0037, 2, Purpose.POLL, None, b"", b""), instant(1))
     moved = replace(LINE, port="/dev/ttyUSB1")
     assert topics(running.configure(moved, [ONE_VALUE, TWO_VALUES], instant(2))) == ["line/state"]
     assert fields(shown(running, "line/stats"), "gap_us") == ({"min": 3700.0, "p50": 3700.0, "p99": 3700.0},)
@@ -427,8 +428,8 @@ def test_another_port_keeps_the_gaps() -> None:
 
 def test_a_snapshot_is_plain_json_with_line_and_devices() -> None:
     running = station()
-    running.heard(PortChanged(0, None), instant(0))
-    running.heard(good("a", 1), instant(1))
+    running.on_event(PortChanged(0, None), instant(0))
+    running.on_event(good("a", 1), instant(1))
     running.line_failed(FaultCode.STORAGE_FULL, "disk full", instant(2))
     snapshot = json.loads(json.dumps(running.snapshot(instant(2)), allow_nan=False))
     assert (snapshot["v"], snapshot["info"]["boot"]) == (1, "k3f9a2c7")
@@ -446,8 +447,8 @@ def test_a_snapshot_is_plain_json_with_line_and_devices() -> None:
 
 def test_a_reading_of_a_disabled_device_is_told_only_if_a_request_wants_it() -> None:
     told = station(replace(ONE_VALUE, enabled=False))
-    assert told.heard(good("a", 1), instant(1)) == []
-    assert topics(told.heard(replace(good("a", 2), requests=(1,)), instant(2))) == ["device/a/telemetry"]
+    assert told.on_event(good("a", 1), instant(1)) == []
+    assert topics(told.on_event(replace(good("a", 2), requests=(1,)), instant(2))) == ["device/a/telemetry"]
 
 
 def test_statistics_that_are_due_just_now_are_due_once() -> None:
@@ -465,25 +466,25 @@ def test_a_snapshot_says_when_it_is_and_since_when_the_daemon_runs() -> None:
 
 def test_a_summary_counts_who_is_polled_and_says_how_busy_the_line_is() -> None:
     running = station(ONE_VALUE, TWO_VALUES, replace(THIRD, enabled=False))
-    running.heard(good("a", 0.4), instant(0.4))
+    running.on_event(good("a", 0.4), instant(0.4))
     assert running.summary(instant(0.5)) == "1 of 2 slaves online"
-    running.heard(Exchanged(1.5, 0.0, 0.0, None, 2, Purpose.POLL, None, b"", b""), instant(1.5))
+    running.on_event(Exchanged(1.5, 0.0, 0.0, None, 2, Purpose.POLL, None, b"", b""), instant(1.5))
     assert running.summary(instant(2)) == "1 of 2 slaves online, line 75 % busy"
 
 
 def test_what_is_told_late_is_dated_when_it_happened() -> None:
     running = station()
-    running.heard(good("a", 1), instant(5))
+    running.on_event(good("a", 1), instant(5))
     assert fields(shown(running, "device/a/stats", 5), "last_good_ts") == (1_795_298_001_000,)
-    running.heard(PortChanged(6, LOST), instant(9))
+    running.on_event(PortChanged(6, LOST), instant(9))
     assert fields(shown(running, "line/error", 9), "since") == (1_795_298_006_000,)
-    running.heard(PortChanged(10, None), instant(11))
+    running.on_event(PortChanged(10, None), instant(11))
     assert fields(shown(running, "line/error", 11), "cleared") == (1_795_298_011_000,)
 
 
 def test_while_the_port_is_lost_no_failure_is_held_against_a_device() -> None:
     running = station()
-    running.heard(PortChanged(0, LOST), instant(0))
+    running.on_event(PortChanged(0, LOST), instant(0))
     assert "device/a/error" not in ail(running, since=1)
     assert fields(shown(running, "device/a/error"), "active") == (False,)
 
@@ -498,8 +499,8 @@ def test_everything_that_changes_at_once_is_told() -> None:
 def test_another_pace_of_states_is_taken_up_by_a_reload() -> None:
     slow = replace(ONE_VALUE, state_every=600.0)
     running = station(slow)
-    running.heard(good("a", 1.0), instant(1.0))
-    running.heard(good("a", 2.0), instant(2.0))
+    running.on_event(good("a", 1.0), instant(1.0))
+    running.on_event(good("a", 2.0), instant(2.0))
     assert running.due() == 30.0
     running.configure(LINE, [replace(slow, state_every=5.0)], instant(3.0))
     assert running.due() == 8.0

@@ -11,10 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lfs10d.reading import Exchanged, Fault, FaultCode, PortChanged, Purpose, Reading
+from lfs10d.system.clock import Instant
 from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry.contract import check
+from lfs10d.telemetry.info import DeviceInfo
 from lfs10d.telemetry.publication import Payload, Publication
-from lfs10d.telemetry.station import DeviceInfo, Instant, Station
+from lfs10d.telemetry.station import Station
 from tests.support.stations import DAEMON, LINE, LOCKED, LOST, ONE_VALUE, THIRD, TWO_VALUES, fields, good, instant
 
 FLEET = (ONE_VALUE, TWO_VALUES, THIRD)
@@ -70,13 +72,13 @@ def take(running: Station, step: object, now: Instant) -> list[Publication]:
     """Let one step of a random history happen now."""
     match step:
         case Exchanged():
-            return running.heard(replace(step, at=now.mono, asked=now.mono - step.at), now)
+            return running.on_event(replace(step, at=now.mono, asked=now.mono - step.at), now)
         case Reading() | PortChanged():
-            return running.heard(replace(step, at=now.mono), now)
+            return running.on_event(replace(step, at=now.mono), now)
         case str() if step in WORDS:
             return WORDS[step](running, now)
         case str():
-            return running.acting(step, now)
+            return running.on_activity(step, now)
         case _:
             return running.configure(LINE, cast("tuple[DeviceInfo, ...]", step), now)
 
