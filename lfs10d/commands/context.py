@@ -14,7 +14,7 @@ from lfs10d.config.models import SlaveConfig
 from lfs10d.line.jobs.ping import Ping
 from lfs10d.line.jobs.register_access import Access
 from lfs10d.line.jobs.scan import Scan
-from lfs10d.modbus.frames import Request as RegisterRequest
+from lfs10d.modbus.request import Request as RegisterRequest
 from lfs10d.profiles.profile import Profile
 
 

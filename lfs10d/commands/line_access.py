@@ -24,8 +24,8 @@ from lfs10d.line.jobs.ping import Ping
 from lfs10d.line.jobs.register_access import Access
 from lfs10d.line.jobs.scan import Scan
 from lfs10d.line.line import Line
-from lfs10d.modbus.exchange import Echo
-from lfs10d.modbus.frames import Request as RegisterRequest
+from lfs10d.modbus.echo import Echo
+from lfs10d.modbus.request import Request as RegisterRequest
 from lfs10d.mqtt.uplink import Uplink
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Event, Exchanged, Reading

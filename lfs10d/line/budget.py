@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from lfs10d.config.models import Config, LineConfig, SlaveConfig
-from lfs10d.modbus.frames import Checksum, Codec, Framing, ReadRegisters
+from lfs10d.modbus.frames import Checksum, Codec, Framing
+from lfs10d.modbus.request import ReadRegisters
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.profile import Profile
 

@@ -21,7 +21,7 @@ from lfs10d.line.scheduler import Scheduler
 from lfs10d.line.settings import device_specs, line_rules, poll_rules, port_settings
 from lfs10d.line.thread import WAKING, WAKING_REALTIME, LineThread
 from lfs10d.modbus.bus import Bus
-from lfs10d.modbus.exchange import Echo
+from lfs10d.modbus.echo import Echo
 from lfs10d.modbus.pending import PendingRequests
 from lfs10d.modbus.port import SerialPort
 from lfs10d.modbus.realtime import sharpen_timers, take_precedence, yield_precedence

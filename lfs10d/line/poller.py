@@ -13,12 +13,13 @@ from math import inf
 from typing import TypeAlias
 
 from lfs10d.line.device import DeviceSpec, PollRules
-from lfs10d.line.jobs.job import Ask, Job
+from lfs10d.line.jobs.job import Job
 from lfs10d.line.jobs.poll import Poll
 from lfs10d.line.scheduler import Rest, Scheduler
+from lfs10d.modbus.ask import Ask
 from lfs10d.modbus.bus import Bus, LineRules, Order, Wait
-from lfs10d.modbus.exchange import Outcome
-from lfs10d.modbus.port import PortSettings
+from lfs10d.modbus.outcome import Outcome
+from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.reading import Event, Exchanged, Fault, FaultCode, PortChanged, Purpose, UartCounted, UartCounters
 
 COUNTERS_EVERY = 10.0

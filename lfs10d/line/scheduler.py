@@ -22,17 +22,19 @@ from typing import TypeAlias
 
 from lfs10d.line.device import LEARNED_MOST, Device, DeviceSpec, Health, PollRules
 from lfs10d.line.job_queue import JobQueue
-from lfs10d.line.jobs.job import Ask, Continue, Hold, Job, Requeue
+from lfs10d.line.jobs.job import Continue, Hold, Job, Requeue
 from lfs10d.line.jobs.poll import Poll, tell, tell_lost
 from lfs10d.line.poll_queue import PollQueue, back_on_grid, spread
 from lfs10d.line.probing import Probing
 from lfs10d.line.slave_rests import SlaveRests
 from lfs10d.line.surcharge import Surcharge
 from lfs10d.modbus import diagnosis
-from lfs10d.modbus.exchange import Outcome
-from lfs10d.modbus.frames import EXCEPTION_FLAG, ReadRegisters
+from lfs10d.modbus.ask import Ask
+from lfs10d.modbus.frames import EXCEPTION_FLAG
+from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.overhearing import Overhearing
 from lfs10d.modbus.pending import PendingRequests
+from lfs10d.modbus.request import ReadRegisters
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.reading import AnsweredTwice, Fault, FaultCode, Purpose, Reading
 

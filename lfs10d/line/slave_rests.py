@@ -15,9 +15,10 @@ from collections.abc import Mapping
 from math import inf
 
 from lfs10d.line.device import Device
-from lfs10d.line.jobs.job import Ask, Job
+from lfs10d.line.jobs.job import Job
 from lfs10d.line.jobs.poll import Poll
-from lfs10d.modbus.exchange import Outcome
+from lfs10d.modbus.ask import Ask
+from lfs10d.modbus.outcome import Outcome
 from lfs10d.reading import FaultCode
 
 

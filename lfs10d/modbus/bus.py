@@ -13,10 +13,15 @@ from math import inf
 from typing import Literal, NamedTuple, TypeAlias
 
 from lfs10d.errors import PortBusyError, PortError
-from lfs10d.modbus.echo import EchoLearner
-from lfs10d.modbus.exchange import Attempt, Echo, Exchange, Listen, Outcome, Pending, Quiet, Settled
-from lfs10d.modbus.frames import Codec, ReadRegisters, Request
-from lfs10d.modbus.port import Port, PortSettings
+from lfs10d.modbus.ask import Attempt
+from lfs10d.modbus.echo import Echo, EchoLearner
+from lfs10d.modbus.exchange import Exchange, Listen, Quiet, Settled
+from lfs10d.modbus.frames import Codec
+from lfs10d.modbus.outcome import Outcome
+from lfs10d.modbus.pending import Pending
+from lfs10d.modbus.port import Port
+from lfs10d.modbus.port_settings import PortSettings
+from lfs10d.modbus.request import ReadRegisters, Request
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.reading import Fault, FaultCode, PortChanged, UartCounters
 

@@ -4,18 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from lfs10d.modbus.attempt import Attempt
+from lfs10d.modbus.ask import Attempt
 from lfs10d.modbus.duplicates import Twice
-from lfs10d.modbus.frames import (
-    BROADCAST,
-    EXCEPTION_FLAG,
-    EXCEPTION_NAMES,
-    READ_INPUT_REGISTERS,
-    Codec,
-    ReadRegisters,
-    Request,
-)
+from lfs10d.modbus.frames import EXCEPTION_FLAG, EXCEPTION_NAMES, Codec
 from lfs10d.modbus.reception import Reception
+from lfs10d.modbus.request import BROADCAST, READ_INPUT_REGISTERS, ReadRegisters, Request
 from lfs10d.reading import FaultCode
 
 _REQUEST_BODY = 6

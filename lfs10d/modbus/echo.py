@@ -6,12 +6,19 @@ nothing is proved. Learned anew at each opening of the port; until it is known n
 
 from __future__ import annotations
 
+from enum import StrEnum
 from typing import Literal
-
-from lfs10d.modbus.exchange import Echo
 
 AGREEING = 3
 """So many observations in a row must agree."""
+
+
+class Echo(StrEnum):
+    """Whether the adapter returns our own bytes."""
+
+    ON = "on"
+    OFF = "off"
+    UNKNOWN = "unknown"
 
 
 class EchoLearner:

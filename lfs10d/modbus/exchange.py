@@ -42,43 +42,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import StrEnum
 from math import isfinite
+from typing import NamedTuple, TypeAlias
 
 from lfs10d.modbus import diagnosis
-from lfs10d.modbus.attempt import (
-    Attempt,
-    Decision,
-    Echo,
-    LateAnswer,
-    Listen,
-    Outcome,
-    Pending,
-    Quiet,
-    Send,
-    Settled,
-)
+from lfs10d.modbus.ask import Attempt
 from lfs10d.modbus.diagnosis import Diagnosis
 from lfs10d.modbus.frame_search import FoundFrame
-from lfs10d.modbus.frames import BROADCAST, EXCEPTION_FLAG, Framing
+from lfs10d.modbus.frames import EXCEPTION_FLAG, Framing
+from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.reception import HEARD_KEPT, Reception
+from lfs10d.modbus.request import BROADCAST
 from lfs10d.reading import Fault
-
-__all__ = [
-    "TRANSITIONS",
-    "Attempt",
-    "Decision",
-    "Echo",
-    "Exchange",
-    "Happening",
-    "LateAnswer",
-    "Listen",
-    "MisuseError",
-    "Outcome",
-    "Pending",
-    "Quiet",
-    "Send",
-    "Settled",
-    "State",
-]
 
 ASCII_PAUSE = 1.0
 """Longest pause between two characters of an ASCII frame, s (Modbus over Serial Line V1.02, section 2.5.2.1)."""
@@ -118,6 +92,38 @@ TRANSITIONS: Mapping[tuple[State, Happening], State] = {
     (State.LISTENING, Happening.EXPIRED): State.SETTLED,
 }
 """The whole machine; the picture in `docs/` is drawn from it."""
+
+
+class Quiet(NamedTuple):
+    """Let the line be silent: call `step` again at `until`, or when bytes have been given to `received`."""
+
+    until: float
+
+
+class Send(NamedTuple):
+    """Look once more whether bytes wait; if none do, write `frame` at once and tell it by `sent`."""
+
+    frame: bytes
+
+
+class Listen(NamedTuple):
+    """Read what comes and give it to `received`; call `step` after that, or at `until`.
+
+    Nothing can be decided on new bytes before `not_before`, so the caller may sleep to it. At `until` what is
+    there must be read before `step` is called.
+    """
+
+    until: float
+    not_before: float
+
+
+class Settled(NamedTuple):
+    """The exchange is over."""
+
+    outcome: Outcome
+
+
+Decision: TypeAlias = Quiet | Send | Listen | Settled
 
 
 class MisuseError(RuntimeError):

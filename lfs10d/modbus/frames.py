@@ -29,37 +29,12 @@ from pymodbus.pdu.register_message import (
 )
 
 from lfs10d.modbus.request import (
-    BROADCAST,
-    NOT_FINAL,
-    READ_COUNT_MAX,
     READ_HOLDING_REGISTERS,
     READ_INPUT_REGISTERS,
-    SLAVE_MAX,
     WRITE_SINGLE_REGISTER,
-    ReadRegisters,
     Request,
     WriteRegister,
 )
-
-__all__ = [
-    "BROADCAST",
-    "EXCEPTION_FLAG",
-    "EXCEPTION_NAMES",
-    "NOT_FINAL",
-    "READ_COUNT_MAX",
-    "READ_HOLDING_REGISTERS",
-    "READ_INPUT_REGISTERS",
-    "SLAVE_MAX",
-    "WRITE_SINGLE_REGISTER",
-    "Checksum",
-    "Codec",
-    "Framing",
-    "ReadRegisters",
-    "Request",
-    "Shape",
-    "WriteRegister",
-    "describe",
-]
 
 EXCEPTION_FLAG = 0x80
 """Added to the function code of a refused request (Modbus Application Protocol V1.1b3, section 7)."""

@@ -10,15 +10,8 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from lfs10d.modbus.frames import (
-    EXCEPTION_FLAG,
-    READ_COUNT_MAX,
-    READ_HOLDING_REGISTERS,
-    READ_INPUT_REGISTERS,
-    Codec,
-    Framing,
-    ReadRegisters,
-)
+from lfs10d.modbus.frames import EXCEPTION_FLAG, Codec, Framing
+from lfs10d.modbus.request import READ_COUNT_MAX, READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS, ReadRegisters
 
 KEPT = 600
 """Characters kept of a frame whose end has not come: more than the longest has (513, ASCII)."""

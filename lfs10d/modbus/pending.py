@@ -26,10 +26,12 @@ Rules
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 
 from lfs10d.modbus.duplicates import Duplicates
-from lfs10d.modbus.exchange import LateAnswer, Outcome, Pending
-from lfs10d.modbus.frames import Codec, Request
+from lfs10d.modbus.frames import Codec
+from lfs10d.modbus.outcome import LateAnswer, Outcome
+from lfs10d.modbus.request import Request
 from lfs10d.reading import FaultCode
 
 QUIET_LEAST = 1.0
@@ -39,6 +41,19 @@ _SILENT = frozenset({FaultCode.TIMEOUT, FaultCode.LATE, FaultCode.WRONG_SLAVE})
 EQUALS_KEPT = 16
 """Of equal pending requests so many are remembered, the newest: more than any sensor keeps in mind. The answer of one
 forgotten too soon would count as that of the next, and whatever was asked between the two as answered."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pending:
+    """An unanswered earlier request, whose answer may still come; `sent_end` is its last bit.
+
+    `ours`: we asked it, no other master did.
+    """
+
+    request: Request
+    codec: Codec
+    sent_end: float
+    ours: bool = True
 
 
 class PendingRequests:

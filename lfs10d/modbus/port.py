@@ -21,12 +21,10 @@ from typing import Protocol
 from lfs10d.errors import PortError, PortLostError
 from lfs10d.modbus.port_errors import PortErrorFacts, hung_up, look, number_of, refusal
 from lfs10d.modbus.port_lock import claim, holder, is_pty, release
-from lfs10d.modbus.port_settings import PortSettings, Rs485
+from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.modbus.serial_driver import USB_LATENCY, lower_latency, read_counters, switch_rs485
 from lfs10d.modbus.termios_attributes import attributes, differences
 from lfs10d.reading import UartCounters
-
-__all__ = ["Port", "PortSettings", "Rs485", "SerialPort", "attributes"]
 
 _READ_SIZE = 4096
 """What the kernel's line discipline can hold (N_TTY_BUF_SIZE)."""

@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import inf
 
-from lfs10d.modbus.attempt import Attempt, Echo, LateAnswer, Pending
+from lfs10d.modbus.ask import Attempt
+from lfs10d.modbus.echo import Echo
 from lfs10d.modbus.frame_search import ExpectedFrame, FoundFrame, FrameSearch
-from lfs10d.modbus.frames import BROADCAST, EXCEPTION_FLAG, ReadRegisters, Shape, WriteRegister
+from lfs10d.modbus.frames import EXCEPTION_FLAG, Shape
+from lfs10d.modbus.outcome import LateAnswer
+from lfs10d.modbus.pending import Pending
+from lfs10d.modbus.request import BROADCAST, ReadRegisters, WriteRegister
 
 HEARD_KEPT = 1024
 """Bytes remembered as heard, the last ones; the longest frame has 513 (ASCII)."""

@@ -1,7 +1,4 @@
-"""What the master asks: read registers, or write one. Refused here when it cannot be asked at all.
-
-Callers import these from `lfs10d.modbus.frames`, which turns them into bytes.
-"""
+"""Requests of the master: read registers, or write one. Raises ValueError for what cannot be asked at all."""
 
 from __future__ import annotations
 

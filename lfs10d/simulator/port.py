@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Final, Protocol
 
 from lfs10d.errors import PortBusyError, PortLostError
-from lfs10d.modbus.port import PortSettings
+from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.reading import UartCounters
 from lfs10d.simulator.adapter import Adapter
 from lfs10d.simulator.line import SimulatedLine

@@ -22,7 +22,8 @@ from lfs10d.commands.handlers.registry import REQUESTS
 from lfs10d.commands.message import parameters_of
 from lfs10d.config.diff import RESTART_KEYS
 from lfs10d.config.models import Config
-from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
+from lfs10d.modbus.frames import Codec, Framing
+from lfs10d.modbus.request import ReadRegisters
 from lfs10d.schema.fields import FieldKind
 from lfs10d.telemetry.contract import OUTBOUND, check
 

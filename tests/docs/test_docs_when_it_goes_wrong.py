@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from lfs10d.modbus import diagnosis, port_errors
-from lfs10d.modbus.frames import ReadRegisters
 from lfs10d.modbus.port_errors import PortErrorFacts
+from lfs10d.modbus.request import ReadRegisters
 from lfs10d.mqtt.reasons import REFUSED_FROM, failed, reason_in_words
 from lfs10d.mqtt.settings import BrokerSettings
 from lfs10d.reading import FaultCode, UartCounters

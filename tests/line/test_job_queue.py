@@ -9,11 +9,12 @@ import pytest
 
 from lfs10d.line.device import Device, DeviceSpec, PollRules
 from lfs10d.line.job_queue import JOB_CREDIT, JobQueue
-from lfs10d.line.jobs.job import Ask, Done, Hold, Next
+from lfs10d.line.jobs.job import Done, Hold, Next
 from lfs10d.line.jobs.poll import Poll
 from lfs10d.line.quota import Quota
-from lfs10d.modbus.exchange import Outcome
+from lfs10d.modbus.ask import Ask
 from lfs10d.modbus.frames import Codec, Framing
+from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.pending import PendingRequests
 from lfs10d.profiles.library import load_profile
 from lfs10d.reading import Purpose

@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lfs10d.line.device import Device, DeviceSpec, PollRules
-from lfs10d.line.jobs.job import Ask
 from lfs10d.line.jobs.poll import Poll
 from lfs10d.line.poll_queue import EXCLUDED_PAUSE, FLAT_OUT_PATIENCE, PollQueue, back_on_grid, spread
+from lfs10d.modbus.ask import Ask
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.pending import PendingRequests
 from lfs10d.profiles.library import load_profile

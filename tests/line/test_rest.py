@@ -9,7 +9,8 @@ import pytest
 
 from lfs10d.line.device import DeviceSpec, PollRules
 from lfs10d.line.jobs.register_access import Access, End, Target
-from lfs10d.modbus.frames import Codec, Framing, ReadRegisters, Request, WriteRegister
+from lfs10d.modbus.frames import Codec, Framing
+from lfs10d.modbus.request import ReadRegisters, Request, WriteRegister
 from lfs10d.reading import FaultCode
 from lfs10d.simulator.burst import MASTER
 from tests.support.lines import LFS10, Rig, Rigs, a_spec

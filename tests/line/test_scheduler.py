@@ -11,8 +11,8 @@ import pytest
 from lfs10d.line.device import LEARNED_MOST, Health, PollRules
 from lfs10d.line.jobs.job import Continue, Hold, Requeue
 from lfs10d.line.scheduler import START_PATIENT, Rest, Scheduler
-from lfs10d.modbus.exchange import LateAnswer
-from lfs10d.modbus.frames import ReadRegisters
+from lfs10d.modbus.outcome import LateAnswer
+from lfs10d.modbus.request import ReadRegisters
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.reading import Fault, FaultCode, Purpose
 from tests.support.schedules import GONE, RTU, T9600, TAKES, Rig, Task, asking, spec

@@ -8,12 +8,12 @@ from math import inf
 import pytest
 
 from lfs10d.line.device import Device, PollRules
-from lfs10d.line.jobs.job import Ask
 from lfs10d.line.jobs.poll import Poll
 from lfs10d.line.slave_rests import SlaveRests
-from lfs10d.modbus.exchange import LateAnswer
-from lfs10d.modbus.frames import ReadRegisters
+from lfs10d.modbus.ask import Ask
+from lfs10d.modbus.outcome import LateAnswer
 from lfs10d.modbus.pending import PendingRequests
+from lfs10d.modbus.request import ReadRegisters
 from lfs10d.reading import Fault, FaultCode, Purpose
 from tests.support.outcomes import ended
 from tests.support.schedules import RTU, Task, spec

@@ -9,9 +9,11 @@ import pytest
 
 from lfs10d.errors import PortBusyError, PortLostError
 from lfs10d.modbus.bus import AWAKE_BEFORE, RATE_SETTLE, REOPEN_FIRST, Bus, LineRules, Order, Wait
-from lfs10d.modbus.exchange import Echo, Outcome
-from lfs10d.modbus.frames import Codec, Framing, ReadRegisters, WriteRegister
+from lfs10d.modbus.echo import Echo
+from lfs10d.modbus.frames import Codec, Framing
+from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.port_settings import PortSettings
+from lfs10d.modbus.request import ReadRegisters, WriteRegister
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.reading import FaultCode, PortChanged, UartCounters
 

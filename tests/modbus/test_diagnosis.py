@@ -7,10 +7,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lfs10d.modbus import diagnosis
-from lfs10d.modbus.attempt import Attempt, Echo, Pending
+from lfs10d.modbus.ask import Attempt
 from lfs10d.modbus.duplicates import Twice
-from lfs10d.modbus.frames import Codec, Framing, ReadRegisters, Request, WriteRegister
+from lfs10d.modbus.echo import Echo
+from lfs10d.modbus.frames import Codec, Framing
+from lfs10d.modbus.pending import Pending
 from lfs10d.modbus.reception import Reception
+from lfs10d.modbus.request import ReadRegisters, Request, WriteRegister
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.reading import FaultCode
 

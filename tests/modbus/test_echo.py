@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.modbus.echo import AGREEING, EchoLearner
-from lfs10d.modbus.exchange import Echo
+from lfs10d.modbus.echo import AGREEING, Echo, EchoLearner
 
 
 def learned(*seen: bool | None) -> Echo:

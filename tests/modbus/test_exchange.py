@@ -9,21 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.modbus.exchange import (
-    TRANSITIONS,
-    Attempt,
-    Echo,
-    Exchange,
-    Happening,
-    Listen,
-    MisuseError,
-    Pending,
-    Quiet,
-    Send,
-    Settled,
-    State,
-)
-from lfs10d.modbus.frames import ReadRegisters, WriteRegister
+from lfs10d.modbus.ask import Attempt
+from lfs10d.modbus.echo import Echo
+from lfs10d.modbus.exchange import TRANSITIONS, Exchange, Happening, Listen, MisuseError, Quiet, Send, Settled, State
+from lfs10d.modbus.pending import Pending
+from lfs10d.modbus.request import ReadRegisters, WriteRegister
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.reading import FaultCode
 from tests.support.exchanges import (

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.modbus.frames import Codec, ReadRegisters
+from lfs10d.modbus.frames import Codec
+from lfs10d.modbus.request import ReadRegisters
 from lfs10d.reading import FaultCode
 from tests.support.exchanges import (
     ANSWER,

@@ -6,10 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from lfs10d.modbus.exchange import (
-    Attempt,
-    Echo,
-)
+from lfs10d.modbus.ask import Attempt
+from lfs10d.modbus.echo import Echo
 from lfs10d.reading import FaultCode
 from tests.support.exchanges import (
     ANSWER,

@@ -6,11 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from lfs10d.modbus.exchange import (
-    LateAnswer,
-    Pending,
-)
-from lfs10d.modbus.frames import ReadRegisters
+from lfs10d.modbus.outcome import LateAnswer
+from lfs10d.modbus.pending import Pending
+from lfs10d.modbus.request import ReadRegisters
 from lfs10d.reading import FaultCode
 from tests.support.exchanges import (
     ANSWER,

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from lfs10d.modbus.exchange import Echo
-from lfs10d.modbus.frames import ReadRegisters
+from lfs10d.modbus.echo import Echo
+from lfs10d.modbus.request import ReadRegisters
 from lfs10d.reading import FaultCode
 from tests.support.exchanges import (
     ANSWER,

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lfs10d.modbus.frame_search import KEPT, ExpectedFrame, FoundFrame, FrameSearch
-from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
+from lfs10d.modbus.frames import Codec, Framing
+from lfs10d.modbus.request import ReadRegisters
 
 RTU = Codec(Framing.RTU)
 NORMAL, EXCEPTION = RTU.shapes(ReadRegisters(1, 0x0001, 2))

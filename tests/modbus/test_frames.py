@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from pymodbus.framer import FramerAscii, FramerRTU
 from pymodbus.pdu import DecodePDU, ExceptionResponse
 
-from lfs10d.modbus.frames import Checksum, Codec, Framing, ReadRegisters, Request, WriteRegister, describe
+from lfs10d.modbus.frames import Checksum, Codec, Framing, describe
+from lfs10d.modbus.request import ReadRegisters, Request, WriteRegister
 
 RTU = Codec(Framing.RTU)
 SUM = Codec(Framing.RTU, Checksum.SUM)

@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.modbus.frames import Codec, ReadRegisters
+from lfs10d.modbus.frames import Codec
 from lfs10d.modbus.overhearing import PAUSE, Overheard, Overhearing
+from lfs10d.modbus.request import ReadRegisters
 from tests.support.exchanges import ANSWER, ASCII, REFUSED, RTU, SUM, WIND, framed
 
 REQUEST = RTU.encode(WIND)

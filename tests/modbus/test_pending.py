@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.modbus.exchange import LateAnswer
-from lfs10d.modbus.frames import Codec, Framing, ReadRegisters, Request, WriteRegister
+from lfs10d.modbus.frames import Codec, Framing
+from lfs10d.modbus.outcome import LateAnswer
 from lfs10d.modbus.pending import EQUALS_KEPT, PendingRequests
+from lfs10d.modbus.request import ReadRegisters, Request, WriteRegister
 from lfs10d.reading import Fault, FaultCode
 from tests.support.outcomes import ended
 

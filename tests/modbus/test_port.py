@@ -17,8 +17,8 @@ import pytest
 from lfs10d.errors import PortBusyError, PortError, PortLostError
 from lfs10d.modbus import port as module
 from lfs10d.modbus import port_lock
-from lfs10d.modbus.port import Port, PortSettings, Rs485, SerialPort
-from lfs10d.modbus.port_settings import BAUDRATES
+from lfs10d.modbus.port import Port, SerialPort
+from lfs10d.modbus.port_settings import BAUDRATES, PortSettings, Rs485
 from tests.support.far_end import FarEnd
 
 FRAME = bytes.fromhex("01 03 00 01 00 02 95 CB")

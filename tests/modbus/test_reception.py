@@ -6,9 +6,12 @@ from dataclasses import replace
 
 import pytest
 
-from lfs10d.modbus.attempt import Attempt, Echo, Pending
-from lfs10d.modbus.frames import Checksum, Codec, Framing, ReadRegisters, Request, WriteRegister
+from lfs10d.modbus.ask import Attempt
+from lfs10d.modbus.echo import Echo
+from lfs10d.modbus.frames import Checksum, Codec, Framing
+from lfs10d.modbus.pending import Pending
 from lfs10d.modbus.reception import HEARD_KEPT, Reception
+from lfs10d.modbus.request import ReadRegisters, Request, WriteRegister
 from lfs10d.modbus.timing import LineTiming
 
 RTU, ASCII = Codec(Framing.RTU), Codec(Framing.ASCII)

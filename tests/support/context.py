@@ -19,8 +19,8 @@ from lfs10d.line.jobs.register_access import Access, Target
 from lfs10d.line.jobs.scan import Scan
 from lfs10d.line.jobs.scan_plan import ScanPlan
 from lfs10d.modbus.frames import Codec, Framing
-from lfs10d.modbus.frames import Request as RegisterRequest
 from lfs10d.modbus.pending import PendingRequests
+from lfs10d.modbus.request import Request as RegisterRequest
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile

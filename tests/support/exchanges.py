@@ -4,17 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from lfs10d.modbus.exchange import (
-    Attempt,
-    Echo,
-    Exchange,
-    Listen,
-    Outcome,
-    Quiet,
-    Send,
-    Settled,
-)
-from lfs10d.modbus.frames import Checksum, Codec, Framing, ReadRegisters, WriteRegister
+from lfs10d.modbus.ask import Attempt
+from lfs10d.modbus.echo import Echo
+from lfs10d.modbus.exchange import Exchange, Listen, Quiet, Send, Settled
+from lfs10d.modbus.frames import Checksum, Codec, Framing
+from lfs10d.modbus.outcome import Outcome
+from lfs10d.modbus.request import ReadRegisters, WriteRegister
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.reading import FaultCode
 

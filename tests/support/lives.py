@@ -25,7 +25,7 @@ from lfs10d.line.poller import Poller
 from lfs10d.line.scheduler import Scheduler
 from lfs10d.line.settings import device_specs, line_rules, poll_rules, port_settings
 from lfs10d.modbus.bus import Bus
-from lfs10d.modbus.exchange import Echo
+from lfs10d.modbus.echo import Echo
 from lfs10d.modbus.pending import PendingRequests
 from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.mqtt.topics import InboundRequest

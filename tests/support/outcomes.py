@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from lfs10d.modbus.exchange import Outcome
-from lfs10d.modbus.frames import Request
+from lfs10d.modbus.outcome import Outcome
+from lfs10d.modbus.request import Request
 
 
 def ended(request: Request, **facts: Any) -> Outcome:  # noqa: ANN401  # passed on to a dataclass, which checks names

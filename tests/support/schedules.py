@@ -6,11 +6,13 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from lfs10d.line.device import DeviceSpec, PollRules
-from lfs10d.line.jobs.job import Ask, Continue, Done, Hold, Next, Requeue
+from lfs10d.line.jobs.job import Continue, Done, Hold, Next, Requeue
 from lfs10d.line.jobs.poll import Poll
 from lfs10d.line.scheduler import Rest, Scheduler
-from lfs10d.modbus.exchange import LateAnswer, Outcome
-from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
+from lfs10d.modbus.ask import Ask
+from lfs10d.modbus.frames import Codec, Framing
+from lfs10d.modbus.outcome import LateAnswer, Outcome
+from lfs10d.modbus.request import ReadRegisters
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.library import load_profile
 from lfs10d.reading import Fault, FaultCode, Purpose, Reading

@@ -7,11 +7,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from lfs10d.line.jobs.job import Ask, Hold
+from lfs10d.line.jobs.job import Hold
 from lfs10d.line.jobs.procedure import Await, LineLostError, ProcedureClock, Step
-from lfs10d.modbus.exchange import Outcome
-from lfs10d.modbus.frames import Codec, Framing, ReadRegisters, Request, WriteRegister
+from lfs10d.modbus.ask import Ask
+from lfs10d.modbus.frames import Codec, Framing
+from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.pending import PendingRequests
+from lfs10d.modbus.request import ReadRegisters, Request, WriteRegister
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Fault, FaultCode

@@ -24,7 +24,7 @@ from lfs10d.commands.message import Parameters
 from lfs10d.config.effective import Effective
 from lfs10d.config.models import SlaveConfig
 from lfs10d.line.jobs.register_access import Access, End
-from lfs10d.modbus.frames import READ_COUNT_MAX, ReadRegisters, WriteRegister
+from lfs10d.modbus.request import READ_COUNT_MAX, ReadRegisters, WriteRegister
 from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.profiles.values import Setting

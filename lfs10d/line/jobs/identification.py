@@ -18,8 +18,9 @@ from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
-from lfs10d.modbus.exchange import Outcome
-from lfs10d.modbus.frames import READ_HOLDING_REGISTERS, Codec, ReadRegisters
+from lfs10d.modbus.frames import Codec
+from lfs10d.modbus.outcome import Outcome
+from lfs10d.modbus.request import READ_HOLDING_REGISTERS, ReadRegisters
 from lfs10d.profiles.blocks import Block
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Fault, FaultCode, Number

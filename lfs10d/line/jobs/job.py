@@ -9,28 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
-from lfs10d.modbus.exchange import Outcome
-from lfs10d.modbus.frames import Codec, Request
+from lfs10d.modbus.ask import Ask
+from lfs10d.modbus.outcome import Outcome
 from lfs10d.reading import Purpose
-
-
-@dataclass(frozen=True, slots=True)
-class Ask:
-    """Put this request on the line now.
-
-    `timeout` (s) runs from the request's last bit to the answer's first byte; `patience` is the slave's learned
-    p99 of it, None where it is not known. `baudrate` None means the line's own rate. `at_once`: nobody else is asked
-    between the job's exchange before and this one, so that what comes late is received here. `request_gap` (s) is the
-    rest that the slave needs by what the job knows of it; the schedule keeps what it knows itself in any case.
-    """
-
-    request: Request
-    codec: Codec
-    timeout: float
-    patience: float | None = None
-    baudrate: int | None = None
-    at_once: bool = False
-    request_gap: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

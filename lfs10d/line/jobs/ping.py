@@ -6,9 +6,10 @@ from collections.abc import Callable
 
 from lfs10d.line.device import FIRST_TIMEOUTS
 from lfs10d.line.jobs.identification import first_read, speaks
-from lfs10d.line.jobs.job import Ask, Done, Next, Requeue
-from lfs10d.modbus.exchange import Outcome
+from lfs10d.line.jobs.job import Done, Next, Requeue
+from lfs10d.modbus.ask import Ask
 from lfs10d.modbus.frames import Codec
+from lfs10d.modbus.outcome import Outcome
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Fault, Purpose
 

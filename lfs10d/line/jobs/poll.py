@@ -20,10 +20,12 @@ from dataclasses import replace
 from functools import lru_cache
 
 from lfs10d.line.device import Device
-from lfs10d.line.jobs.job import Ask, Done, Hold, Next, Requeue
-from lfs10d.modbus.exchange import FAULT_HEARD, Outcome
-from lfs10d.modbus.frames import ReadRegisters
+from lfs10d.line.jobs.job import Done, Hold, Next, Requeue
+from lfs10d.modbus.ask import Ask
+from lfs10d.modbus.exchange import FAULT_HEARD
+from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.pending import PendingRequests
+from lfs10d.modbus.request import ReadRegisters
 from lfs10d.profiles.blocks import Block
 from lfs10d.reading import ALIVE_CODES, Fault, FaultCode, Number, Purpose, Reading
 

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from math import inf
 from typing import Any, TypeAlias
 
-from lfs10d.line.jobs.job import Ask, Continue, Done, Hold, Next, Requeue
-from lfs10d.modbus.exchange import Outcome
+from lfs10d.line.jobs.job import Continue, Done, Hold, Next, Requeue
+from lfs10d.modbus.ask import Ask
+from lfs10d.modbus.outcome import Outcome
 from lfs10d.reading import Purpose
 
 SLICE = 0.25

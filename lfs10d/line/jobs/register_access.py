@@ -19,11 +19,13 @@ from enum import StrEnum
 from typing import TypeAlias
 
 from lfs10d.line.device import FIRST_TIMEOUTS
-from lfs10d.line.jobs.job import Ask, Done, Hold, Next, Requeue
+from lfs10d.line.jobs.job import Done, Hold, Next, Requeue
 from lfs10d.line.jobs.poll import told_busy
-from lfs10d.modbus.exchange import Outcome
-from lfs10d.modbus.frames import Codec, ReadRegisters, Request, WriteRegister
+from lfs10d.modbus.ask import Ask
+from lfs10d.modbus.frames import Codec
+from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.pending import PendingRequests
+from lfs10d.modbus.request import ReadRegisters, Request, WriteRegister
 from lfs10d.profiles.profile import BUSY_EXCEPTIONS, Profile
 from lfs10d.reading import Fault, FaultCode, Purpose
 

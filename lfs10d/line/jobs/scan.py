@@ -21,9 +21,10 @@ from dataclasses import dataclass, replace
 from math import inf
 
 from lfs10d.line.jobs.identification import FoundDevice, Identification, shortest_answer, speaks, spoilt, strangers
-from lfs10d.line.jobs.job import Ask, Continue, Done, Next, Requeue
+from lfs10d.line.jobs.job import Continue, Done, Next, Requeue
 from lfs10d.line.jobs.scan_plan import LAST_TIMEOUT, RESERVED_FROM, ScanPlan
-from lfs10d.modbus.exchange import Outcome
+from lfs10d.modbus.ask import Ask
+from lfs10d.modbus.outcome import Outcome
 from lfs10d.reading import Fault, FaultCode, Purpose
 
 PATIENT_TIMEOUT = 0.4

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from lfs10d.line.jobs.identification import first_read
-from lfs10d.modbus.frames import Codec, ReadRegisters
+from lfs10d.modbus.frames import Codec
+from lfs10d.modbus.request import ReadRegisters
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.profile import Profile
 

@@ -13,9 +13,10 @@ from typing import Any, TypeAlias
 
 from lfs10d.line.device import Device
 from lfs10d.line.jobs.identification import first_read, speaks
-from lfs10d.line.jobs.job import Ask, Hold
+from lfs10d.line.jobs.job import Hold
 from lfs10d.line.jobs.procedure import Await, ProcedureClock, Step
 from lfs10d.line.probing import PROBE_SPACING
+from lfs10d.modbus.ask import Ask
 
 LOST_AFTER = 30.0
 """Seconds for which every sensor must be offline."""

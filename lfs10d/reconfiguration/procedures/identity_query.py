@@ -15,11 +15,13 @@ from collections.abc import Generator
 from dataclasses import dataclass, field, replace
 
 from lfs10d.line.jobs.identification import shortest_answer, strangers
-from lfs10d.line.jobs.job import Ask, Hold
+from lfs10d.line.jobs.job import Hold
 from lfs10d.line.jobs.procedure import ProcedureClock, Step
-from lfs10d.modbus.exchange import Outcome
-from lfs10d.modbus.frames import NOT_FINAL, Codec, ReadRegisters
+from lfs10d.modbus.ask import Ask
+from lfs10d.modbus.frames import Codec
+from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.pending import PendingRequests
+from lfs10d.modbus.request import NOT_FINAL, ReadRegisters
 from lfs10d.profiles.blocks import Block
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import FaultCode

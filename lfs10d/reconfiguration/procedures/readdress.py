@@ -33,10 +33,11 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
-from lfs10d.line.jobs.job import Ask, Hold
+from lfs10d.line.jobs.job import Hold
 from lfs10d.line.jobs.procedure import Await, LineLostError, Step
-from lfs10d.modbus.exchange import Outcome
-from lfs10d.modbus.frames import WriteRegister
+from lfs10d.modbus.ask import Ask
+from lfs10d.modbus.outcome import Outcome
+from lfs10d.modbus.request import WriteRegister
 from lfs10d.reading import FaultCode
 from lfs10d.reconfiguration.journal import Endpoint
 from lfs10d.reconfiguration.procedures.identity_query import PATIENT, SILENCE, IdentityQuery, IdentityReply

@@ -23,7 +23,7 @@ from itertools import pairwise
 
 from lfs10d.line.jobs.identification import rate_fits
 from lfs10d.line.jobs.procedure import Step
-from lfs10d.modbus.exchange import Outcome
+from lfs10d.modbus.outcome import Outcome
 from lfs10d.profiles.blocks import Block
 from lfs10d.profiles.values import Value
 from lfs10d.reading import Fault

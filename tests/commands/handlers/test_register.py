@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from lfs10d.command import Result
 from lfs10d.line.jobs.register_access import End
-from lfs10d.modbus.frames import ReadRegisters, WriteRegister
+from lfs10d.modbus.request import ReadRegisters, WriteRegister
 from lfs10d.profiles.library import builtin_names
 from lfs10d.reading import Fault, FaultCode
 from tests.support.context import Ask, FakePowers

@@ -16,8 +16,9 @@ from lfs10d.line.jobs.identification import (
     spoilt,
     strangers,
 )
-from lfs10d.modbus.exchange import Outcome
-from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
+from lfs10d.modbus.frames import Codec, Framing
+from lfs10d.modbus.outcome import Outcome
+from lfs10d.modbus.request import ReadRegisters
 from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Fault, FaultCode

@@ -6,10 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from lfs10d.line.jobs.job import Ask, Done, Requeue
+from lfs10d.line.jobs.job import Done, Requeue
 from lfs10d.line.jobs.ping import Ping
-from lfs10d.modbus.exchange import Outcome
-from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
+from lfs10d.modbus.ask import Ask
+from lfs10d.modbus.frames import Codec, Framing
+from lfs10d.modbus.outcome import Outcome
+from lfs10d.modbus.request import ReadRegisters
 from lfs10d.profiles.library import load_profile
 from lfs10d.reading import Fault, FaultCode
 from tests.support.outcomes import ended

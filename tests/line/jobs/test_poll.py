@@ -8,11 +8,13 @@ from pathlib import Path
 import pytest
 
 from lfs10d.line.device import Device, DeviceSpec, PollRules
-from lfs10d.line.jobs.job import Ask, Done, Hold, Requeue
+from lfs10d.line.jobs.job import Done, Hold, Requeue
 from lfs10d.line.jobs.poll import Poll
-from lfs10d.modbus.exchange import LateAnswer
-from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
+from lfs10d.modbus.ask import Ask
+from lfs10d.modbus.frames import Codec, Framing
+from lfs10d.modbus.outcome import LateAnswer
 from lfs10d.modbus.pending import PendingRequests
+from lfs10d.modbus.request import ReadRegisters
 from lfs10d.profiles.library import load_profile
 from lfs10d.reading import Fault, FaultCode, Purpose
 from tests.support.outcomes import ended

@@ -8,10 +8,12 @@ from typing import Any
 
 import pytest
 
-from lfs10d.line.jobs.job import Ask, Continue, Done, Hold, Requeue
+from lfs10d.line.jobs.job import Continue, Done, Hold, Requeue
 from lfs10d.line.jobs.procedure import SLICE, Await, Finished, LineLostError, Procedure, ProcedureClock, Step
-from lfs10d.modbus.exchange import Outcome
-from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
+from lfs10d.modbus.ask import Ask
+from lfs10d.modbus.frames import Codec, Framing
+from lfs10d.modbus.outcome import Outcome
+from lfs10d.modbus.request import ReadRegisters
 from lfs10d.reading import Purpose
 
 RTU = Codec(Framing.RTU)

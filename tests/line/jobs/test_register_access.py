@@ -14,10 +14,10 @@ from lfs10d.line.jobs.register_access import DIFFERING, ECHO_READS, VERIFY_WITHI
 from lfs10d.line.poller import Poller
 from lfs10d.line.scheduler import Scheduler
 from lfs10d.modbus.bus import Bus, LineRules
-from lfs10d.modbus.exchange import Echo
-from lfs10d.modbus.frames import Codec, Framing, ReadRegisters, WriteRegister
+from lfs10d.modbus.echo import Echo
+from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.port_settings import PortSettings
-from lfs10d.modbus.request import Request
+from lfs10d.modbus.request import ReadRegisters, Request, WriteRegister
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Event, Exchanged, Fault, FaultCode, Purpose, Reading

@@ -11,14 +11,15 @@ import pytest
 
 from lfs10d.line.device import DeviceSpec, PollRules
 from lfs10d.line.jobs.identification import FoundDevice
-from lfs10d.line.jobs.job import Ask, Continue, Done, Requeue
+from lfs10d.line.jobs.job import Continue, Done, Requeue
 from lfs10d.line.jobs.scan import SLICE, Scan
 from lfs10d.line.jobs.scan_plan import ScanPlan
 from lfs10d.line.poller import Poller
 from lfs10d.line.scheduler import Scheduler
+from lfs10d.modbus.ask import Ask
 from lfs10d.modbus.bus import Bus, LineRules
-from lfs10d.modbus.exchange import Outcome
 from lfs10d.modbus.frames import Codec, Framing
+from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.library import builtin_names, load_profile

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lfs10d.line.jobs.scan_plan import LAST_TIMEOUT, ScanPlan, ids_of
-from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
+from lfs10d.modbus.frames import Codec, Framing
+from lfs10d.modbus.request import ReadRegisters
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.library import load_profile
 

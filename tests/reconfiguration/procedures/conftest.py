@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from lfs10d.modbus.exchange import Outcome
+from lfs10d.modbus.outcome import Outcome
 from tests.support.sensors import Pretence, heard
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from lfs10d.modbus.frames import ReadRegisters, WriteRegister
+from lfs10d.modbus.request import ReadRegisters, WriteRegister
 from lfs10d.reconfiguration.journal import Endpoint
 from lfs10d.reconfiguration.procedures.adopt import AdoptReport, AdoptWish, adopt
 from lfs10d.reconfiguration.procedures.readdress import IdWrite, ReaddressEnding, ReaddressReport

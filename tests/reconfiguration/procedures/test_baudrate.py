@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from lfs10d.modbus.frames import WriteRegister
+from lfs10d.modbus.request import WriteRegister
 from lfs10d.profiles.library import load_profile
 from lfs10d.reconfiguration.procedures.baudrate import (
     ROLL_BACK,

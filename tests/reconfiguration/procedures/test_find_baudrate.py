@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from lfs10d.line.device import Device, DeviceSpec, Health, PollRules
-from lfs10d.line.jobs.job import Ask, Hold
+from lfs10d.line.jobs.job import Hold
+from lfs10d.modbus.ask import Ask
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.profiles.library import load_profile
 from lfs10d.reconfiguration.procedures.find_baudrate import LOST_AFTER, in_words, seek

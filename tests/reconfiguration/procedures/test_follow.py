@@ -6,7 +6,7 @@ from functools import partial
 
 import pytest
 
-from lfs10d.modbus.frames import WriteRegister
+from lfs10d.modbus.request import WriteRegister
 from lfs10d.reconfiguration.journal import Endpoint
 from lfs10d.reconfiguration.procedures.follow import follow
 from lfs10d.reconfiguration.procedures.readdress import ReaddressEnding, ReaddressReport

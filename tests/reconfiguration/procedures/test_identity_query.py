@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from lfs10d.line.jobs.job import Ask
-from lfs10d.modbus.exchange import LateAnswer, Outcome
-from lfs10d.modbus.frames import Codec, Framing, ReadRegisters
+from lfs10d.modbus.ask import Ask
+from lfs10d.modbus.frames import Codec, Framing
+from lfs10d.modbus.outcome import LateAnswer, Outcome
+from lfs10d.modbus.request import ReadRegisters
 from lfs10d.profiles.library import load_profile, parse_profile
 from lfs10d.reading import FaultCode
 from lfs10d.reconfiguration.journal import Endpoint

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.modbus.frames import ReadRegisters, WriteRegister
+from lfs10d.modbus.request import ReadRegisters, WriteRegister
 from lfs10d.reconfiguration.journal import Endpoint
 from lfs10d.reconfiguration.procedures.identity_query import PATIENT, QUICK, SILENCE, IdentityReply
 from lfs10d.reconfiguration.procedures.readdress import (

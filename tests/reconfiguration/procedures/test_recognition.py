@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lfs10d.line.jobs.identification import rate_fits
-from lfs10d.line.jobs.job import Ask
-from lfs10d.modbus.exchange import Outcome
-from lfs10d.modbus.frames import ReadRegisters
+from lfs10d.modbus.ask import Ask
+from lfs10d.modbus.outcome import Outcome
+from lfs10d.modbus.request import ReadRegisters
 from lfs10d.profiles.library import parse_profile
 from lfs10d.reading import FaultCode
 from lfs10d.reconfiguration.journal import Endpoint
@@ -222,7 +222,7 @@ def test_a_late_answer_to_an_older_question_is_its_own(pretence: Pretence, monke
 
 
 def late_answer() -> Any:  # noqa: ANN401 - the package's own type, built here alone
-    from lfs10d.modbus.exchange import LateAnswer  # noqa: PLC0415 - beside its one use
+    from lfs10d.modbus.outcome import LateAnswer  # noqa: PLC0415 - beside its one use
 
     return LateAnswer(ReadRegisters(3, 1, 2), 0.3)
 

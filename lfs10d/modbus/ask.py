@@ -1,0 +1,61 @@
+"""What is to be put on the line: a request, and what its exchange must know."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from lfs10d.modbus.echo import Echo
+from lfs10d.modbus.frames import Codec
+from lfs10d.modbus.pending import Pending
+from lfs10d.modbus.request import Request
+from lfs10d.modbus.timing import LineTiming
+
+
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """Put this request on the line now.
+
+    `timeout` (s) runs from the request's last bit to the answer's first byte; `patience` is the slave's learned
+    p99 of it, None where it is not known. `baudrate` None means the line's own rate. `at_once`: nobody else is asked
+    between the job's exchange before and this one, so that what comes late is received here. `request_gap` (s) is the
+    rest that the slave needs by what the job knows of it; the schedule keeps what it knows itself in any case.
+    """
+
+    request: Request
+    codec: Codec
+    timeout: float
+    patience: float | None = None
+    baudrate: int | None = None
+    at_once: bool = False
+    request_gap: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """One request to be put on the line, and all that its exchange must know. Durations are seconds.
+
+    `timeout` runs from the last bit of the request to the first byte of the answer; `patience` is the slave's
+    learned p99 of the same (None: not learned). `adapter_latency` is the longest pause that the adapter may put
+    into one answer. `earlier` are the requests to this slave whose answers may still come, the oldest first,
+    `elsewhere` those to any slave, by slave id. `turn` is how long to wait for
+    silence before giving up; `turnaround_delay` the silence after a broadcast. `gap` is the required silence
+    where it is longer than the timing's (a change of rate). `echo_proved`: that the adapter has no echo was observed,
+    not only configured. `paced`: the port is a real wire, on which nothing
+    arrives sooner than the rate allows (not so on a pseudo terminal or behind a network bridge).
+    """
+
+    request: Request
+    codec: Codec
+    timing: LineTiming
+    timeout: float
+    patience: float | None
+    echo: Echo
+    adapter_latency: float
+    earlier: tuple[Pending, ...]
+    turn: float
+    turnaround_delay: float = 0.1
+    gap: float | None = None
+    paced: bool = False
+    echo_proved: bool = False
+    elsewhere: Mapping[int, tuple[Pending, ...]] = field(default_factory=dict)
