@@ -1,11 +1,14 @@
-# make demo | make test | make check | make docs | make bench | make soak: what a newcomer types.
-# Everything lives in .venv.
+# `make` alone lists the targets. Everything is installed in .venv.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: demo test test-oldest coverage check format docs bench soak clean
+.DEFAULT_GOAL := help
+.PHONY: help demo test test-oldest coverage check format docs bench soak clean
+
+help: ## Print this list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 $(VENV)/.demo: pyproject.toml
 	@echo 'Setting up $(VENV), once; this takes a moment.'
@@ -18,11 +21,11 @@ $(VENV)/.dev: $(VENV)/.demo
 	@$(BIN)/pip install --quiet --editable '.[demo,dev]'
 	@touch $@
 
-demo: $(VENV)/.demo
+demo: $(VENV)/.demo ## Show it at work: simulated line, broker, daemon; no hardware needed
 	@$(BIN)/lfs10d demo
 
-# Most tests wait for brokers, ptys and daemons of their own: three workers share what the machine has.
-test: $(VENV)/.dev
+# Most tests wait for brokers, pseudo terminals and daemons: three workers share the machine.
+test: $(VENV)/.dev ## Run all tests
 	$(BIN)/python -m pytest -n 3 --dist loadfile
 
 # The ranges of pyproject.toml begin with versions that work: the lowest of each, in an environment of its own.
@@ -37,32 +40,31 @@ $(OLDEST)/.installed: pyproject.toml tests/oldest.py
 	@$(OLDEST)/bin/pip install --quiet --no-deps --editable .
 	@touch $@
 
-test-oldest: $(OLDEST)/.installed
+test-oldest: $(OLDEST)/.installed ## Run the tests of the lowest dependency versions
 	$(OLDEST)/bin/python -m pytest -q -n 3 --dist load $(TESTED_OLDEST)
 
-# Each pure module by its own tests alone; fails below 100 % of lines and branches.
-coverage: $(VENV)/.dev
+# Fails below 100 % of lines and branches.
+coverage: $(VENV)/.dev ## Check that pure modules are covered by their own tests
 	$(BIN)/python -m tests.own_coverage
 
-check: $(VENV)/.dev
+check: $(VENV)/.dev ## Check format, lint, types and imports
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-format: $(VENV)/.dev
+format: $(VENV)/.dev ## Format the code and fix what ruff can fix
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-docs: $(VENV)/.dev
+docs: $(VENV)/.dev ## Write the generated pages of docs/
 	$(BIN)/python -m docs.generate
 
-bench: $(VENV)/.dev
+bench: $(VENV)/.dev ## Measure against a master in C on a paced line (20 minutes)
 	$(BIN)/python -m bench
 
-# make soak FOR=12h SEED=7; each has a default.
-soak: $(VENV)/.dev
+soak: $(VENV)/.dev ## Account for every sample under faults: FOR=12h SEED=7
 	$(BIN)/python -m soak --for $(or $(FOR),5m) --exchanges $(or $(EXCHANGES),1000000) $(if $(SEED),--seed $(SEED))
 
-clean:
+clean: ## Remove .venv and built files
 	rm -rf $(VENV) bench/build

@@ -1,14 +1,14 @@
-"""The parts of docs/architecture.md: the floors from the contract that holds them, the exchange from its table."""
+"""The parts of docs/architecture.md: the packages from the contract on imports, the exchange from its table."""
 
 from __future__ import annotations
 
 import ast
 import re
+import textwrap
 import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from docs.generate.markdown import plain, table
 from lfs10d.modbus.exchange import TRANSITIONS, State
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -17,10 +17,16 @@ FLOORS = "The floors: a package imports only from floors below"
 """The contract's name in pyproject.toml."""
 
 
+WIDTH = 100
+"""Columns of the picture."""
+
+
 def parts() -> Mapping[str, str]:
     """Return the generated parts by name."""
+    modules = (f"`{name}.py`" for floor in floors() for name in floor if not _is_package(name) and name != "__main__")
     return {
-        "floors": table(("floor", "package", "what it is for"), _floors()),
+        "picture": "\n".join(("```text", *_picture(), "```")),
+        "modules": ", ".join(modules),
         "exchange": "\n".join(("```mermaid", "stateDiagram-v2", *_transitions(), "```")),
     }
 
@@ -34,10 +40,30 @@ def floors() -> list[list[str]]:
     return [[name for name in floor if _file(name) is not None] for floor in names]
 
 
-def _floors() -> Iterator[tuple[str, ...]]:
-    for number, floor in reversed(list(enumerate(floors()))):
-        for place, name in enumerate(floor):
-            yield (str(number) if place == 0 else "", f"`{name}`", plain(_purpose(name)))
+def _picture() -> Iterator[str]:
+    """Yield the packages as boxes, floor by floor from the top."""
+    for floor in reversed(floors()):
+        names = packages(floor)
+        boxes = [_box(name, WIDTH // len(names) - 1) for name in names]
+        height = max(map(len, boxes), default=0)
+        lines = [box[:-1] + [f"│{' ' * (len(box[0]) - 2)}│"] * (height - len(box)) + box[-1:] for box in boxes]
+        yield from (" ".join(parts) for parts in zip(*lines, strict=True))
+
+
+def _box(name: str, width: int) -> list[str]:
+    inner = width - 4
+    text = textwrap.wrap(_purpose(name), inner)
+    lines = [f"│ {line:<{inner}} │" for line in (f"{name}/", *text)]
+    return [f"┌{'─' * (width - 2)}┐", *lines, f"└{'─' * (width - 2)}┘"]
+
+
+def packages(floor: list[str]) -> list[str]:
+    """Return the packages of a floor, without single modules."""
+    return [name for name in floor if _is_package(name)]
+
+
+def _is_package(name: str) -> bool:
+    return (PACKAGE / name / "__init__.py").exists()
 
 
 def _purpose(name: str) -> str:

@@ -16,7 +16,6 @@ from lfs10d.modbus import diagnosis
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.reading import Exchanged, Fault, FaultCode, PortChanged, Purpose, Reading, UartCounted, UartCounters
 from lfs10d.system.clock import Instant
-from lfs10d.telemetry import publication
 from lfs10d.telemetry.info import DaemonInfo, DeviceInfo, LineInfo
 from lfs10d.telemetry.payloads import TracePayload
 from lfs10d.telemetry.publication import BacklogStats, Publication, Sample
@@ -62,6 +61,10 @@ _DAEMON = DaemonInfo(
     mqtt={"version": "5"},
     features=("history",),
 )
+
+
+EVENT_TS: Final = Instant(31, BEGUN + 31, "synced").ts()
+"""Epoch milliseconds of the events shown."""
 
 
 def _at(mono: float) -> Instant:
@@ -121,13 +124,6 @@ class Story:
             for payload in self.by_topic["device/slave-3/error"]
             if isinstance(payload, dict) and payload.get("cleared") is not None
         )
-
-
-def events() -> Iterator[object]:
-    """Yield events as they go out."""
-    ts = _at(31).ts()
-    yield publication.event("device_added", ts, device="vane", slave=7).payload
-    yield publication.dropped("mast-top", BOOT, 9001, 9100, count=100, ts=ts).payload
 
 
 def trace() -> object:

@@ -10,8 +10,9 @@ from typing import Any, get_args, get_origin
 from pydantic import BaseModel, TypeAdapter
 from pydantic.fields import FieldInfo
 
+from docs.generate import events
 from docs.generate.configuration import kind_of, kinds_within, written
-from docs.generate.examples import Story, events, responses, trace
+from docs.generate.examples import EVENT_TS, Story, responses, trace
 from docs.generate.markdown import example, plain, table
 from docs.generate.meanings import ERROR_CODES, FAULT_CODES
 from docs.generate.uplink import bytes_table
@@ -21,10 +22,14 @@ from lfs10d.commands.handlers.registry import REQUESTS
 from lfs10d.reading import FaultCode
 from lfs10d.telemetry.contract import OUTBOUND, Outbound
 from lfs10d.telemetry.payloads import Availability
+from lfs10d.telemetry.publication import EVENT
 
 SHOWN_BEFORE = {"device/+/telemetry": "device/+/state", "device/+/history": "device/+/state"}
 SHOWN_BEFORE |= {"device/+/error": "line/error", "response/+": "response/+/+"}
 """Topics whose payload has the same keys as another's."""
+
+SHOWN_LATER = {EVENT, "response/+/+", "response/+"}
+"""Topics whose examples have a chapter of their own."""
 
 CLASSES = ("always", "polling", "sensors", "registers")
 """Classes of requests, as they are listed."""
@@ -35,6 +40,7 @@ def parts() -> Mapping[str, str]:
     return {
         "topics": table(("topic under `B`", "retained", "QoS", "when"), map(_topic, OUTBOUND)),
         "payloads": "\n\n".join(_payloads()),
+        "events": "\n\n".join(events.sections(EVENT_TS)),
         "requests": "\n\n".join(_requests()),
         "fault_codes": table(("code", "it means"), _meanings(FAULT_CODES, tuple(FaultCode))),
         "error_codes": table(("code", "it means"), _meanings(ERROR_CODES, get_args(ErrorCode))),
@@ -80,7 +86,7 @@ def examples() -> Mapping[str, tuple[object, ...]]:
         "device/+/availability": (story.newest("device/mast-top/availability"),),
         "device/+/error": (story.newest("device/slave-3/error"), story.cleared()),
         "device/+/stats": (story.newest("device/slave-3/stats"),),
-        "event": tuple(events()),
+        "event": tuple(events.payloads(EVENT_TS)),
         "response/+/+": tuple(responses()),
         "response/+": (),
         "trace": (trace(),),
@@ -94,11 +100,13 @@ def _payloads() -> Iterator[str]:
         yield f"{'Retained' if row.retain else 'Not retained'}, QoS {row.qos}. Sent: {row.when}."
         if row.form is Availability:
             yield f"One bare word: {' or '.join(f'`{word}`' for word in get_args(Availability))}."
+        elif row.topic == EVENT:
+            yield "An object with `v`, `type`, `ts` and the keys of its type: [Events](#events)."
         elif row.topic in SHOWN_BEFORE:
             yield f"The keys are those of `{shown(SHOWN_BEFORE[row.topic])}`."
         else:
             yield from _keys_of(row)
-        yield from map(example, samples[row.topic] if not row.topic.startswith("response") else ())
+        yield from map(example, () if row.topic in SHOWN_LATER else samples[row.topic])
 
 
 def _keys_of(row: Outbound) -> Iterator[str]:

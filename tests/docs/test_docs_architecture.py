@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -45,3 +46,11 @@ def test_make_knows_every_target_of_the_readme() -> None:
     wanted = set(re.findall(r"\bmake (\w+)", README))
     assert {"demo", "test", "check", "bench"} <= wanted
     assert wanted <= set(re.findall(r"^(\w+):", MAKEFILE, re.MULTILINE))
+
+
+@pytest.mark.needs("make")
+def test_make_alone_lists_every_target_with_one_line() -> None:
+    printed = subprocess.run(["make"], cwd=ROOT, capture_output=True, text=True, check=True, timeout=60).stdout
+    (phony,) = re.findall(r"^\.PHONY: (.*)$", MAKEFILE, re.MULTILINE)
+    assert re.findall(r"^  make ([\w-]+) +\S.*$", printed, re.MULTILINE) == phony.split()
+    assert len(printed.splitlines()) == len(phony.split())
