@@ -20,6 +20,7 @@ from paho.mqtt.enums import CallbackAPIVersion, MQTTProtocolVersion
 
 from bench.broker import Broker
 from lfs10d.mqtt.settings import BrokerSettings
+from lfs10d.mqtt.topics import InboundRequest
 from lfs10d.mqtt.uplink import Uplink
 from lfs10d.outbox.store.database import Limits
 from lfs10d.outbox.store.sample_file import SampleFile, StoreEntry
@@ -102,6 +103,31 @@ def percentile(values: Iterable[float], share: float) -> float:
     return ordered[min(len(ordered) - 1, int(len(ordered) * share))] * 1000 if ordered else float("nan")
 
 
+class NothingElse:
+    """An uplink's events where there are only samples."""
+
+    def burst(self) -> tuple[Publication, ...]:
+        """Return that nothing is retained."""
+        return ()
+
+    def topics(self) -> frozenset[str]:
+        """Return that nothing is retained."""
+        return frozenset()
+
+    def on_request(self, request: InboundRequest) -> None:
+        """Take nothing."""
+
+    def on_uplink_change(self) -> None:
+        """Take nothing."""
+
+    def on_announced(self) -> None:
+        """Take nothing."""
+
+    def on_spool_trouble(self, trouble: str | None) -> None:
+        """Print it."""
+        print(trouble)
+
+
 async def live(uplink: Uplink, rate: float, seconds: float) -> None:
     """Publish live samples at an even rate."""
     loop = asyncio.get_running_loop()
@@ -123,13 +149,10 @@ async def replay(folder: Path, options: argparse.Namespace) -> bool:
         uplink = Uplink(
             BrokerSettings("127.0.0.1", broker.port, "bench-replay"),
             base="bench/line0",
-            burst=lambda: (),
-            stands_behind=frozenset,
-            requested=lambda _: None,
             epoch_ms=lambda: int(time.time() * 1000),
+            store=Store(folder, boot="k0000002", limits=LIMITS),
         )
-        uplink.keep_in(Store(folder, boot="k0000002", limits=LIMITS), print)
-        await uplink.start()
+        await uplink.start(NothingElse())
         publishing = asyncio.create_task(live(uplink, options.rate, options.seconds))
         worst = 0.0
         while not publishing.done():

@@ -20,6 +20,7 @@ from lfs10d.line.scheduler import Scheduler
 from lfs10d.line.settings import device_specs, line_rules, poll_rules, port_settings
 from lfs10d.modbus.bus import Bus
 from lfs10d.mqtt.settings import BrokerSettings
+from lfs10d.mqtt.topics import InboundRequest
 from lfs10d.mqtt.uplink import Uplink
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Event, Reading
@@ -120,18 +121,12 @@ class DaemonInMemory:
         self.poller = Poller(Bus(self.port, line_rules(config.line), self.clock), schedule, self._take_over, self.clock)
         facts = DaemonInfo("0", "soak", boot, None, config_hash(config))
         devices = device_facts(config, profiles)
-        self._station = Station(
-            facts, line_facts(config.line), devices, self.now(), backlog=lambda: self._uplink.backlog
-        )
+        self._station = Station(facts, line_facts(config.line), devices, self.now())
         settings = BrokerSettings.of(config.mqtt, client_id="soak", password=lambda: None)
         self._uplink = Uplink(
             settings,
             base=f"{config.mqtt.base_topic}/{config.line.name}",
-            burst=lambda: self._first_burst.burst(self._station.burst(self.now())),
-            stands_behind=self._station.topics,
-            requested=lambda _: None,
             epoch_ms=lambda: self.now().ts(),
-            announced=self._announced,
             connect=self.broker.connect(),
         )
         self._first_burst = FirstBurst(self._station.burst(self.now()))
@@ -184,7 +179,7 @@ class DaemonInMemory:
     # -- the loop, as in `lfs10d.daemon.daemon`
 
     async def _begin(self) -> None:
-        await self._uplink.start()
+        await self._uplink.start(self)
         self._tick()
 
     def _heard(self, events: list[Event]) -> None:
@@ -206,8 +201,28 @@ class DaemonInMemory:
     def _tick(self) -> None:
         if self._ticking is not None:
             self._ticking.cancel()
-        self._uplink.publish(self._first_burst.passing(self._station.tick(self.now())))
+        self._uplink.publish(self._first_burst.passing(self._station.tick(self.now(), self._uplink.backlog)))
         self._ticking = self.loop.call_at(self._station.due(), self._tick)
 
-    def _announced(self) -> None:
+    # -- the uplink's events
+
+    def burst(self) -> list[Publication]:
+        """Return every retained topic."""
+        return self._first_burst.burst(self._station.burst(self.now(), self._uplink.backlog))
+
+    def topics(self) -> frozenset[str]:
+        """Return the retained topics."""
+        return self._station.topics()
+
+    def on_request(self, request: InboundRequest) -> None:
+        """Take nothing."""
+
+    def on_uplink_change(self) -> None:
+        """Take nothing."""
+
+    def on_spool_trouble(self, trouble: str | None) -> None:
+        """Take nothing."""
+
+    def on_announced(self) -> None:
+        """Publish what was held back for the first burst."""
         self._uplink.publish(self._first_burst.settle(self._station.burst(self.now())))

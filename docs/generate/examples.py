@@ -18,7 +18,7 @@ from lfs10d.reading import Exchanged, Fault, FaultCode, PortChanged, Purpose, Re
 from lfs10d.system.clock import Instant
 from lfs10d.telemetry.info import DaemonInfo, DeviceInfo, LineInfo
 from lfs10d.telemetry.payloads import TracePayload
-from lfs10d.telemetry.publication import BacklogStats, Publication, Sample
+from lfs10d.telemetry.publication import Publication, Sample
 from lfs10d.telemetry.station import Station
 
 LINE: Final = "line0"
@@ -77,7 +77,7 @@ class Story:
     def __init__(self) -> None:
         self.by_topic: dict[str, list[object]] = {}
         self._samples: list[Sample] = []
-        self._station = Station(_DAEMON, _LINE, (_MAST, _ROOF), _at(0), backlog=BacklogStats)
+        self._station = Station(_DAEMON, _LINE, (_MAST, _ROOF), _at(0))
         self._note(self._station.burst(_at(0)))
         self._note(self._station.on_event(PortChanged(0.05, None), _at(0.05)))
         counters = UartCounters(framing=0, parity=0, overrun=0, breaks=0)

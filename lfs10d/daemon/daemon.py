@@ -37,6 +37,7 @@ from lfs10d.daemon.supervision import Supervision
 from lfs10d.errors import StateError
 from lfs10d.line.line import Line
 from lfs10d.mqtt.settings import BrokerSettings
+from lfs10d.mqtt.topics import InboundRequest
 from lfs10d.mqtt.uplink import Uplink
 from lfs10d.outbox.store.store import Store
 from lfs10d.reading import Event, Exchanged, FaultCode, PortChanged, Reading
@@ -83,10 +84,7 @@ class Daemon:
         self._over = asyncio.Event()
         self._failed = False
         self._tasks = BackgroundTasks(on_failure=self._failed_inside)
-        self._moments = Clock(
-            synchronised=lambda: self._uplink.synchronised(),  # noqa: PLW0108 - built below
-            stepped=lambda: self._uplink.stepped(),  # noqa: PLW0108 - built below
-        )
+        self._moments = Clock()
         self._now = self._moments.now
         self._boot = boot
         self._state_directory = state_directory
@@ -110,20 +108,13 @@ class Daemon:
             line_facts(config.line),
             device_facts(config, loaded.profiles),
             self._now(),
-            backlog=lambda: self._uplink.backlog,
         )
         self._uplink = Uplink(
             self._broker_settings(),
             base=f"{config.mqtt.base_topic}/{config.line.name}",
-            burst=lambda: self._first_burst.burst(self._station.burst(self._now())),
-            stands_behind=self._station.topics,
-            requested=lambda request: self._service.requested(request),  # noqa: PLW0108 - built below
-            epoch_ms=lambda: self._now().ts(),
-            changed=self._uplink_changed,
-            announced=self._announced,
+            epoch_ms=self._moments.epoch_ms,
+            store=Store(state_directory, boot=boot.id, limits=store_limits(config.store)),
         )
-        store = Store(state_directory, boot=boot.id, limits=store_limits(config.store))
-        self._uplink.keep_in(store, self._storage.backlog_failed)
         self._uplink.send_samples(telemetry=config.mqtt.telemetry)
         self._first_burst = FirstBurst(self._station.burst(self._now()))
         self._powers = LineAccess(
@@ -161,7 +152,8 @@ class Daemon:
             devices=lambda: tuple(self._line.poller.schedule.devices.values()),
             tell=self._told_lost,
         )
-        self._line = Line(self._physical.polled(), loaded.profiles, heard=self._heard, failed=self._line_failed)
+        self._line = Line(config.line)
+        self._line.take(self._physical.polled(), loaded.profiles)
         if self._running.missing:
             recalling = Restore(
                 running=lambda: self._running.now,
@@ -197,13 +189,13 @@ class Daemon:
             len(config.slaves), config.mqtt.broker,
         )  # fmt: skip
         self._storage.look()
-        self._tasks.start("clock", self._moments.watch())
+        self._tasks.start("clock", self._moments.watch(self._uplink))
         self._tasks.start("storage", self._storage.watch())
         self._tasks.start("supervision", self._supervision.run())
         try:
             self._physical.recall()
-            self._line.start()
-            await self._uplink.start()
+            self._line.start(self)
+            await self._uplink.start(self)
             self._tick()
             self._tell_news()
             if not any(slave.enabled for slave in self._running.now.polled.slaves):
@@ -222,7 +214,8 @@ class Daemon:
 
     # -- the line
 
-    def _heard(self, events: list[Event]) -> None:
+    def on_events(self, events: list[Event]) -> None:
+        """Publish what the line reports."""
         now = self._now()
         port, frames = self._line.port, log.isEnabledFor(logging.DEBUG)
         published: list[Publication] = []
@@ -235,7 +228,7 @@ class Daemon:
             if isinstance(event, Exchanged) or (isinstance(event, PortChanged) and event.fault is not None):
                 self._signals.ready()
         if self._station.due() <= now.mono:  # what is due goes with what was heard: one segment to the broker, not two
-            published += self._station.tick(now)
+            published += self._station.tick(now, self._uplink.backlog)
         self._publish(published)
         if any(isinstance(event, PortChanged) and event.fault is None for event in events):
             self._yield(self._running.now.conflicts)
@@ -269,7 +262,7 @@ class Daemon:
         for entry in entries:
             log.log(entry.level, "%s", entry.text)
 
-    def _line_failed(self, error: BaseException) -> None:
+    def on_failure(self, error: BaseException) -> None:
         """End the daemon: its line's thread ended by a mistake."""
         log.error("the line's thread ended", exc_info=error)
         self._failed_inside()
@@ -285,7 +278,7 @@ class Daemon:
         """Publish what time alone makes known, and come back when more is due."""
         now = self._now()
         if self._station.due() <= now.mono:
-            self._uplink.publish(self._first_burst.passing(self._station.tick(now)))
+            self._uplink.publish(self._first_burst.passing(self._station.tick(now, self._uplink.backlog)))
         self._set_tick()
 
     def _set_tick(self) -> None:
@@ -388,10 +381,28 @@ class Daemon:
 
     # -- the broker
 
-    def _announced(self) -> None:
+    def burst(self) -> list[Publication]:
+        """Return every retained topic, with nothing known of the devices in the first burst."""
+        return self._first_burst.burst(self._station.burst(self._now(), self._uplink.backlog))
+
+    def topics(self) -> frozenset[str]:
+        """Return the retained topics."""
+        return self._station.topics()
+
+    def on_request(self, request: InboundRequest) -> None:
+        """Hand it to the dispatcher."""
+        self._service.requested(request)
+
+    def on_spool_trouble(self, trouble: str | None) -> None:
+        """Report it as trouble of the storage."""
+        self._storage.backlog_failed(trouble)
+
+    def on_announced(self) -> None:
+        """Publish what was held back for the first burst."""
         self._uplink.publish(self._first_burst.settle(self._station.burst(self._now())))
 
-    def _uplink_changed(self) -> None:
+    def on_uplink_change(self) -> None:
+        """Publish what is known of the broker now."""
         version = self._uplink.version
         now = self._now()
         if version is not None:

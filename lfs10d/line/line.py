@@ -10,9 +10,10 @@ import contextlib
 import logging
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from typing import Protocol
 
-from lfs10d.config.models import Config
+from lfs10d.config.models import Config, LineConfig
 from lfs10d.line.budget import timing_of
 from lfs10d.line.jobs.job import Job
 from lfs10d.line.jobs.procedure import Procedure
@@ -31,37 +32,36 @@ from lfs10d.reading import Event
 log = logging.getLogger(__name__)
 
 
+class LineEvents(Protocol):
+    """What the line reports to, in the thread of the asyncio loop."""
+
+    def on_events(self, events: list[Event]) -> None:
+        """Take what came of an exchange, in order."""
+        ...
+
+    def on_failure(self, error: BaseException) -> None:
+        """Take the internal error that ended the line's thread."""
+        ...
+
+
 class Line:
-    """Built in the thread of the asyncio loop; `heard(events)` and `failed(error)` are called there.
+    """Built in the thread of the asyncio loop. Its devices are given by `take`, before the start too."""
 
-    `failed` is told what ended the line's thread by mistake.
-    """
-
-    def __init__(
-        self,
-        config: Config,
-        profiles: Mapping[str, Profile],
-        *,
-        heard: Callable[[list[Event]], None],
-        failed: Callable[[BaseException], None],
-    ) -> None:
-        line = config.line
+    def __init__(self, line: LineConfig) -> None:
         self.port = SerialPort(port_settings(line))
         bus = Bus(self.port, line_rules(line), time.monotonic)
         schedule = Scheduler(timing_of(line), time.monotonic())
-        schedule.replace(
-            device_specs(config, profiles), poll_rules(config.poll), time.monotonic()
-        )  # fmt: skip
         self.poller = Poller(bus, schedule, self._take_over, time.monotonic)
         self._realtime = line.realtime
-        self._heard = heard
-        self._failed = failed
+        self._events: LineEvents
+        """Given at the start."""
         self._loop = asyncio.get_running_loop()
         self._inbox: deque[list[Event]] = deque()
         self._thread = LineThread(self.poller, prepare=self._prepare, failed=self._tell_failed)
 
-    def start(self) -> None:
+    def start(self, events: LineEvents) -> None:
         """Open the port and poll."""
+        self._events = events
         self._thread.start()
 
     async def stop(self, within: float) -> None:
@@ -128,7 +128,9 @@ class Line:
         """Whether it is known how the adapter echoes: before that nothing is written."""
         return self.poller.bus.echo is not Echo.UNKNOWN
 
-    def take(self, config: Config, profiles: Mapping[str, Profile], *, line: bool, realtime: bool) -> None:
+    def take(
+        self, config: Config, profiles: Mapping[str, Profile], *, line: bool = False, realtime: bool = False
+    ) -> None:
         """Poll by another configuration from now on; `line` and `realtime` tell whether those changed."""
         if line:
             self.poller.reconfigure(port_settings(config.line), line_rules(config.line))
@@ -164,10 +166,10 @@ class Line:
 
     def _tell_failed(self, error: BaseException) -> None:
         with contextlib.suppress(RuntimeError):
-            self._loop.call_soon_threadsafe(self._failed, error)
+            self._loop.call_soon_threadsafe(self._events.on_failure, error)
 
     # -- in the loop again
 
     def _empty(self) -> None:
         while self._inbox:
-            self._heard(self._inbox.popleft())
+            self._events.on_events(self._inbox.popleft())

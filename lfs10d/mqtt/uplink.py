@@ -12,6 +12,7 @@ import logging
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from collections.abc import Set as AbstractSet
 from functools import partial
+from typing import Protocol
 
 from lfs10d.mqtt.broker_client import BrokerClient
 from lfs10d.mqtt.cleanup import Cleanup
@@ -43,35 +44,55 @@ for the disk to keep what the broker did not take."""
 _ONLINE = telemetry.retained(telemetry.AVAILABILITY, ONLINE)
 
 
+class UplinkEvents(Protocol):
+    """What the uplink publishes at each connect, and what it reports. Called in the thread of the asyncio loop."""
+
+    def burst(self) -> Iterable[Publication]:
+        """Return every retained topic but `availability`, as it is now."""
+        ...
+
+    def topics(self) -> AbstractSet[str]:
+        """Return the retained topics under `B` that are ours, but for `availability`."""
+        ...
+
+    def on_request(self, request: InboundRequest) -> None:
+        """Take a request."""
+        ...
+
+    def on_uplink_change(self) -> None:
+        """Take that a connect, loss, takeover or subscription changed the properties of the uplink."""
+        ...
+
+    def on_announced(self) -> None:
+        """Take that the broker has the whole burst after a connect."""
+        ...
+
+    def on_spool_trouble(self, trouble: str | None) -> None:
+        """Take why the disk does not keep what waits; None when it does again."""
+        ...
+
+
 class Uplink:
     """Built and called in the thread of the asyncio loop, while it runs.
 
-    `base` is `B`, whose last level is the line's name. `burst()` returns every retained topic but `availability`;
-    `stands_behind()` the retained topics under `B` that are ours; `requested` takes each request; `changed` is told
-    of every connect, loss, takeover and subscription, whose state is then in the properties; `announced` of every
-    burst after a connect that the broker has whole; `epoch_ms()` is the wall clock; `connect` is as in `BrokerClient`.
+    `base` is `B`, whose last level is the line's name. `epoch_ms()` is the wall clock; `connect` is as in
+    `BrokerClient`. What waits is kept in the `store`, if one is given.
     """
 
-    def __init__(  # noqa: PLR0913 - each is one side of the uplink, named where it is called
+    def __init__(
         self,
         settings: BrokerSettings,
         *,
         base: str,
-        burst: Callable[[], Iterable[Publication]],
-        stands_behind: Callable[[], AbstractSet[str]],
-        requested: Callable[[InboundRequest], None],
         epoch_ms: Callable[[], int],
-        changed: Callable[[], None] = lambda: None,
-        announced: Callable[[], None] = lambda: None,
+        store: Store | None = None,
         connect: type[Connection] = Connection,
     ) -> None:
         self._topics = Topics(base)
-        self._burst = burst
-        self._cleanup = Cleanup(self._topics, stands_behind=stands_behind, clear=self._clear_orphans)
-        self._requested = requested
+        self._events: UplinkEvents
+        """Given at the start."""
+        self._cleanup = Cleanup(self._topics, stands_behind=self._owned_topics, clear=self._clear_orphans)
         self._retained_requests = RetainedRequests(self._ask_for_retained_requests)
-        self._changed = changed
-        self._announced = announced
         self._announcing = False
         self._client = BrokerClient(
             settings,
@@ -89,7 +110,7 @@ class Uplink:
         self._progress = asyncio.Event()
         self._drop_told = False
         self._epoch_ms = epoch_ms
-        self._spooler: Spooler | None = None
+        self._spooler = None if store is None else self._keep_in(store)
         self._retained_reader: RetainedReader | None = None
         self.requests_denied = False
         """The broker refused the subscription to requests: none will come over this connection."""
@@ -119,25 +140,29 @@ class Uplink:
         """What waits, for `line/stats`."""
         return self._outbox.stats
 
-    async def start(self) -> None:
+    async def start(self, events: UplinkEvents) -> None:
         """Begin to connect; what is published before waits."""
+        self._events = events
         if self._spooler is not None:
             self._spooler.start()
         self._client.start()
 
-    def keep_in(self, store: Store, troubled: Callable[[str | None], None]) -> None:
-        """Keep on disk what the broker does not take; to be called before `start`.
-
-        `troubled` is told why that is not possible, and None when it is again.
-        """
-        self._spooler = Spooler(
+    def _keep_in(self, store: Store) -> Spooler:
+        """Return what keeps on disk what the broker does not take."""
+        return Spooler(
             self._outbox,
             store,
             epoch_ms=self._epoch_ms,
             wake=self._sender.wake,
-            troubled=troubled,
+            troubled=self._spool_trouble,
             tell=lambda event: self.publish([event]),
         )
+
+    def _spool_trouble(self, trouble: str | None) -> None:
+        self._events.on_spool_trouble(trouble)
+
+    def _owned_topics(self) -> AbstractSet[str]:
+        return self._events.topics()
 
     def read_back(self, wanted: AbstractSet[str], told: Callable[[Mapping[str, bytes]], Awaitable[None]]) -> None:
         """Read these retained topics under `B` before the first burst is published over them; before `start`.
@@ -204,7 +229,7 @@ class Uplink:
     def republish(self) -> None:
         """Send every retained topic once more."""
         if self.connected:
-            self._outbox.burst(self._burst(), _ONLINE)
+            self._outbox.burst(self._events.burst(), _ONLINE)
             self._sender.wake()
 
     def publish(self, publications: Iterable[Publication]) -> None:
@@ -271,11 +296,11 @@ class Uplink:
         self._sender.connected(standing, accepted)
         self._subscription = standing.subscribe([Filter(self._topics.requests), Filter(self._topics.availability)])
         self.requests_denied = False
-        self._outbox.burst(self._burst(), _ONLINE)
+        self._outbox.burst(self._events.burst(), _ONLINE)
         self._announcing = self._cleanup.wanted = True
         self._sender.wake()
         self._poke()
-        self._changed()
+        self._events.on_uplink_change()
 
     def ended(self, ended: Disconnect) -> None:
         """Keep what is not acknowledged."""
@@ -289,7 +314,7 @@ class Uplink:
         self._drop_told = False
         self._progress.set()
         self._poke()
-        self._changed()
+        self._events.on_uplink_change()
 
     def acknowledged(self, mid: int, reason: int) -> None:
         """Send on."""
@@ -301,7 +326,7 @@ class Uplink:
         if self._outbox.announced:
             if self._announcing:
                 self._announcing = False
-                self._announced()
+                self._events.on_announced()
             self._clear_if_out()
         self._progress.set()
 
@@ -314,7 +339,7 @@ class Uplink:
             for topic, reason in zip((self._topics.requests, self._topics.availability), reasons, strict=False):
                 if reason >= REFUSED_FROM:
                     log.warning("the broker refuses to let us subscribe to %s: %s", topic, reason_in_words(reason))
-            self._changed()
+            self._events.on_uplink_change()
 
     def arrived(self, message: Incoming) -> None:
         """Take a request, or somebody's word that we are offline, or what is retained."""
@@ -329,7 +354,7 @@ class Uplink:
         request = inbound(message, self._topics)
         if request is not None:
             self._retained_requests.received(request, self.version)
-            self._requested(request)
+            self._events.on_request(request)
 
     def _ask_for_retained_requests(self) -> None:
         if (standing := self._client.standing) is not None:

@@ -11,9 +11,10 @@ import contextlib
 import os
 import subprocess
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 from lfs10d.system import clock_step
 from lfs10d.system.clock_step import ClockState
@@ -90,15 +91,22 @@ class Instant:
         return round((self.wall if at is None else self.wall - self.mono + at) * 1000)
 
 
+class ClockEvents(Protocol):
+    """What `Clock.watch` reports to."""
+
+    def synchronised(self) -> None:
+        """Take that the wall clock has become synchronised."""
+        ...
+
+    def stepped(self) -> None:
+        """Take that the wall clock was set while it was not known to be synchronised."""
+        ...
+
+
 class Clock:
-    """`synchronised()` is called whenever the wall clock has become synchronised.
+    """The time on both clocks. Built and used in one thread."""
 
-    `stepped()` is called when it was set while it was not known to be synchronised. Built and used in one thread.
-    """
-
-    def __init__(self, synchronised: Callable[[], None], stepped: Callable[[], None]) -> None:
-        self._synchronised = synchronised
-        self._stepped = stepped
+    def __init__(self) -> None:
         self._state: ClockState = "unknown"
         self._start = time.monotonic()
         self._shift = round((time.time() - self._start) * 1000)
@@ -114,16 +122,20 @@ class Clock:
         self._shift = shift
         return now
 
-    async def watch(self) -> None:
-        """Look after the wall clock until cancelled; at once when it was set."""
+    def epoch_ms(self) -> int:
+        """Return the wall clock, in epoch milliseconds."""
+        return self.now().ts()
+
+    async def watch(self, events: ClockEvents) -> None:
+        """Check the wall clock now and then until cancelled; at once when it was set."""
         while True:
             if self._set.is_set():
                 self._set.clear()
                 if self._state != "synced":
-                    self._stepped()
+                    events.stepped()
             before, self._state = self._state, await run_in_thread(look, "clock")
             if self._state == "synced" != before:
-                self._synchronised()
+                events.synchronised()
             patience = look_again(self._state, time.monotonic() - self._start)
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._set.wait(), patience)

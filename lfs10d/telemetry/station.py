@@ -11,7 +11,7 @@ one reading with the port's fault, which takes it offline.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Final, assert_never
 
 from lfs10d.reading import (
@@ -46,14 +46,13 @@ from lfs10d.telemetry.publication import (
 STATS_EVERY: Final = 30.0
 """Seconds between two publications of the statistics."""
 
+NOTHING_WAITS: Final = BacklogStats()
+
 LINE_TOPICS: Final = (INFO, DEVICES, LINE_STATE, LINE_ERROR, LINE_STATS)
 
 
 class Station:
-    """One daemon, its line and its devices.
-
-    `backlog` returns at any time how many samples wait for the broker. Names in `devices` are distinct.
-    """
+    """One daemon, its line and its devices. Names in `devices` are distinct."""
 
     def __init__(
         self,
@@ -61,12 +60,9 @@ class Station:
         line: LineInfo,
         devices: Sequence[DeviceInfo],
         now: Instant,
-        *,
-        backlog: Callable[[], BacklogStats] = BacklogStats,
     ) -> None:
         self._daemon = daemon
         self._line = LineState(line, now)
-        self._backlog = backlog
         self._clock = now.clock
         self._started = now.mono
         self._started_ts = now.ts()
@@ -102,8 +98,11 @@ class Station:
                 assert_never(happened)
         return published
 
-    def tick(self, now: Instant) -> list[Publication]:
-        """Return what time alone makes due: states that were held back, statistics."""
+    def tick(self, now: Instant, backlog: BacklogStats = NOTHING_WAITS) -> list[Publication]:
+        """Return what time alone makes due: states that were held back, statistics.
+
+        `backlog` is what waits for the broker.
+        """
         published = self._watch_clock(now)
         if self._states_due is not None and self._states_due <= now.mono:
             for device in self._devices.values():
@@ -115,7 +114,7 @@ class Station:
             self._stats_due += STATS_EVERY
             if self._stats_due <= now.mono:  # the process was stopped: missed statistics are not made up
                 self._stats_due = now.mono + STATS_EVERY
-            published.append(self._line.stats(now, self._backlog()))
+            published.append(self._line.stats(now, backlog))
             published += [device.stats(now) for device in self._devices.values()]
         return published
 
@@ -127,7 +126,7 @@ class Station:
         """Return the monotonic time at which `tick` is wanted next."""
         return self._stats_due if self._states_due is None else min(self._states_due, self._stats_due)
 
-    def burst(self, now: Instant) -> list[Publication]:
+    def burst(self, now: Instant, backlog: BacklogStats = NOTHING_WAITS) -> list[Publication]:
         """Return every retained topic in its newest form, `B/availability` excepted."""
         self._watch_clock(now)
         published = [
@@ -135,7 +134,7 @@ class Station:
             self._device_list(),
             self._line.state(),
             self._line.error(),
-            self._line.stats(now, self._backlog()),
+            self._line.stats(now, backlog),
         ]
         for device in self._devices.values():
             published += device.burst(now)

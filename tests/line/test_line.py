@@ -27,7 +27,7 @@ def test_the_thread_is_awake_earlier_while_it_has_precedence(
     found = load(file)
 
     async def live() -> list[float]:
-        line = Line(found.config, found.profiles, heard=lambda _: None, failed=lambda _: None)
+        line = Line(found.config.line)
         seen = [line._thread.waking]
         line._prepare()
         seen.append(line._thread.waking)

@@ -41,23 +41,37 @@ def sample(seq: int, device: str = "a") -> Publication:
 class Site:
     """A daemon's worth of retained topics around an uplink."""
 
-    def __init__(self, port: int, **changes: object) -> None:
+    def __init__(self, port: int, *, store: Store | None = None, **changes: object) -> None:
         facts: dict[str, object] = {"host": "127.0.0.1", "port": port, "client_id": "gateway", **changes}
         self.settings = BrokerSettings(**facts)  # type: ignore[arg-type]  # the test says which are changed
         self.retained = {f"device/{name}/state": {"device": name} for name in "abc"}
         self.requests: list[InboundRequest] = []
         self.changes: list[bool] = []
+        self.announced = 0
+        self.troubles: list[str | None] = []
         self.uplink = Uplink(
             self.settings,
             base=B,
-            burst=lambda: [publication.retained(topic, payload) for topic, payload in self.retained.items()],
-            stands_behind=lambda: frozenset(self.retained),
-            requested=self.requests.append,
             epoch_ms=lambda: 1_795_298_022_003,
-            changed=self._changed,
+            store=store,
         )
 
-    def _changed(self) -> None:
+    def burst(self) -> list[Publication]:
+        return [publication.retained(topic, payload) for topic, payload in self.retained.items()]
+
+    def topics(self) -> frozenset[str]:
+        return frozenset(self.retained)
+
+    def on_request(self, request: InboundRequest) -> None:
+        self.requests.append(request)
+
+    def on_announced(self) -> None:
+        self.announced += 1
+
+    def on_spool_trouble(self, trouble: str | None) -> None:
+        self.troubles.append(trouble)
+
+    def on_uplink_change(self) -> None:
         if self.changes[-1:] != [self.uplink.connected]:
             self.changes.append(self.uplink.connected)
 
@@ -73,7 +87,7 @@ async def until(claim: Callable[[], bool], what: str, *, within: float = PATIENC
 @contextlib.asynccontextmanager
 async def running(site: Site) -> AsyncIterator[Uplink]:
     """Start and stop an uplink."""
-    await site.uplink.start()
+    await site.uplink.start(site)
     try:
         yield site.uplink
     finally:
@@ -185,7 +199,7 @@ def test_a_broker_that_hangs_does_not_hold_up_the_end(mosquitto: Mosquitto) -> N
     async def scenario() -> float:
         listener = mosquitto.subscribe(f"{B}/#")
         site = Site(mosquitto.port)
-        await site.uplink.start()
+        await site.uplink.start(site)
         await online(listener)
         assert mosquitto.process is not None
         mosquitto.process.send_signal(signal.SIGSTOP)
@@ -598,8 +612,7 @@ def test_while_a_backlog_on_disk_leaves_in_order_live_samples_stay_live(mosquitt
 
     async def scenario() -> None:
         listener = mosquitto.subscribe(f"{B}/#")
-        site = Site(mosquitto.port)
-        site.uplink.keep_in(Store(tmp_path, boot="k0000001", limits=limits), lambda _: None)
+        site = Site(mosquitto.port, store=Store(tmp_path, boot="k0000001", limits=limits))
         async with running(site) as uplink:
             await until(lambda: uplink.backlog.depth == spool, "the store is opened")
             await until(lambda: bool(listener.on(f"{B}/device/b/history")), "the past is open", within=20)

@@ -12,13 +12,9 @@ from lfs10d.system.clock import Clock
 from lfs10d.system.clock_step import ClockState
 
 
-def nothing() -> None:
-    """Take the word."""
-
-
 def test_a_moment_is_told_on_both_clocks() -> None:
     before = time.monotonic(), time.time()
-    now = Clock(nothing, nothing).now()
+    now = Clock().now()
     after = time.monotonic(), time.time()
 
     assert before[0] <= now.mono <= after[0]
@@ -41,7 +37,13 @@ class Looked:
         monkeypatch.setattr(clock, "look_again", self._look_again)
         real = time.time
         monkeypatch.setattr(time, "time", lambda: real() + self.ahead)
-        self.moments = Clock(lambda: self.told.append("synchronised"), lambda: self.told.append("stepped"))
+        self.moments = Clock()
+
+    def synchronised(self) -> None:
+        self.told.append("synchronised")
+
+    def stepped(self) -> None:
+        self.told.append("stepped")
 
     def _look(self) -> ClockState:
         if not self.answers:
@@ -59,7 +61,7 @@ def test_the_clock_is_looked_after_and_told_whenever_it_becomes_synchronised(mon
     looked = Looked(monkeypatch, list(answers))
 
     with pytest.raises(LookupError):
-        asyncio.run(looked.moments.watch())
+        asyncio.run(looked.moments.watch(looked))
 
     assert looked.waits == answers
     assert looked.told == ["synchronised", "synchronised"]
@@ -79,7 +81,7 @@ def test_a_clock_that_is_set_is_looked_at_at_once(
     looked = Looked(monkeypatch, answers, patience=600.0)
 
     async def scenario() -> None:
-        watching = asyncio.create_task(looked.moments.watch())
+        watching = asyncio.create_task(looked.moments.watch(looked))
         await looked.at.wait()
         looked.at.clear()
         looked.moments.now()

@@ -295,9 +295,10 @@ def test_statistics_come_every_half_minute_and_are_not_made_up_for_a_sleep() -> 
 
 
 def test_statistics_tell_what_waits_for_the_broker() -> None:
-    waiting = Station(DAEMON, LINE, [ONE_VALUE], instant(0), backlog=lambda: BacklogStats(7, 5, 2))
-    published = waiting.tick(instant(30))
-    assert fields(published[0].payload, "store") == ({"depth": 7, "oldest_ts": 5, "dropped": 2},)
+    waiting, backlog = Station(DAEMON, LINE, [ONE_VALUE], instant(0)), BacklogStats(7, 5, 2)
+    published = [*waiting.tick(instant(30), backlog), *waiting.burst(instant(31), backlog)]
+    statistics = [each for each in published if each.topic == "line/stats"]
+    assert [fields(each.payload, "store") for each in statistics] == [({"depth": 7, "oldest_ts": 5, "dropped": 2},)] * 2
 
 
 def test_a_state_that_waits_is_published_when_its_time_comes() -> None:
