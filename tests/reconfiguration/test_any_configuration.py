@@ -146,7 +146,7 @@ def whole(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[s
         del name
         return call()
 
-    monkeypatch.setattr("lfs10d.commands.line_access.aside", at_once)
+    monkeypatch.setattr("lfs10d.commands.line_access.run_in_thread", at_once)
 
     async def born() -> Whole:
         return Whole(bench)
