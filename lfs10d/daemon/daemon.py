@@ -148,7 +148,7 @@ class Daemon:
         )
         self._losing = BaudrateWatch(
             running=lambda: self._running.now,
-            talk=self._physical.talk,
+            new_run=self._physical.new_run,
             devices=lambda: tuple(self._line.poller.schedule.devices.values()),
             tell=self._told_lost,
         )

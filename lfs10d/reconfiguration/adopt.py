@@ -1,12 +1,13 @@
-"""`line/adopt` from the request to the journal, the line, the configuration and the answer."""
+"""`line/adopt` from the command to the journal, the line, the configuration and the result."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Mapping
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lfs10d.command import ErrorCode, Result, failed, ok, rejected
 from lfs10d.config.effective import Effective
@@ -15,12 +16,18 @@ from lfs10d.errors import StateError
 from lfs10d.line.jobs.procedure import ProcedureClock
 from lfs10d.line.settings import DEFAULT_PROFILE
 from lfs10d.profiles.profile import Profile
-from lfs10d.reconfiguration.journal import CommandRecord, Endpoint, Move, OpenChange
+from lfs10d.reconfiguration.journal import (
+    AdoptFacts,
+    CommandRecord,
+    Endpoint,
+    Move,
+    OpenAdopt,
+    OpenChange,
+    ResultRecord,
+)
 from lfs10d.reconfiguration.procedures import adopt
 from lfs10d.reconfiguration.procedures.readdress import NOTHING_WRITTEN, IdWrite, ReaddressEnding, ReaddressReport
-
-if TYPE_CHECKING:
-    from lfs10d.reconfiguration.reconfiguration import Reconfiguration
+from lfs10d.reconfiguration.runner import ChangeRunner
 
 log = logging.getLogger(__name__)
 
@@ -32,7 +39,7 @@ LAST_ID = 247
 CANDIDATES = 8
 """So many ids are looked at before it is told that somebody who is not configured has them all."""
 
-_WORDS: Mapping[ReaddressEnding, tuple[ErrorCode, str]] = {
+_ERRORS: Mapping[ReaddressEnding, tuple[ErrorCode, str]] = {
     ReaddressEnding.TAKEN: (
         "address_in_use",
         "somebody is heard at slave id {to}, who is not configured; see line/scan",
@@ -108,160 +115,187 @@ class AdoptRequest:
 
 
 class Adopt:
-    """Newcomers; a part of `Reconfiguration`."""
+    """New sensors that are given an id and the line's rate."""
 
-    def __init__(self, physical: Reconfiguration) -> None:
-        self._physical = physical
+    def __init__(self, runner: ChangeRunner) -> None:
+        self._runner = runner
 
-    async def perform(self, wanted: AdoptRequest, asked: CommandRecord) -> Result:
-        """Take in a factory-new sensor; see `lfs10d.reconfiguration.procedures.adopt`."""
-        physical = self._physical
-        profile = await physical.profile(wanted.profile)
-        now = physical.running()
-        wish = self._wish(wanted, profile, now)
+    async def perform(self, request: AdoptRequest, command: CommandRecord) -> Result:
+        """Adopt a factory-new sensor; see `lfs10d.reconfiguration.procedures.adopt`."""
+        runner = self._runner
+        profile = await runner.profile(request.profile)
+        now = runner.running()
+        wish = self._wish(request, profile, now)
         if isinstance(wish, Result):
-            return await physical.refused(asked, wish)
-        slave = SlaveConfig(id=wish.factory, profile=wanted.profile)
+            return await runner.refuse(command, wish)
+        slave = SlaveConfig(id=wish.factory, profile=request.profile)
         clock = ProcedureClock()
-        talk = physical.talk()
-        asking = physical.asking(slave, clock, line_rate=0, profile=profile)
-        steps = adopt.adopt(wish, asking, physical.wire().echo_known)
+        run = runner.new_run()
+        query = runner.query(slave, clock, line_rate=0, profile=profile)
+        steps = adopt.adopt(wish, query, runner.wire().echo_known)
         ids = frozenset({wish.factory, *wish.candidates})
-        talk.begin(steps, clock, line_rate=now.config.line.baudrate, excludes=ids)
+        run.begin(steps, clock, line_rate=now.config.line.baudrate, excludes=ids)
 
-        async def conclude(result: Any, change: OpenChange | None) -> Result:  # noqa: ANN401 - a course's
-            found = result or adopt.AdoptReport(ReaddressReport(ReaddressEnding.LOST_BEFORE))
-            return await self._conclude(wanted, wish, profile, found, change, asked)
+        def intend(write: IdWrite) -> OpenAdopt:
+            return self._intend(request, write, command)
 
-        return await physical.carried_out(talk, asked, lambda write: self._intend(wanted, write, asked), conclude)
+        async def conclude(report: adopt.AdoptReport | None, change: OpenAdopt | None) -> Result:
+            report = report or adopt.AdoptReport(ReaddressReport(ReaddressEnding.LOST_BEFORE))
+            return await self._conclude(request, wish, profile, report, change, command)
 
-    def _wish(self, wanted: AdoptRequest, profile: Profile, now: Effective) -> adopt.AdoptWish | Result:
-        """Return what the line is asked, or why it need not be."""
+        return await runner.perform(run, command, intend, conclude)
+
+    def _wish(self, request: AdoptRequest, profile: Profile, now: Effective) -> adopt.AdoptWish | Result:
+        """Return what is wanted of the line, or why it need not even be asked."""
         line_rate = now.config.line.baudrate
         if profile.factory is None or (unfit := _unfit(profile, now.config.line)) is not None:
-            why = f"profile {profile.name} does not say how a new one comes" if profile.factory is None else unfit
+            why = f"profile {profile.name} has no factory settings" if profile.factory is None else unfit
             return rejected("not_allowed", f"{profile.title}: {why}", param="profile")
-        factory = wanted.factory or profile.factory.id
-        taken = {slave.id: f"is that of {slave.name}" for slave in now.config.slaves}
-        for slave in now.config.slaves:
-            taken |= {place.id: f"is that of {slave.name}" for place in now.places[slave.name]}
-        taken |= {
-            slave: why for slave, why in self._physical.reserved().items() if slave not in wanted.slaves | {factory}
-        }
-        for change in self._physical.open:
-            taken |= dict.fromkeys(change.slaves, "is reserved by an open change")
+        factory = request.factory or profile.factory.id
         names = {slave.name for slave in now.config.slaves}
-        if factory in taken:
-            message = f"slave id {factory} {taken[factory]}; keep the factory's id free for newcomers"
-            return rejected("address_in_use", message, param="from")
-        if wanted.to is not None and (wanted.to in taken or wanted.to == factory):
-            why = taken.get(wanted.to, "is where the newcomer is")
-            return rejected("address_in_use", f"slave id {wanted.to} {why}", param="to")
-        if wanted.name is not None and (wanted.name in names or now.changes.of(wanted.name).added is not None):
-            return rejected("invalid_param", f"name: {wanted.name} is taken; give it another name", param="name")
-        ids = range(FIRST_ID, min(LAST_ID, profile.ids[1]) + 1) if wanted.to is None else (wanted.to,)
-        free = [slave for slave in ids if slave not in taken and slave != factory]
-        candidates = [slave for slave in free if wanted.name or default_device_name(slave) not in names][:CANDIDATES]
-        if not candidates and wanted.to is not None:
-            message = f"name: the default {default_device_name(wanted.to)} is taken; give it another name"
+        taken = self._taken(request.slaves | {factory}, now)
+        if (refusal := _refusal(request, factory, taken, names, now)) is not None:
+            return refusal
+        candidates = _candidates(request, factory, taken, names, profile)
+        if not candidates and request.to is not None:
+            message = f"name: the default {default_device_name(request.to)} is taken; give it another name"
             return rejected("invalid_param", message, param="name")
         codes = profile.baudrate.codes if profile.baudrate else ()
         rates = tuple(dict.fromkeys((line_rate, profile.factory.baudrate, *codes)))
-        return adopt.AdoptWish(factory, tuple(candidates), line_rate, rates)
+        return adopt.AdoptWish(factory, candidates, line_rate, rates)
 
-    def _intend(self, wanted: AdoptRequest, write: IdWrite, asked: CommandRecord) -> OpenChange:
-        name = wanted.name or default_device_name(write.new.slave)
+    def _taken(self, own: frozenset[int], now: Effective) -> dict[int, str]:
+        """Return the slave ids that a new sensor cannot have, with the reason; `own` are those of its own command."""
+        taken = {slave.id: f"is that of {slave.name}" for slave in now.config.slaves}
+        for slave in now.config.slaves:
+            taken |= {place.id: f"is that of {slave.name}" for place in now.places[slave.name]}
+        reserved = self._runner.reservations.reserved
+        taken |= {slave_id: why for slave_id, why in reserved.items() if slave_id not in own}
+        for change in self._runner.open:
+            taken |= dict.fromkeys(change.slaves, "is reserved by an open change")
+        return taken
+
+    def _intend(self, request: AdoptRequest, write: IdWrite, command: CommandRecord) -> OpenAdopt:
+        name = request.name or default_device_name(write.new.slave)
         move = Move(device=name, old=write.old, new=write.new, register_before=write.register_before)
-        moment = self._physical.now().ts()
-        facts = {"label": wanted.label, "profile": wanted.profile}
-        return self._physical.journal.intend("adopt", (move,), moment, asked, **facts)
+        facts = AdoptFacts(label=request.label, profile=request.profile)
+        change = OpenAdopt(moves=(move,), begun=self._runner.timestamp(), asked=command, facts=facts)
+        return self._runner.journal.intend(change)
 
     async def _conclude(
         self,
-        wanted: AdoptRequest,
+        request: AdoptRequest,
         wish: adopt.AdoptWish,
         profile: Profile,
-        found: adopt.AdoptReport,
-        change: OpenChange | None,
-        asked: CommandRecord,
+        report: adopt.AdoptReport,
+        change: OpenAdopt | None,
+        command: CommandRecord,
     ) -> Result:
-        physical, verdict = self._physical, found.verdict
-        old, to = wish.factory, found.to or 0
-        name = wanted.name or default_device_name(to)
-        answer = _answer(name, old, to, verdict, profile, written=change is not None)
-        if verdict.ending is ReaddressEnding.TWINS:
-            physical.tell("duplicate_id", {"slave": old, "baudrate": found.old.baudrate if found.old else None})
-        if change is None or verdict.ending in NOTHING_WRITTEN:
-            return await physical.refused(asked, answer)
-        told = physical.told(asked, answer)
-        numbers = frozenset({change.number})
+        """Put on the disk what came of it; return the result."""
+        runner, ending = self._runner, report.verdict.ending
+        to = report.to or 0
+        name = request.name or default_device_name(to)
+        result = _result(name, wish.factory, to, report.verdict, profile, written=change is not None)
+        if ending is ReaddressEnding.TWINS:
+            rate = report.old.baudrate if report.old else None
+            runner.announce("duplicate_id", {"slave": wish.factory, "baudrate": rate})
+        if change is None or ending in NOTHING_WRITTEN:
+            return await runner.refuse(command, result)
         try:
-            if verdict.ending is ReaddressEnding.MOVED:
-                (move,) = change.moves
-                await physical.record(name, move.new, newcomer=entry(change))
-                await physical.put(partial(physical.journal.close, numbers, told))
-                facts = {"request": NAME, "id": asked.key, "device": name, "from": None, "to": {"slave": to}}
-                physical.tell("change_applied", facts)
-            elif verdict.stays_open:
-                if verdict.ending is not ReaddressEnding.NOWHERE and found.at_rate:
-                    await physical.put(partial(physical.journal.amend, change.number, (_at_rate(change),)))
-                await physical.put(partial(physical.journal.keep, change.number, told))
-            else:
-                await physical.put(partial(physical.journal.close, numbers, told))
+            await self._save(name, report, change, runner.record(command, result))
         except StateError as error:
-            if verdict.ending is ReaddressEnding.MOVED:
-                return failed("storage_full", f"the sensor is at slave id {to} now, but that cannot be kept: {error}")
+            if ending is ReaddressEnding.MOVED:
+                return failed("storage_full", f"the sensor is at slave id {to} now, but that cannot be saved: {error}")
             log.warning("%s", error)
-        return answer
+            return result
+        if ending is ReaddressEnding.MOVED:
+            facts = {"request": NAME, "id": command.key, "device": name, "from": None, "to": {"slave": to}}
+            runner.announce("change_applied", facts)
+        return result
+
+    async def _save(self, name: str, report: adopt.AdoptReport, change: OpenAdopt, record: ResultRecord | None) -> None:
+        """Put on the disk where the sensor is, or that it is still to be found."""
+        runner, verdict = self._runner, report.verdict
+        journal, journalled = runner.journal, runner.journalled
+        if verdict.ending is ReaddressEnding.MOVED:
+            (move,) = change.moves
+            await runner.save_endpoint(name, move.new, added=entry(change))
+        elif verdict.stays_open:
+            if verdict.ending is not ReaddressEnding.NOWHERE and report.at_rate:
+                await journalled(partial(journal.amend, change.number, (_at_rate(change),)))
+            await journalled(partial(journal.keep, change.number, record))
+            return
+        await journalled(partial(journal.close, frozenset({change.number}), record))
 
 
-def _at_rate(change: OpenChange) -> Move:
-    """Return where the newcomer is since it speaks at the line's rate: where it was before another one may be now."""
+def _refusal(
+    request: AdoptRequest, factory: int, taken: Mapping[int, str], names: AbstractSet[str], now: Effective
+) -> Result | None:
+    """Return why a request cannot be carried out whatever is on the line; None if it can."""
+    if factory in taken:
+        message = f"slave id {factory} {taken[factory]}; keep the factory's id free for new sensors"
+        return rejected("address_in_use", message, param="from")
+    if request.to is not None and (request.to in taken or request.to == factory):
+        why = taken.get(request.to, "is where the new sensor is")
+        return rejected("address_in_use", f"slave id {request.to} {why}", param="to")
+    if request.name is not None and (request.name in names or now.changes.of(request.name).added is not None):
+        return rejected("invalid_param", f"name: {request.name} is taken; give it another name", param="name")
+    return None
+
+
+def _candidates(
+    request: AdoptRequest, factory: int, taken: Mapping[int, str], names: AbstractSet[str], profile: Profile
+) -> tuple[int, ...]:
+    """Return the slave ids to try, in order; none whose default name is taken where the request gives no name."""
+    ids = range(FIRST_ID, min(LAST_ID, profile.ids[1]) + 1) if request.to is None else (request.to,)
+    free = [slave_id for slave_id in ids if slave_id not in taken and slave_id != factory]
+    named = [slave_id for slave_id in free if request.name or default_device_name(slave_id) not in names]
+    return tuple(named[:CANDIDATES])
+
+
+def _at_rate(change: OpenAdopt) -> Move:
+    """Return where the new sensor is since it has the line's rate: where it was before another one may be now."""
     (move,) = change.moves
     return move.model_copy(update={"old": Endpoint(slave=move.old.slave, baudrate=move.new.baudrate)})
 
 
 def entry(change: OpenChange) -> dict[str, Any] | None:
-    """Return what is said of the newcomer of an open change; None if it has none."""
+    """Return the configuration's entry for the new sensor of an open change; None if it has none."""
     if change.kind != "adopt":
         return None
-    label = change.facts.get("label")
-    said: dict[str, Any] = {"id": change.moves[0].new.slave}
-    if label is not None:
-        said["label"] = label
-    if _word(change) != DEFAULT_PROFILE:
-        said["profile"] = _word(change)
-    return said
+    values: dict[str, Any] = {"id": change.moves[0].new.slave}
+    if change.facts.label is not None:
+        values["label"] = change.facts.label
+    if change.facts.profile not in (None, DEFAULT_PROFILE):
+        values["profile"] = change.facts.profile
+    return values
 
 
-def _word(change: OpenChange) -> str:
-    """Return the configuration's word for the profile of a newcomer; an older journal has no such word."""
-    return str(change.facts.get("profile", DEFAULT_PROFILE))
-
-
-def newcomer(change: OpenChange, move: Move) -> SlaveConfig | None:
-    """Return the newcomer of an open change as it would be configured; None if it has none."""
+def new_slave(change: OpenChange) -> SlaveConfig | None:
+    """Return the new sensor of an open change as it would be configured; None if it has none."""
     if change.kind != "adopt":
         return None
-    return SlaveConfig(id=move.new.slave, name=move.device, profile=_word(change))
+    (move,) = change.moves
+    return SlaveConfig(id=move.new.slave, name=move.device, profile=change.facts.profile or DEFAULT_PROFILE)
 
 
 def _unfit(profile: Profile, line: LineConfig) -> str | None:
-    """Return why no newcomer of a profile can be adopted on a line; None if one can."""
+    """Return why no new sensor of a profile can be adopted on a line; None if one can."""
     if profile.slave_id is None:
         return f"profile {profile.name} does not say how its slave id is set"
     if line.framing not in profile.framings:
-        return f"it does not speak {line.framing}"
+        return f"it does not support {line.framing}"
     at_factory = profile.factory is not None and profile.factory.baudrate == line.baudrate
     if not at_factory and (profile.baudrate is None or line.baudrate not in profile.baudrate.codes):
         return f"it cannot be set to the {line.baudrate} baud of this line"
     return None
 
 
-def _answer(name: str, old: int, to: int, verdict: ReaddressReport, profile: Profile, *, written: bool) -> Result:
+def _result(name: str, old: int, to: int, verdict: ReaddressReport, profile: Profile, *, written: bool) -> Result:
+    """Return the result of `line/adopt`; `written`: something was written to the sensor."""
     if verdict.ending is ReaddressEnding.MOVED:
         return ok({"device": name, "slave": to, "from": old})
-    code, text = _WORDS[verdict.ending]
+    code, text = _ERRORS[verdict.ending]
     refusal = "" if verdict.exception is None else f" (exception {verdict.exception:02X})"
     lock = (profile.slave_id and profile.slave_id.locked_by) or "address switch"
     title = profile.title

@@ -24,12 +24,12 @@ class BaudrateWatch:
         self,
         *,
         running: Callable[[], Effective],
-        talk: Callable[[], ProcedureRun],
+        new_run: Callable[[], ProcedureRun],
         devices: Callable[[], Iterable[Device]],
         tell: Callable[[str | None], None],
     ) -> None:
         self._running = running
-        self._talk = talk
+        self._new_run = new_run
         self._devices = devices
         self._tell = tell
         self._tasks = BackgroundTasks()
@@ -42,28 +42,27 @@ class BaudrateWatch:
         if self._task is not None and self._task[0] == rate and not self._task[2].done():
             return
         self.stop()
-        talk = self._talk()
-        self._task = rate, talk, self._tasks.start("rate watch", self._look_out(rate, talk))
+        run = self._new_run()
+        self._task = rate, run, self._tasks.start("rate watch", self._look_out(rate, run))
         self._say(None)
 
     def stop(self) -> None:
         """Look out no more."""
         if self._task is not None:
-            _, talk, task = self._task
-            talk.halt()
-            talk.go_on()
+            _, run, task = self._task
+            run.stop()
             task.cancel()
             self._task = None
 
-    async def _look_out(self, rate: int, talk: ProcedureRun) -> None:
+    async def _look_out(self, rate: int, run: ProcedureRun) -> None:
         clock = ProcedureClock()
-        talk.begin(seek(self._devices, clock, rate), clock, line_rate=rate, share=1.0, errand=Purpose.PROBE)
-        while not isinstance(found := await talk.wanted(), Finished):
+        run.begin(seek(self._devices, clock, rate), clock, line_rate=rate, share=1.0, errand=Purpose.PROBE)
+        while not isinstance(found := await run.next_await(), Finished):
             if isinstance(found, dict):
                 now = self._running()
                 polled = sum(slave.enabled for slave in now.config.slaves)
                 self._say(in_words(found, rate, polled, filed=now.said.baudrate) if found else None)
-            talk.go_on()
+            run.resume()
 
     def _say(self, words: str | None) -> None:
         if words != self._told:

@@ -1,10 +1,10 @@
-"""The journal of physical changes: what is about to be written to a sensor is on the disk before its first byte is.
+"""The journal of changes of sensors: each write is recorded on the disk before its first byte is sent.
 
 One small file, replaced as a whole at each step. A change stays in it until every sensor it touched was found again
-and the configuration says where. With it lie the answers to physical changes, so that a request which is repeated
+and the configuration says where. The results of such changes are kept there too, so that a command that is repeated
 after a restart is answered and not carried out once more.
 
-A file that cannot be understood (damaged, of a newer lfs10d) is put aside and reported.
+A file that cannot be read (damaged, or of a newer lfs10d) is put aside and reported.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_serializer
 
 from lfs10d.command import Command, Result
 from lfs10d.errors import StateError
@@ -22,14 +22,12 @@ from lfs10d.system.disk import Disk
 
 FILE_NAME = "journal.json"
 ASIDE = "journal.json.unreadable"
-"""Where a file that cannot be understood is put; the last one is kept."""
+"""Where a file that cannot be read is put; the last one is kept."""
 VERSION: Literal[1] = 1
 REMEMBERED = 256
-"""Answers that are kept, the newest."""
+"""Results that are kept, the newest."""
 REMEMBERED_FOR_MS = 24 * 3600 * 1000
-"""How long an answer is kept."""
-
-Kind: TypeAlias = Literal["readdress", "baudrate", "adopt"]
+"""How long a result is kept, in ms."""
 
 
 class _Record(BaseModel):
@@ -37,14 +35,14 @@ class _Record(BaseModel):
 
 
 class Endpoint(_Record):
-    """Where a sensor answers: by this slave id, at this rate in baud."""
+    """Where a sensor answers: its slave id, and its rate in baud."""
 
     slave: int
     baudrate: int
 
 
 class Move(_Record):
-    """One sensor that is to answer elsewhere; `register` is what its id register said before (None: not asked)."""
+    """One sensor that is to answer elsewhere; `register_before` is what its id register held (None: not read)."""
 
     device: str
     old: Endpoint
@@ -53,7 +51,7 @@ class Move(_Record):
 
 
 class CommandRecord(_Record):
-    """The request a change was asked by: its name, id and content, and where its answer goes (correlation in hex)."""
+    """The command of a change: its name, id and content, and where its result goes (correlation in hex)."""
 
     name: str
     id: str | int | None = None
@@ -64,34 +62,63 @@ class CommandRecord(_Record):
 
     @property
     def key(self) -> str | int | None:
-        """What tells a repeat."""
+        """What identifies a repeat."""
         return self.transaction if self.id is None else self.id
 
     @property
     def finished(self) -> CommandRecord:
-        """The same once it has its answer: a repeat says itself where the answer goes."""
+        """The same once it has its result: a repeat says itself where the result goes."""
         return self.model_copy(update={"topic": None, "correlation": None})
 
 
-class OpenChange(_Record):
-    """A change that may have been written. `begun` is in epoch milliseconds.
+class _Facts(_Record):
+    """What a kind of change needs besides to be finished; keys of other versions are ignored."""
 
-    `answered`: its request has its answer, and the sensors are followed until they are found. `facts` is what the
-    kind of change needs besides to be finished.
+    model_config = ConfigDict(extra="ignore", populate_by_name=True)
+
+
+class ReaddressFacts(_Facts):
+    """Nothing."""
+
+
+class BaudrateFacts(_Facts):
+    """The rates, in baud. `pending` are the sensors that have stored the new one and wait for their power cycle."""
+
+    old: int = Field(alias="from")
+    to: int
+    power_cycle: bool = False
+    pending: tuple[str, ...] | None = None
+
+    @model_serializer
+    def _form(self) -> dict[str, object]:
+        form: dict[str, object] = {"from": self.old, "to": self.to, "power_cycle": self.power_cycle}
+        return form if self.pending is None else {**form, "pending": self.pending}
+
+
+class AdoptFacts(_Facts):
+    """The label of the new sensor, and its profile's name or path (None: an older lfs10d wrote no such key)."""
+
+    label: str | None = None
+    profile: str | None = None
+
+
+class _OpenChange(_Record):
+    """A change that may have been written. `begun` is in epoch milliseconds; the journal gives the number.
+
+    `answered`: its command has its result, and the sensors are followed until they are found.
     """
 
-    number: int
-    kind: Kind
+    number: int = 0
+    kind: Literal["readdress", "baudrate", "adopt"]
     moves: tuple[Move, ...]
     begun: int
     asked: CommandRecord | None = None
     answered: bool = False
-    facts: dict[str, Any] = {}
 
     @property
     def slaves(self) -> frozenset[int]:
         """Every slave id that one of its sensors may have."""
-        return frozenset(spot.slave for move in self.moves for spot in (move.old, move.new))
+        return frozenset(endpoint.slave for move in self.moves for endpoint in (move.old, move.new))
 
     @property
     def devices(self) -> frozenset[str]:
@@ -99,8 +126,33 @@ class OpenChange(_Record):
         return frozenset(move.device for move in self.moves)
 
 
+class OpenReaddress(_OpenChange):
+    """A configured sensor gets another slave id."""
+
+    kind: Literal["readdress"] = "readdress"
+    facts: ReaddressFacts = ReaddressFacts()
+
+
+class OpenBaudrate(_OpenChange):
+    """Every sensor and the line get another rate."""
+
+    kind: Literal["baudrate"] = "baudrate"
+    facts: BaudrateFacts
+
+
+class OpenAdopt(_OpenChange):
+    """A new sensor gets an id and the line's rate."""
+
+    kind: Literal["adopt"] = "adopt"
+    facts: AdoptFacts = AdoptFacts()
+
+
+OpenChange: TypeAlias = Annotated[OpenReaddress | OpenBaudrate | OpenAdopt, Field(discriminator="kind")]
+C = TypeVar("C", bound=_OpenChange)
+
+
 class ResultRecord(_Record):
-    """An answer that was given: `status`, `data` and `error` as in the response, at `at` in epoch milliseconds."""
+    """A result that was given: `status`, `data` and `error` as in the response, at `at` in epoch milliseconds."""
 
     asked: CommandRecord
     status: Literal["ok", "rejected", "failed"]
@@ -118,9 +170,9 @@ class _JournalContent(_Record):
 
 
 class Journal:
-    """The journal in one state directory. Used by one caller at a time; every step is on the disk when it returns.
+    """The journal in one state directory. Used by one caller at a time; every step but `note` is on the disk at return.
 
-    Only `note` is not. A step that cannot be put on the disk raises StateError, and nothing has happened then.
+    A step that cannot be put on the disk raises StateError, and nothing has happened then.
     """
 
     def __init__(self, directory: Path, disk: Disk) -> None:
@@ -131,14 +183,14 @@ class Journal:
         self._unread: str | None = None
 
     def take(self) -> str | None:
-        """Read it, once, at the start; return what is wrong with it, in words. Never fails."""
+        """Read it, once, at the start; return what is wrong with it, as a message to a person. Never fails."""
         try:
             content = self._disk.read(self.path)
         except FileNotFoundError:
             return None
         except OSError as error:
             self._unread = f"{self.path} cannot be read: {error.strerror}"
-            return f"{self._unread}; whether a sensor was being moved is not known"
+            return f"{self._unread}; it is not known whether a sensor was being changed"
         try:
             kept = _JournalContent.model_validate_json(content)
         except ValidationError:
@@ -160,52 +212,52 @@ class Journal:
 
     @property
     def answers(self) -> tuple[ResultRecord, ...]:
-        """The answers that were given, the oldest first."""
+        """The results that were given, the oldest first."""
         return self._content.answers
 
-    def reserved(self) -> frozenset[int]:
-        """Return every slave id at which a sensor of an open change may appear."""
-        return frozenset().union(*(change.slaves for change in self.open))
+    def intend(self, change: C) -> C:
+        """Record that sensors are about to be changed; return the change with its number.
 
-    def intend(
-        self, kind: Kind, moves: tuple[Move, ...], begun: int, asked: CommandRecord | None, **facts: object
-    ) -> OpenChange:
-        """Note that these sensors are about to be moved; when this returns the first byte may be sent."""
-        number = self._content.last_number + 1
-        change = OpenChange(number=number, kind=kind, moves=moves, begun=begun, asked=asked, facts=facts)
-        self._save(last_number=number, changes=(*self.open, change))
-        return change
+        When this returns the first byte may be sent.
+        """
+        numbered = change.model_copy(update={"number": self._content.last_number + 1})
+        self._save(last_number=numbered.number, changes=(*self.open, numbered))
+        return numbered
 
-    def amend(self, number: int, moves: tuple[Move, ...], **facts: object) -> None:
-        """Note which sensors of a change are still to be found, and what else there is to know."""
+    def amend(self, number: int, moves: tuple[Move, ...]) -> None:
+        """Record where the sensors of a change are looked for from now on."""
+        self._save(changes=self._with(number, lambda change: change.model_copy(update={"moves": moves})))
+
+    def set_pending(self, number: int, pending: tuple[str, ...]) -> None:
+        """Record which sensors of a change of the rate wait for their power cycle."""
 
         def amended(change: OpenChange) -> OpenChange:
-            return change.model_copy(update={"moves": moves, "facts": {**change.facts, **facts}})
+            return change.model_copy(update={"facts": change.facts.model_copy(update={"pending": pending})})
 
         self._save(changes=self._with(number, amended))
 
-    def keep(self, number: int, told: ResultRecord | None) -> None:
-        """Note that a change stays open, and the answer its request was given."""
+    def keep(self, number: int, record: ResultRecord | None) -> None:
+        """Record that a change stays open, and the result its command was given."""
 
         def answered(change: OpenChange) -> OpenChange:
             asked = None if change.asked is None else change.asked.finished
             return change.model_copy(update={"answered": True, "asked": asked})
 
-        self._save(changes=self._with(number, answered), answers=self._answers(told))
+        self._save(changes=self._with(number, answered), answers=self._answers(record))
 
-    def close(self, numbers: frozenset[int], *told: ResultRecord | None) -> None:
-        """Note that these changes are finished or undone, and the answers that are given with that."""
+    def close(self, numbers: frozenset[int], *records: ResultRecord | None) -> None:
+        """Record that these changes are finished or undone, and the results that are given with that."""
         changes = tuple(change for change in self.open if change.number not in numbers)
-        answers = self._answers(*told)
+        answers = self._answers(*records)
         if (changes, answers) != (self.open, self.answers):
             self._save(changes=changes, answers=answers)
 
-    def note(self, told: ResultRecord | None) -> None:
-        """Remember an answer to a request of which nothing was written; it comes on the disk with the next `save`.
+    def note(self, record: ResultRecord | None) -> None:
+        """Remember the result of a command of which nothing was written; the next `save` puts it on the disk.
 
-        Lost before that, a repeat of the request is judged anew.
+        Lost before that, a repeat of the command is judged anew.
         """
-        answers = self._answers(told)
+        answers = self._answers(record)
         if answers != self.answers:
             self._content = self._content.model_copy(update={"answers": answers})
             self._unsaved = True
@@ -218,9 +270,9 @@ class Journal:
     def _with(self, number: int, amended: Callable[[OpenChange], OpenChange]) -> tuple[OpenChange, ...]:
         return tuple(amended(change) if change.number == number else change for change in self.open)
 
-    def _answers(self, *told: ResultRecord | None) -> tuple[ResultRecord, ...]:
+    def _answers(self, *records: ResultRecord | None) -> tuple[ResultRecord, ...]:
         answers = self.answers
-        for each in told:
+        for each in records:
             if each is not None and each.asked.key is not None:
                 kept = [older for older in answers if older.at > each.at - REMEMBERED_FOR_MS]
                 answers = (*kept[-REMEMBERED + 1 :], each.model_copy(update={"asked": each.asked.finished}))
@@ -244,35 +296,35 @@ class Journal:
                 self._disk.replace(self.path, self._content.model_dump_json(indent=1).encode())
 
 
-def asked_by(name: str, call: Command) -> CommandRecord:
-    """Return a request as the journal keeps it."""
+def command_record(name: str, command: Command) -> CommandRecord:
+    """Return a command as the journal keeps it."""
     return CommandRecord(
         name=name,
-        id=call.id,
-        transaction=call.transaction,
-        fingerprint=call.fingerprint,
-        topic=call.topic,
-        correlation=None if call.correlation is None else call.correlation.hex(),
+        id=command.id,
+        transaction=command.transaction,
+        fingerprint=command.fingerprint,
+        topic=command.topic,
+        correlation=None if command.correlation is None else command.correlation.hex(),
     )
 
 
-def call_of(asked: CommandRecord) -> Command:
-    """Return a request as the service knows it."""
-    correlation = None if asked.correlation is None else bytes.fromhex(asked.correlation)
+def command_of(record: CommandRecord) -> Command:
+    """Return a command as the dispatcher knows it."""
+    correlation = None if record.correlation is None else bytes.fromhex(record.correlation)
     return Command(
-        asked.id, asked.transaction, fingerprint=asked.fingerprint, topic=asked.topic, correlation=correlation
+        record.id, record.transaction, fingerprint=record.fingerprint, topic=record.topic, correlation=correlation
     )
 
 
-def told(asked: CommandRecord | None, answer: Result, ts: int) -> ResultRecord | None:
-    """Return an answer given at `ts` (epoch ms) as the journal keeps it; None if nobody asked."""
-    if asked is None:
+def result_record(command: CommandRecord | None, result: Result, ts: int) -> ResultRecord | None:
+    """Return a result given at `ts` (epoch ms) as the journal keeps it; None where no command is to be answered."""
+    if command is None:
         return None
-    return ResultRecord(asked=asked, status=answer.status, data=answer.data, error=answer.error(), at=ts)
+    return ResultRecord(asked=command, status=result.status, data=result.data, error=result.error(), at=ts)
 
 
-def answer_of(told: ResultRecord) -> Result:
-    """Return an answer as the service gives it."""
-    error = dict(told.error or {})
+def result_of(record: ResultRecord) -> Result:
+    """Return a result as the dispatcher gives it."""
+    error = dict(record.error or {})
     code, message = error.pop("code", None), error.pop("message", "")
-    return Result(told.status, told.data, code, message, error)
+    return Result(record.status, record.data, code, message, error)

@@ -7,7 +7,6 @@ import logging
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 from lfs10d.config.changes import Changes, Place, Rate
 from lfs10d.config.effective import Effective
@@ -16,10 +15,8 @@ from lfs10d.reading import Purpose
 from lfs10d.reconfiguration.journal import Endpoint
 from lfs10d.reconfiguration.procedure_run import ProcedureRun
 from lfs10d.reconfiguration.procedures.locate import locate
+from lfs10d.reconfiguration.runner import ChangeRunner
 from lfs10d.system.tasks import BackgroundTasks
-
-if TYPE_CHECKING:
-    from lfs10d.reconfiguration.reconfiguration import Reconfiguration
 
 log = logging.getLogger(__name__)
 
@@ -27,8 +24,8 @@ log = logging.getLogger(__name__)
 class Locator:
     """A part of `Reconfiguration`; `repoll()` has the devices polled that are no longer `withheld`."""
 
-    def __init__(self, physical: Reconfiguration, repoll: Callable[[], None]) -> None:
-        self._physical = physical
+    def __init__(self, runner: ChangeRunner, repoll: Callable[[], None]) -> None:
+        self._runner = runner
         self._repoll = repoll
         self._asked: dict[str, tuple[Place, ...]] = {}
         """Devices that answered nowhere when they were asked, with where that was."""
@@ -37,7 +34,7 @@ class Locator:
 
     def contested(self) -> dict[str, tuple[Place, ...]]:
         """Return the devices that may be at one of several places; less the id that another one was verified at."""
-        now = self._physical.running()
+        now = self._runner.running()
         contested: dict[str, tuple[Place, ...]] = {}
         for slave in now.config.slaves:
             places = now.places[slave.name]
@@ -53,7 +50,7 @@ class Locator:
 
     def begin(self) -> None:
         """Ask for every contested device that nobody asks for now, and whose turn it is."""
-        if self._physical.ending:
+        if self._runner.ending:
             return
         contested = self.contested()
         turn = in_turn({name: places for name, places in contested.items() if self._asked.get(name) != places})
@@ -63,16 +60,16 @@ class Locator:
         for name, places in contested.items():
             if name in self._searches or (name not in turn and self._asked.get(name) != places):
                 continue
-            now = self._physical.running()
+            now = self._runner.running()
             slave = now.slave(name)
             if (
                 slave is None or now.loaded.profiles[slave.profile].slave_id is None
             ):  # it cannot be asked who it is: the file's place is kept
                 self._asked[name] = places
                 continue
-            talk = self._physical.talk()
-            task = self._tasks.start(f"locate {name}", self._locate(name, places, talk), partial(self._over, name))
-            self._searches[name] = places, talk, task
+            run = self._runner.new_run()
+            task = self._tasks.start(f"locate {name}", self._locate(name, places, run), partial(self._over, name))
+            self._searches[name] = places, run, task
 
     def stop(self) -> None:
         """Ask no more."""
@@ -80,41 +77,40 @@ class Locator:
             self._end(name)
 
     def _end(self, name: str) -> None:
-        _, talk, task = self._searches.pop(name)
-        talk.halt()
-        talk.go_on()
+        _, run, task = self._searches.pop(name)
+        run.stop()
         task.cancel()
 
     def _over(self, name: str, task: asyncio.Task[None]) -> None:
         if name in self._searches and self._searches[name][-1] is task:
             del self._searches[name]
 
-    async def _locate(self, name: str, places: tuple[Place, ...], talk: ProcedureRun) -> None:
-        physical = self._physical
-        now = physical.running()
+    async def _locate(self, name: str, places: tuple[Place, ...], run: ProcedureRun) -> None:
+        runner = self._runner
+        now = runner.running()
         slave = now.slave(name)
         if slave is None:
             return
         rate = now.config.line.baudrate
-        known, spots = (
+        known, endpoints = (
             [Endpoint(slave=place.id, baudrate=place.baudrate or rate) for place in each]
             for each in (now.places[name], places)
         )
         clock = ProcedureClock()
-        asking = physical.asking(slave, clock, line_rate=0)
+        query = runner.query(slave, clock, line_rate=0)
         errand = Purpose.PROBE if self._asked.get(name) == places else Purpose.CHANGE
-        steps = locate(spots, asking, longest_pause=now.config.poll.probe_interval_max)
-        talk.begin(steps, clock, line_rate=rate, errand=errand)
-        while not isinstance(what := await talk.wanted(), Finished):
+        steps = locate(endpoints, query, longest_pause=now.config.poll.probe_interval_max)
+        run.begin(steps, clock, line_rate=rate, errand=errand)
+        while not isinstance(awaited := await run.next_await(), Finished):
             if self._asked.get(name) != places:
                 self._asked[name] = places
                 self._tell(name, known, None)
                 self._repoll()
                 self.begin()
-            talk.go_on()
-        talk.go_on()
-        if isinstance(what.result, Endpoint):
-            await self._found(name, known, what.result)
+            run.resume()
+        run.resume()
+        if isinstance(awaited.result, Endpoint):
+            await self._found(name, known, awaited.result)
 
     async def _found(self, name: str, known: list[Endpoint], spot: Endpoint) -> None:
         def edit(now: Effective) -> Changes:
@@ -127,7 +123,7 @@ class Locator:
             return changes
 
         self._searches.pop(name, None)  # it is found: another configuration ends no search any more
-        await self._physical.learn(edit)
+        await self._runner.learn(edit)
         self._tell(name, known, spot)
         self._repoll()
         self.begin()
@@ -135,7 +131,7 @@ class Locator:
     def _tell(self, name: str, known: list[Endpoint], used: Endpoint | None) -> None:
         first, last = known[0], known[-1]
         facts = {"device": name, "file": first.model_dump(), "last": last.model_dump()}
-        self._physical.tell("change_conflict", {**facts, "used": None if used is None else used.model_dump()})
+        self._runner.announce("change_conflict", {**facts, "used": None if used is None else used.model_dump()})
         where = "at neither; both are asked" if used is None else f"at slave id {used.slave}, {used.baudrate} baud"
         log.warning(
             "%s: the file says slave id %d at %d baud, it was last verified at %d at %d: it answers %s",

@@ -1,4 +1,4 @@
-"""One course as seen from the asyncio loop: what it wants done off the line, in turn."""
+"""A procedure on the line, as seen from the asyncio loop: what it awaits off the line, one after the other."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from lfs10d.modbus.pending import PendingRequests
 
 
 class Wire(Protocol):
-    """What physical changes need of the line; see `lfs10d.line.line.Line`."""
+    """What changes of sensors need of the line; see `lfs10d.line.line.Line`."""
 
     @property
     def unanswered(self) -> PendingRequests:
@@ -28,39 +28,40 @@ class Wire(Protocol):
         ...
 
     def go_on(self, course: Procedure, answer: object) -> None:
-        """Tell a course what came of what it had done aside."""
+        """Give a procedure the result of what it awaited."""
         ...
 
 
 class ProcedureRun:
-    """One course as seen from the asyncio loop: what it wants done aside, in turn."""
+    """Runs procedures on the line, one after the other. Used in the thread of the asyncio loop."""
 
     def __init__(self, wire: Wire) -> None:
-        self.wire = wire
+        self._wire = wire
         self._loop = asyncio.get_running_loop()
-        self._wanted: asyncio.Queue[object] = asyncio.Queue()
-        self._course: Procedure | None = None
+        self._awaited: asyncio.Queue[object] = asyncio.Queue()
+        self._procedure: Procedure | None = None
 
-    def begin(self, steps: Steps, clock: ProcedureClock, **sides: Any) -> None:  # noqa: ANN401 - the sides of a course
-        """Have a course done on the line."""
-        self._course = Procedure(steps, clock, self._aside, **sides)
-        self.wire.submit(self._course)
+    def begin(self, steps: Steps, clock: ProcedureClock, **settings: Any) -> None:  # noqa: ANN401 - those of Procedure
+        """Have a procedure done on the line."""
+        self._procedure = Procedure(steps, clock, self._on_await, **settings)
+        self._wire.submit(self._procedure)
 
-    def _aside(self, _: Procedure, what: object) -> None:
-        """Take over what is wanted, from the line's thread."""
-        with contextlib.suppress(RuntimeError):  # the loop is closed: we are ending
-            self._loop.call_soon_threadsafe(self._wanted.put_nowait, what)
+    def _on_await(self, _: Procedure, awaited: object) -> None:
+        """Take over what is awaited, from the line's thread."""
+        with contextlib.suppress(RuntimeError):  # the loop is closed: the daemon is stopping
+            self._loop.call_soon_threadsafe(self._awaited.put_nowait, awaited)
 
-    async def wanted(self) -> object:
-        """Wait for what is wanted next, `Over` in the end."""
-        return await self._wanted.get()
+    async def next_await(self) -> object:
+        """Wait for what the procedure awaits next, `Finished` in the end; it waits for `resume` then."""
+        return await self._awaited.get()
 
-    def go_on(self, answer: object = None) -> None:
-        """Answer what was wanted."""
-        if self._course is not None:
-            self.wire.go_on(self._course, answer)
+    def resume(self, result: object = None) -> None:
+        """Give the procedure the result of what it awaited."""
+        if self._procedure is not None:
+            self._wire.go_on(self._procedure, result)
 
-    def halt(self) -> None:
-        """Send no new frame."""
-        if self._course is not None:
-            self._course.halt()
+    def stop(self) -> None:
+        """Send no new frame, and give the line back."""
+        if self._procedure is not None:
+            self._procedure.halt()
+        self.resume()

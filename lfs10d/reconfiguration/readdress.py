@@ -1,10 +1,9 @@
-"""`device/readdress` from the request to the journal, the line, the configuration and the answer."""
+"""`device/readdress` from the command to the journal, the line, the configuration and the result."""
 
 from __future__ import annotations
 
 import logging
 from functools import partial
-from typing import TYPE_CHECKING, Any
 
 from lfs10d.command import Result, failed, rejected
 from lfs10d.config.effective import Effective
@@ -13,7 +12,7 @@ from lfs10d.errors import StateError
 from lfs10d.line.jobs.procedure import ProcedureClock
 from lfs10d.profiles.profile import Profile
 from lfs10d.reconfiguration import readdress_answers
-from lfs10d.reconfiguration.journal import CommandRecord, Endpoint, Move, OpenChange
+from lfs10d.reconfiguration.journal import CommandRecord, Endpoint, Move, OpenReaddress, ResultRecord
 from lfs10d.reconfiguration.procedures.readdress import (
     NOTHING_WRITTEN,
     IdWrite,
@@ -22,9 +21,7 @@ from lfs10d.reconfiguration.procedures.readdress import (
     ReaddressWish,
     readdress,
 )
-
-if TYPE_CHECKING:
-    from lfs10d.reconfiguration.reconfiguration import Reconfiguration
+from lfs10d.reconfiguration.runner import ChangeRunner
 
 log = logging.getLogger(__name__)
 
@@ -32,15 +29,14 @@ NAME = "device/readdress"
 
 
 class Readdress:
-    """Sensors that get another slave id; a part of `Reconfiguration`."""
+    """Sensors that get another slave id."""
 
-    def __init__(self, physical: Reconfiguration) -> None:
-        self._physical = physical
+    def __init__(self, runner: ChangeRunner) -> None:
+        self._runner = runner
 
     def fit(self, device: str, to: int) -> SlaveConfig | Result:
-        """Return the device that may be moved as far as is known here, or why the line need not even be asked."""
-        physical = self._physical
-        now = physical.running()
+        """Return the device that may get this id as far as is known here, or why the line need not even be asked."""
+        now = self._runner.running()
         slave = now.slave(device)
         if slave is None:
             names = ", ".join(other.name for other in now.config.slaves) or "none"
@@ -56,82 +52,85 @@ class Readdress:
         return self._taken(device, to, now) or slave
 
     def _taken(self, device: str, to: int, now: Effective) -> Result | None:
-        physical = self._physical
         for other in now.config.slaves:
             if to in {other.id, *(place.id for place in now.places[other.name])}:
                 return rejected("address_in_use", f"slave id {to} is that of {other.name}", param="to")
-        reserved = physical.reserved()
-        mine = physical.changes_of(device)
-        own = frozenset().union(*(each.slaves for each in physical.open if each.number in mine))
+        reserved = self._runner.reservations.reserved
+        mine = self._runner.id_changes_of(device)
+        own = frozenset().union(*(each.slaves for each in self._runner.open if each.number in mine))
         if to in reserved and to not in own:
             return rejected("address_in_use", f"slave id {to} {reserved[to]}", param="to")
         return None
 
-    async def perform(self, slave: SlaveConfig, to: int, asked: CommandRecord, *, dry_run: bool) -> Result:
-        """Give a sensor another slave id, verified; see `lfs10d.reconfiguration.procedures.readdress`."""
-        physical = self._physical
-        now = physical.running()
+    async def perform(self, slave: SlaveConfig, to: int, command: CommandRecord, *, dry_run: bool) -> Result:
+        """Give a sensor another slave id, verified; see `lfs10d.reconfiguration.procedures.readdress`.
+
+        No open change of its id is followed meanwhile.
+        """
+        runner = self._runner
+        now = runner.running()
         profile, rate = now.loaded.profiles[slave.profile], now.config.line.baudrate
         rates = tuple(profile.baudrate.codes) if profile.baudrate else ()
         wish = ReaddressWish(Endpoint(slave=slave.id, baudrate=rate), to, rates, dry_run)
-        physical.leave(physical.changes_of(slave.name))
         clock = ProcedureClock()
-        talk = physical.talk()
-        steps = readdress(wish, physical.asking(slave, clock), physical.wire().echo_known)
-        talk.begin(steps, clock, line_rate=rate, excludes=frozenset({slave.id, to}))
+        run = runner.new_run()
+        steps = readdress(wish, runner.query(slave, clock), runner.wire().echo_known)
+        run.begin(steps, clock, line_rate=rate, excludes=frozenset({slave.id, to}))
 
-        def intend(write: IdWrite) -> OpenChange:
+        def intend(write: IdWrite) -> OpenReaddress:
             move = Move(device=slave.name, old=write.old, new=write.new, register_before=write.register_before)
-            return physical.journal.intend("readdress", (move,), physical.now().ts(), asked)
+            return runner.journal.intend(OpenReaddress(moves=(move,), begun=runner.timestamp(), asked=command))
 
-        async def conclude(result: Any, change: OpenChange | None) -> Result:  # noqa: ANN401 - a course's
-            verdict = result or ReaddressReport(ReaddressEnding.LOST_BEFORE)
-            return await self._conclude(slave.name, wish, verdict, change, asked, profile)
+        async def conclude(report: ReaddressReport | None, change: OpenReaddress | None) -> Result:
+            report = report or ReaddressReport(ReaddressEnding.LOST_BEFORE)
+            return await self._conclude(slave.name, wish, report, change, command, profile)
 
-        return await physical.carried_out(talk, asked, intend, conclude)
+        return await runner.perform(run, command, intend, conclude)
 
     async def _conclude(
         self,
         device: str,
         wish: ReaddressWish,
-        verdict: ReaddressReport,
-        change: OpenChange | None,
-        asked: CommandRecord,
+        report: ReaddressReport,
+        change: OpenReaddress | None,
+        command: CommandRecord,
         profile: Profile,
     ) -> Result:
-        """Put on the disk what came of it; return the answer."""
-        physical = self._physical
-        journal = physical.journal
-        answer = readdress_answers.readdressed(device, wish, verdict, profile)
-        if verdict.ending is ReaddressEnding.TWINS:
-            self.tell_duplicate(device, wish.old, wish.old)
-        if change is None or verdict.ending in NOTHING_WRITTEN:
-            return await physical.refused(asked, answer)
-        told = physical.told(asked, answer)
+        """Put on the disk what came of it; return the result."""
+        runner = self._runner
+        result = readdress_answers.result(device, wish, report, profile)
+        if report.ending is ReaddressEnding.TWINS:
+            runner.announce_duplicate(device, wish.old.slave, wish.old.slave)
+        if change is None or report.ending in NOTHING_WRITTEN:
+            return await runner.refuse(command, result)
         try:
-            if verdict.ending is ReaddressEnding.MOVED:
-                await physical.record(device, wish.new)
-                await physical.close(physical.changes_of(device), change, told)
-                self.tell_moved(device, wish.old, wish.new)
-            elif verdict.stays_open:
-                if verdict.ending is ReaddressEnding.PENDING:
-                    await physical.close(physical.changes_of(device) - {change.number}, change, None)
-                await physical.put(partial(journal.keep, change.number, told))
-            else:
-                await physical.put(partial(journal.close, frozenset({change.number}), told))
+            await self._save(device, wish, report, change, runner.record(command, result))
         except StateError as error:
-            if verdict.ending is ReaddressEnding.MOVED:
-                message = f"{device} answers at slave id {wish.to} now, but that cannot be kept: {error}"
-                return failed("storage_full", message, data=answer.data)
+            if report.ending is ReaddressEnding.MOVED:
+                message = f"{device} answers at slave id {wish.to} now, but that cannot be saved: {error}"
+                return failed("storage_full", message, data=result.data)
             log.warning("%s", error)
-        if verdict.ending in (ReaddressEnding.BOTH, ReaddressEnding.GARBAGE):
-            self.tell_duplicate(device, wish.old, wish.new)
-        return answer
+        if report.ending in (ReaddressEnding.BOTH, ReaddressEnding.GARBAGE):
+            runner.announce_duplicate(device, wish.new.slave, wish.old.slave)
+        return result
 
-    def tell_moved(self, device: str, old: Endpoint, new: Endpoint) -> None:
-        """Tell that a sensor has another slave id now."""
-        self._physical.tell("readdressed", {"device": device, "from": old.slave, "to": new.slave})
-
-    def tell_duplicate(self, device: str, old: Endpoint, new: Endpoint) -> None:
-        """Tell that two sensors have one slave id, or had."""
-        self._physical.tell("duplicate_id", {"device": device, "slave": new.slave, "from": old.slave})
+    async def _save(
+        self,
+        device: str,
+        wish: ReaddressWish,
+        report: ReaddressReport,
+        change: OpenReaddress,
+        record: ResultRecord | None,
+    ) -> None:
+        """Put on the disk where the sensor is, or that it is still to be found."""
+        runner = self._runner
+        if report.ending is ReaddressEnding.MOVED:
+            await runner.save_endpoint(device, wish.new)
+            await runner.close(runner.id_changes_of(device), change, record)
+            runner.announce_readdressed(device, wish.old.slave, wish.new.slave)
+        elif report.stays_open:
+            if report.ending is ReaddressEnding.PENDING:
+                await runner.close(runner.id_changes_of(device) - {change.number}, change, None)
+            await runner.journalled(partial(runner.journal.keep, change.number, record))
+        else:
+            await runner.journalled(partial(runner.journal.close, frozenset({change.number}), record))

@@ -12,7 +12,7 @@ from lfs10d.command import ErrorCode, Result, failed, ok, rejected
 from lfs10d.profiles.profile import Profile
 from lfs10d.reconfiguration.procedures.readdress import NOTHING_WRITTEN, ReaddressEnding, ReaddressReport, ReaddressWish
 
-_READDRESSED: Mapping[ReaddressEnding, tuple[ErrorCode, str]] = {
+_ERRORS: Mapping[ReaddressEnding, tuple[ErrorCode, str]] = {
     ReaddressEnding.TAKEN: (
         "address_in_use",
         (
@@ -83,24 +83,24 @@ _READDRESSED: Mapping[ReaddressEnding, tuple[ErrorCode, str]] = {
 }
 
 
-def readdressed(device: str, wish: ReaddressWish, verdict: ReaddressReport, profile: Profile) -> Result:
-    """Return the answer to `device/readdress`."""
+def result(device: str, wish: ReaddressWish, report: ReaddressReport, profile: Profile) -> Result:
+    """Return the result of `device/readdress`."""
     data: dict[str, Any] = {"device": device, "from": wish.old.slave, "to": wish.to}
-    if verdict.ending is ReaddressEnding.MOVED:
+    if report.ending is ReaddressEnding.MOVED:
         return ok(data)
-    if verdict.ending is ReaddressEnding.FREE:
+    if report.ending is ReaddressEnding.FREE:
         return ok({**data, "dry_run": True})
-    code, text = _READDRESSED[verdict.ending]
+    code, text = _ERRORS[report.ending]
     message = text.format(
         device=device,
         old=wish.old.slave,
         to=wish.to,
-        at=verdict.at,
-        why=verdict.why,
-        refusal="" if verdict.exception is None else f" (exception {verdict.exception:02X})",
+        at=report.at,
+        why=report.why,
+        refusal="" if report.exception is None else f" (exception {report.exception:02X})",
         lock=(profile.slave_id and profile.slave_id.locked_by) or "address switch",
     )
-    facts: dict[str, Any] = {} if verdict.exception is None else {"exception_code": verdict.exception}
-    if verdict.ending in NOTHING_WRITTEN:
+    facts: dict[str, Any] = {} if report.exception is None else {"exception_code": report.exception}
+    if report.ending in NOTHING_WRITTEN:
         return rejected(code, message, param="to" if code == "address_in_use" else None, **facts)
     return failed(code, message, data=data, **facts)

@@ -12,7 +12,7 @@ from lfs10d.config.changes_file import ChangesFile
 from lfs10d.daemon import boot
 from lfs10d.errors import ConfigError, Problem
 from lfs10d.profiles.library import parse_profile
-from lfs10d.reconfiguration.journal import FILE_NAME, Endpoint, Journal, Move
+from lfs10d.reconfiguration.journal import FILE_NAME, Endpoint, Journal, Move, OpenReaddress
 from lfs10d.system.disk import Disk
 from tests.support.volatile_disk import ForgetfulFiles
 
@@ -85,7 +85,7 @@ def test_any_journal_is_read_or_put_aside_and_the_next_intent_is_kept(content: b
     trouble = journal.take()
     assert trouble is None or trouble.isprintable()
     opened = journal.open
-    change = journal.intend("readdress", (Move(device="a", old=SPOT, new=SPOT),), 5, None)
+    change = journal.intend(OpenReaddress(moves=(Move(device="a", old=SPOT, new=SPOT),), begun=5))
     files.power_cut()
     again = Journal(STATE, Disk(files))
     assert again.take() is None

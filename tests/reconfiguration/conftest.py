@@ -22,7 +22,7 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
         del name
         return call()
 
-    for module in ("reconfiguration.reconfiguration", "config.live_config", "commands.handlers.device"):
+    for module in ("reconfiguration.runner", "config.live_config", "commands.handlers.device"):
         monkeypatch.setattr(f"lfs10d.{module}.run_in_thread", at_once)
     loop = Loop()
     loop.set_exception_handler(_mistake)

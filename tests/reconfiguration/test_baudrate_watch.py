@@ -16,7 +16,7 @@ def looking_out(bench: Bench, life: Life) -> list[str | None]:
     async def begin() -> None:
         BaudrateWatch(
             running=lambda: life.running.now,
-            talk=life.physical.talk,
+            new_run=life.physical.new_run,
             devices=lambda: tuple(life.poller.schedule.devices.values()),
             tell=told.append,
         ).begin()

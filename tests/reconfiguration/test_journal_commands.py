@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lfs10d.command import Command, Result, failed, ok, rejected
-from lfs10d.reconfiguration.journal import answer_of, asked_by, call_of, told
+from lfs10d.reconfiguration.journal import command_of, command_record, result_of, result_record
 
 KEYS = st.none() | st.text(max_size=64) | st.integers()
 CALLS = st.builds(
@@ -16,9 +16,9 @@ CALLS = st.builds(
 
 @given(CALLS)
 def test_a_request_comes_back_as_it_was(call: Command) -> None:
-    asked = asked_by("device/readdress", call)
-    assert (asked.name, asked.key) == ("device/readdress", call.key)
-    assert call_of(asked) == call
+    record = command_record("device/readdress", call)
+    assert (record.name, record.key) == ("device/readdress", call.key)
+    assert command_of(record) == call
 
 
 @given(
@@ -27,12 +27,12 @@ def test_a_request_comes_back_as_it_was(call: Command) -> None:
     )
 )
 def test_an_answer_comes_back_as_it_was(answer: Result) -> None:
-    kept = told(asked_by("x", Command("a")), answer, 5)
+    kept = result_record(command_record("x", Command("a")), answer, 5)
     assert kept is not None
     assert kept.at == 5
-    again = answer_of(kept)
+    again = result_of(kept)
     assert (again.status, again.data, again.error()) == (answer.status, answer.data, answer.error())
 
 
 def test_an_answer_that_nobody_asked_for_is_not_kept() -> None:
-    assert told(None, ok(), 5) is None
+    assert result_record(None, ok(), 5) is None

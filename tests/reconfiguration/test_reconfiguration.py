@@ -9,6 +9,7 @@ from contextlib import ExitStack
 import pytest
 
 from lfs10d.command import RefusedError
+from lfs10d.reconfiguration.runner import REFUSALS_SAVED_AFTER
 from tests.support.lives import Bench
 
 
@@ -42,7 +43,7 @@ def test_a_request_refused_without_asking_the_line_is_answered_alike_in_the_next
     life = bench.sensors(3, 4)
     bench.go(life, 2.0)
     life.request(name, id="x", **parameters)
-    bench.turn(life)
+    bench.go(life, REFUSALS_SAVED_AFTER + 1.0)
     bench.cut()
     life = bench.begin()
     bench.line.sensors.clear()

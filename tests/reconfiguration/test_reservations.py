@@ -5,12 +5,11 @@ from __future__ import annotations
 import pytest
 
 from lfs10d.command import RefusedError
-from lfs10d.reconfiguration.journal import Endpoint, Move, OpenChange
+from lfs10d.reconfiguration.journal import Endpoint, Move, OpenReaddress
 from lfs10d.reconfiguration.reservations import Reservations
 
-OPEN = OpenChange(
+OPEN = OpenReaddress(
     number=1,
-    kind="readdress",
     moves=(Move(device="north", old=Endpoint(slave=3, baudrate=9600), new=Endpoint(slave=9, baudrate=9600)),),
     begun=0,
 )
