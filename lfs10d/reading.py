@@ -119,7 +119,7 @@ class Exchanged:
     began: float | None
     gap: float | None
     slave: int
-    errand: Purpose
+    purpose: Purpose
     fault: FaultCode | None
     sent: bytes
     heard: bytes

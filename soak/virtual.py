@@ -116,9 +116,11 @@ class DaemonInMemory:
         self._told = False
         self.mistakes: list[str] = []
         """What ended by a mistake in the loop."""
-        schedule = Scheduler(timing_of(config.line), 0.0)
-        schedule.replace(device_specs(config, profiles), poll_rules(config.poll), 0.0)
-        self.poller = Poller(Bus(self.port, line_rules(config.line), self.clock), schedule, self._take_over, self.clock)
+        scheduler = Scheduler(timing_of(config.line), 0.0)
+        scheduler.replace(device_specs(config, profiles), poll_rules(config.poll), 0.0)
+        self.poller = Poller(
+            Bus(self.port, line_rules(config.line), self.clock), scheduler, self._take_over, self.clock
+        )
         facts = DaemonInfo("0", "soak", boot, None, config_hash(config))
         devices = device_facts(config, profiles)
         self._station = Station(facts, line_facts(config.line), devices, self.now())

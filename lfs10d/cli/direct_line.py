@@ -37,8 +37,8 @@ class DirectLine:
         self._told: SimpleQueue[_Told] = SimpleQueue()
         self._first: UartCounters | None = None
         self._bus = Bus(SerialPort(settings), LineRules(), time.monotonic)
-        schedule = Scheduler(self._bus.line_timing, time.monotonic())
-        self._poller = Poller(self._bus, schedule, self._take, time.monotonic)
+        scheduler = Scheduler(self._bus.line_timing, time.monotonic())
+        self._poller = Poller(self._bus, scheduler, self._take, time.monotonic)
         self._thread = LineThread(self._poller, prepare=_prepare, failed=self._told.put)
 
     def __enter__(self) -> Self:

@@ -122,7 +122,7 @@ class _ReadOptions:
 
     @property
     def spec(self) -> DeviceSpec:
-        """The device for the schedule."""
+        """The device for the scheduler."""
         interval = self.interval if self.watch else AT_ONCE
         return DeviceSpec(
             name=f"slave-{self.slave}",

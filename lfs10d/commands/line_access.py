@@ -195,7 +195,7 @@ class LineAccess:
                 lambda over: Access(
                     target,
                     what,
-                    unanswered=poller.schedule.unanswered,
+                    pending=poller.scheduler.pending,
                     echo_known=lambda: poller.bus.echo is not Echo.UNKNOWN,
                     over=over,
                 )

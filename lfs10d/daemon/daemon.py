@@ -149,7 +149,7 @@ class Daemon:
         self._losing = BaudrateWatch(
             running=lambda: self._running.now,
             new_run=self._physical.new_run,
-            devices=lambda: tuple(self._line.poller.schedule.devices.values()),
+            devices=lambda: tuple(self._line.poller.scheduler.devices.values()),
             tell=self._told_lost,
         )
         self._line = Line(config.line)
@@ -158,7 +158,7 @@ class Daemon:
             recalling = Restore(
                 running=lambda: self._running.now,
                 learn=self._learn,
-                devices=lambda: tuple(self._line.poller.schedule.devices.values()),
+                devices=lambda: tuple(self._line.poller.scheduler.devices.values()),
                 tell=self._powers.tell,
             )
             self._uplink.read_back(recalling.wanted, recalling.take)

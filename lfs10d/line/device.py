@@ -100,7 +100,7 @@ class PollRules:
 
 
 class ResponseTimes:
-    """The last answers' turnarounds in s (last bit of the request to first byte of the answer) and their p99."""
+    """The last answers' response_times in s (last bit of the request to first byte of the answer) and their p99."""
 
     def __init__(self) -> None:
         self._last: deque[float] = deque(maxlen=LEARNED_FROM)
@@ -126,7 +126,7 @@ class Device:
     """One configured slave at run time.
 
     `due` is its next point of the grid, `overruns` counts the points missed since its last reading. `queued`: it
-    waits in the schedule's queue; `polling`: a poll or probe of it is under way. `polled_at` is when its last poll
+    waits in the scheduler's queue; `polling`: a poll or probe of it is under way. `polled_at` is when its last poll
     was begun, whoever wanted it. `silent`: its last poll failed without an answer, good or bad. `start_polls` are left
     of those that are made at once, the next one at `again_at`; `hurried`: many are silent, none is waited for long.
     """
@@ -145,7 +145,7 @@ class Device:
     probe_exempt: bool = False
     queued: bool = False
     polling: bool = False
-    turnarounds: ResponseTimes = field(default_factory=ResponseTimes)
+    response_times: ResponseTimes = field(default_factory=ResponseTimes)
     gap: RequestGap = field(default_factory=RequestGap)
     polled_at: float = float("-inf")
     silent: bool = False
@@ -178,18 +178,18 @@ class Device:
         """How long its next poll waits for the first byte of an answer, in s (rules 4 and 5)."""
         if self.spec.response_timeout is not None:
             return self.spec.response_timeout
-        p99 = self.turnarounds.p99
+        p99 = self.response_times.p99
         if p99 is None:
             if self.hurried or (self.failures and not self.silent):
                 return FIRST_TIMEOUTS[0]
             return FIRST_TIMEOUTS[min(self.failures, len(FIRST_TIMEOUTS) - 1)]
-        least = LEARNED_LEAST if len(self.turnarounds) >= CONFIDENT_FROM else FIRST_TIMEOUTS[0]
+        least = LEARNED_LEAST if len(self.response_times) >= CONFIDENT_FROM else FIRST_TIMEOUTS[0]
         return min(max(2 * p99 + LEARNED_MARGIN, least), LEARNED_MOST)
 
     @property
     def patience(self) -> float | None:
         """How long after a request bytes may come that begin its answer, in s, where that is known."""
-        p99 = self.turnarounds.p99
+        p99 = self.response_times.p99
         if p99 is None and self.failures and not self.silent:
             return BAD_ANSWER_PATIENCE
         return p99
@@ -203,7 +203,7 @@ class Device:
             return PROBE_TIMEOUT if self.probe_exempt else self.timeout
         if self.probes % PATIENT_PROBE_EVERY == PATIENT_PROBE_EVERY - 1:
             return LEARNED_MOST
-        return PROBE_TIMEOUT if self.turnarounds.p99 is None else max(PROBE_TIMEOUT, self.timeout)
+        return PROBE_TIMEOUT if self.response_times.p99 is None else max(PROBE_TIMEOUT, self.timeout)
 
     @property
     def retries(self) -> int:

@@ -45,7 +45,7 @@ class JobQueue:
         else:
             self._waiting.append(job)
 
-    def go_on(self, job: Job) -> None:
+    def continue_slice(self, job: Job) -> None:
         """Let a job have the line next, before all others and whatever its share: its slice goes on."""
         self._waiting.insert(0, job)
         self._slice = job

@@ -1,4 +1,4 @@
-"""The line as the daemon holds it: port, bus, schedule and poller, and the thread that owns them.
+"""The line as the daemon holds it: port, bus, scheduler and poller, and the thread that owns them.
 
 What the thread hears is taken over to the asyncio loop by one `call_soon_threadsafe` per exchange.
 """
@@ -50,8 +50,8 @@ class Line:
     def __init__(self, line: LineConfig) -> None:
         self.port = SerialPort(port_settings(line))
         bus = Bus(self.port, line_rules(line), time.monotonic)
-        schedule = Scheduler(timing_of(line), time.monotonic())
-        self.poller = Poller(bus, schedule, self._take_over, time.monotonic)
+        scheduler = Scheduler(timing_of(line), time.monotonic())
+        self.poller = Poller(bus, scheduler, self._take_over, time.monotonic)
         self._realtime = line.realtime
         self._events: LineEvents
         """Given at the start."""
@@ -88,12 +88,12 @@ class Line:
         self.poller.submit(job)
         self.wake()
 
-    def go_on(self, course: Procedure, answer: object) -> None:
+    def resume_procedure(self, procedure: Procedure, result: object) -> None:
         """Tell a course what came of what it had done aside."""
 
         def tell(now: float) -> None:
-            course.go_on(answer)
-            self.poller.schedule.wake(course, now)
+            procedure.resume(result)
+            self.poller.scheduler.wake(procedure, now)
 
         self.poller.post(tell)
         self.wake()
@@ -120,9 +120,9 @@ class Line:
         self.wake()
 
     @property
-    def unanswered(self) -> PendingRequests:
+    def pending(self) -> PendingRequests:
         """Which requests may still be answered; for jobs, in the line's thread."""
-        return self.poller.schedule.unanswered
+        return self.poller.scheduler.pending
 
     def echo_known(self) -> bool:
         """Whether it is known how the adapter echoes: before that nothing is written."""

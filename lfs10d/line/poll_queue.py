@@ -40,8 +40,8 @@ def spread(devices: Iterable[Device], *, polled: int, wire_time: float, now: flo
 class PollQueue:
     """The devices waiting for their poll and the polls waiting for their next exchange."""
 
-    def __init__(self, unanswered: PendingRequests) -> None:
-        self._unanswered = unanswered
+    def __init__(self, pending: PendingRequests) -> None:
+        self._pending = pending
         self._due: list[tuple[float, int, Device | Poll]] = []
         self._flat: deque[Device] = deque()
         self._turn = 0
@@ -123,7 +123,7 @@ class PollQueue:
             device.due = due + (missed + 1) * interval
         device.polling = True
         device.last_asked = now
-        return Poll(device, self._unanswered, due=due, errand=Purpose.POLL)
+        return Poll(device, self._pending, due=due, purpose=Purpose.POLL)
 
     def _push(self, key: float, entry: Device | Poll) -> None:
         self._turn += 1

@@ -1,4 +1,4 @@
-"""The body of the line thread: the schedule decides, the bus obeys, what was heard goes out as events.
+"""The body of the line thread: the scheduler decides, the bus obeys, what was heard goes out as events.
 
 `Poller.turn` is called with a time and says when to come back: by `LineThread` with the real clock, by tests with a
 virtual one. Other threads only `post`.
@@ -34,14 +34,14 @@ Sink: TypeAlias = "Callable[[list[Event]], None]"
 class Poller:
     """One line. `sink` takes what was heard, at most once per exchange; `clock` is the bus's."""
 
-    def __init__(self, bus: Bus, schedule: Scheduler, sink: Sink, clock: Callable[[], float]) -> None:
+    def __init__(self, bus: Bus, scheduler: Scheduler, sink: Sink, clock: Callable[[], float]) -> None:
         self.bus = bus
-        self.schedule = schedule
+        self.scheduler = scheduler
         self._sink = sink
         self._clock = clock
         self._posted: deque[Callable[[float], None]] = deque()
         self._events: list[Event] = []
-        self._errand = Purpose.POLL
+        self._purpose = Purpose.POLL
         self._paused = False
         self._count_at = clock()
         self._first_counters: UartCounters | None = None
@@ -55,26 +55,26 @@ class Poller:
 
     def submit(self, job: Job) -> None:
         """Have `job` done on the line."""
-        self.post(lambda now: self._events.extend(self.schedule.submit(job, now)))
+        self.post(lambda now: self._events.extend(self.scheduler.submit(job, now)))
 
     def wake(self, job: Job) -> None:
         """End the rest of `job`."""
-        self.post(lambda now: self.schedule.wake(job, now))
+        self.post(lambda now: self.scheduler.wake(job, now))
 
     def read(self, device: str, request: int) -> None:
         """Have a device polled now for a request, whose number comes back with the reading; none for an unknown one."""
         self.post(lambda now: self._read(device, request, now))
 
     def _read(self, name: str, request: int, now: float) -> None:
-        device = self.schedule.devices.get(name)
+        device = self.scheduler.devices.get(name)
         if device is not None:
-            poll = Poll(device, self.schedule.unanswered, due=now, errand=Purpose.REQUEST, request=request)
-            self._events += self.schedule.submit(poll, now)
+            poll = Poll(device, self.scheduler.pending, due=now, purpose=Purpose.REQUEST, request=request)
+            self._events += self.scheduler.submit(poll, now)
 
     def replace(self, specs: Iterable[DeviceSpec], rules: PollRules) -> None:
         """Poll these devices from now on."""
         devices = tuple(specs)
-        self.post(lambda now: self.schedule.replace(devices, rules, now))
+        self.post(lambda now: self.scheduler.replace(devices, rules, now))
 
     def reconfigure(self, settings: PortSettings, rules: LineRules) -> None:
         """Speak by other settings from now on; another path closes the port and opens that one."""
@@ -82,7 +82,7 @@ class Poller:
 
     def _reconfigure(self, settings: PortSettings, rules: LineRules, now: float) -> None:
         self.bus.reconfigure(settings, rules, now)
-        self.schedule.retime(self.bus.line_timing)
+        self.scheduler.retime(self.bus.line_timing)
 
     def pause(self, freed: Callable[[], None]) -> None:
         """Give the port back after the exchange under way, until `resume`; `freed()` is called in the line thread."""
@@ -128,7 +128,7 @@ class Poller:
             return self._reopen(now)
         resting = None
         if self.bus.idle:
-            decision = self.schedule.next(now)
+            decision = self.scheduler.next(now)
             if isinstance(decision, Rest):
                 resting = decision
             else:
@@ -136,7 +136,7 @@ class Poller:
         step = self.bus.step(now, readable=readable)
         if self.bus.strays:
             strays, self.bus.strays = self.bus.strays, []
-            self._events += self.schedule.overheard(strays)
+            self._events += self.scheduler.on_strays(strays)
         if isinstance(step, PortChanged):
             self._port_changed(step)
             return None
@@ -156,21 +156,21 @@ class Poller:
         return None
 
     def _ask(self, ask: Ask) -> None:
-        self._errand = self.schedule.errand
+        self._purpose = self.scheduler.purpose
         order = Order(
             ask.request,
             ask.codec,
             ask.timeout,
             ask.patience,
             ask.baudrate,
-            self.schedule.unanswered.earlier(ask.request.slave),
-            self.schedule.unanswered.everybodys,
+            self.scheduler.pending.earlier(ask.request.slave),
+            self.scheduler.pending.by_slave,
         )
         self.bus.ask(order)
 
     def _settled(self, outcome: Outcome) -> None:
         now = self._clock()
-        readings = self.schedule.settled(outcome, now)
+        readings = self.scheduler.on_outcome(outcome, now)
         stray, self.bus.unsolicited = self.bus.unsolicited, 0
         self._events.append(
             Exchanged(
@@ -179,7 +179,7 @@ class Poller:
                 began=outcome.began,
                 gap=outcome.gap,
                 slave=outcome.request.slave,
-                errand=self._errand,
+                purpose=self._purpose,
                 fault=None if outcome.fault is None else outcome.fault.code,
                 sent=outcome.sent,
                 heard=outcome.heard,
@@ -188,18 +188,18 @@ class Poller:
             )
         )
         self._events += readings
-        self._events += self.schedule.answered(outcome)
+        self._events += self.scheduler.on_answer(outcome)
         if outcome.strays:
-            self._events += self.schedule.overheard(outcome.strays, outcome)
+            self._events += self.scheduler.on_strays(outcome.strays, outcome)
 
     def _port_changed(self, changed: PortChanged) -> None:
         self._events.append(changed)
         if changed.fault is None:
             self._first_counters, self._counted_before = None, self._counted  # another adapter begins at 0
             self._count_at = changed.at
-            self.schedule.port_opened(changed.at)
+            self.scheduler.on_port_opened(changed.at)
         else:
-            self._events += self.schedule.port_lost(changed.fault, changed.at)
+            self._events += self.scheduler.on_port_lost(changed.fault, changed.at)
 
     def _count(self, now: float) -> None:
         """Read the driver's counters now and then."""

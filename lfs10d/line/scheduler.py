@@ -55,19 +55,19 @@ Decision: TypeAlias = Ask | Rest
 class Scheduler:
     """The devices of one line and the jobs on it; `now` is the line's clock at the beginning.
 
-    `timing` is that of the line's own rate. The port counts as open until `port_lost`.
+    `timing` is that of the line's own rate. The port counts as open until `on_port_lost`.
     """
 
     def __init__(self, timing: LineTiming, now: float) -> None:
         self.timing = timing
-        self.unanswered = PendingRequests()
+        self.pending = PendingRequests()
         self.devices: dict[str, Device] = {}
         self._by_slave: dict[int, Device] = {}
         self._overhearing = Overhearing()
-        self._polls = PollQueue(self.unanswered)
+        self._polls = PollQueue(self.pending)
         self._probing = Probing(now)
         self._jobs = JobQueue()
-        self._toll = Surcharge()
+        self._surcharge = Surcharge()
         self._current: tuple[Job, Ask] | None = None
         self._silent: int | None = None
         self._lost: Fault | None = None
@@ -99,7 +99,7 @@ class Scheduler:
         self._by_slave = {device.slave: device for device in self.devices.values()}
         self._overhearing.listen_to({device.slave: device.spec.codec for device in self.devices.values()})
         for device in fresh:
-            self.unanswered.duplicates.forget(device.slave)
+            self.pending.duplicates.forget(device.slave)
         for job in self._jobs.drop(lambda job: isinstance(job, Poll) and not self._wanted(job)):
             job.cut_off(now)
         self._requeue(fresh, now)
@@ -123,7 +123,7 @@ class Scheduler:
     def _wanted(self, poll: Poll) -> bool:
         """Whether the reading of this poll is of any use (rule 5)."""
         device = poll.device
-        useful = device.spec.enabled or poll.errand is Purpose.REQUEST
+        useful = device.spec.enabled or poll.purpose is Purpose.REQUEST
         return useful and self.devices.get(device.name) is device
 
     # -- jobs
@@ -133,7 +133,7 @@ class Scheduler:
         wanted = not isinstance(job, Poll) or self._wanted(job)
         lost = self._lost
         if wanted and lost is None:
-            probes = job.errand is Purpose.PROBE
+            probes = job.purpose is Purpose.PROBE
             self._jobs.submit(job, now, self._probing.account if probes else None)
             return []
         job.cut_off(now)
@@ -148,7 +148,7 @@ class Scheduler:
 
     # -- the port
 
-    def port_lost(self, fault: Fault, now: float) -> list[Reading]:
+    def on_port_lost(self, fault: Fault, now: float) -> list[Reading]:
         """Note that the port is lost: one reading per device that is or was asked to be polled; every job is over.
 
         While it is lost already only the reason is noted.
@@ -161,7 +161,7 @@ class Scheduler:
             job, ask = self._current
             self._jobs.over(job)
             jobs.append(job)
-            self.unanswered.abandoned(ask.request, ask.codec, ask.timeout, now)
+            self.pending.abandoned(ask.request, ask.codec, ask.timeout, now)
             self._rests.abandoned(ask.request.slave, now)
         for job in jobs:
             job.cut_off(now)
@@ -172,7 +172,7 @@ class Scheduler:
         for device in self.devices.values():
             device.cut_off()
         polls = [job for job in jobs if isinstance(job, Poll) and self._wanted(job)]
-        wanted = {poll.device.name for poll in polls if poll.errand is Purpose.REQUEST}
+        wanted = {poll.device.name for poll in polls if poll.purpose is Purpose.REQUEST}
         told = [device for device in self.devices.values() if device.spec.enabled or device.name in wanted]
         return [tell_lost(device, fault, now, polls) for device in told]
 
@@ -180,13 +180,13 @@ class Scheduler:
         """Take the times of the line's new rate; what was learned at another rate is forgotten."""
         if timing.baudrate != self.timing.baudrate:
             for device in self.devices.values():
-                device.turnarounds.forget()
+                device.response_times.forget()
         self.timing = timing
 
-    def port_opened(self, now: float) -> None:
+    def on_port_opened(self, now: float) -> None:
         """Note that the port is open: every device is due at once."""
         self._lost = None
-        self.unanswered.duplicates.forget()
+        self.pending.duplicates.forget()
         for device in self.devices.values():
             device.reconnected()
         self._requeue(list(self.devices.values()), now)
@@ -194,7 +194,7 @@ class Scheduler:
     # -- who speaks next
 
     def next(self, now: float) -> Decision:
-        """Decide who speaks next; the outcome of an `Ask` must come back through `settled`."""
+        """Decide who speaks next; the outcome of an `Ask` must come back through `on_outcome`."""
         for job in self._jobs.released(now):
             self._resume(job, now)
         while (chosen := self._choose(now)) is not None:
@@ -204,7 +204,7 @@ class Scheduler:
                 if until <= now:
                     self._begin(chosen, decision, now)
                     return decision
-                self._toll.released()
+                self._surcharge.released()
                 decision = Hold(until)
             if isinstance(decision, Hold):
                 self._jobs.hold(chosen, decision)
@@ -231,27 +231,27 @@ class Scheduler:
             return None
         device.polling = True
         device.last_asked = now
-        return Poll(device, self.unanswered, due=now, errand=Purpose.PROBE)
+        return Poll(device, self.pending, due=now, purpose=Purpose.PROBE)
 
     def _resume(self, job: Job, key: float) -> None:
-        if isinstance(job, Poll) and job.errand is Purpose.POLL:
+        if isinstance(job, Poll) and job.purpose is Purpose.POLL:
             self._polls.resume(job, key)
         else:
             self._jobs.resume(job)
 
     @property
-    def errand(self) -> Purpose:
+    def purpose(self) -> Purpose:
         """What the exchange on the line is for."""
-        return self._current[0].errand if self._current else Purpose.POLL
+        return self._current[0].purpose if self._current else Purpose.POLL
 
     # -- what came of it
 
-    def settled(self, outcome: Outcome, now: float) -> list[Reading]:
+    def on_outcome(self, outcome: Outcome, now: float) -> list[Reading]:
         """Take the outcome of the last `Ask`; return the reading of a poll or probe that is over by it."""
         if self._current is None:
             raise RuntimeError("an outcome without an Ask")
         (job, ask), self._current = self._current, None
-        self.unanswered.settled(outcome, ask.codec, ask.timeout, now)
+        self.pending.on_outcome(outcome, ask.codec, ask.timeout, now)
         self._learn(outcome)
         widened = self._rests.learn(outcome, ask, self._by_slave, line_rate=self.timing.baudrate)
         self._spend(job, outcome, now)
@@ -259,9 +259,9 @@ class Scheduler:
         if isinstance(job, Poll) and self._wanted(job) and (widened or (ignored and self._benefits(job.device))):
             self._jobs.resume(job)
             return []
-        following = job.heard(outcome, now)
+        following = job.on_outcome(outcome, now)
         if not isinstance(following, Continue):
-            self._toll.released()
+            self._surcharge.released()
         if isinstance(job, Poll) and not self._wanted(job):
             job.cut_off(now)
             return []
@@ -269,12 +269,12 @@ class Scheduler:
             self._resume(job, following.key)
             return []
         if isinstance(following, Continue):
-            self._jobs.go_on(job)
+            self._jobs.continue_slice(job)
             return []
         self._jobs.over(job)
         return [self._finish(job, now)] if isinstance(job, Poll) else []
 
-    def answered(self, outcome: Outcome) -> list[AnsweredTwice]:
+    def on_answer(self, outcome: Outcome) -> list[AnsweredTwice]:
         """Take an outcome that is settled: a second answer may follow it, or none does any more."""
         device = self._by_slave.get(outcome.request.slave)
         if device is None or outcome.answer is None:
@@ -283,10 +283,10 @@ class Scheduler:
         asked = (
             None if barrier is None else ReadRegisters(device.slave, barrier.register, barrier.count, barrier.function)
         )
-        ended = self.unanswered.duplicates.answered(device.slave, outcome.ended, barrier=request == asked)
+        ended = self.pending.duplicates.answered(device.slave, outcome.ended, barrier=request == asked)
         return [AnsweredTwice(outcome.ended, device.name, device.slave, None)] if ended else []
 
-    def overheard(self, strays: Iterable[tuple[bytes, float]], outcome: Outcome | None = None) -> list[AnsweredTwice]:
+    def on_strays(self, strays: Iterable[tuple[bytes, float]], outcome: Outcome | None = None) -> list[AnsweredTwice]:
         """Take what was heard and belongs to no exchange, or is left over by `outcome`, with the times of its pieces.
 
         A right frame of a slave that owes nothing is one answer too many.
@@ -296,13 +296,13 @@ class Scheduler:
         for frame in self._overhearing.hear(strays):
             codec = self._by_slave[frame.slave].spec.codec
             if frame.request is not None:
-                self.unanswered.asked_by_another(frame.request, codec, frame.at)
+                self.pending.asked_by_another(frame.request, codec, frame.at)
                 continue
             size, exception = codec.size(len(frame.body)), bool(frame.body[1] & EXCEPTION_FLAG)
-            owed = self.unanswered.overheard(frame.slave, size, exception=exception, now=frame.at)
+            owed = self.pending.overheard(frame.slave, size, exception=exception, now=frame.at)
             if owed or frame.slave == owing:
                 continue
-            twice = self.unanswered.duplicates.second(frame.slave, frame.at)
+            twice = self.pending.duplicates.second(frame.slave, frame.at)
             if twice is not None:
                 fault = Fault(FaultCode.DUPLICATE_ID, diagnosis.twice(twice), heard=codec.wrap(frame.body))
                 events.append(AnsweredTwice(frame.at, self._by_slave[frame.slave].name, frame.slave, fault))
@@ -328,17 +328,17 @@ class Scheduler:
             device = self._by_slave.get(late.request.slave)
             # What is later than any time-out says nothing of the usual time, and may be an older answer's.
             if device is not None and late.ours and late.latency <= LEARNED_MOST:
-                device.turnarounds.learn(late.latency)
+                device.response_times.learn(late.latency)
         if outcome.turnaround is not None and outcome.answer is not None:
             device = self._by_slave.get(outcome.request.slave)
             if device is not None:
-                device.turnarounds.learn(outcome.turnaround)
+                device.response_times.learn(outcome.turnaround)
 
     def _spend(self, job: Job, outcome: Outcome, now: float) -> None:
         taken = outcome.ended - outcome.asked + self.timing.gap
-        if isinstance(job, Poll) and job.errand is Purpose.PROBE:
+        if isinstance(job, Poll) and job.purpose is Purpose.PROBE:
             self._probing.spend(job.device, taken, now)
-        elif job.errand is Purpose.CHANGE:
+        elif job.purpose is Purpose.CHANGE:
             self._jobs.spend(job, self._charge(job, outcome), now)
         else:
             self._jobs.spend(job, taken, now)
@@ -349,7 +349,7 @@ class Scheduler:
         intervals = [each.spec.interval for each in others if each.slave not in job.excludes]
         wire_time = _wire_time(others[0], self.timing) if others else 0.0
         ended = outcome.ended + self.timing.gap
-        return self._toll.charge(job.share, outcome.asked, ended, intervals=intervals, wire_time=wire_time)
+        return self._surcharge.charge(job.share, outcome.asked, ended, intervals=intervals, wire_time=wire_time)
 
     def _finish(self, poll: Poll, now: float) -> Reading:
         device = poll.device
@@ -358,7 +358,7 @@ class Scheduler:
             device.answered()
         else:
             device.failed(poll.fault, now)
-        if poll.errand is not Purpose.REQUEST:
+        if poll.purpose is not Purpose.REQUEST:
             device.polling = False
         if (before is not Health.ONLINE and device.online) or (doubtful and not device.doubtful):
             back_on_grid(device, now)

@@ -56,7 +56,7 @@ def profile_codec(line: LineConfig, profile: Profile) -> Codec:
 
 
 def device_specs(config: Config, profiles: Mapping[str, Profile]) -> tuple[DeviceSpec, ...]:
-    """Return the devices for the schedule; `profiles` by the configuration's word for each."""
+    """Return the devices for the scheduler; `profiles` by the configuration's word for each."""
     return tuple(_device_spec(slave, config.line, profiles[slave.profile]) for slave in config.slaves)
 
 

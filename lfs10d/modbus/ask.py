@@ -19,7 +19,7 @@ class Ask:
     `timeout` (s) runs from the request's last bit to the answer's first byte; `patience` is the slave's learned
     p99 of it, None where it is not known. `baudrate` None means the line's own rate. `at_once`: nobody else is asked
     between the job's exchange before and this one, so that what comes late is received here. `request_gap` (s) is the
-    rest that the slave needs by what the job knows of it; the schedule keeps what it knows itself in any case.
+    rest that the slave needs by what the job knows of it; the scheduler keeps what it knows itself in any case.
     """
 
     request: Request

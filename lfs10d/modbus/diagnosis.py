@@ -111,8 +111,8 @@ def _asking(request: Request) -> str:
 def stranger(request: Request, codec: Codec, heard: bytes) -> Diagnosis | None:
     """Judge the nearest frame in `heard` that has a right check and is no answer to `request`; None without one."""
     size = codec.answer_size(request)
-    verdicts = [_judge(request, body) for _, _, body in codec.frames(heard, request.slave, size)]
-    return max(verdicts, key=_closeness, default=None)
+    diagnoses = [_judge(request, body) for _, _, body in codec.frames(heard, request.slave, size)]
+    return max(diagnoses, key=_closeness, default=None)
 
 
 def broken(heard: bytes, size: int, *, begun: bool) -> Diagnosis:

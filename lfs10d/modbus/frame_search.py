@@ -63,7 +63,7 @@ class FrameSearch:
         return self._base + len(self._stream)
 
     def feed(self, data: bytes, now: float) -> None:
-        """Add what was heard at `now`; call `seek` for every quarry before the next."""
+        """Add what was heard at `now`; call `seek` for every expected before the next."""
         if len(self._stream) > 2 * KEPT:
             self._forget(len(self._stream) - KEPT)
         self._stream += data
@@ -76,25 +76,25 @@ class FrameSearch:
         gone = bisect_right(self._mark_ends, self._base)
         del self._mark_ends[:gone], self._mark_times[:gone]
 
-    def seek(self, quarry: ExpectedFrame) -> FoundFrame | None:
+    def seek(self, expected: ExpectedFrame) -> FoundFrame | None:
         """Return the next right frame of this shape, or None; goes on behind it at the next call."""
-        head, size = quarry.shape.head, quarry.shape.size
-        quarry.partial = False
+        head, size = expected.shape.head, expected.shape.size
+        expected.partial = False
         while True:
-            at = self._stream.find(head, max(0, quarry.start - self._base))
+            at = self._stream.find(head, max(0, expected.start - self._base))
             if at < 0:
-                quarry.start = max(quarry.start, self.end - len(head) + 1)
+                expected.start = max(expected.start, self.end - len(head) + 1)
                 return None
-            quarry.begun = True
-            begin = quarry.start = self._base + at
+            expected.begun = True
+            begin = expected.start = self._base + at
             if begin + size > self.end:
-                quarry.partial = True
+                expected.partial = True
                 return None
-            body = quarry.codec.unwrap(bytes(self._stream[at : at + size]))
+            body = expected.codec.unwrap(bytes(self._stream[at : at + size]))
             if body is not None:
-                quarry.start = end = begin + size
+                expected.start = end = begin + size
                 return FoundFrame(body, begin, end, self._heard_at(begin), self._heard_at(end - 1))
-            quarry.start = begin + 1
+            expected.start = begin + 1
 
     def _heard_at(self, position: int) -> float:
         return self._mark_times[bisect_right(self._mark_ends, position)]
@@ -143,30 +143,30 @@ class FrameSearch:
         claimed = sum(max(0, end - max(begin, start)) for begin, end in self._claims)
         return self.end - start - claimed
 
-    def begins(self, quarry: ExpectedFrame) -> bool:
+    def begins(self, expected: ExpectedFrame) -> bool:
         """Whether bytes came that begin as this answer: its head, or enough of it at the very end."""
-        return quarry.begun or self._tail(quarry) >= quarry.shape.sign
+        return expected.begun or self._tail(expected) >= expected.shape.sign
 
-    def _tail(self, quarry: ExpectedFrame) -> int:
+    def _tail(self, expected: ExpectedFrame) -> int:
         """Return how many characters at the very end are the beginning of this answer's head."""
-        head = quarry.shape.head
-        for length in range(min(len(head), self.end - max(quarry.start, self._base)), 0, -1):
+        head = expected.shape.head
+        for length in range(min(len(head), self.end - max(expected.start, self._base)), 0, -1):
             if self._stream.endswith(head[:length]):
                 return length
         return 0
 
-    def missing(self, quarries: Iterable[ExpectedFrame]) -> int:
+    def missing(self, expected_frames: Iterable[ExpectedFrame]) -> int:
         """Return how many characters must still come before any of these can be whole; 0 if none has begun.
 
         Where one character fits several, the first of them is taken: an answer is likelier than a refusal, and
         a refusal noticed a few characters late costs less than a wake-up in every exchange.
         """
         fewest = 0
-        for quarry in quarries:
-            if quarry.partial:
-                lacking, length = quarry.start + quarry.shape.size - self.end, len(quarry.shape.head)
-            elif length := self._tail(quarry):
-                lacking = quarry.shape.size - length
+        for expected in expected_frames:
+            if expected.partial:
+                lacking, length = expected.start + expected.shape.size - self.end, len(expected.shape.head)
+            elif length := self._tail(expected):
+                lacking = expected.shape.size - length
             else:
                 continue
             if not fewest or (length > 1 and lacking < fewest):

@@ -5,7 +5,7 @@
     RTU     [ slave ][ function ][ data ... ][ check, 2 bytes ]           CRC low byte first, SUM high byte first
     ASCII   ":" [ the same bytes and the LRC as two hex digits each ] CR LF
 
-Whether a frame's check is right, and whether it answers a request, is decided here and in `hunt`, before
+Whether a frame's check is right, and whether it answers a request, is decided here and in `search`, before
 pymodbus sees it: its own framers lose a good frame behind one byte of noise and accept a wrong function.
 """
 

@@ -68,7 +68,7 @@ class PendingRequests:
         self.duplicates = Duplicates()
 
     @property
-    def everybodys(self) -> Mapping[int, tuple[Pending, ...]]:
+    def by_slave(self) -> Mapping[int, tuple[Pending, ...]]:
         """The requests of every slave id whose answers may still come, each slave's oldest first; a view."""
         return self._pending
 
@@ -131,7 +131,7 @@ class PendingRequests:
         if request.slave:
             self._remember(Pending(request, codec, now), lingers=now + max(2 * timeout, QUIET_LEAST))
 
-    def settled(self, outcome: Outcome, codec: Codec, timeout: float, now: float) -> None:
+    def on_outcome(self, outcome: Outcome, codec: Codec, timeout: float, now: float) -> None:
         """Learn from an exchange that is over at `now`; `timeout` in s is the one it had."""
         slave = outcome.request.slave
         for late in outcome.late:

@@ -39,10 +39,10 @@ class Reception:
         normal, exception = attempt.codec.shapes(attempt.request)
         self._attempt = attempt
         self._frame = frame
-        self._hunt = FrameSearch()
+        self._search = FrameSearch()
         self._normal = ExpectedFrame(attempt.codec, normal)
         self._exception = ExpectedFrame(attempt.codec, exception)
-        self._older = [older for pending in attempt.earlier for older in self._quarries_of(pending)]
+        self._older = [older for pending in attempt.earlier for older in self._expected_of(pending)]
         self._pending = list(attempt.earlier)
         self._held: list[tuple[bytes, float]] = []
         self._matched = self._missing = self._from = self._sent_at = self._early_end = 0
@@ -60,7 +60,7 @@ class Reception:
         self.late: list[LateAnswer] = []
         self.late_at = self.whole_at = -inf
 
-    def _quarries_of(self, pending: Pending) -> Iterator[tuple[Pending, ExpectedFrame]]:
+    def _expected_of(self, pending: Pending) -> Iterator[tuple[Pending, ExpectedFrame]]:
         """Yield the answers to an earlier request that cannot be taken for ours."""
         ours = {self._normal.shape, self._exception.shape}
         for shape in pending.codec.shapes(pending.request):
@@ -72,8 +72,8 @@ class Reception:
         timing = self._attempt.timing
         self._earliest = begun + timing.transmission(len(self._frame) - EARLY_TOLERANCE)
         self._undecided = self._attempt.echo is not Echo.OFF
-        self._owes_another = self._foreign(0, self._hunt.end, unanswered=True)
-        self._sent_at = self._early_end = self._hunt.end
+        self._owes_another = self._foreign(0, self._search.end, unanswered=True)
+        self._sent_at = self._early_end = self._search.end
         self._begin_at(self._sent_at)
         self.heard.clear()
         self.sent_yet = True
@@ -111,10 +111,10 @@ class Reception:
     def _sort(self, data: bytes, now: float) -> None:
         early = self._too_early(len(data), now) if self.sent_yet else 0
         if early:
-            self._early_end = self._hunt.end + early
+            self._early_end = self._search.end + early
             if self._attempt.paced:
                 self._begin_at(self._early_end)
-        self._hunt.feed(data, now)
+        self._search.feed(data, now)
         self._seek_older(now)
         if self.sent_yet and self._attempt.request.slave != BROADCAST:
             self._seek_ours()
@@ -138,10 +138,10 @@ class Reception:
 
     def _seek_older(self, now: float) -> None:
         """Drop the slave's answers to earlier requests; since it answers in order, none older can follow them."""
-        for pending, quarry in tuple(self._older):
-            if pending not in self._pending or (catch := self._hunt.seek(quarry)) is None:
+        for pending, expected in tuple(self._older):
+            if pending not in self._pending or (catch := self._search.seek(expected)) is None:
                 continue
-            self._hunt.claim(catch)
+            self._search.claim(catch)
             for other in (self._normal, self._exception, *(other for _, other in self._older)):
                 other.skip(catch.end)
             del self._pending[: self._pending.index(pending) + 1]
@@ -154,29 +154,29 @@ class Reception:
         """Drop the late answers of other slaves too; called once, at the end: they can be many and come seldom."""
         if not self._attempt.elsewhere or not self.unsolicited:
             return
-        rest = self._hunt.unclaimed(0)
+        rest = self._search.unclaimed(0)
         for slave, pending in self._attempt.elsewhere.items():
             if slave == self._attempt.request.slave:
                 continue
             start = 0
             for each in pending:
                 shapes = [shape for shape in each.codec.shapes(each.request) if shape.head in rest]
-                catches = [self._hunt.seek(ExpectedFrame(each.codec, shape, start)) for shape in shapes]
-                catch = min((catch for catch in catches if catch), key=lambda catch: catch.begin, default=None)
-                if catch is not None and not self._hunt.claimed(catch):
-                    self._hunt.claim(catch)
+                candidates = [self._search.seek(ExpectedFrame(each.codec, shape, start)) for shape in shapes]
+                catch = min((catch for catch in candidates if catch), key=lambda catch: catch.begin, default=None)
+                if catch is not None and not self._search.claimed(catch):
+                    self._search.claim(catch)
                     latency = max(0.0, catch.first_at - each.sent_end)
                     self.late.append(LateAnswer(each.request, latency, each.ours))
                     start = catch.end
 
     def _seek_ours(self) -> None:
-        quarries = [self._normal, self._exception]
+        expected_frames = [self._normal, self._exception]
         if self._expects_echo and not self._echo_whole and isinstance(self._attempt.request, WriteRegister):
-            del quarries[0]
-        for quarry in quarries:
-            while self.answer is None and (catch := self._hunt.seek(quarry)) is not None:
+            del expected_frames[0]
+        for expected in expected_frames:
+            while self.answer is None and (catch := self._search.seek(expected)) is not None:
                 foreign = self._owes_another or self._foreign(self._sent_at, catch.begin)
-                self._hunt.claim(catch)
+                self._search.claim(catch)
                 if foreign:
                     self.displaced = catch
                     return
@@ -194,7 +194,7 @@ class Reception:
         attempt = self._attempt
         if end - start < attempt.codec.size(REQUEST_BODY) or not isinstance(attempt.request, ReadRegisters):
             return False
-        heard = self._hunt.unclaimed_between(start, end)
+        heard = self._search.unclaimed_between(start, end)
         if self.sent_yet and self._echo_possible:
             heard = heard.replace(self._frame, b"", 1)
         found = False
@@ -209,8 +209,8 @@ class Reception:
         if self._held:
             missing = len(self._frame) - self._matched if self._attempt.echo is Echo.ON else 0
         else:
-            older = [quarry for _, quarry in self._older]
-            missing = self._hunt.missing([self._normal, self._exception, *older])
+            older = [expected for _, expected in self._older]
+            missing = self._search.missing([self._normal, self._exception, *older])
         expected = now + missing * self._attempt.timing.character
         self.whole_at = min(self.whole_at, expected) if 0 < missing < self._missing else expected
         self._missing = missing
@@ -220,21 +220,21 @@ class Reception:
     @property
     def rest(self) -> int:
         """How many characters came in the place of an answer and are neither echo nor an earlier answer."""
-        return self._hunt.unclaimed_count(self._from) + sum(len(held) for held, _ in self._held)
+        return self._search.unclaimed_count(self._from) + sum(len(held) for held, _ in self._held)
 
     def leftover(self) -> bytes:
         """Return these characters (the last of them where there were very many)."""
-        return self._hunt.unclaimed(self._from) + b"".join(held for held, _ in self._held)
+        return self._search.unclaimed(self._from) + b"".join(held for held, _ in self._held)
 
     @property
     def strays(self) -> tuple[tuple[bytes, float], ...]:
         """What belongs to no echo and to no answer, in pieces, with the times at which they were read."""
         if self._echo_possible:
             own = Shape(self._frame, len(self._frame), len(self._frame))
-            echo = self._hunt.seek(ExpectedFrame(self._attempt.codec, own, self._sent_at))
+            echo = self._search.seek(ExpectedFrame(self._attempt.codec, own, self._sent_at))
             if echo is not None:
-                self._hunt.claim(echo)
-        return tuple(self._hunt.pieces(0))
+                self._search.claim(echo)
+        return tuple(self._search.pieces(0))
 
     @property
     def _echo_possible(self) -> bool:
@@ -247,14 +247,14 @@ class Reception:
         """Whether bytes came that begin as the answer."""
         if self.answer is not None or self.spare is not None:
             return True
-        if self._hunt.begins(self._normal) or self._hunt.begins(self._exception):
+        if self._search.begins(self._normal) or self._search.begins(self._exception):
             return True
         return not self._expects_echo and self._matched >= self._normal.shape.sign and bool(self._held)
 
     @property
     def expected(self) -> int:
         """How many characters the answer has that came, as far as can be told."""
-        only_exception = self._hunt.begins(self._exception) and not self._hunt.begins(self._normal)
+        only_exception = self._search.begins(self._exception) and not self._search.begins(self._normal)
         return (self._exception if only_exception else self._normal).shape.size
 
     @property
@@ -267,7 +267,7 @@ class Reception:
         """Whether an echo was expected, and something came in its place."""
         if not self._expects_echo or self._echo_whole:
             return False
-        return bool(self._held) or self._hunt.unclaimed_count(self._sent_at) > 0
+        return bool(self._held) or self._search.unclaimed_count(self._sent_at) > 0
 
     @property
     def echoed(self) -> bool | None:
@@ -302,7 +302,7 @@ class Reception:
     @property
     def unsolicited(self) -> int:
         """How many bytes are no echo and belong to no answer, of this or of an earlier request."""
-        count = self._hunt.unclaimed_count(0) + sum(len(held) for held, _ in self._held)
+        count = self._search.unclaimed_count(0) + sum(len(held) for held, _ in self._held)
         if self.answer is None and self.spare is None and self.displaced is None and self.begun:
             count -= min(self.rest, self.expected)
         return count

@@ -59,7 +59,7 @@ class BaudrateRecovery:
         clock = ProcedureClock()
         sensors = self._changes.sensors(pending, clock)
         steps = await_power(sensors, old, to, longest_pause=runner.running().config.poll.probe_interval_max)
-        run.begin(steps, clock, line_rate=0, share=1.0, errand=Purpose.PROBE)
+        run.begin(steps, clock, line_rate=0, share=1.0, purpose=Purpose.PROBE)
         while not isinstance(awaited := await run.next_await(), Finished):
             if isinstance(awaited, CameUp):
                 if runner.running().config.line.baudrate != to:
@@ -142,7 +142,7 @@ class _Undo:
             longest_pause=longest,
             tell_at=inf if self._change.answered else give_up_at,
         )
-        found: tuple[RateSensor, ...] | None = await self._result_of(steps, share=1.0, errand=Purpose.PROBE)
+        found: tuple[RateSensor, ...] | None = await self._result_of(steps, share=1.0, purpose=Purpose.PROBE)
         return found
 
     async def _result_of(self, steps: Steps, **settings: Any) -> Any:  # noqa: ANN401 - a procedure's

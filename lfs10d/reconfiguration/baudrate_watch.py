@@ -56,7 +56,7 @@ class BaudrateWatch:
 
     async def _look_out(self, rate: int, run: ProcedureRun) -> None:
         clock = ProcedureClock()
-        run.begin(seek(self._devices, clock, rate), clock, line_rate=rate, share=1.0, errand=Purpose.PROBE)
+        run.begin(seek(self._devices, clock, rate), clock, line_rate=rate, share=1.0, purpose=Purpose.PROBE)
         while not isinstance(found := await run.next_await(), Finished):
             if isinstance(found, dict):
                 now = self._running()

@@ -98,9 +98,9 @@ class Locator:
         )
         clock = ProcedureClock()
         query = runner.query(slave, clock, line_rate=0)
-        errand = Purpose.PROBE if self._asked.get(name) == places else Purpose.CHANGE
+        purpose = Purpose.PROBE if self._asked.get(name) == places else Purpose.CHANGE
         steps = locate(endpoints, query, longest_pause=now.config.poll.probe_interval_max)
-        run.begin(steps, clock, line_rate=rate, errand=errand)
+        run.begin(steps, clock, line_rate=rate, purpose=purpose)
         while not isinstance(awaited := await run.next_await(), Finished):
             if self._asked.get(name) != places:
                 self._asked[name] = places

@@ -15,7 +15,7 @@ class Wire(Protocol):
     """What changes of sensors need of the line; see `lfs10d.line.line.Line`."""
 
     @property
-    def unanswered(self) -> PendingRequests:
+    def pending(self) -> PendingRequests:
         """Which requests may still be answered."""
         ...
 
@@ -27,7 +27,7 @@ class Wire(Protocol):
         """Have a job done; what it calls, it calls in the line's thread."""
         ...
 
-    def go_on(self, course: Procedure, answer: object) -> None:
+    def resume_procedure(self, procedure: Procedure, result: object) -> None:
         """Give a procedure the result of what it awaited."""
         ...
 
@@ -58,7 +58,7 @@ class ProcedureRun:
     def resume(self, result: object = None) -> None:
         """Give the procedure the result of what it awaited."""
         if self._procedure is not None:
-            self._wire.go_on(self._procedure, result)
+            self._wire.resume_procedure(self._procedure, result)
 
     def stop(self) -> None:
         """Send no new frame, and give the line back."""

@@ -105,7 +105,7 @@ class Recovery:
             before=None if here == move.old else move.old,
             newcomer=change.kind == "adopt",
         )
-        run.begin(steps, clock, line_rate=now.config.line.baudrate, share=1.0, errand=Purpose.PROBE)
+        run.begin(steps, clock, line_rate=now.config.line.baudrate, share=1.0, purpose=Purpose.PROBE)
         ending: ReaddressEnding | None = None
         while not isinstance(awaited := await run.next_await(), Finished):
             if isinstance(awaited, ReaddressReport):

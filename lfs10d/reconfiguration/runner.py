@@ -139,7 +139,7 @@ class ChangeRunner:
         alone = now.config.model_copy(update={"slaves": (slave,)})
         (spec,) = device_specs(alone, profiles)
         rate = now.config.line.baudrate if line_rate is None else line_rate
-        return IdentityQuery(spec.profile, spec.codec, self.wire().unanswered, clock, line_rate=rate)
+        return IdentityQuery(spec.profile, spec.codec, self.wire().pending, clock, line_rate=rate)
 
     async def perform(
         self,

@@ -84,7 +84,7 @@ class LineCounters:
             self.errors[FaultCode.LATE.value] += event.late
         self._second(event.at).busy += event.at - event.asked
         gap = event.gap
-        if gap is not None and event.errand not in OTHER_RATES:
+        if gap is not None and event.purpose not in OTHER_RATES:
             self._gaps.append(gap)
             if self._least_gap is None or gap < self._least_gap:
                 self._least_gap = gap

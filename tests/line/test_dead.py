@@ -27,7 +27,7 @@ def test_8_of_32_dead_leave_the_others_94_percent_of_their_rate(rigs: Rigs, *, s
     assert sum(rates) / len(rates) >= 0.94
     # Which of the shy come right behind a probe is chance: one may lose a few polls more than another.
     assert min(rates) >= (0.92 if shy else 0.94)
-    probes = [exchange for exchange in rig.exchanges if exchange.errand is Purpose.PROBE and exchange.at > 60.0]
+    probes = [exchange for exchange in rig.exchanges if exchange.purpose is Purpose.PROBE and exchange.at > 60.0]
     assert sum(exchange.at - exchange.asked for exchange in probes) <= 0.05 * 60.0 + 1.0
 
 
@@ -59,8 +59,8 @@ def test_what_an_exchange_is_told_of_the_dead_does_not_grow_with_their_number(ri
     for slave in range(2, 250):
         rig.line.sensor(slave).ail("silent")
     rig.run(700.0).prove()
-    unanswered = rig.poller.schedule.unanswered
-    assert len(unanswered.everybodys) == 248
-    assert unanswered.earlier(1) == ()
-    assert all(len(unanswered.earlier(slave)) <= 8 for slave in range(2, 250))
+    pending = rig.poller.scheduler.pending
+    assert len(pending.by_slave) == 248
+    assert pending.earlier(1) == ()
+    assert all(len(pending.earlier(slave)) <= 8 for slave in range(2, 250))
     assert len(rig.good(1, since=690.0)) >= 9

@@ -45,34 +45,34 @@ def test_a_device_never_heard_gets_200_then_400_then_1000_ms() -> None:
 def test_the_learned_time_out(turnaround: float, answers: int, timeout: float) -> None:
     device = a_device()
     for _ in range(answers):
-        device.turnarounds.learn(turnaround)
+        device.response_times.learn(turnaround)
     assert device.timeout == pytest.approx(timeout)
 
 
 def test_the_p99_of_100_answers_leaves_one_out() -> None:
-    turnarounds = ResponseTimes()
+    response_times = ResponseTimes()
     for _ in range(99):
-        turnarounds.learn(0.01)
-    turnarounds.learn(0.5)
-    assert turnarounds.p99 == 0.01
-    turnarounds.learn(0.4)
-    assert turnarounds.p99 == 0.4
+        response_times.learn(0.01)
+    response_times.learn(0.5)
+    assert response_times.p99 == 0.01
+    response_times.learn(0.4)
+    assert response_times.p99 == 0.4
     for _ in range(100):
-        turnarounds.learn(0.02)
-    assert turnarounds.p99 == 0.02
+        response_times.learn(0.02)
+    assert response_times.p99 == 0.02
 
 
 def test_after_a_change_of_rate_learning_begins_anew() -> None:
     device = a_device()
-    device.turnarounds.learn(0.01)
-    device.turnarounds.forget()
-    assert device.turnarounds.p99 is None
+    device.response_times.learn(0.01)
+    device.response_times.forget()
+    assert device.response_times.p99 is None
     assert device.timeout == 0.2
 
 
 def test_a_fixed_time_out_holds_for_polls_and_probes() -> None:
     device = a_device(response_timeout=0.5)
-    device.turnarounds.learn(0.01)
+    device.response_times.learn(0.01)
     assert device.timeout == 0.5
     assert device.probe_timeout == 0.5
 
@@ -184,7 +184,7 @@ def test_one_that_answers_badly_is_never_in_doubt_and_not_waited_for_long() -> N
     assert device.health is Health.OFFLINE
     device.failed(SILENCE, 0.0)
     assert device.doubtful
-    device.turnarounds.learn(0.03)
+    device.response_times.learn(0.03)
     assert device.patience == 0.03
 
 
@@ -213,7 +213,7 @@ def test_one_that_goes_offline_may_come_back_as_another_sensor() -> None:
 def test_a_probe_of_one_that_answers_slowly_waits_as_long_as_was_learned() -> None:
     device = a_device(rules=PollRules(offline_after=1))
     for _ in range(20):
-        device.turnarounds.learn(0.25)
+        device.response_times.learn(0.25)
     device.answered()
     device.failed(SILENCE, 0.0)
     assert device.probe_timeout == pytest.approx(0.52)

@@ -25,7 +25,7 @@ NONE: frozenset[int] = frozenset()
 class Task:
     """A job of a class; it is never asked here."""
 
-    errand = Purpose.SCAN
+    purpose = Purpose.SCAN
 
     def __init__(self, share: float = 1.0, excludes: frozenset[int] = NONE) -> None:
         self.share = share
@@ -34,7 +34,7 @@ class Task:
     def ask(self, now: float) -> Ask | Hold | Done:
         raise NotImplementedError
 
-    def heard(self, outcome: Outcome, now: float) -> Next:
+    def on_outcome(self, outcome: Outcome, now: float) -> Next:
         raise NotImplementedError
 
     def cut_off(self, now: float) -> None:
@@ -44,7 +44,7 @@ class Task:
 def a_poll(slave: int) -> Poll:
     profile = load_profile("lfs10", relative_to=Path())
     spec = DeviceSpec(f"slave-{slave}", slave, profile, Codec(Framing.RTU), 1.0)
-    return Poll(Device(spec, PollRules(), slave), PendingRequests(), due=0.0, errand=Purpose.REQUEST)
+    return Poll(Device(spec, PollRules(), slave), PendingRequests(), due=0.0, purpose=Purpose.REQUEST)
 
 
 @pytest.fixture
@@ -95,7 +95,7 @@ def test_a_slice_goes_on_before_all_others_and_whatever_the_share() -> None:
     queue.submit(change, 0.0)
     queue.submit(scan, 0.0)
     queue.spend(scan, 5.0, 0.0)
-    queue.go_on(scan)
+    queue.continue_slice(scan)
     assert queue.choose(0.0) is scan
     assert queue.choose(0.0) is change
 

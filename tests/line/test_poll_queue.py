@@ -172,7 +172,7 @@ def test_nobody_waits_twice() -> None:
 def test_clearing_forgets_everybody() -> None:
     gridded, flat = a_device(1, 1.0), a_device(2, 0.0)
     queue = a_queue(gridded, flat)
-    queue.resume(Poll(a_device(3, 1.0), PendingRequests(), due=0.0, errand=Purpose.POLL), 0.0)
+    queue.resume(Poll(a_device(3, 1.0), PendingRequests(), due=0.0, purpose=Purpose.POLL), 0.0)
     queue.clear()
     assert queue.next_due() == inf
     assert queue.choose(0.0, NOBODY) is None
@@ -199,12 +199,12 @@ def test_what_passed_while_offline_is_no_overrun() -> None:
 @pytest.mark.parametrize(("interval", "due"), [(1.0, 0.5), (0.0, 0.7)])
 def test_a_poll_knows_what_it_is_for_and_when_it_was_due(interval: float, due: float) -> None:
     device = a_device(1, interval, due=0.5)
-    unanswered = PendingRequests()
-    queue = PollQueue(unanswered)
+    pending = PendingRequests()
+    queue = PollQueue(pending)
     queue.enqueue(device)
     poll = queue.choose(0.7, NOBODY)
     assert poll is not None
-    assert (poll.errand, poll.due, poll.device) == (Purpose.POLL, due, device)
+    assert (poll.purpose, poll.due, poll.device) == (Purpose.POLL, due, device)
     assert isinstance(poll.ask(0.7), Ask)
     assert device.polling
     assert device.last_asked == 0.7

@@ -40,9 +40,9 @@ class Rig:
     def __post_init__(self) -> None:
         self.line = SimulatedLine([Sensor(slave) for slave in (1, 2, 3)])
         self.port = SimulatedPort(self.line, self.clock, SETTINGS)
-        schedule = Scheduler(LineTiming.of(9600), 0.0)
-        schedule.replace([spec(1), spec(2)], PollRules(), 0.0)
-        self.poller = Poller(Bus(self.port, LineRules(), self.clock), schedule, self.told.append, self.clock)
+        scheduler = Scheduler(LineTiming.of(9600), 0.0)
+        scheduler.replace([spec(1), spec(2)], PollRules(), 0.0)
+        self.poller = Poller(Bus(self.port, LineRules(), self.clock), scheduler, self.told.append, self.clock)
 
     def run(self, until: float) -> None:
         run(self.poller.turn, self.port, self.clock, until)
@@ -77,7 +77,7 @@ def test_an_exchange_is_told_with_its_reading(rig: Rig) -> None:
     exchanged, reading = rig.told[1][:2]
     assert isinstance(reading, Reading)
     assert isinstance(exchanged, Exchanged)
-    assert (exchanged.slave, exchanged.errand, exchanged.fault) == (1, Purpose.POLL, None)
+    assert (exchanged.slave, exchanged.purpose, exchanged.fault) == (1, Purpose.POLL, None)
     assert exchanged.sent == bytes.fromhex("01030001000295cb")
     assert exchanged.at == reading.at
 
@@ -100,8 +100,8 @@ def test_a_poll_requested_by_number_comes_back_with_it(rig: Rig) -> None:
 def test_a_submitted_job_is_done_between_exchanges(rig: Rig) -> None:
     rig.run(0.01)
     assert not rig.poller.bus.idle
-    device = rig.poller.schedule.devices["slave-1"]
-    job = Poll(device, rig.poller.schedule.unanswered, due=0.0, errand=Purpose.REQUEST, request=5)
+    device = rig.poller.scheduler.devices["slave-1"]
+    job = Poll(device, rig.poller.scheduler.pending, due=0.0, purpose=Purpose.REQUEST, request=5)
     rig.poller.submit(job)
     rig.poller.turn(rig.clock.now)
     assert len(rig.told) == 1
@@ -124,7 +124,7 @@ def test_another_rate_is_spoken_from_the_next_exchange_on(rig: Rig) -> None:
     rig.poller.reconfigure(PortSettings("/dev/simulated", 19200), LineRules())
     rig.run(10.0)
     assert all(reading.fault is None for reading in rig.of(1))
-    assert rig.poller.schedule.timing.baudrate == 19200
+    assert rig.poller.scheduler.timing.baudrate == 19200
 
 
 def test_the_port_is_lost_and_back(rig: Rig) -> None:

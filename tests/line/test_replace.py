@@ -16,9 +16,9 @@ RULES = PollRules()
 
 def requested(rig: Rig, slave: int, number: int) -> Poll:
     """Have a device polled for request `number` now."""
-    schedule = rig.poller.schedule
-    device = schedule.devices[f"slave-{slave}"]
-    poll = Poll(device, schedule.unanswered, due=rig.clock.now, errand=Purpose.REQUEST, request=number)
+    scheduler = rig.poller.scheduler
+    device = scheduler.devices[f"slave-{slave}"]
+    poll = Poll(device, scheduler.pending, due=rig.clock.now, purpose=Purpose.REQUEST, request=number)
     rig.poller.submit(poll)
     return poll
 
@@ -152,7 +152,7 @@ def change(rigs: Rigs, rig: Rig, step: list[tuple[int, float, bool, str]] | str,
                 sensor.heal()
         case _:
             for slave in range(1, 6):
-                if f"slave-{slave}" in rig.poller.schedule.devices:
+                if f"slave-{slave}" in rig.poller.scheduler.devices:
                     requested(rig, slave, number)
 
 

@@ -71,16 +71,16 @@ def least_rest(rig: Rig, slave: int) -> float:
 def access(rig: Rig, what: Request, spec: DeviceSpec) -> list[End | None]:
     ends: list[End | None] = []
     target = Target(1, Codec(Framing.RTU), spec.profile)
-    unanswered = rig.poller.schedule.unanswered
+    pending = rig.poller.scheduler.pending
     rig.poller.submit(
-        Access(target, what, unanswered=unanswered, echo_known=lambda: True, over=lambda job: ends.append(job.end))
+        Access(target, what, pending=pending, echo_known=lambda: True, over=lambda job: ends.append(job.end))
     )
     return ends
 
 
 def test_requests_of_every_kind_keep_the_rest_and_others_are_polled_meanwhile(rigs: Rigs) -> None:
     rig = a_line(rigs, 0.3, alone=False, gap=0.3)
-    spec = rig.poller.schedule.devices["slave-1"].spec
+    spec = rig.poller.scheduler.devices["slave-1"].spec
     rig.run(5.02)
     ends = access(rig, ReadRegisters(1, 0x0005, 1), spec)
     rig.poller.read("slave-1", 7)

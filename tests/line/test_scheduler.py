@@ -19,8 +19,8 @@ from tests.support.schedules import GONE, RTU, T9600, TAKES, Rig, Task, asking, 
 
 
 def test_with_nobody_to_poll_it_rests() -> None:
-    assert Rig().schedule.next(0.0) == Rest(inf)
-    assert Rig(spec(1, enabled=False)).schedule.next(0.0) == Rest(inf)
+    assert Rig().scheduler.next(0.0) == Rest(inf)
+    assert Rig(spec(1, enabled=False)).scheduler.next(0.0) == Rest(inf)
 
 
 def test_a_poll_is_one_reading() -> None:
@@ -29,21 +29,21 @@ def test_a_poll_is_one_reading() -> None:
     assert (reading.device, reading.values, reading.rtt) == ("slave-1", {"wind_speed": 12.99}, TAKES)
     assert reading.online
     assert not reading.probe
-    assert rig.schedule.next(0.5) == Rest(1.0)
-    assert rig.schedule.errand is Purpose.POLL
+    assert rig.scheduler.next(0.5) == Rest(1.0)
+    assert rig.scheduler.purpose is Purpose.POLL
 
 
 def test_an_outcome_without_a_question_is_a_mistake() -> None:
     rig = Rig(spec(1))
     with pytest.raises(RuntimeError, match=r"^an outcome without an Ask$"):
-        rig.schedule.settled(rig.outcome(asking(1)), 1.0)
+        rig.scheduler.on_outcome(rig.outcome(asking(1)), 1.0)
 
 
 def test_requests_go_before_polls_and_jobs_in_their_share_too() -> None:
     rig = Rig(spec(1, 0.0))
     rig.run(0.1)
-    rig.schedule.submit(Task(asking(7), share=0.3), rig.now)
-    rig.schedule.submit(Task(asking(8)), rig.now)
+    rig.scheduler.submit(Task(asking(7), share=0.3), rig.now)
+    rig.scheduler.submit(Task(asking(8)), rig.now)
     rig.asked.clear()
     rig.run(rig.now + 0.1)
     assert rig.asked[:3] == [8, 7, 1]
@@ -52,14 +52,14 @@ def test_requests_go_before_polls_and_jobs_in_their_share_too() -> None:
 def test_a_job_in_its_share_leaves_the_rest_to_the_polls() -> None:
     rig = Rig(spec(1, 0.0))
     words = [word for _ in range(1000) for word in (asking(7), Requeue(0.0))]
-    rig.schedule.submit(Task(*words, share=0.3), 0.0)
+    rig.scheduler.submit(Task(*words, share=0.3), 0.0)
     rig.run(20.0)
     assert rig.asked.count(7) / len(rig.asked) == pytest.approx(0.3, abs=0.03)
 
 
 def test_a_job_that_has_nothing_to_ask_is_over_and_its_slave_ids_are_free() -> None:
     rig = Rig(spec(1, 0.0))
-    rig.schedule.submit(Task(excludes=frozenset({1})), 0.0)
+    rig.scheduler.submit(Task(excludes=frozenset({1})), 0.0)
     rig.run(0.1)
     assert set(rig.asked) == {1}
 
@@ -67,16 +67,16 @@ def test_a_job_that_has_nothing_to_ask_is_over_and_its_slave_ids_are_free() -> N
 def test_another_interval_is_another_grid_of_the_same_device() -> None:
     rig = Rig(spec(1, 1.0))
     rig.run(5.5)
-    device = rig.schedule.devices["slave-1"]
+    device = rig.scheduler.devices["slave-1"]
     rig.replace(spec(1, 0.25))
-    assert rig.schedule.devices["slave-1"] is device
+    assert rig.scheduler.devices["slave-1"] is device
     assert len(rig.run(10.5)) == 20
 
 
 def test_a_slice_of_a_job_is_not_interrupted() -> None:
     rig = Rig(spec(1, 0.0))
     rig.run(0.1)
-    rig.schedule.submit(Task(asking(7), Continue(), asking(8), Continue(), asking(9), share=0.1), rig.now)
+    rig.scheduler.submit(Task(asking(7), Continue(), asking(8), Continue(), asking(9), share=0.1), rig.now)
     rig.asked.clear()
     rig.run(rig.now + 0.2)
     assert rig.asked[:4] == [7, 8, 9, 1]
@@ -85,21 +85,21 @@ def test_a_slice_of_a_job_is_not_interrupted() -> None:
 def test_others_are_polled_while_a_job_rests_and_it_may_be_woken() -> None:
     rig = Rig(spec(1, 0.0))
     resting, asleep = Task(Hold(0.5), asking(7)), Task(Hold(), asking(8))
-    rig.schedule.submit(resting, 0.0)
-    rig.schedule.submit(asleep, 0.0)
+    rig.scheduler.submit(resting, 0.0)
+    rig.scheduler.submit(asleep, 0.0)
     rig.run(0.4)
     assert set(rig.asked) == {1}
     rig.run(0.6)
     assert set(rig.asked) == {1, 7}
-    rig.schedule.wake(asleep, rig.now)
-    rig.schedule.wake(resting, rig.now)
+    rig.scheduler.wake(asleep, rig.now)
+    rig.scheduler.wake(resting, rig.now)
     assert rig.ask() == asking(8)
-    assert rig.schedule.errand is Purpose.SCAN
+    assert rig.scheduler.purpose is Purpose.SCAN
 
 
 def test_a_slave_id_that_a_job_excludes_is_polled_by_nobody_else() -> None:
     rig = Rig(spec(1, 0.1), spec(2, 0.1))
-    rig.schedule.submit(Task(Hold(1.0), asking(1), excludes=frozenset({1})), 0.0)
+    rig.scheduler.submit(Task(Hold(1.0), asking(1), excludes=frozenset({1})), 0.0)
     rig.run(0.99)
     assert set(rig.asked) == {2}
     rig.run(3.0)
@@ -161,7 +161,7 @@ def test_one_that_answers_badly_is_polled_on_its_grid_though_it_is_offline() -> 
     rig.run(0.5)
     rig.dead = {2}
     rig.run(8.5)
-    device = rig.schedule.devices["slave-2"]
+    device = rig.scheduler.devices["slave-2"]
     assert (device.health, device.doubtful) == (Health.OFFLINE, True)
     rig.dead, rig.garbage = set(), {2}
     while device.doubtful:
@@ -182,26 +182,26 @@ def test_late_answers_are_learned_whoever_asked_but_not_what_is_later_than_any_t
     wind = ReadRegisters(2, 0x0001, 2)
     late = [LateAnswer(wind, 0.4), LateAnswer(wind, 7.0), LateAnswer(replace(wind, slave=9), 0.4)]
     rig.settle(ask, late)
-    assert rig.schedule.devices["slave-2"].turnarounds.p99 == 0.4
-    assert rig.schedule.devices["slave-1"].turnarounds.p99 == 0.005
+    assert rig.scheduler.devices["slave-2"].response_times.p99 == 0.4
+    assert rig.scheduler.devices["slave-1"].response_times.p99 == 0.005
 
 
 def test_the_answer_of_an_unknown_slave_teaches_nothing() -> None:
     rig = Rig(spec(1, 10.0))
     rig.run(0.5)
-    rig.schedule.submit(Task(asking(9)), rig.now)
+    rig.scheduler.submit(Task(asking(9)), rig.now)
     rig.run(1.0)
     assert rig.asked[-1] == 9
-    assert len(rig.schedule.devices["slave-1"].turnarounds) == 1
+    assert len(rig.scheduler.devices["slave-1"].response_times) == 1
 
 
 def test_another_rate_forgets_what_was_learned_and_another_gap_does_not() -> None:
     rig = Rig(spec(1))
     rig.run(0.5)
-    rig.schedule.retime(LineTiming.of(9600, extra_gap=0.01))
-    kept = rig.schedule.devices["slave-1"].turnarounds.p99
-    rig.schedule.retime(LineTiming.of(19200))
-    assert (kept, rig.schedule.devices["slave-1"].turnarounds.p99) == (0.005, None)
+    rig.scheduler.retime(LineTiming.of(9600, extra_gap=0.01))
+    kept = rig.scheduler.devices["slave-1"].response_times.p99
+    rig.scheduler.retime(LineTiming.of(19200))
+    assert (kept, rig.scheduler.devices["slave-1"].response_times.p99) == (0.005, None)
 
 
 def test_the_loss_of_the_port_is_one_reading_per_device_and_ends_every_job() -> None:
@@ -209,10 +209,10 @@ def test_the_loss_of_the_port_is_one_reading_per_device_and_ends_every_job() -> 
     rig.run(0.5)
     waiting, resting, asking_now = Task(asking(7)), Task(Hold()), Task(asking(8))
     for job in (resting, asking_now, waiting):
-        rig.schedule.submit(job, rig.now)
-    rig.schedule.submit(rig.poll_of("slave-3", 33), rig.now)
+        rig.scheduler.submit(job, rig.now)
+    rig.scheduler.submit(rig.poll_of("slave-3", 33), rig.now)
     assert rig.ask() == asking(8)
-    readings = rig.schedule.port_lost(GONE, 1.0)
+    readings = rig.scheduler.on_port_lost(GONE, 1.0)
     assert [(reading.device, reading.fault, reading.requests) for reading in readings] == [
         ("slave-1", GONE, ()),
         ("slave-2", GONE, ()),
@@ -220,25 +220,25 @@ def test_the_loss_of_the_port_is_one_reading_per_device_and_ends_every_job() -> 
     ]
     assert not any(reading.online for reading in readings)
     assert [job.over_at for job in (waiting, resting, asking_now)] == [1.0] * 3
-    assert [each.request for each in rig.schedule.unanswered.earlier(8)] == [asking(8).request]
-    assert rig.schedule.next(1.0) == Rest(inf)
+    assert [each.request for each in rig.scheduler.pending.earlier(8)] == [asking(8).request]
+    assert rig.scheduler.next(1.0) == Rest(inf)
     busy = Fault(FaultCode.PORT_BUSY, "taken")
-    assert rig.schedule.port_lost(busy, 2.0) == []
-    (told,) = rig.schedule.submit(rig.poll_of("slave-1", 34), 3.0)
+    assert rig.scheduler.on_port_lost(busy, 2.0) == []
+    (told,) = rig.scheduler.submit(rig.poll_of("slave-1", 34), 3.0)
     assert (told.fault, told.requests) == (busy, (34,))
     late = Task(asking(9))
-    assert rig.schedule.submit(late, 3.0) == []
+    assert rig.scheduler.submit(late, 3.0) == []
     assert late.over_at == 3.0
 
 
 def test_when_the_port_is_back_all_are_due_at_once() -> None:
     rig = Rig(spec(1, 100.0), spec(2, 100.0))
     rig.run(5.0)
-    rig.schedule.port_lost(GONE, 5.0)
+    rig.scheduler.on_port_lost(GONE, 5.0)
     rig.replace(spec(1, 100.0), spec(2, 100.0), spec(3, 100.0))
-    assert not rig.schedule.devices["slave-3"].online
+    assert not rig.scheduler.devices["slave-3"].online
     rig.now = 50.0
-    rig.schedule.port_opened(50.0)
+    rig.scheduler.on_port_opened(50.0)
     readings = rig.run(51.0)
     assert {reading.device for reading in readings} == {"slave-1", "slave-2", "slave-3"}
     assert all(reading.values for reading in readings)
@@ -273,10 +273,10 @@ def test_a_requested_poll_of_one_that_is_gone_is_cut_off() -> None:
     rig = Rig(spec(1, 100.0), spec(2, 100.0))
     rig.run(1.0)
     poll, stale = rig.poll_of("slave-1"), rig.poll_of("slave-1")
-    rig.schedule.submit(poll, rig.now)
+    rig.scheduler.submit(poll, rig.now)
     rig.replace(spec(2, 100.0))
     rig.asked.clear()
-    assert rig.schedule.submit(stale, rig.now) == []
+    assert rig.scheduler.submit(stale, rig.now) == []
     rig.run(3.0)
     assert rig.asked == []
     assert (poll.at, stale.at) == (1.0, 1.0)
@@ -287,7 +287,7 @@ def test_a_requested_poll_does_not_disturb_the_one_in_progress() -> None:
     rig.run(0.9)
     rig.dead = {1}
     rig.run(1.05)
-    rig.schedule.submit(rig.poll_of("slave-1", 5), rig.now)
+    rig.scheduler.submit(rig.poll_of("slave-1", 5), rig.now)
     rig.dead = set()
     readings = rig.run(4.0)
     assert [reading.requests for reading in readings].count((5,)) == 1
@@ -296,8 +296,8 @@ def test_a_requested_poll_does_not_disturb_the_one_in_progress() -> None:
 
 def test_a_line_without_devices_carries_out_jobs() -> None:
     rig = Rig()
-    rig.schedule = Scheduler(T9600, 0.0)
-    rig.schedule.submit(Task(asking(7)), 0.0)
+    rig.scheduler = Scheduler(T9600, 0.0)
+    rig.scheduler.submit(Task(asking(7)), 0.0)
     assert rig.run(1.0) == []
     assert rig.asked == [7]
 
@@ -305,8 +305,8 @@ def test_a_line_without_devices_carries_out_jobs() -> None:
 def test_jobs_and_requested_polls_outlast_a_change_of_what_is_polled() -> None:
     rig = Rig(spec(1, 100.0), spec(2, 100.0))
     rig.run(1.0)
-    rig.schedule.submit(rig.poll_of("slave-1", 5), rig.now)
-    rig.schedule.submit(Task(asking(7)), rig.now)
+    rig.scheduler.submit(rig.poll_of("slave-1", 5), rig.now)
+    rig.scheduler.submit(Task(asking(7)), rig.now)
     rig.replace(spec(1, 100.0))
     rig.asked.clear()
     assert [reading.requests for reading in rig.run(2.0)] == [(5,)]
@@ -316,9 +316,9 @@ def test_jobs_and_requested_polls_outlast_a_change_of_what_is_polled() -> None:
 def test_a_job_that_probes_has_the_share_of_probes_while_somebody_answers() -> None:
     rig = Rig(spec(1, 0.0))
     job = Task(*[word for _ in range(2000) for word in (asking(7), Requeue(0.0))], share=0.3)
-    job.errand = Purpose.PROBE
+    job.purpose = Purpose.PROBE
     rig.run(0.5)
-    rig.schedule.submit(job, rig.now)
+    rig.scheduler.submit(job, rig.now)
     rig.run(100.0)
     assert rig.asked.count(7) / len(rig.asked) < 0.06
 
@@ -327,22 +327,22 @@ def test_while_the_port_is_lost_nothing_is_told_of_a_device_that_is_gone() -> No
     rig = Rig(spec(1), spec(2))
     stale = rig.poll_of("slave-2")
     rig.replace(spec(1))
-    lost = rig.schedule.port_lost(GONE, 1.0)
+    lost = rig.scheduler.on_port_lost(GONE, 1.0)
     assert [(reading.device, reading.at) for reading in lost] == [("slave-1", 1.0)]
-    assert rig.schedule.submit(stale, 2.0) == []
-    (told,) = rig.schedule.submit(rig.poll_of("slave-1"), 3.0)
+    assert rig.scheduler.submit(stale, 2.0) == []
+    (told,) = rig.scheduler.submit(rig.poll_of("slave-1"), 3.0)
     assert told.at == 3.0
 
 
 def test_when_the_port_is_back_what_a_lost_job_excluded_is_free_and_jobs_are_carried_out() -> None:
     rig = Rig(spec(1))
-    rig.schedule.submit(Task(asking(1), excludes=frozenset({1})), 0.0)
+    rig.scheduler.submit(Task(asking(1), excludes=frozenset({1})), 0.0)
     assert rig.ask() == asking(1)
-    rig.schedule.port_lost(GONE, 0.5)
-    assert [each.codec for each in rig.schedule.unanswered.earlier(1)] == [RTU]
+    rig.scheduler.on_port_lost(GONE, 0.5)
+    assert [each.codec for each in rig.scheduler.pending.earlier(1)] == [RTU]
     rig.now = 1.0
-    rig.schedule.port_opened(1.0)
-    rig.schedule.submit(Task(asking(7)), 1.0)
+    rig.scheduler.on_port_opened(1.0)
+    rig.scheduler.submit(Task(asking(7)), 1.0)
     rig.asked.clear()
     rig.run(1.5)
     assert rig.asked == [7, 1]
@@ -352,15 +352,15 @@ def test_a_single_dead_device_is_probed_and_the_line_rests_until_then() -> None:
     rig = Rig(spec(1, 0.5), rules=PollRules(offline_after=1))
     rig.dead = {1}
     *_, first = rig.run(1.7)  # three polls at once
-    decision = rig.schedule.next(rig.now)
+    decision = rig.scheduler.next(rig.now)
     assert not first.online
     assert isinstance(decision, Rest)
     assert decision.until == pytest.approx(2.6, abs=0.1)
     rig.now = decision.until
     ask = rig.ask()
     assert ask is not None
-    device = rig.schedule.devices["slave-1"]
-    assert rig.schedule.errand is Purpose.PROBE
+    device = rig.scheduler.devices["slave-1"]
+    assert rig.scheduler.purpose is Purpose.PROBE
     assert (device.polling, device.last_asked) == (True, rig.now)
     (reading,) = rig.settle(ask)
     assert reading.probe
@@ -369,10 +369,10 @@ def test_a_single_dead_device_is_probed_and_the_line_rests_until_then() -> None:
 
 def test_the_line_rests_until_the_share_of_a_job_allows() -> None:
     rig = Rig()
-    rig.schedule.submit(Task(*[word for _ in range(9) for word in (asking(7), Requeue(0.0))], share=0.01), 0.0)
+    rig.scheduler.submit(Task(*[word for _ in range(9) for word in (asking(7), Requeue(0.0))], share=0.01), 0.0)
     while (ask := rig.ask()) is not None:
         rig.settle(ask)
-    decision = rig.schedule.next(rig.now)
+    decision = rig.scheduler.next(rig.now)
     assert isinstance(decision, Rest)
     assert rig.now < decision.until < rig.now + 10.0
     rig.now = decision.until
@@ -383,7 +383,7 @@ def test_a_requested_poll_that_is_tried_again_goes_before_others_that_are_due() 
     rig = Rig(spec(1, 100.0), spec(2, 1.0))
     rig.run(1.5)
     rig.dead = {1}
-    rig.schedule.submit(rig.poll_of("slave-1"), 1.95)
+    rig.scheduler.submit(rig.poll_of("slave-1"), 1.95)
     rig.now = 1.95
     rig.asked.clear()
     rig.run(2.2)
@@ -394,7 +394,7 @@ def test_a_requested_poll_whose_device_goes_while_it_is_on_the_line_is_over_then
     rig = Rig(spec(1, 100.0))
     rig.run(1.0)
     poll = rig.poll_of("slave-1")
-    rig.schedule.submit(poll, rig.now)
+    rig.scheduler.submit(poll, rig.now)
     ask = rig.ask()
     rig.replace()
     assert ask is not None
@@ -423,7 +423,7 @@ def test_what_takes_exactly_the_longest_time_out_is_learned() -> None:
     ask = rig.ask()
     assert ask is not None
     rig.settle(ask, [LateAnswer(ReadRegisters(1, 0x0001, 2), LEARNED_MOST)])
-    assert rig.schedule.devices["slave-1"].turnarounds.p99 == LEARNED_MOST
+    assert rig.scheduler.devices["slave-1"].response_times.p99 == LEARNED_MOST
 
 
 def test_a_refusal_teaches_nothing_about_time_nor_does_an_answer_without_one() -> None:
@@ -431,26 +431,26 @@ def test_a_refusal_teaches_nothing_about_time_nor_does_an_answer_without_one() -
     ask = rig.ask()
     assert ask is not None
     refused = replace(rig.outcome(ask), answer=None, fault=Fault(FaultCode.EXCEPTION, "refused", 2))
-    rig.schedule.settled(refused, 0.1)
+    rig.scheduler.on_outcome(refused, 0.1)
     rig.now = 1.0
     ask = rig.ask()
     assert ask is not None
-    rig.schedule.settled(replace(rig.outcome(ask), turnaround=None), 1.1)
-    assert len(rig.schedule.devices["slave-1"].turnarounds) == 0
+    rig.scheduler.on_outcome(replace(rig.outcome(ask), turnaround=None), 1.1)
+    assert len(rig.scheduler.devices["slave-1"].response_times) == 0
 
 
 def test_grids_of_slow_devices_lie_two_exchanges_apart() -> None:
     rig = Rig(spec(1, 100.0), spec(2, 100.0))
-    assert rig.schedule.devices["slave-2"].due == pytest.approx(2 * T9600.exchange(8, 9))
+    assert rig.scheduler.devices["slave-2"].due == pytest.approx(2 * T9600.exchange(8, 9))
 
 
-@pytest.mark.parametrize(("errand", "share"), [(Purpose.SCAN, 0.3), (Purpose.CHANGE, 0.2)])
-def test_a_change_pays_half_as_much_again_on_a_crowded_line(errand: Purpose, share: float) -> None:
+@pytest.mark.parametrize(("purpose", "share"), [(Purpose.SCAN, 0.3), (Purpose.CHANGE, 0.2)])
+def test_a_change_pays_half_as_much_again_on_a_crowded_line(purpose: Purpose, share: float) -> None:
     rig = Rig(spec(1, 0.0))
     rig.run(0.5)
     job = Task(*[word for _ in range(1000) for word in (asking(7), Requeue(0.0))], share=0.3)
-    job.errand = errand
-    rig.schedule.submit(job, rig.now)
+    job.purpose = purpose
+    rig.scheduler.submit(job, rig.now)
     rig.asked.clear()
     rig.run(20.0)
     assert rig.asked.count(7) / len(rig.asked) == pytest.approx(share, abs=0.03)
@@ -459,8 +459,8 @@ def test_a_change_pays_half_as_much_again_on_a_crowded_line(errand: Purpose, sha
 def test_a_change_pays_nothing_for_others_where_there_are_none() -> None:
     rig = Rig()
     job = Task(*[word for _ in range(1000) for word in (asking(7), Requeue(0.0))], share=0.3)
-    job.errand = Purpose.CHANGE
-    rig.schedule.submit(job, 0.0)
+    job.purpose = Purpose.CHANGE
+    rig.scheduler.submit(job, 0.0)
     rig.run(20.0)
     assert len(rig.asked) * (TAKES + T9600.gap) / 20.0 == pytest.approx(0.3, abs=0.03)
 
@@ -471,7 +471,7 @@ def test_those_probed_in_turn_after_the_first_answer_are_asked_twice_where_they_
     rig.dead = {1, 2, 3}
     rig.run(150.0)
     rig.dead = {2, 3}
-    while not rig.schedule.devices["slave-1"].online:
+    while not rig.scheduler.devices["slave-1"].online:
         rig.run(rig.now + 0.01)
     rig.asked.clear()
     rig.run(rig.now + 0.65)
@@ -481,8 +481,8 @@ def test_those_probed_in_turn_after_the_first_answer_are_asked_twice_where_they_
 def test_a_slave_is_asked_no_sooner_than_its_rest_allows_and_others_have_the_line_meanwhile() -> None:
     rig = Rig(replace(spec(1, 100.0), request_gap=0.5), spec(2, 0.0))
     rig.run(0.2)
-    rig.schedule.submit(Task(asking(1), Requeue(0.0), asking(1)), rig.now)
-    rig.schedule.submit(rig.poll_of("slave-1", 5), rig.now)
+    rig.scheduler.submit(Task(asking(1), Requeue(0.0), asking(1)), rig.now)
+    rig.scheduler.submit(rig.poll_of("slave-1", 5), rig.now)
     readings = rig.run(3.0)
     of_1 = [(began, ended) for slave, began, ended in rig.times if slave == 1]
     assert len(of_1) == 4
@@ -493,7 +493,7 @@ def test_a_slave_is_asked_no_sooner_than_its_rest_allows_and_others_have_the_lin
 
 def test_a_poll_goes_on_when_its_silence_has_widened_the_gap_and_the_gap_outlasts_another_id() -> None:
     rig = Rig(spec(1, 100.0), rules=PollRules(retries=0))
-    device = rig.schedule.devices["slave-1"]
+    device = rig.scheduler.devices["slave-1"]
     for began in (-20.0, -10.0):
         device.gap.exchanged(began, began + 0.02, spoke=True, silent=False)
         if began < -15.0:
@@ -508,7 +508,7 @@ def test_a_poll_goes_on_when_its_silence_has_widened_the_gap_and_the_gap_outlast
     (reading,) = rig.run(4.0)
     assert (reading.fault, reading.gap_learned) == (None, True)
     rig.replace(replace(spec(7, 100.0), name="slave-1"))
-    assert rig.schedule.devices["slave-1"].gap is device.gap
+    assert rig.scheduler.devices["slave-1"].gap is device.gap
     other = spec(7).profile.model_copy(update={"title": "Another"})
     rig.replace(replace(spec(7, 100.0), name="slave-1", profile=other))
-    assert rig.schedule.devices["slave-1"].gap.learned == 0
+    assert rig.scheduler.devices["slave-1"].gap.learned == 0

@@ -31,7 +31,7 @@ def test_one_that_answers_badly_is_polled_as_one_that_answers(rigs: Rigs, fault:
     rig.run(60.0).prove()
     for slave in range(1, 9):
         assert len(rig.of(slave, since=10.0)) == pytest.approx(50, abs=1)
-    assert not any(exchange.errand is Purpose.PROBE for exchange in rig.exchanges)
+    assert not any(exchange.purpose is Purpose.PROBE for exchange in rig.exchanges)
 
 
 def test_of_32_with_half_of_them_silent_each_silent_one_has_failed_within_ten_seconds(rigs: Rigs) -> None:

@@ -12,8 +12,8 @@ WIRE = 0.025
 SHARE = 0.3
 
 
-def charged(toll: Surcharge, began: float, ended: float, *intervals: float) -> float:
-    return toll.charge(SHARE, began, ended, intervals=intervals, wire_time=WIRE)
+def charged(surcharge: Surcharge, began: float, ended: float, *intervals: float) -> float:
+    return surcharge.charge(SHARE, began, ended, intervals=intervals, wire_time=WIRE)
 
 
 def test_on_a_line_with_time_a_change_is_charged_what_it_takes() -> None:
@@ -31,19 +31,19 @@ def test_what_makes_others_miss_polls_is_charged_by_what_they_may_miss() -> None
 
 
 def test_exchanges_on_end_count_as_one_until_others_may_have_the_line() -> None:
-    toll = Surcharge()
-    first = charged(toll, 0.0, 0.3, 0.4)
-    second = charged(toll, 0.3, 1.0, 0.4)
+    surcharge = Surcharge()
+    first = charged(surcharge, 0.0, 0.3, 0.4)
+    second = charged(surcharge, 0.3, 1.0, 0.4)
     assert (first, second) == pytest.approx((0.3, 0.6 * SHARE / MISSED))
-    toll.released()
-    assert charged(toll, 1.0, 1.3, 0.4) == pytest.approx(0.3)
+    surcharge.released()
+    assert charged(surcharge, 1.0, 1.3, 0.4) == pytest.approx(0.3)
 
 
 @given(st.lists(st.floats(0.01, 1.0), min_size=1, max_size=6), st.floats(0.05, 2.0))
 def test_a_wait_in_pieces_is_charged_no_less_than_in_one(pieces: list[float], interval: float) -> None:
-    toll, at, total = Surcharge(), 0.0, 0.0
+    surcharge, at, total = Surcharge(), 0.0, 0.0
     for piece in pieces:
-        total += charged(toll, at, at + piece, interval)
+        total += charged(surcharge, at, at + piece, interval)
         at += piece
     assert total >= max(0.0, at - interval) * SHARE / MISSED - 1e-9
     assert total >= at - 1e-9

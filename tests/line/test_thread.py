@@ -70,10 +70,10 @@ class Rig:
         self.failure: BaseException | None = None
         self._told = threading.Condition()
         bus = Bus(SerialPort(PortSettings(str(path))), LineRules(), time.monotonic)
-        schedule = Scheduler(LineTiming.of(9600), time.monotonic())
+        scheduler = Scheduler(LineTiming.of(9600), time.monotonic())
         spec = DeviceSpec("mast", 1, LFS10, Codec(Framing.RTU), interval)
-        schedule.replace([spec], PollRules(), time.monotonic())
-        self.poller = Poller(bus, schedule, self._tell, time.monotonic)
+        scheduler.replace([spec], PollRules(), time.monotonic())
+        self.poller = Poller(bus, scheduler, self._tell, time.monotonic)
         self.prepared: list[threading.Thread] = []
         self.thread = LineThread(
             self.poller, prepare=lambda: self.prepared.append(threading.current_thread()), failed=self._fail

@@ -20,19 +20,19 @@ BROKEN = bytes.fromhex("010304414FD70A0030")
 
 def fed(*pieces: bytes) -> tuple[FrameSearch, ExpectedFrame, FoundFrame | None]:
     """Feed pieces at 0, 1, 2 ... s; return what was caught first."""
-    hunt, quarry, caught = FrameSearch(), ExpectedFrame(RTU, NORMAL), None
+    search, expected, caught = FrameSearch(), ExpectedFrame(RTU, NORMAL), None
     for now, piece in enumerate(pieces):
-        hunt.feed(piece, float(now))
-        caught = caught or hunt.seek(quarry)
-    return hunt, quarry, caught
+        search.feed(piece, float(now))
+        caught = caught or search.seek(expected)
+    return search, expected, caught
 
 
 def test_a_frame_is_caught_the_moment_it_is_whole() -> None:
-    hunt, quarry, caught = fed(ANSWER[:-1])
+    search, expected, caught = fed(ANSWER[:-1])
     assert caught is None
-    assert quarry.partial
-    hunt.feed(ANSWER[-1:], 7.0)
-    assert hunt.seek(quarry) == FoundFrame(ANSWER[:-2], 0, 9, 0.0, 7.0)
+    assert expected.partial
+    search.feed(ANSWER[-1:], 7.0)
+    assert search.seek(expected) == FoundFrame(ANSWER[:-2], 0, 9, 0.0, 7.0)
 
 
 @given(st.binary(max_size=40), st.binary(max_size=40), st.lists(st.integers(0, 89), max_size=6))
@@ -46,30 +46,30 @@ def test_noise_and_pieces_hide_no_frame(before: bytes, after: bytes, cuts: list[
 
 
 def test_a_false_beginning_does_not_hide_the_frame() -> None:
-    _, quarry, caught = fed(ANSWER[:3] + ANSWER)
+    _, expected, caught = fed(ANSWER[:3] + ANSWER)
     assert caught is not None
-    assert (caught.begin, caught.end, quarry.start) == (3, 12, 12)
+    assert (caught.begin, caught.end, expected.start) == (3, 12, 12)
 
 
 def test_a_frame_with_a_wrong_check_counts_as_begun_only() -> None:
-    hunt, quarry, caught = fed(BROKEN)
+    search, expected, caught = fed(BROKEN)
     assert caught is None
-    assert hunt.begins(quarry)
+    assert search.begins(expected)
 
 
 @pytest.mark.parametrize(("tail", "begins"), [("01", False), ("0103", True), ("010302", False), ("000103", True)])
 def test_slave_and_function_at_the_end_are_a_beginning(tail: str, *, begins: bool) -> None:
-    hunt, quarry, _ = fed(bytes.fromhex(tail))
-    assert hunt.begins(quarry) is begins
+    search, expected, _ = fed(bytes.fromhex(tail))
+    assert search.begins(expected) is begins
 
 
 def test_what_came_before_the_start_is_not_looked_at() -> None:
-    hunt, quarry, _ = fed(b"\x00" * 3)
-    quarry.skip(5)
-    quarry.skip(4)
-    assert quarry.start == 5
-    hunt.feed(b"\x01\x01" + ANSWER, 1.0)
-    caught = hunt.seek(quarry)
+    search, expected, _ = fed(b"\x00" * 3)
+    expected.skip(5)
+    expected.skip(4)
+    assert expected.start == 5
+    search.feed(b"\x01\x01" + ANSWER, 1.0)
+    caught = search.seek(expected)
     assert caught is not None
     assert caught.begin == 5
 
@@ -81,38 +81,38 @@ def test_first_and_last_byte_have_their_own_times() -> None:
 
 
 def test_a_frame_is_claimed_where_one_byte_of_it_is() -> None:
-    hunt, _, caught = fed(ANSWER)
+    search, _, caught = fed(ANSWER)
     assert caught is not None
-    assert not hunt.claimed(caught)
-    hunt.claim(caught)
-    assert hunt.claimed(caught)
-    assert hunt.claimed(FoundFrame(b"", 8, 12, 0.0, 0.0))
-    assert not hunt.claimed(FoundFrame(b"", 9, 12, 0.0, 0.0))
+    assert not search.claimed(caught)
+    search.claim(caught)
+    assert search.claimed(caught)
+    assert search.claimed(FoundFrame(b"", 8, 12, 0.0, 0.0))
+    assert not search.claimed(FoundFrame(b"", 9, 12, 0.0, 0.0))
 
 
 def test_claimed_frames_are_explained() -> None:
-    hunt, quarry, caught = fed(b"\xaa" + ANSWER + b"\xbb")
+    search, expected, caught = fed(b"\xaa" + ANSWER + b"\xbb")
     assert caught is not None
-    hunt.claim(caught)
-    assert hunt.unclaimed(0) == b"\xaa\xbb"
-    assert hunt.unclaimed(5) == b"\xbb"
-    assert (hunt.unclaimed_count(0), hunt.unclaimed_count(5), hunt.unclaimed_count(10)) == (2, 1, 1)
-    hunt.feed(ANSWER, 1.0)
-    again = hunt.seek(quarry)
+    search.claim(caught)
+    assert search.unclaimed(0) == b"\xaa\xbb"
+    assert search.unclaimed(5) == b"\xbb"
+    assert (search.unclaimed_count(0), search.unclaimed_count(5), search.unclaimed_count(10)) == (2, 1, 1)
+    search.feed(ANSWER, 1.0)
+    again = search.seek(expected)
     assert again is not None
-    hunt.claim(again)
-    assert hunt.unclaimed(0) == b"\xaa\xbb"
+    search.claim(again)
+    assert search.unclaimed(0) == b"\xaa\xbb"
 
 
 def test_long_garbage_is_forgotten_and_the_frame_behind_it_found() -> None:
     pieces = [b"\x01\x03" * 300] * 20
-    hunt, _, caught = fed(*pieces, ANSWER)
+    search, _, caught = fed(*pieces, ANSWER)
     assert caught is not None
     assert caught.begin == 20 * 600
     assert caught.last_at == 20.0
-    assert len(hunt._stream) < 3 * KEPT
-    assert len(hunt.unclaimed(0)) == KEPT
-    assert hunt.unclaimed_count(0) == 20 * 600 + 9
+    assert len(search._stream) < 3 * KEPT
+    assert len(search.unclaimed(0)) == KEPT
+    assert search.unclaimed_count(0) == 20 * 600 + 9
 
 
 def test_one_huge_piece_is_searched_whole() -> None:
@@ -138,18 +138,18 @@ def test_one_huge_piece_is_searched_whole() -> None:
     ],
 )
 def test_what_is_missing_is_what_the_soonest_frame_still_needs(heard: str, missing: int) -> None:
-    hunt, normal, exception = FrameSearch(), ExpectedFrame(RTU, NORMAL), ExpectedFrame(RTU, EXCEPTION)
-    hunt.feed(bytes.fromhex(heard), 0.0)
-    for quarry in (normal, exception):
-        hunt.seek(quarry)
-    assert hunt.missing([normal, exception]) == missing
+    search, normal, exception = FrameSearch(), ExpectedFrame(RTU, NORMAL), ExpectedFrame(RTU, EXCEPTION)
+    search.feed(bytes.fromhex(heard), 0.0)
+    for expected in (normal, exception):
+        search.seek(expected)
+    assert search.missing([normal, exception]) == missing
 
 
 def test_of_two_frames_the_first_is_caught_first() -> None:
-    hunt, quarry, caught = fed(ANSWER + ANSWER)
+    search, expected, caught = fed(ANSWER + ANSWER)
     assert caught is not None
     assert (caught.begin, caught.end) == (0, 9)
-    again = hunt.seek(quarry)
+    again = search.seek(expected)
     assert again is not None
     assert (again.begin, again.end) == (9, 18)
 
@@ -157,19 +157,19 @@ def test_of_two_frames_the_first_is_caught_first() -> None:
 def test_a_head_that_overlaps_a_false_one_is_found() -> None:
     (normal, _) = RTU.shapes(ReadRegisters(4, 0x0001, 2, 4))
     frame = RTU.wrap(bytes.fromhex("040404414FD70A"))
-    hunt, quarry = FrameSearch(), ExpectedFrame(RTU, normal)
-    hunt.feed(b"\x04" + frame, 0.0)
-    caught = hunt.seek(quarry)
+    search, expected = FrameSearch(), ExpectedFrame(RTU, normal)
+    search.feed(b"\x04" + frame, 0.0)
+    caught = search.seek(expected)
     assert caught is not None
     assert caught.begin == 1
 
 
 def test_skipping_ahead_leaves_a_frame_begun_there_and_skipping_on_the_spot_does_not() -> None:
-    _, quarry, _ = fed(ANSWER[:5])
-    quarry.skip(quarry.start)
-    assert quarry.partial
-    quarry.skip(quarry.start + 1)
-    assert not quarry.partial
+    _, expected, _ = fed(ANSWER[:5])
+    expected.skip(expected.start)
+    assert expected.partial
+    expected.skip(expected.start + 1)
+    assert not expected.partial
 
 
 def test_a_frame_that_spans_what_is_forgotten_keeps_the_time_of_its_first_byte() -> None:
@@ -179,40 +179,40 @@ def test_a_frame_that_spans_what_is_forgotten_keeps_the_time_of_its_first_byte()
 
 
 def test_no_more_is_kept_than_twice_the_least() -> None:
-    hunt = FrameSearch()
+    search = FrameSearch()
     for now in range(100):
-        hunt.feed(b"\xff" * 100, float(now))
-        assert len(hunt._stream) <= 2 * KEPT + 100
-    assert hunt.end == 10_000
+        search.feed(b"\xff" * 100, float(now))
+        assert len(search._stream) <= 2 * KEPT + 100
+    assert search.end == 10_000
 
 
 def test_frames_side_by_side_do_not_claim_each_other() -> None:
-    hunt, quarry, first = fed(ANSWER + ANSWER)
-    second = hunt.seek(quarry)
+    search, expected, first = fed(ANSWER + ANSWER)
+    second = search.seek(expected)
     assert first is not None
     assert second is not None
-    hunt.claim(second)
-    assert not hunt.claimed(first)
-    assert hunt.unclaimed(0) == ANSWER
+    search.claim(second)
+    assert not search.claimed(first)
+    assert search.unclaimed(0) == ANSWER
 
 
 def test_a_frame_at_the_very_beginning_is_explained_whole() -> None:
-    hunt, _, caught = fed(ANSWER + b"\xff")
+    search, _, caught = fed(ANSWER + b"\xff")
     assert caught is not None
-    hunt.claim(caught)
-    assert hunt.unclaimed(0) == b"\xff"
+    search.claim(caught)
+    assert search.unclaimed(0) == b"\xff"
 
 
 def test_what_lies_around_a_claimed_frame_is_told_though_older_bytes_are_forgotten() -> None:
-    hunt, _, caught = fed(b"\xff" * 3 * KEPT, b"\xfe" * 3, ANSWER, b"\xfd")
+    search, _, caught = fed(b"\xff" * 3 * KEPT, b"\xfe" * 3, ANSWER, b"\xfd")
     assert caught is not None
-    hunt.claim(caught)
-    assert hunt.unclaimed(3 * KEPT) == b"\xfe\xfe\xfe\xfd"
+    search.claim(caught)
+    assert search.unclaimed(3 * KEPT) == b"\xfe\xfe\xfe\xfd"
 
 
 def test_a_head_that_began_before_the_start_is_no_beginning() -> None:
-    hunt, quarry = FrameSearch(), ExpectedFrame(RTU, NORMAL)
-    quarry.skip(1)
-    hunt.feed(ANSWER[:2], 0.0)
-    assert hunt.seek(quarry) is None
-    assert not hunt.begins(quarry)
+    search, expected = FrameSearch(), ExpectedFrame(RTU, NORMAL)
+    expected.skip(1)
+    search.feed(ANSWER[:2], 0.0)
+    assert search.seek(expected) is None
+    assert not search.begins(expected)

@@ -29,7 +29,7 @@ class Line:
     """An `PendingRequests` and what happens on its line."""
 
     def __init__(self) -> None:
-        self.unanswered = PendingRequests()
+        self.pending = PendingRequests()
 
     def silent(self, request: Request, at: float, code: FaultCode = FaultCode.TIMEOUT, *late: Request) -> None:
         self._settle(request, at, fault=Fault(code, ""), late=late)
@@ -65,18 +65,18 @@ class Line:
             answered=answered,
             ambiguous=ambiguous,
         )
-        self.unanswered.settled(outcome, RTU, 0.2, at + 0.2)
+        self.pending.on_outcome(outcome, RTU, 0.2, at + 0.2)
 
-    def pending(self, slave: int = 1) -> list[Request]:
-        return [each.request for each in self.unanswered.earlier(slave)]
+    def waiting(self, slave: int = 1) -> list[Request]:
+        return [each.request for each in self.pending.earlier(slave)]
 
     def free(self, request: Request, now: float) -> bool:
         """Whether a value may be asked now."""
-        if self.unanswered.left_alone_until(request.slave, now) is not None:
+        if self.pending.left_alone_until(request.slave, now) is not None:
             return False
-        if self.unanswered.confusable(request, RTU):
+        if self.pending.confusable(request, RTU):
             return False
-        return self.unanswered.lingering_until(request, RTU, now) is None
+        return self.pending.lingering_until(request, RTU, now) is None
 
 
 @pytest.fixture
@@ -86,32 +86,32 @@ def line() -> Line:
 
 def test_an_answer_leaves_nothing_pending(line: Line) -> None:
     line.answered(WIND, 0.0)
-    assert line.pending() == []
+    assert line.waiting() == []
     assert line.free(WIND, 0.2)
-    assert not line.unanswered.everybodys
+    assert not line.pending.by_slave
 
 
 def test_after_silence_only_another_shape_may_be_asked(line: Line) -> None:
     line.silent(WIND, 0.0)
-    assert line.unanswered.confusable(WIND, RTU)
-    assert not line.unanswered.confusable(WHO, RTU)
-    assert not line.unanswered.confusable(OTHER, RTU)
-    assert list(line.unanswered.everybodys) == [1]
+    assert line.pending.confusable(WIND, RTU)
+    assert not line.pending.confusable(WHO, RTU)
+    assert not line.pending.confusable(OTHER, RTU)
+    assert list(line.pending.by_slave) == [1]
 
 
 def test_an_answered_barrier_ends_it_once_the_silent_request_has_lingered(line: Line) -> None:
     line.silent(WIND, 0.0)
     line.answered(WHO, 0.3)
-    assert not line.unanswered.confusable(WIND, RTU)
-    assert line.unanswered.lingering_until(WIND, RTU, 0.6) == 1.0
-    assert line.unanswered.lingering_until(WHO, RTU, 0.6) is None
+    assert not line.pending.confusable(WIND, RTU)
+    assert line.pending.lingering_until(WIND, RTU, 0.6) == 1.0
+    assert line.pending.lingering_until(WHO, RTU, 0.6) is None
     assert line.free(WIND, 1.0)
-    assert line.pending() == []
+    assert line.waiting() == []
 
 
 def test_after_broken_bytes_nothing_lingers(line: Line) -> None:
     line.silent(WIND, 0.0, FaultCode.MALFORMED)
-    assert line.unanswered.confusable(WIND, RTU)
+    assert line.pending.confusable(WIND, RTU)
     line.answered(WHO, 0.3)
     assert line.free(WIND, 0.5)
 
@@ -120,32 +120,32 @@ def test_an_answer_to_a_barrier_may_be_that_of_the_barrier_before(line: Line) ->
     line.silent(WIND, 0.0)
     line.silent(WHO, 2.0)
     line.answered(WHO, 4.0)
-    assert line.pending() == [WHO]
+    assert line.waiting() == [WHO]
     assert line.free(WIND, 4.2)
     line.silent(WIND, 4.2)
     line.answered(WHO, 6.0)  # of the barrier at 4.0, for all we know
-    assert line.pending() == [WIND, WHO]
+    assert line.waiting() == [WIND, WHO]
     line.answered(WHO, 8.0)
     assert line.free(WIND, 8.2)
     line.answered(WIND, 8.2)
-    assert line.pending() == []
+    assert line.waiting() == []
 
 
 def test_another_request_of_the_same_shape_is_confusable_too(line: Line) -> None:
     line.silent(WHERE, 0.0)
-    assert line.unanswered.confusable(WHO, RTU)
+    assert line.pending.confusable(WHO, RTU)
     line.answered(WHO, 2.0)
-    assert line.pending() == [WHO]
+    assert line.waiting() == [WHO]
 
 
 def test_a_late_answer_ends_its_request_and_those_before(line: Line) -> None:
     line.silent(WIND, 0.0, FaultCode.CRC)
     line.silent(WHERE, 0.3, FaultCode.CRC)
     line.silent(WHO, 0.6, FaultCode.LATE, WHERE)
-    assert line.pending() == [WHO]
+    assert line.waiting() == [WHO]
     line.silent(OTHER, 0.9, FaultCode.TIMEOUT, WHO, WHO)
-    assert line.pending() == []
-    assert line.pending(2) == [OTHER]
+    assert line.waiting() == []
+    assert line.waiting(2) == [OTHER]
 
 
 def test_a_late_answer_that_came_is_not_waited_for(line: Line) -> None:
@@ -156,62 +156,62 @@ def test_a_late_answer_that_came_is_not_waited_for(line: Line) -> None:
 
 def test_bytes_that_only_begin_as_an_answer_end_the_oldest(line: Line) -> None:
     line.begun(WIND, 0.0)
-    assert line.pending() == []
+    assert line.waiting() == []
     line.silent(WIND, 0.0, FaultCode.CRC)
     line.silent(WHERE, 0.3, FaultCode.CRC)
     line.begun(WHO, 0.6)
-    assert line.pending() == [WHERE, WHO]
+    assert line.waiting() == [WHERE, WHO]
 
 
 def test_an_ambiguous_exception_has_the_slave_left_alone_for_a_second(line: Line) -> None:
     line.silent(WIND, 0.0)
     line.refused(WHO, 0.3, ambiguous=True)
-    assert line.unanswered.left_alone_until(1, 1.0) == 1.3
-    assert line.unanswered.left_alone_until(2, 1.0) is None
-    assert line.unanswered.left_alone_until(1, 1.3) is None
-    assert line.pending() == []
+    assert line.pending.left_alone_until(1, 1.0) == 1.3
+    assert line.pending.left_alone_until(2, 1.0) is None
+    assert line.pending.left_alone_until(1, 1.3) is None
+    assert line.waiting() == []
     assert line.free(WIND, 1.3)
 
 
 def test_an_exception_that_can_only_be_ours_proves_that_nothing_is_pending(line: Line) -> None:
     line.silent(WIND, 0.0, FaultCode.CRC)
     line.refused(WHO, 0.3, ambiguous=False)
-    assert line.pending() == []
+    assert line.waiting() == []
 
 
 def test_a_late_answer_to_the_last_one_ends_the_rest_of_the_slave_too(line: Line) -> None:
     line.silent(WIND, 0.0, FaultCode.CRC)
     line.refused(WHO, 0.3, ambiguous=True)
     line.answered(OTHER, 0.6, WHO)
-    assert line.unanswered.left_alone_until(1, 0.7) is None
+    assert line.pending.left_alone_until(1, 0.7) is None
 
 
 def test_a_slave_without_barrier_is_left_alone_for_twice_its_time_out(line: Line) -> None:
     line.silent(WIND, 5.0)
-    line.unanswered.leave_alone(1, 0.8)
-    assert line.unanswered.left_alone_until(1, 6.0) == 6.6
+    line.pending.leave_alone(1, 0.8)
+    assert line.pending.left_alone_until(1, 6.0) == 6.6
 
 
 def test_what_was_never_sent_and_what_nobody_answers_is_not_pending(line: Line) -> None:
-    line.unanswered.settled(replace(PLAIN, sent_end=None), RTU, 0.2, 0.2)
+    line.pending.on_outcome(replace(PLAIN, sent_end=None), RTU, 0.2, 0.2)
     everybody = replace(PLAIN, request=WriteRegister(0, 4, 1))
-    line.unanswered.settled(everybody, RTU, 0.2, 0.2)
-    line.unanswered.abandoned(everybody.request, RTU, 0.2, 0.2)
-    assert not line.unanswered.everybodys
+    line.pending.on_outcome(everybody, RTU, 0.2, 0.2)
+    line.pending.abandoned(everybody.request, RTU, 0.2, 0.2)
+    assert not line.pending.by_slave
 
 
 def test_an_exchange_that_was_cut_off_may_still_be_answered(line: Line) -> None:
-    line.unanswered.abandoned(WIND, RTU, 0.2, 3.0)
-    assert line.unanswered.confusable(WIND, RTU)
+    line.pending.abandoned(WIND, RTU, 0.2, 3.0)
+    assert line.pending.confusable(WIND, RTU)
     line.answered(WHO, 3.1)
-    assert line.unanswered.lingering_until(WIND, RTU, 3.4) == 4.0
+    assert line.pending.lingering_until(WIND, RTU, 3.4) == 4.0
 
 
 def test_of_equal_requests_the_newest_are_remembered(line: Line) -> None:
     line.silent(WIND, 0.0)
     for n in range(20):
         line.silent(WHO, 1.0 + n)
-    pending = line.unanswered.earlier(1)
+    pending = line.pending.earlier(1)
     assert [each.request for each in pending] == [WIND] + [WHO] * EQUALS_KEPT
     assert pending[-1].sent_end == 20.0
 
@@ -225,7 +225,7 @@ def test_answers_to_many_barriers_do_not_end_a_value_asked_after_those(line: Lin
         line.silent(WHO, 20.0 + n)
     for n in range(before):
         line.answered(WHO, 30.0 + n)
-    assert line.unanswered.confusable(WIND, RTU)
+    assert line.pending.confusable(WIND, RTU)
 
 
 @given(
@@ -241,7 +241,7 @@ def test_no_answer_of_a_slave_that_answers_in_turn_is_taken_for_another(
     for number, (step, pause) in enumerate(steps):
         now += EXCHANGE + pause
         request = WIND if line.free(WIND, now) else WHO
-        if request is WIND or line.unanswered.left_alone_until(1, now) is None:
+        if request is WIND or line.pending.left_alone_until(1, now) is None:
             backlog.append((request, number))
         else:
             continue
@@ -261,10 +261,10 @@ def test_no_answer_of_a_slave_that_answers_in_turn_is_taken_for_another(
 def test_a_slave_whose_answer_came_while_another_was_asked_is_tardy() -> None:
     line = Line()
     line.silent(WIND, 0.0)
-    assert not line.unanswered.tardy(1)
+    assert not line.pending.tardy(1)
     line.answered(OTHER, 0.3, WIND)
-    assert line.unanswered.tardy(1)
-    assert not line.unanswered.tardy(2)
+    assert line.pending.tardy(1)
+    assert not line.pending.tardy(2)
 
 
 @pytest.mark.parametrize("exception", [5, 10, 11])
@@ -273,48 +273,48 @@ def test_after_an_exception_that_does_not_end_it_a_request_stays_pending(excepti
     line = Line()
     line.silent(WHO, 0.0)
     outcome = ended(WIND, fault=Fault(FaultCode.EXCEPTION, "", exception), answered=True, ambiguous=ambiguous)
-    line.unanswered.settled(replace(outcome, sent_end=1.0), RTU, 0.2, 1.1)
-    assert [each.request for each in line.unanswered.earlier(1)] == [WHO, WIND]
-    assert line.unanswered.confusable(WIND, RTU)
-    assert line.unanswered.left_alone_until(1, 1.1) is None
+    line.pending.on_outcome(replace(outcome, sent_end=1.0), RTU, 0.2, 1.1)
+    assert [each.request for each in line.pending.earlier(1)] == [WHO, WIND]
+    assert line.pending.confusable(WIND, RTU)
+    assert line.pending.left_alone_until(1, 1.1) is None
 
 
 def test_another_masters_request_is_pending_until_its_answer_is_heard() -> None:
     line = Line()
-    unanswered = line.unanswered
-    assert not unanswered.overheard(1, 9, exception=False, now=0.0)
-    unanswered.asked_by_another(WIND, RTU, 1.0)
-    assert unanswered.confusable(WIND, RTU)
-    assert unanswered.overheard(1, 7, exception=False, now=1.1)  # of another shape: something is owed, but not this
-    assert unanswered.overheard(1, 9, exception=False, now=1.2)
-    assert unanswered.earlier(1) == ()
-    unanswered.asked_by_another(WIND, RTU, 2.0)
-    assert unanswered.overheard(1, 5, exception=True, now=2.1)
-    assert unanswered.earlier(1) == ()
+    pending = line.pending
+    assert not pending.overheard(1, 9, exception=False, now=0.0)
+    pending.asked_by_another(WIND, RTU, 1.0)
+    assert pending.confusable(WIND, RTU)
+    assert pending.overheard(1, 7, exception=False, now=1.1)  # of another shape: something is owed, but not this
+    assert pending.overheard(1, 9, exception=False, now=1.2)
+    assert pending.earlier(1) == ()
+    pending.asked_by_another(WIND, RTU, 2.0)
+    assert pending.overheard(1, 5, exception=True, now=2.1)
+    assert pending.earlier(1) == ()
 
 
 def test_a_request_of_ours_is_not_answered_by_what_is_overheard() -> None:
     line = Line()
     line.silent(WIND, 0.0)
-    assert line.unanswered.overheard(1, 9, exception=False, now=0.1)
-    assert [each.request for each in line.unanswered.earlier(1)] == [WIND]
+    assert line.pending.overheard(1, 9, exception=False, now=0.1)
+    assert [each.request for each in line.pending.earlier(1)] == [WIND]
 
 
 def test_the_answer_to_another_master_that_comes_in_our_exchange_makes_nobody_tardy() -> None:
     line = Line()
-    line.unanswered.asked_by_another(WIND, RTU, 0.0)
+    line.pending.asked_by_another(WIND, RTU, 0.0)
     outcome = ended(WHO, answer=(7,), fault=None, answered=True, late=(LateAnswer(WIND, 0.1, ours=False),))
-    line.unanswered.settled(replace(outcome, sent_end=0.1), RTU, 0.2, 0.2)
-    assert line.unanswered.earlier(1) == ()
-    assert not line.unanswered.tardy(1)
+    line.pending.on_outcome(replace(outcome, sent_end=0.1), RTU, 0.2, 0.2)
+    assert line.pending.earlier(1) == ()
+    assert not line.pending.tardy(1)
 
 
 def test_a_slave_that_is_answered_for_twice_is_left_alone() -> None:
     line = Line()
-    line.unanswered.duplicates.answered(1, 1.0)
-    until = line.unanswered.left_alone_until(1, 1.0)
+    line.pending.duplicates.answered(1, 1.0)
+    until = line.pending.left_alone_until(1, 1.0)
     assert until is not None
-    assert line.unanswered.left_alone_until(1, until) is None
+    assert line.pending.left_alone_until(1, until) is None
     line.silent(WIND, 1.0)
-    line.unanswered.leave_alone(1, 0.2)
-    assert line.unanswered.left_alone_until(1, 1.1) == 2.0
+    line.pending.leave_alone(1, 0.2)
+    assert line.pending.left_alone_until(1, 1.1) == 2.0

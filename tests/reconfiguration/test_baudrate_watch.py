@@ -17,7 +17,7 @@ def looking_out(bench: Bench, life: Life) -> list[str | None]:
         BaudrateWatch(
             running=lambda: life.running.now,
             new_run=life.physical.new_run,
-            devices=lambda: tuple(life.poller.schedule.devices.values()),
+            devices=lambda: tuple(life.poller.scheduler.devices.values()),
             tell=told.append,
         ).begin()
 

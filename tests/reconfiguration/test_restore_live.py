@@ -24,7 +24,7 @@ def recalled(bench: Bench, life: Life, baudrate: int = 9600, **slaves: int) -> N
         recalling = Restore(
             running=lambda: life.running.now,
             learn=life.running.learn,
-            devices=life.poller.schedule.devices.values,
+            devices=life.poller.scheduler.devices.values,
             tell=lambda kind, facts: life.events.append((kind, facts)),
         )
         payloads = {"line/state": json.dumps({"v": 1, "baudrate": baudrate}).encode()}

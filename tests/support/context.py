@@ -124,7 +124,7 @@ class FakePowers:
     async def access(self, what: RegisterRequest, device: SlaveConfig | None) -> Access:
         self.done.append((device and device.name, what))
         never = PendingRequests()
-        access = Access(Target(1, Codec(Framing.RTU)), what, unanswered=never, echo_known=bool, over=lambda _: None)
+        access = Access(Target(1, Codec(Framing.RTU)), what, pending=never, echo_known=bool, over=lambda _: None)
         for name, what_came in self.came.items():
             setattr(access, name, what_came)
         return access

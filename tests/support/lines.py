@@ -161,9 +161,9 @@ class Rigs:
         clock = VirtualClock(started)
         port = SimulatedPort(line, clock, PortSettings("/dev/simulated", baudrate), echo=echo, latency=latency)
         bus = Bus(port, line_rules or LineRules(), clock)
-        schedule = Scheduler(LineTiming.of(baudrate), started)
+        scheduler = Scheduler(LineTiming.of(baudrate), started)
         if polled is None:
             polled = [a_spec(slave, interval, response_timeout=response_timeout) for slave in ids]
-        schedule.replace(polled, rules or PollRules(), started)
+        scheduler.replace(polled, rules or PollRules(), started)
         events: list[Event] = []
-        return Rig(line, clock, port, Poller(bus, schedule, events.extend, clock), events)
+        return Rig(line, clock, port, Poller(bus, scheduler, events.extend, clock), events)

@@ -58,8 +58,8 @@ class Wire:
         self.poller = poller
 
     @property
-    def unanswered(self) -> PendingRequests:
-        return self.poller.schedule.unanswered
+    def pending(self) -> PendingRequests:
+        return self.poller.scheduler.pending
 
     def echo_known(self) -> bool:
         return self.poller.bus.echo is not Echo.UNKNOWN
@@ -67,10 +67,10 @@ class Wire:
     def submit(self, job: Job) -> None:
         self.poller.submit(job)
 
-    def go_on(self, course: Procedure, answer: object) -> None:
+    def resume_procedure(self, procedure: Procedure, result: object) -> None:
         def tell(now: float) -> None:
-            course.go_on(answer)
-            self.poller.schedule.wake(course, now)
+            procedure.resume(result)
+            self.poller.scheduler.wake(procedure, now)
 
         self.poller.post(tell)
 
@@ -113,11 +113,11 @@ class Life:
         config, profiles = self.physical.polled(), self.running.loaded.profiles
         bench.port = SimulatedPort(bench.line, bench.clock, port_settings(config.line), echo=bench.echo)
         bus = Bus(bench.port, line_rules(config.line), bench.clock)
-        schedule = Scheduler(timing_of(config.line), bench.clock.now)
-        schedule.replace(
+        scheduler = Scheduler(timing_of(config.line), bench.clock.now)
+        scheduler.replace(
             device_specs(config, profiles), poll_rules(config.poll), bench.clock.now
         )  # fmt: skip
-        self.poller = Poller(bus, schedule, self._heard, bench.clock)
+        self.poller = Poller(bus, scheduler, self._heard, bench.clock)
         self.physical.recall()
 
     def effective(self) -> Effective:

@@ -1,4 +1,4 @@
-"""A schedule on a line whose `dead` slaves are silent, in virtual time: for the tests of who speaks next."""
+"""A scheduler on a line whose `dead` slaves are silent, in virtual time: for the tests of who speaks next."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Task:
         self.words = list(words)
         self.share = share
         self.excludes = excludes
-        self.errand = Purpose.SCAN
+        self.purpose = Purpose.SCAN
         self.over_at: float | None = None
 
     def ask(self, now: float) -> Ask | Hold | Done:  # noqa: ARG002 - a job
@@ -47,7 +47,7 @@ class Task:
             self.words = self.words[1:]
         return word
 
-    def heard(self, outcome: Outcome, now: float) -> Next:  # noqa: ARG002 - a job
+    def on_outcome(self, outcome: Outcome, now: float) -> Next:  # noqa: ARG002 - a job
         self.words = self.words[1:]
         word = self.words.pop(0) if self.words else Done()
         assert isinstance(word, Requeue | Continue | Done)
@@ -62,20 +62,20 @@ def asking(slave: int) -> Ask:
 
 
 class Rig:
-    """A schedule and a line whose `dead` slaves are silent; `times` are slave, begin and end of each exchange."""
+    """A scheduler and a line whose `dead` slaves are silent; `times` are slave, begin and end of each exchange."""
 
     def __init__(self, *specs: DeviceSpec, rules: PollRules | None = None) -> None:
         self.now = 0.0
-        self.schedule = Scheduler(T9600, 0.0)
+        self.scheduler = Scheduler(T9600, 0.0)
         self.rules = rules or PollRules()
-        self.schedule.replace(specs, self.rules, 0.0)
+        self.scheduler.replace(specs, self.rules, 0.0)
         self.dead: set[int] = set()
         self.garbage: set[int] = set()
         self.times: list[tuple[int, float, float]] = []
         self.asked: list[int] = []
 
     def replace(self, *specs: DeviceSpec) -> None:
-        self.schedule.replace(specs, self.rules, self.now)
+        self.scheduler.replace(specs, self.rules, self.now)
 
     def outcome(self, ask: Ask, late: Iterable[LateAnswer] = ()) -> Outcome:
         request = ask.request
@@ -105,8 +105,8 @@ class Rig:
         )
 
     def ask(self) -> Ask | None:
-        """Have the schedule decide; None where nobody wants the line now."""
-        decision = self.schedule.next(self.now)
+        """Have the scheduler decide; None where nobody wants the line now."""
+        decision = self.scheduler.next(self.now)
         if isinstance(decision, Rest):
             assert decision.until > self.now
             return None
@@ -117,13 +117,13 @@ class Rig:
         outcome = self.outcome(ask, late)
         self.now = outcome.ended
         self.times.append((outcome.request.slave, outcome.asked, outcome.ended))
-        return self.schedule.settled(outcome, self.now)
+        return self.scheduler.on_outcome(outcome, self.now)
 
     def run(self, until: float) -> list[Reading]:
         """Carry out what is wanted until then; return the readings."""
         readings: list[Reading] = []
         while self.now < until:
-            decision = self.schedule.next(self.now)
+            decision = self.scheduler.next(self.now)
             if isinstance(decision, Ask):
                 self.asked.append(decision.request.slave)
                 readings += self.settle(decision)
@@ -133,5 +133,5 @@ class Rig:
         return readings
 
     def poll_of(self, name: str, request: int = 1) -> Poll:
-        device = self.schedule.devices[name]
-        return Poll(device, self.schedule.unanswered, due=self.now, errand=Purpose.REQUEST, request=request)
+        device = self.scheduler.devices[name]
+        return Poll(device, self.scheduler.pending, due=self.now, purpose=Purpose.REQUEST, request=request)

@@ -76,7 +76,7 @@ class Pretence:
 
     sensors: list[Mimic] = field(default_factory=list)
     clock: ProcedureClock = field(default_factory=ProcedureClock)
-    unanswered: PendingRequests = field(default_factory=PendingRequests)
+    pending: PendingRequests = field(default_factory=PendingRequests)
     line_rate: int = 9600
     asked: list[Ask] = field(default_factory=list)
     aside: list[object] = field(default_factory=list)
@@ -97,7 +97,7 @@ class Pretence:
 
     def asking(self, profile: Profile = LFS10) -> IdentityQuery:
         """Return what asks sensors of this profile."""
-        return IdentityQuery(profile, CODEC, self.unanswered, self.clock, line_rate=self.line_rate)
+        return IdentityQuery(profile, CODEC, self.pending, self.clock, line_rate=self.line_rate)
 
     @property
     def requests(self) -> list[Request]:
@@ -167,7 +167,7 @@ class Pretence:
         begun = self.clock.now
         self.clock.now = begun + outcome.ended
         moved = replace(outcome, asked=begun, began=begun, sent_end=begun, ended=self.clock.now)
-        self.unanswered.settled(moved, CODEC, ask.timeout, self.clock.now)
+        self.pending.on_outcome(moved, CODEC, ask.timeout, self.clock.now)
         return moved
 
 

@@ -25,7 +25,7 @@ def exchange(
     *,
     took: float = 0.03,
     gap: float | None = 0.004,
-    errand: Purpose = Purpose.POLL,
+    purpose: Purpose = Purpose.POLL,
     unsolicited: int = 0,
     late: int = 0,
 ) -> Exchanged:
@@ -35,7 +35,7 @@ def exchange(
         began=at - took,
         gap=gap,
         slave=1,
-        errand=errand,
+        purpose=purpose,
         fault=None,
         sent=b"",
         heard=b"",
@@ -181,10 +181,10 @@ def test_the_least_gap_is_since_boot_and_the_others_of_the_last_thousand() -> No
     assert gaps(counters) == {"min": 3700.0, "p50": 5000.0, "p99": 5000.0}
 
 
-@pytest.mark.parametrize("errand", [Purpose.SCAN, Purpose.CHANGE])
-def test_gaps_at_other_rates_are_left_out(errand: Purpose) -> None:
+@pytest.mark.parametrize("purpose", [Purpose.SCAN, Purpose.CHANGE])
+def test_gaps_at_other_rates_are_left_out(purpose: Purpose) -> None:
     counters = LineCounters(START)
-    counters.exchanged(exchange(START, gap=0.001, errand=errand))
+    counters.exchanged(exchange(START, gap=0.001, purpose=purpose))
     counters.exchanged(exchange(START, gap=None))
     assert gaps(counters) == {"min": None, "p50": None, "p99": None}
 

@@ -92,7 +92,7 @@ def test_a_port_that_is_freed_on_request_is_no_warning() -> None:
 )
 def test_frames_are_told_at_debug_where_they_are_wanted(heard: bytes, fault: FaultCode | None, words: str) -> None:
     happened = Exchanged(
-        at=1.0, asked=0.0, began=0.1, gap=0.004, slave=1, errand=Purpose.POLL, fault=fault, sent=b"\x01\x03\x00",
+        at=1.0, asked=0.0, began=0.1, gap=0.004, slave=1, purpose=Purpose.POLL, fault=fault, sent=b"\x01\x03\x00",
         heard=heard,
     )  # fmt: skip
     log = EventLog()

@@ -1,6 +1,6 @@
 """What a job is: something done on the line, one exchange after the other.
 
-A job never touches the line. The schedule calls `ask` when the line could be the job's, and `heard` with the
+A job never touches the line. The scheduler calls `ask` when the line could be the job's, and `on_outcome` with the
 outcome of what it asked; between the two and after them others may have had the line. Time is an argument.
 """
 
@@ -16,7 +16,7 @@ from lfs10d.reading import Purpose
 
 @dataclass(frozen=True, slots=True)
 class Hold:
-    """Nothing to ask before `until` (None: before the schedule is told to `wake` the job)."""
+    """Nothing to ask before `until` (None: before the scheduler is told to `wake` the job)."""
 
     until: float | None = None
 
@@ -68,7 +68,7 @@ class Job(Protocol):
     """
 
     @property
-    def errand(self) -> Purpose:
+    def purpose(self) -> Purpose:
         """What its exchanges are for."""
         ...
 
@@ -89,7 +89,7 @@ class Job(Protocol):
         """
         ...
 
-    def heard(self, outcome: Outcome, now: float) -> Next:
+    def on_outcome(self, outcome: Outcome, now: float) -> Next:
         """Take the outcome of what was asked."""
         ...
 

@@ -21,7 +21,7 @@ class Ping:
     over: `answered`, or `fault` says what came instead; neither where the port is lost.
     """
 
-    errand = Purpose.REQUEST
+    purpose = Purpose.REQUEST
     share = 1.0
 
     def __init__(self, slave: int, profile: Profile, codec: Codec, over: Callable[[Ping], None]) -> None:
@@ -40,7 +40,7 @@ class Ping:
         del now
         return Ask(self._request, self._codec, FIRST_TIMEOUTS[self._asked], request_gap=self._gap)
 
-    def heard(self, outcome: Outcome, now: float) -> Next:
+    def on_outcome(self, outcome: Outcome, now: float) -> Next:
         """Take an outcome; silence and noise are asked again."""
         self._asked += 1
         self.answered = speaks(outcome, self._codec)

@@ -55,10 +55,10 @@ class Poll:
     excludes = _NOTHING
 
     def __init__(
-        self, device: Device, unanswered: PendingRequests, *, due: float, errand: Purpose, request: int | None = None
+        self, device: Device, pending: PendingRequests, *, due: float, purpose: Purpose, request: int | None = None
     ) -> None:
         self.device = device
-        self.errand = errand
+        self.purpose = purpose
         self.request = request
         self.due = due
         self.values: dict[str, Number] = {}
@@ -66,11 +66,11 @@ class Poll:
         self.rtt: float | None = None
         self.at = due
         self.failed_attempts: list[FaultCode] = []
-        self._unanswered = unanswered
+        self._pending = pending
         self._blocks = device.spec.profile.reads()
         self._block = 0
-        self._retries = device.retries if errand is not Purpose.PROBE else 0
-        self._barrier_due = errand is Purpose.PROBE
+        self._retries = device.retries if purpose is not Purpose.PROBE else 0
+        self._barrier_due = purpose is Purpose.PROBE
         self._barrier_asked = False
         self._begun = False
         self._waking = False
@@ -94,22 +94,22 @@ class Poll:
         block = self._blocks[self._block]
         request = _read(device.slave, block.address, block.count, block.function)
         barrier = spec.profile.barrier
-        if barrier is None and self._unanswered.confusable(request, spec.codec):
-            self._unanswered.leave_alone(device.slave, device.timeout)
-        until = self._unanswered.left_alone_until(device.slave, now)
+        if barrier is None and self._pending.confusable(request, spec.codec):
+            self._pending.leave_alone(device.slave, device.timeout)
+        until = self._pending.left_alone_until(device.slave, now)
         if until is not None:
             return Hold(until)
         self._barrier_asked = False
         first = self._barrier_due or (self._waking and device.gap.sleeps)
-        if barrier is not None and (first or self._unanswered.confusable(request, spec.codec)):
+        if barrier is not None and (first or self._pending.confusable(request, spec.codec)):
             request = _read(device.slave, barrier.register, barrier.count, barrier.function)
             self._barrier_asked = True
-        elif (until := self._unanswered.lingering_until(request, spec.codec, now)) is not None:
+        elif (until := self._pending.lingering_until(request, spec.codec, now)) is not None:
             return Hold(until)
-        timeout = device.probe_timeout if self.errand is Purpose.PROBE else device.timeout
+        timeout = device.probe_timeout if self.purpose is Purpose.PROBE else device.timeout
         return Ask(request, spec.codec, timeout, device.patience)
 
-    def heard(self, outcome: Outcome, now: float) -> Next:
+    def on_outcome(self, outcome: Outcome, now: float) -> Next:
         """Take the outcome of what was asked."""
         device = self.device
         self.at = outcome.ended
@@ -180,7 +180,7 @@ def _reading(device: Device, at: float, fault: Fault | None, poll: Poll | None, 
         rtt=poll.rtt if poll else None,
         online=device.online,
         response_timeout=device.timeout,
-        probe=poll is not None and poll.errand is Purpose.PROBE,
+        probe=poll is not None and poll.purpose is Purpose.PROBE,
         failed_attempts=tuple(poll.failed_attempts) if poll else (),
         overruns=overruns,
         requests=tuple(each.request for each in polls if each.request is not None),

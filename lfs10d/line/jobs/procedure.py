@@ -1,7 +1,7 @@
 """A course: a job whose questions follow from the answers, told as one generator. Pure.
 
 Its generator yields `Ask` and is sent the outcome; yields `Hold(until)` to rest; yields `Await(...)` to have something
-done off the line (an intent put on the disk) and is sent what `go_on` brings, while others have the line. What it
+done off the line (an intent put on the disk) and is sent what `resume` brings, while others have the line. What it
 returns goes aside too: the job is over only when that has been taken care of, so that its slave ids stay its own
 until the configuration says who has them. Where the port is lost `LineLostError` is thrown into it.
 """
@@ -54,7 +54,7 @@ class ProcedureClock:
 class Procedure:
     """The job. `aside(course, what)` is told what to do off the line, and in the end `Finished` with what was returned.
 
-    It is called once for each, in the line's thread, and is answered with `go_on` and a wake. `line_rate` is the
+    It is called once for each, in the line's thread, and is answered with `resume` and a wake. `line_rate` is the
     line's own rate.
     """
 
@@ -67,11 +67,11 @@ class Procedure:
         line_rate: int,
         excludes: frozenset[int] = frozenset(),
         share: float = 0.3,
-        errand: Purpose = Purpose.CHANGE,
+        purpose: Purpose = Purpose.CHANGE,
     ) -> None:
         self.excludes = excludes
         self.share = share
-        self.errand = errand
+        self.purpose = purpose
         self._steps = steps
         self._clock = clock
         self._aside = aside
@@ -86,8 +86,8 @@ class Procedure:
         """Send no new frame from now on, and tell nothing; from any thread."""
         self._over = True
 
-    def go_on(self, answer: object = None) -> None:
-        """Tell what came of the thing done aside; the schedule must be told to wake the job then."""
+    def resume(self, answer: object = None) -> None:
+        """Tell what came of the thing done aside; the scheduler must be told to wake the job then."""
         self._answer = (answer,)
 
     # -- as a job
@@ -136,7 +136,7 @@ class Procedure:
         except StopIteration as end:
             self._following, self._result = None, end.value
 
-    def heard(self, outcome: Outcome, now: float) -> Next:
+    def on_outcome(self, outcome: Outcome, now: float) -> Next:
         """Take the outcome of what was asked."""
         self._clock.now = now
         asked = self._following

@@ -88,7 +88,7 @@ class Access:
     left. `before` is what the register held before a write, where it can be read.
     """
 
-    errand = Purpose.REQUEST
+    purpose = Purpose.REQUEST
     share = 1.0
 
     def __init__(
@@ -96,7 +96,7 @@ class Access:
         target: Target,
         what: Request,
         *,
-        unanswered: PendingRequests,
+        pending: PendingRequests,
         echo_known: Callable[[], bool],
         over: Callable[[Access], None],
     ) -> None:
@@ -107,7 +107,7 @@ class Access:
         self.fault: Fault | None = None
         self.sent = False
         self._target = target
-        self._unanswered = unanswered
+        self._pending = pending
         self._echo_known = echo_known
         self._over = over
         self._now = 0.0
@@ -125,23 +125,23 @@ class Access:
         slave, codec, request = self._target.slave, self._target.codec, self._following
         if now < self._rest_until:
             return Hold(self._rest_until)
-        until = self._unanswered.left_alone_until(slave, now)
+        until = self._pending.left_alone_until(slave, now)
         reads = isinstance(request, ReadRegisters)
-        if until is None and reads and self._unanswered.confusable(request, codec):
+        if until is None and reads and self._pending.confusable(request, codec):
             other = self._other_shape()
             if other is not None:
                 self._shaping = True
                 return Ask(other, codec, self._timeout)
-            self._unanswered.leave_alone(slave, self._timeout)
-            until = self._unanswered.left_alone_until(slave, now)
+            self._pending.leave_alone(slave, self._timeout)
+            until = self._pending.left_alone_until(slave, now)
         if until is None:
-            until = self._unanswered.lingering_until(request, codec, now)
+            until = self._pending.lingering_until(request, codec, now)
         if until is not None:
             return Hold(until)
         self.sent = self.sent or not reads
         return Ask(request, codec, self._timeout)
 
-    def heard(self, outcome: Outcome, now: float) -> Next:
+    def on_outcome(self, outcome: Outcome, now: float) -> Next:
         """Take the outcome of what was asked."""
         self._now = now
         if self._shaping and (outcome.fault is None or _refused(outcome)):
@@ -173,7 +173,7 @@ class Access:
         if profile.barrier is not None:
             places.insert(0, (profile.barrier.register, profile.barrier.count, profile.barrier.function))
         reads = (ReadRegisters(slave, *place) for place in places)
-        return next((read for read in reads if not self._unanswered.confusable(read, self._target.codec)), None)
+        return next((read for read in reads if not self._pending.confusable(read, self._target.codec)), None)
 
     # -- what is asked, one after the other
 

@@ -81,7 +81,7 @@ class Scan:
     `ended` is called once, with this job, when it is over.
     """
 
-    errand = Purpose.SCAN
+    purpose = Purpose.SCAN
     excludes: frozenset[int] = frozenset()
 
     def __init__(self, search: ScanPlan, ended: Callable[[Scan], None] = _nobody) -> None:
@@ -137,7 +137,7 @@ class Scan:
             self._slice_until = now + SLICE
         return self._following
 
-    def heard(self, outcome: Outcome, now: float) -> Next:
+    def on_outcome(self, outcome: Outcome, now: float) -> Next:
         """Take the outcome of what was asked."""
         asked, self._now = self._following, now
         if asked is not None:

@@ -63,7 +63,7 @@ class IdentityQuery:
     """Asks devices of one profile. `line_rate` is the line's own; `clock` is that of the course this is for."""
 
     def __init__(
-        self, profile: Profile, codec: Codec, unanswered: PendingRequests, clock: ProcedureClock, *, line_rate: int
+        self, profile: Profile, codec: Codec, pending: PendingRequests, clock: ProcedureClock, *, line_rate: int
     ) -> None:
         if profile.slave_id is None:
             raise ValueError(f"profile {profile.name} knows no register of the slave id")
@@ -72,7 +72,7 @@ class IdentityQuery:
         self.clock = clock
         self.timeout = QUICK
         self.id_register = profile.slave_id.register
-        self._unanswered = unanswered
+        self._pending = pending
         self.line_rate = line_rate
 
     def who(
@@ -95,7 +95,7 @@ class IdentityQuery:
             return self
         known = register.model_copy(update={"codes": {**register.codes, baudrate: code}})
         profile = self.profile.model_copy(update={"baudrate": known})
-        return IdentityQuery(profile, self.codec, self._unanswered, self.clock, line_rate=self.line_rate)
+        return IdentityQuery(profile, self.codec, self._pending, self.clock, line_rate=self.line_rate)
 
     def values(
         self, spot: Endpoint, timeout: float | None = None, *, block: Block | None = None
@@ -104,7 +104,7 @@ class IdentityQuery:
 
         A late answer to an older such question counts.
         """
-        until = self._unanswered.left_alone_until(spot.slave, self.clock.now)
+        until = self._pending.left_alone_until(spot.slave, self.clock.now)
         if until is not None:
             yield Hold(until)
         return self._reply((yield self._ask(self._values_of(spot, block), spot, timeout)), values=True)
@@ -126,19 +126,19 @@ class IdentityQuery:
     def settle(self, spot: Endpoint) -> Generator[Step, Outcome, bool]:
         """Ask until no answer to an older question can come from a place; whether that could be reached."""
         for _ in range(8):
-            if not self._unanswered.earlier(spot.slave):
+            if not self._pending.earlier(spot.slave):
                 return True
-            until = self._unanswered.left_alone_until(spot.slave, self.clock.now)
+            until = self._pending.left_alone_until(spot.slave, self.clock.now)
             if until is None:
                 reply = yield from self.who(spot, PATIENT)
                 if not reply.answers:
                     reply = yield from self.values(spot, PATIENT)
-                self._unanswered.lingering_until(self._values_of(spot), self.codec, self.clock.now)
-                if not self._unanswered.earlier(spot.slave):
+                self._pending.lingering_until(self._values_of(spot), self.codec, self.clock.now)
+                if not self._pending.earlier(spot.slave):
                     return True
                 until = self.clock.now + 0.25
             yield Hold(until)
-        return not self._unanswered.earlier(spot.slave)
+        return not self._pending.earlier(spot.slave)
 
     def _values_of(self, spot: Endpoint, block: Block | None = None) -> ReadRegisters:
         block = block or self.profile.reads()[0]
@@ -147,7 +147,7 @@ class IdentityQuery:
     def _ask(self, request: ReadRegisters, spot: Endpoint, timeout: float | None) -> Ask:
         baudrate = None if spot.baudrate == self.line_rate else spot.baudrate
         waits = self.timeout if timeout is None else timeout
-        if self._unanswered.tardy(spot.slave):
+        if self._pending.tardy(spot.slave):
             waits = max(waits, PATIENT)
         return Ask(request, self.codec, waits, None, baudrate, request_gap=self.profile.request_gap)
 
@@ -155,21 +155,21 @@ class IdentityQuery:
         self, request: ReadRegisters, spot: Endpoint, timeout: float | None
     ) -> Generator[Step, Outcome, IdentityReply | None]:
         """Wait and ask what must be asked before `request` may be; return what came instead of an answer, if so."""
-        unanswered, other = self._unanswered, self._values_of(spot)
+        pending, other = self._pending, self._values_of(spot)
         apart = self.codec.shapes(other)[0] != self.codec.shapes(request)[0]
         while True:
             now = self.clock.now
-            until = unanswered.left_alone_until(spot.slave, now)
+            until = pending.left_alone_until(spot.slave, now)
             if until is not None:
                 yield Hold(until)
-            elif unanswered.confusable(request, self.codec):
+            elif pending.confusable(request, self.codec):
                 if not apart:
-                    unanswered.leave_alone(spot.slave, self.timeout)
+                    pending.leave_alone(spot.slave, self.timeout)
                     continue
                 reply = self._reply((yield self._ask(other, spot, timeout)), values=True)
                 if not reply.answers or reply.exception in NOT_FINAL:
                     return reply
-            elif (until := unanswered.lingering_until(request, self.codec, now)) is not None:
+            elif (until := pending.lingering_until(request, self.codec, now)) is not None:
                 yield Hold(until)
             else:
                 return None

@@ -28,29 +28,29 @@ def outcome(request: ReadRegisters, answer: tuple[int, ...] | None, fault: Fault
 
 
 class Door:
-    """A knock at slave 5 and what comes of it."""
+    """A ping at slave 5 and what comes of it."""
 
     def __init__(self) -> None:
         self.told: list[Ping] = []
-        self.knock = Ping(5, LFS10, CODEC, self.told.append)
+        self.ping = Ping(5, LFS10, CODEC, self.told.append)
         self.timeouts: list[float] = []
 
     def hear(self, *faults: Fault | None) -> bool:
         """Answer one question after the other with these faults, None for an answer; return whether it is over."""
         following: object = None
         for fault in faults:
-            ask = self.knock.ask(0.0)
+            ask = self.ping.ask(0.0)
             assert isinstance(ask, Ask)
             assert isinstance(ask.request, ReadRegisters)
             self.timeouts.append(ask.timeout)
-            following = self.knock.heard(outcome(ask.request, (5,) if fault is None else None, fault), 1.0)
+            following = self.ping.on_outcome(outcome(ask.request, (5,) if fault is None else None, fault), 1.0)
         assert following in (Done(), Requeue(1.0))
-        assert self.told == ([self.knock] if following == Done() else [])
+        assert self.told == ([self.ping] if following == Done() else [])
         return following == Done()
 
 
 def test_the_register_of_the_slave_id_is_asked_and_nothing_written() -> None:
-    ask = Door().knock.ask(0.0)
+    ask = Door().ping.ask(0.0)
     assert ask.request == ReadRegisters(5, 0x0005, 1)
 
 
@@ -61,19 +61,19 @@ def test_a_device_without_one_is_asked_for_its_first_values() -> None:
 
 
 def test_nobody_else_asks_it_meanwhile() -> None:
-    assert Door().knock.excludes == {5}
+    assert Door().ping.excludes == {5}
 
 
 def test_an_answer_ends_it() -> None:
     door = Door()
     assert door.hear(None)
-    assert (door.knock.answered, door.knock.fault) == (True, None)
+    assert (door.ping.answered, door.ping.fault) == (True, None)
 
 
 def test_a_refusal_is_an_answer() -> None:
     door = Door()
     assert door.hear(Fault(FaultCode.EXCEPTION, "refused", exception_code=2))
-    assert door.knock.answered
+    assert door.ping.answered
 
 
 def test_silence_is_asked_again_and_more_patiently_and_then_told() -> None:
@@ -81,25 +81,25 @@ def test_silence_is_asked_again_and_more_patiently_and_then_told() -> None:
     assert not door.hear(SILENCE, SILENCE)
     assert door.hear(SILENCE)
     assert door.timeouts == [0.2, 0.4, 1.0]
-    assert (door.knock.answered, door.knock.fault) == (False, SILENCE)
+    assert (door.ping.answered, door.ping.fault) == (False, SILENCE)
 
 
 @pytest.mark.parametrize("order", [(NOISE, SILENCE, SILENCE), (SILENCE, NOISE, SILENCE), (SILENCE, SILENCE, NOISE)])
 def test_what_was_heard_says_more_than_silence(order: tuple[Fault, ...]) -> None:
     door = Door()
     assert door.hear(*order)
-    assert (door.knock.answered, door.knock.fault) == (False, NOISE)
+    assert (door.ping.answered, door.ping.fault) == (False, NOISE)
 
 
 def test_an_answer_after_silence_is_one() -> None:
     door = Door()
     assert door.hear(SILENCE, None)
-    assert door.knock.answered
+    assert door.ping.answered
 
 
 def test_when_the_port_is_lost_nothing_is_known() -> None:
     door = Door()
     door.hear(SILENCE)
-    door.knock.cut_off(2.0)
-    assert door.told == [door.knock]
-    assert (door.knock.answered, door.knock.fault) == (False, None)
+    door.ping.cut_off(2.0)
+    assert door.told == [door.ping]
+    assert (door.ping.answered, door.ping.fault) == (False, None)

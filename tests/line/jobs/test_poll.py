@@ -30,16 +30,16 @@ PLAIN = ended(WIND)
 class Rig:
     """A device on a line, and a poll of it."""
 
-    def __init__(self, errand: Purpose = Purpose.POLL, *, profile: str = "lfs10", retries: int = 1) -> None:
-        self.unanswered = PendingRequests()
+    def __init__(self, purpose: Purpose = Purpose.POLL, *, profile: str = "lfs10", retries: int = 1) -> None:
+        self.pending = PendingRequests()
         chosen = load_profile(profile, relative_to=Path())
         self.device = Device(DeviceSpec("mast", 1, chosen, RTU, 1.0), PollRules(retries=retries), 1)
         self.device.answered()
-        self.errand = errand
+        self.purpose = purpose
         self.begin()
 
     def begin(self) -> None:
-        self.poll = Poll(self.device, self.unanswered, due=0.0, errand=self.errand)
+        self.poll = Poll(self.device, self.pending, due=0.0, purpose=self.purpose)
 
     def asks(self, now: float = 0.0) -> ReadRegisters:
         ask = self.poll.ask(now)
@@ -58,7 +58,7 @@ class Rig:
         ambiguous: bool = False,
         heard: bytes = b"",
     ) -> Requeue | Done:
-        """Ask and hear; remembered by the line as in the schedule."""
+        """Ask and hear; remembered by the line as in the scheduler."""
         request = self.asks(now)
         fault = None if code is None else Fault(code, "", 2 if code is FaultCode.EXCEPTION else None)
         outcome = replace(
@@ -74,8 +74,8 @@ class Rig:
             ambiguous=ambiguous,
             heard=heard,
         )
-        self.unanswered.settled(outcome, RTU, 0.2, now + 0.02)
-        following = self.poll.heard(outcome, now + 0.02)
+        self.pending.on_outcome(outcome, RTU, 0.2, now + 0.02)
+        following = self.poll.on_outcome(outcome, now + 0.02)
         assert isinstance(following, Requeue | Done)
         return following
 
@@ -188,13 +188,13 @@ def test_a_probe_begins_with_the_barrier_and_is_never_tried_again() -> None:
 def test_a_probe_waits_as_probes_do_and_a_poll_as_was_learned() -> None:
     rig = Rig(Purpose.PROBE)
     for _ in range(20):
-        rig.device.turnarounds.learn(0.01)
+        rig.device.response_times.learn(0.01)
     rig.device.failed(Fault(FaultCode.TIMEOUT, ""), 0.0)
     rig.asks()
     assert (rig.asked.timeout, rig.asked.patience) == (0.2, 0.01)
     rig = Rig()
     for _ in range(20):
-        rig.device.turnarounds.learn(0.1)
+        rig.device.response_times.learn(0.1)
     rig.asks()
     assert rig.asked.timeout == pytest.approx(0.22)
     assert rig.asked.patience == 0.1
@@ -208,7 +208,7 @@ def test_without_a_barrier_the_slave_is_left_alone() -> None:
     rig.hears(0.0, code=FaultCode.TIMEOUT)
     assert rig.poll.ask(0.2) == Hold(1.0)
     assert rig.asks(1.0) == WIND
-    rig.errand = Purpose.PROBE
+    rig.purpose = Purpose.PROBE
     rig.begin()
     assert rig.asks(1.0) == WIND
 

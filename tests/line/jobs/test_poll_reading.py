@@ -23,8 +23,8 @@ def device() -> Device:
     return Device(spec, PollRules(), 1, overruns=2)
 
 
-def a_poll(device: Device, errand: Purpose, request: int | None = None) -> Poll:
-    return Poll(device, PendingRequests(), due=0.0, errand=errand, request=request)
+def a_poll(device: Device, purpose: Purpose, request: int | None = None) -> Poll:
+    return Poll(device, PendingRequests(), due=0.0, purpose=purpose, request=request)
 
 
 def test_a_good_poll(device: Device) -> None:

@@ -41,7 +41,7 @@ def answer(heard: Callable[..., Outcome]) -> Outcome:
 
 def test_unless_told_otherwise_it_is_a_change_that_takes_a_third_of_the_line_and_no_slave_id_for_itself() -> None:
     made, _ = course(steps_of(HERE))
-    assert (made.errand, made.share, made.excludes) == (Purpose.CHANGE, 0.3, frozenset())
+    assert (made.purpose, made.share, made.excludes) == (Purpose.CHANGE, 0.3, frozenset())
 
 
 def test_it_is_what_it_is_told_to_be() -> None:
@@ -52,9 +52,9 @@ def test_it_is_what_it_is_told_to_be() -> None:
         line_rate=9600,
         excludes=frozenset({3}),
         share=0.1,
-        errand=Purpose.PROBE,
+        purpose=Purpose.PROBE,
     )
-    assert (made.errand, made.share, made.excludes) == (Purpose.PROBE, 0.1, frozenset({3}))
+    assert (made.purpose, made.share, made.excludes) == (Purpose.PROBE, 0.1, frozenset({3}))
 
 
 def test_a_question_is_asked_again_until_its_outcome_came_and_the_outcome_reaches_the_course(answer: Outcome) -> None:
@@ -70,7 +70,7 @@ def test_a_question_is_asked_again_until_its_outcome_came_and_the_outcome_reache
 
     made, _ = course(steps(), clock)
     assert made.ask(1.0) == made.ask(2.0) == HERE
-    assert made.heard(answer, 3.0) == Requeue(3.0)
+    assert made.on_outcome(answer, 3.0) == Requeue(3.0)
     assert sent == [answer]
     assert made.ask(3.5) == Hold(9.0)
     made.ask(9.0)
@@ -100,10 +100,10 @@ def test_what_goes_aside_is_told_once_and_the_course_goes_on_with_what_came_of_i
     made, told = course(steps())
     assert made.ask(1.0) == made.ask(2.0) == Hold()
     assert told == ["intent"]
-    made.go_on("on the disk")
+    made.resume("on the disk")
     assert made.ask(3.0) == Hold()
     assert told == ["intent", "second"]
-    made.go_on()
+    made.resume()
     assert made.ask(4.0) == HERE
     assert sent == ["on the disk", None]
 
@@ -113,7 +113,7 @@ def test_what_is_answered_at_once_is_not_waited_for() -> None:
 
     def at_once(made: Procedure, what: object) -> None:
         told.append(what)
-        made.go_on()
+        made.resume()
 
     made = Procedure(steps_of(Await("intent"), HERE), ProcedureClock(), at_once, line_rate=9600)
     assert made.ask(1.0) == HERE
@@ -123,32 +123,32 @@ def test_what_is_answered_at_once_is_not_waited_for() -> None:
 def test_it_is_over_only_when_its_end_was_taken_care_of(answer: Outcome) -> None:
     made, told = course(steps_of(HERE, result="moved"))
     made.ask(1.0)
-    assert made.heard(answer, 1.1) == Requeue(1.1)
+    assert made.on_outcome(answer, 1.1) == Requeue(1.1)
     assert made.ask(1.2) == made.ask(1.3) == Hold()
     assert told == [Finished("moved")]
-    made.go_on()
+    made.resume()
     assert made.ask(1.4) == Done()
-    assert made.heard(answer, 1.5) == Done()
+    assert made.on_outcome(answer, 1.5) == Done()
     assert told == [Finished("moved")]
 
 
 def test_at_another_rate_it_goes_on_at_once_for_a_quarter_of_a_second(answer: Outcome) -> None:
     made, _ = course(steps_of(*[THERE] * 9))
     made.ask(1.0)
-    assert made.heard(answer, 1.05) == Continue()
+    assert made.on_outcome(answer, 1.05) == Continue()
     made.ask(1.05)
-    assert made.heard(answer, 1.0 + SLICE - THERE.timeout) == Continue()
+    assert made.on_outcome(answer, 1.0 + SLICE - THERE.timeout) == Continue()
     made.ask(1.15)
-    assert made.heard(answer, 1.151) == Requeue(1.151)
+    assert made.on_outcome(answer, 1.151) == Requeue(1.151)
     made.ask(1.4)
-    assert made.heard(answer, 1.4 + SLICE - THERE.timeout) == Continue()
+    assert made.on_outcome(answer, 1.4 + SLICE - THERE.timeout) == Continue()
 
 
 @pytest.mark.parametrize("following", [HERE, Ask(WHO, RTU, 0.1, None, 4800), Hold(2.0)])
 def test_a_stay_at_another_rate_ends_where_what_follows_does_not_belong_there(answer: Outcome, following: Step) -> None:
     made, _ = course(steps_of(THERE, following))
     made.ask(1.0)
-    assert made.heard(answer, 1.01) == Requeue(1.01)
+    assert made.on_outcome(answer, 1.01) == Requeue(1.01)
 
 
 @pytest.mark.parametrize("rate", [None, 9600])
@@ -158,14 +158,14 @@ def test_at_the_lines_own_rate_others_may_have_the_line_between_two_questions(
     own = Ask(WHO, RTU, 0.1, None, rate)
     made, _ = course(steps_of(own, own))
     made.ask(1.0)
-    assert made.heard(answer, 1.01) == Requeue(1.01)
+    assert made.on_outcome(answer, 1.01) == Requeue(1.01)
 
 
 def test_halted_it_sends_nothing_and_tells_nothing(answer: Outcome) -> None:
     made, told = course(steps_of(HERE, HERE))
     made.ask(1.0)
     made.halt()
-    assert made.heard(answer, 1.1) == Done()
+    assert made.on_outcome(answer, 1.1) == Done()
     assert made.ask(1.2) == Done()
     made.cut_off(1.3)
     assert told == []
@@ -174,7 +174,7 @@ def test_halted_it_sends_nothing_and_tells_nothing(answer: Outcome) -> None:
 def test_an_outcome_it_did_not_ask_for_ends_it_without_harm(answer: Outcome) -> None:
     made, _ = course(steps_of(Hold(5.0), HERE))
     made.ask(1.0)
-    assert made.heard(answer, 1.1) == Done()
+    assert made.on_outcome(answer, 1.1) == Done()
 
 
 @pytest.mark.parametrize("begun", [False, True])
@@ -207,7 +207,7 @@ def test_a_course_that_does_not_care_is_over_without_a_result() -> None:
 def test_a_port_lost_after_the_end_changes_nothing_about_it(answer: Outcome) -> None:
     made, told = course(steps_of(HERE, result="moved"))
     made.ask(1.0)
-    made.heard(answer, 1.1)
+    made.on_outcome(answer, 1.1)
     made.cut_off(1.2)
     assert made.ask(1.3) == Hold()
     assert told == [Finished("moved")]
@@ -216,6 +216,6 @@ def test_a_port_lost_after_the_end_changes_nothing_about_it(answer: Outcome) -> 
 def test_a_question_that_belongs_behind_the_one_before_it_is_asked_at_once(answer: Outcome) -> None:
     made, _ = course(steps_of(HERE, replace(HERE, at_once=True), HERE))
     assert made.ask(1.0) == HERE
-    assert made.heard(answer, 1.1) == Continue()
+    assert made.on_outcome(answer, 1.1) == Continue()
     assert made.ask(1.1) == replace(HERE, at_once=True)
-    assert made.heard(answer, 1.2) == Requeue(1.2)
+    assert made.on_outcome(answer, 1.2) == Requeue(1.2)

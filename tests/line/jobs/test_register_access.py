@@ -51,8 +51,8 @@ class Rig:
         self.line = SimulatedLine([self.vane], seed=1)
         self.port = SimulatedPort(self.line, self.clock, PortSettings("/dev/sim"), echo=self.adapter_echoes)
         self.bus = Bus(self.port, LineRules(echo=self.echo), self.clock)
-        self.schedule = Scheduler(self.bus.line_timing, 0.0)
-        self.poller = Poller(self.bus, self.schedule, self.events.extend, self.clock)
+        self.scheduler = Scheduler(self.bus.line_timing, 0.0)
+        self.poller = Poller(self.bus, self.scheduler, self.events.extend, self.clock)
         if self.polled:
             self.poller.replace([DeviceSpec("vane", 7, VANE, RTU, 0.25)], PollRules())
 
@@ -60,7 +60,7 @@ class Rig:
         access = Access(
             Target(what.slave, RTU, profile, timeout),
             what,
-            unanswered=self.schedule.unanswered,
+            pending=self.scheduler.pending,
             echo_known=lambda: self.bus.echo is not Echo.UNKNOWN,
             over=self.ended.append,
         )
@@ -87,7 +87,7 @@ class Rig:
 
     @property
     def exchanges(self) -> list[Exchanged]:
-        return [each for each in self.events if isinstance(each, Exchanged) and each.errand is Purpose.REQUEST]
+        return [each for each in self.events if isinstance(each, Exchanged) and each.purpose is Purpose.REQUEST]
 
     @property
     def writes(self) -> list[bytes]:
@@ -328,7 +328,7 @@ def test_nobody_polls_the_slave_between_a_write_and_its_verification() -> None:
     begun = len(rig.events)
     rig.vane.ail("slow_flash", delay=1.0)
     rig.do(write(10))
-    assert {each.errand for each in rig.events[begun:] if isinstance(each, Exchanged)} == {Purpose.REQUEST}
+    assert {each.purpose for each in rig.events[begun:] if isinstance(each, Exchanged)} == {Purpose.REQUEST}
     rig.vane.heal()
     rig.pass_time(1.0)
     assert [each.fault for each in rig.events if isinstance(each, Reading)][-1] is None

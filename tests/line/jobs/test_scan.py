@@ -70,8 +70,8 @@ class Scanned:
     def __post_init__(self) -> None:
         self.port = SimulatedPort(self.line, self.clock, PortSettings("/dev/sim"), echo=self.echo, latency=self.latency)
         bus = Bus(self.port, LineRules(), self.clock)
-        self.schedule = Scheduler(bus.line_timing, 0.0)
-        self.poller = Poller(bus, self.schedule, self.events.extend, self.clock)
+        self.scheduler = Scheduler(bus.line_timing, 0.0)
+        self.poller = Poller(bus, self.scheduler, self.events.extend, self.clock)
         self.poller.submit(self.scan)
 
     def pass_time(self, seconds: float) -> None:
@@ -364,7 +364,7 @@ def beside_polls(share: float, rates: tuple[int, ...]) -> Scanned:
 
 
 def taken(running: Scanned) -> float:
-    return sum(event.at - event.asked for event in running.exchanges if event.errand is Purpose.SCAN)
+    return sum(event.at - event.asked for event in running.exchanges if event.purpose is Purpose.SCAN)
 
 
 @pytest.mark.parametrize("rate", [9600, 19200])
@@ -373,7 +373,7 @@ def test_beside_polls_it_takes_its_share_of_the_line_and_no_more(rate: int) -> N
 
 
 def test_at_the_lines_own_rate_polls_come_between_any_two_questions() -> None:
-    errands = [event.errand for event in beside_polls(0.3, (9600,)).exchanges]
+    errands = [event.purpose for event in beside_polls(0.3, (9600,)).exchanges]
     assert (Purpose.SCAN, Purpose.SCAN) not in set(pairwise(errands))
 
 
@@ -381,7 +381,7 @@ def test_another_rate_is_spoken_in_slices_and_never_for_one_exchange() -> None:
     running = beside_polls(0.3, (19200,))
     slices: list[list[Exchanged]] = [[]]
     for event in running.exchanges:
-        if event.errand is Purpose.SCAN:
+        if event.purpose is Purpose.SCAN:
             slices[-1].append(event)
         elif slices[-1]:
             slices.append([])
@@ -394,7 +394,7 @@ def test_another_rate_is_spoken_in_slices_and_never_for_one_exchange() -> None:
 
 def test_polls_beside_a_scan_lose_nothing() -> None:
     running = beside_polls(0.3, (19200,))
-    polls = [event for event in running.exchanges if event.errand is Purpose.POLL]
+    polls = [event for event in running.exchanges if event.purpose is Purpose.POLL]
     assert len(polls) > 50
     assert {event.fault for event in polls} == {None}
 
@@ -405,21 +405,21 @@ def test_a_slice_is_claimed_only_where_another_exchange_fits() -> None:
     assert isinstance(first, Ask)
     assert first.baudrate == 19200
     silent = _silence(first)
-    assert isinstance(scan.heard(silent, 0.11), Continue)
+    assert isinstance(scan.on_outcome(silent, 0.11), Continue)
     assert isinstance(scan.ask(0.11), Ask)
-    assert isinstance(scan.heard(silent, 0.22), Requeue)
+    assert isinstance(scan.on_outcome(silent, 0.22), Requeue)
 
 
 def _silence(ask: Ask) -> Outcome:
     """Return the outcome of an exchange in which nothing was heard."""
     running = Scanned(line_of(), Scan(search([ask.request.slave])))
     kept: list[Outcome] = []
-    heard = running.scan.heard
+    on_outcome = running.scan.on_outcome
 
     def keep(outcome: Outcome, now: float) -> Continue | Requeue | Done:
         kept.append(outcome)
-        return heard(outcome, now)
+        return on_outcome(outcome, now)
 
-    running.scan.heard = keep  # type: ignore[method-assign]  # an ear at the door
+    running.scan.on_outcome = keep  # type: ignore[method-assign]  # an ear at the door
     running.finish()
     return kept[0]

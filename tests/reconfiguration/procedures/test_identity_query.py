@@ -145,7 +145,7 @@ def test_without_a_second_shape_the_slave_is_left_alone_first(pretence: Pretence
 def test_values_wait_for_a_slave_that_is_left_alone(pretence: Pretence) -> None:
     asking = pretence.asking()
     pretence.carry_out(asking.who(HERE))
-    pretence.unanswered.leave_alone(3, 0.5)
+    pretence.pending.leave_alone(3, 0.5)
     pretence.sensor(3)
     assert pretence.carry_out(asking.values(HERE)).answers
     assert pretence.clock.now >= 1.0
@@ -161,14 +161,14 @@ def test_it_is_settled_once_the_sensor_answers_and_the_silence_is_over(pretence:
     pretence.carry_out(asking.who(HERE))
     pretence.sensor(3)
     assert pretence.carry_out(asking.settle(HERE))
-    assert pretence.unanswered.earlier(3) == ()
+    assert pretence.pending.earlier(3) == ()
 
 
 def test_a_slave_that_is_left_alone_is_settled_after_that(pretence: Pretence) -> None:
     asking = pretence.asking()
     pretence.carry_out(asking.who(HERE))
-    pretence.unanswered.leave_alone(3, 0.5)
-    until = pretence.unanswered.left_alone_until(3, pretence.clock.now)
+    pretence.pending.leave_alone(3, 0.5)
+    until = pretence.pending.left_alone_until(3, pretence.clock.now)
     pretence.sensor(3)
     assert pretence.carry_out(asking.settle(HERE))
     assert until is not None
@@ -193,7 +193,7 @@ def test_quiet_is_a_silence_in_which_only_others_answered_late(heard: Callable[.
 
 def test_so_is_one_whose_answer_came_while_another_was_asked(pretence: Pretence, heard: Callable[..., Outcome]) -> None:
     late = LateAnswer(WHO, 0.4)
-    pretence.unanswered.settled(heard(ReadRegisters(9, 1, 2), late=(late,)), RTU, QUICK, 1.0)
+    pretence.pending.on_outcome(heard(ReadRegisters(9, 1, 2), late=(late,)), RTU, QUICK, 1.0)
     pretence.carry_out(pretence.asking().who(HERE))
     pretence.carry_out(pretence.asking().who(Endpoint(slave=9, baudrate=9600)))
     assert [ask.timeout for ask in pretence.asked if ask.request == WHO] == [PATIENT]
