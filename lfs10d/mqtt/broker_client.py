@@ -93,13 +93,18 @@ class BrokerClient:
         finally:
             self._waiters.remove(waiter)
 
-    async def leave(self, within: float) -> None:
-        """Disconnect in order if the broker answers `within` seconds, else at once; stay away."""
+    async def leave(self, within: float, *, will: bool = False) -> None:
+        """Disconnect in order if the broker answers `within` seconds, else at once; stay away.
+
+        `will`: close the connection without DISCONNECT, so that the broker publishes the will.
+        """
         self._wanted = False
         if self._timer is not None:
             self._timer.cancel()
         standing = self.standing
-        if standing is not None:
+        if will:
+            self.drop("left without DISCONNECT")
+        elif standing is not None:
             self._over.clear()
             standing.leave()
             try:

@@ -156,7 +156,7 @@ class Sender:
         else:
             self._unproved.append(sent)  # it was written, that is all
         if reason < REFUSED_FROM:
-            self._outbox.on_ack(sent.item, self._now(), heard=reason != NO_MATCHING_SUBSCRIBERS)
+            self._outbox.on_ack(sent.item, self._now(), nobody_listens=reason == NO_MATCHING_SUBSCRIBERS)
         else:
             self._refused(sent, reason)
         congested = self._outbox.congested(self._now())

@@ -42,6 +42,7 @@ KEEP_WITHIN = 0.6
 for the disk to keep what the broker did not take."""
 
 _ONLINE = telemetry.retained(telemetry.AVAILABILITY, ONLINE)
+_OFFLINE = telemetry.retained(telemetry.AVAILABILITY, OFFLINE)
 
 
 class UplinkEvents(Protocol):
@@ -105,7 +106,6 @@ class Uplink:
         line = base.rpartition("/")[2]
         self._sender = Sender(self._outbox, self._topics, line, epoch_ms=epoch_ms, stuck=self._acknowledges_nothing)
         self._subscription: int | None = None
-        self._farewell: int | None = None
         self._leaving = False
         self._progress = asyncio.Event()
         self._drop_told = False
@@ -243,7 +243,7 @@ class Uplink:
             self._drop_told = True
             log.warning("more samples wait for the broker than there is room for: the oldest are dropped")
         self._sender.wake()
-        if self._outbox.backlog.away or self._outbox.backlog.spill_due() is not None:
+        if self._outbox.backlog.spill.away or self._outbox.backlog.spill.due() is not None:
             self._poke()
 
     def respond(self, topic: str, payload: telemetry.Payload, correlation: bytes | None = None) -> None:
@@ -262,15 +262,18 @@ class Uplink:
         loop = asyncio.get_running_loop()
         self._leaving = True
         await self._until(lambda: self._outbox.idle, loop.time() + DRAIN_WITHIN)
-        standing = self._client.standing
-        if standing is not None:
-            self._farewell = standing.publish(self._topics.availability, OFFLINE.encode(), retain=True)
-            await self._until(lambda: self._farewell is None, loop.time() + FAREWELL_WITHIN)
-            if self.connected and self._farewell is None:
-                self._outbox.backlog.part()
-        await self._client.leave(LEAVE_WITHIN)
+        if not self.connected:
+            await self._client.leave(LEAVE_WITHIN)
+            return
+        parting = self._outbox.part(_OFFLINE)
+        self._sender.wake()
+        if await self._until(lambda: parting.over, loop.time() + FAREWELL_WITHIN):
+            self._outbox.backlog.part()
+        # Where the window had no room for it, the broker says it for us.
+        await self._client.leave(LEAVE_WITHIN, will=not parting.sent)
 
-    async def _until(self, reached: Callable[[], bool], deadline: float) -> None:
+    async def _until(self, reached: Callable[[], bool], deadline: float) -> bool:
+        """Wait until this is so; return False if it is not by the deadline, or the connection is lost."""
         try:
             async with asyncio.timeout_at(deadline):
                 while self.connected and not reached():
@@ -278,6 +281,7 @@ class Uplink:
                     await self._progress.wait()
         except TimeoutError:
             log.debug("the broker does not answer in time")
+        return self.connected and reached()
 
     # Events of the client
 
@@ -310,7 +314,6 @@ class Uplink:
             self._retained_reader.lost()
         self._cleanup.lost()
         self._retained_requests.lost()
-        self._farewell = None
         self._drop_told = False
         self._progress.set()
         self._poke()
@@ -318,12 +321,10 @@ class Uplink:
 
     def acknowledged(self, mid: int, reason: int) -> None:
         """Send on."""
-        if mid == self._farewell:
-            self._farewell = None
         self._sender.acknowledged(mid, reason)
         if self._outbox.backlog.spool.rows:
             self._poke()
-        if self._outbox.announced:
+        if (self._announcing or self._cleanup.wanted) and self._outbox.announced:
             if self._announcing:
                 self._announcing = False
                 self._events.on_announced()

@@ -6,12 +6,8 @@ The rules (contract, section 3):
    then it goes oldest first, by boot and seq: what lies in the store, then what waits in memory. One device and one
    boot per batch, at most 1000 samples a second, and as many batches under way at a time as `drain` says: one, as long
    as the backlog shrinks. One more goes whenever none has gone for 2 s.
-2. What was acknowledged from 10 s before a loss until the backlog is opened goes once more, in its place by seq:
-   an acknowledgement of a broker that dies is not durable. After the first connect of a life so does what
-   was acknowledged until then with the word that nobody listens: after a power cut subscribers are late there too.
-3. While the broker has been away for more than 3 s, what waits here is handed to the store, at first at once, then
-   every 5 s; and whenever half of the memory is taken, which happens where the broker is too slow.
-   What the store cannot take waits in memory.
+2. What was acknowledged to no purpose (`recent_acks`) goes once more, in its place by seq.
+3. What waits in memory is handed to the store while the broker is away or too slow (`spill`).
 4. Devices whose history the broker refuses are passed over: their samples wait where they are, the others go on.
 
 So everything in the store is older than everything in memory.
@@ -19,16 +15,16 @@ So everything in the store is older than everything in memory.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterator
 from collections.abc import Set as AbstractSet
-from dataclasses import replace
 
 from lfs10d.outbox.drain import Drain
 from lfs10d.outbox.history import History, QueuedSample
 from lfs10d.outbox.items import HistoryBatch, LossNotice, OutboxItem, samples_of
 from lfs10d.outbox.losses import Loss, Losses
-from lfs10d.outbox.spool import AGAIN_WITHIN, Spool
+from lfs10d.outbox.recent_acks import RecentAcks
+from lfs10d.outbox.spill import Spill
+from lfs10d.outbox.spool import Spool
 from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry import publication
 
@@ -50,24 +46,11 @@ TURN_EVERY = 2.0
 HISTORY_AFTER = 10.0
 """Seconds after a connect at which the backlog is opened (contract, section 3)."""
 
-AWAY_AFTER = 3.0
-"""Seconds without the broker after which samples are kept on disk."""
-
-SPILL_EVERY = 5.0
-"""Seconds from one commit to the next; and to the next attempt where the store cannot take anything."""
-
-SPILL_MOST = 1000
-"""Samples in one commit: about 30 ms of the store's thread."""
-
 
 class Backlog:
     """The rules above. `detection`: seconds in which a dead connection is noticed at the latest."""
 
     def __init__(self, *, capacity: int, detection: float) -> None:
-        self._capacity = capacity
-        self._detection = detection
-        self._connected = False
-        self._away_since = float("-inf")
         self._open_from = 0.0
         self._batch_at = 0.0
         self._batch_most = BATCH_MOST
@@ -75,13 +58,11 @@ class Backlog:
         self._window = 1
         self._turn_at = 0.0
         self._under_way: dict[HistoryBatch | LossNotice, None] = {}
-        self._acknowledged: deque[tuple[float, QueuedSample]] = deque(maxlen=capacity)
-        self._unheard: deque[tuple[float, QueuedSample]] = deque(maxlen=capacity)
-        self._repeat = False
-        self._spilling: list[QueuedSample] = []
-        self._spill_at = float("-inf")
+        self._recent = RecentAcks(capacity=capacity, detection=detection)
         self.history = History()
         """What waits in memory."""
+        self.spill = Spill(self.history, self._recent, capacity)
+        """What of it goes to the store."""
         self.spool = Spool()
         """What waits in the store."""
         self.losses = Losses()
@@ -93,7 +74,7 @@ class Backlog:
 
     def connected(self, now: float, window: int) -> None:
         """Note that the broker is there, and takes `window` messages at once."""
-        self._connected = True
+        self.spill.away = False
         self._open_from = self._batch_at = now + HISTORY_AFTER
         self._turn_at = self._open_from + TURN_EVERY
         self._window = window
@@ -103,22 +84,14 @@ class Backlog:
 
     def lost(self, now: float) -> None:
         """Note that it is gone; what was under way is put back by the outbox."""
-        if self._connected:
-            self._away_since = now
-        self._connected = False
-        if not self._repeat:
-            self._forget(now - AGAIN_WITHIN - self._detection)
-        self._acknowledged.extend(self._unheard)
-        self._unheard.clear()
-        self._repeat = True
+        self.spill.lost(now)
+        self._recent.lost(now)
         self._under_way.clear()
         self.spool.rewind()
 
     def part(self) -> None:
         """Note that we part from a broker that has answered everything: what it has needs no second sending."""
-        if not self._repeat:
-            self._acknowledged.clear()
-        self._unheard.clear()
+        self._recent.part()
         self.spool.release_all()
 
     # What goes
@@ -171,23 +144,16 @@ class Backlog:
 
     def repeat(self, now: float) -> bool:
         """Once the backlog is open, let what rule 2 says wait once more; return True if it does."""
-        if now < self._open_from or not (self._repeat or self._unheard):
+        if now < self._open_from or not self._recent.wanted:
             return False
-        again = self._acknowledged if self._repeat else self._unheard
-        self._repeat = False
-        self._take_again(again)
+        self.history.extend(self._recent.again())
         return True
-
-    def _take_again(self, again: deque[tuple[float, QueuedSample]]) -> None:
-        self.history.extend(replace(queued, repeated=True) for _, queued in again)
-        again.clear()
 
     def due(self, refused: AbstractSet[str]) -> float | None:
         """Return when `next` may have something though nothing happens before; None: not by time alone."""
         declared = self.losses.due() if publication.EVENT not in refused and not self._notifying else None
         times = [] if declared is None else [declared]
-        again = self._acknowledged if self._repeat else self._unheard
-        in_memory = not self.spool.more and (again or self.history.waits(_devices(refused)))
+        in_memory = not self.spool.more and (self._recent.waiting or self.history.waits(_devices(refused)))
         if self.spool.page or in_memory:
             times.append(max(self._batch_at, self._free_at))
         return max(self._open_from, min(times)) if times else None
@@ -199,18 +165,17 @@ class Backlog:
         if isinstance(item, HistoryBatch | LossNotice):
             self._under_way.pop(item, None)
 
-    def on_ack(self, item: OutboxItem, now: float, *, heard: bool = True) -> None:
-        """Note that the broker has it; `heard`: it did not say that nobody listens."""
-        if not self._repeat:
-            self._forget(now - AGAIN_WITHIN)
+    def on_ack(self, item: OutboxItem, now: float, *, nobody_listens: bool = False) -> None:
+        """Note that the broker has it; `nobody_listens`: it said that no subscription matches."""
+        self._recent.on_ack(now)
         if isinstance(item, HistoryBatch) and self.drain.on_ack(now):
             self.drain.look(now, len(self) + self.spool.depth)
-        rows = [queued.row for queued in samples_of(item) if queued.row is not None]
+        samples = samples_of(item)
+        rows = [queued.row for queued in samples if queued.row is not None]
         if rows:
             self.spool.on_ack(rows, now)
         else:
-            late = not (heard or self._repeat) and now < self._open_from
-            (self._unheard if late else self._acknowledged).extend((now, queued) for queued in samples_of(item))
+            self._recent.add(samples, now, without_listener=nobody_listens and now < self._open_from)
 
     def dead(self, item: OutboxItem) -> None:
         """Note that it will never be delivered."""
@@ -245,9 +210,12 @@ class Backlog:
         self.drain.taken(full=True)
         return shorter
 
-    def refused(self, batch: HistoryBatch) -> None:
-        """Let a batch that the broker refused wait again."""
-        self._wait(batch.samples)
+    def refused(self, item: HistoryBatch | LossNotice) -> None:
+        """Let what the broker refused wait again."""
+        if isinstance(item, LossNotice):
+            self.losses.restore(item.loss)
+        else:
+            self._wait(item.samples)
 
     def _wait(self, samples: tuple[QueuedSample, ...]) -> None:
         (self.history if samples[0].row is None else self.spool.page).put_back(samples)
@@ -259,51 +227,13 @@ class Backlog:
         else:
             self.history.extend(queued for queued in item.samples if queued.row is None)
 
-    def _forget(self, before: float) -> None:
-        while self._acknowledged and self._acknowledged[0][0] < before:
-            self._acknowledged.popleft()
-
     # The store
 
-    @property
-    def away(self) -> bool:
-        """The broker is."""
-        return not self._connected
-
-    def spill_at_last(self) -> bool:
-        """Tell whether there is anything for the store before the daemon ends."""
-        return bool(self.history or (self._repeat and self._acknowledged))
-
-    def spill_due(self) -> float | None:
-        """Return when `spill` is wanted for what waits here; None: for nothing."""
-        if self._spilling:
-            return None
-        if len(self.history) > self._capacity // 2:
-            return self._spill_at
-        if self._connected or not self.spill_at_last():
-            return None
-        return max(self._away_since + AWAY_AFTER, self._spill_at)
-
-    def spill(self) -> list[QueuedSample]:
-        """Take what the store shall keep; `spilled` or `not_spilled` is to follow."""
-        if not self._connected and self._repeat:
-            self._take_again(self._acknowledged)
-        while len(self._spilling) < SPILL_MOST and self.history:
-            self._spilling += self.history.take(SPILL_MOST - len(self._spilling))
-        return self._spilling
-
     def spilled(self, evicted: tuple[Loss, ...], now: float) -> None:
-        """Note that the store has it, and what it had to evict."""
-        self._spilling = []
+        """Note that the store has what `spill` took, and what it had to evict."""
+        self.spill.done(now)
         self.spool.more = True
         self.losses.evicted(evicted)
-        self._spill_at = float("-inf") if self.history else now + SPILL_EVERY
-
-    def not_spilled(self, now: float) -> None:
-        """Let it wait in memory, since the store cannot take it."""
-        self.history.extend(self._spilling)
-        self._spilling = []
-        self._spill_at = now + SPILL_EVERY
 
     @property
     def beyond(self) -> int:
@@ -313,7 +243,7 @@ class Backlog:
 
     def page_due(self) -> float | None:
         """Return when the next page of the store is wanted; None: none is."""
-        wanted = self._connected and self.spool.more and not self.spool.page
+        wanted = not self.spill.away and self.spool.more and not self.spool.page
         return self._open_from if wanted else None
 
     def undeclared(self) -> list[Loss]:
@@ -325,17 +255,17 @@ class Backlog:
         """Give what waits the time that the clock tells now, as `QueuedSample.at` does."""
         self.history.correct(shift, clock)
         self.spool.page.correct(shift, clock)
-        self._spilling = [queued.at(shift, clock) for queued in self._spilling]
+        self.spill.correct(shift, clock)
 
     # How much
 
     def __len__(self) -> int:
         """Count the samples that wait in memory alone."""
-        return len(self.history) + len(self._spilling)
+        return len(self.history) + len(self.spill.samples)
 
     def waiting(self) -> Iterator[QueuedSample]:
         """Return the oldest of what waits in memory."""
-        yield from self._spilling[:1]
+        yield from self.spill.samples[:1]
         oldest = self.history.oldest()
         if oldest is not None:
             yield oldest

@@ -5,12 +5,13 @@ Topics are under `B`. Two items are never equal, whatever they say: each is one 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 from lfs10d.outbox.history import QueuedSample
 from lfs10d.outbox.losses import Loss
-from lfs10d.telemetry.publication import EVENT, HISTORY, Publication, device_topic
+from lfs10d.system.clock_step import ClockState
+from lfs10d.telemetry.publication import EVENT, HISTORY, Publication, device_topic, iso_time
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,6 +50,16 @@ class LiveSample:
     def topic(self) -> str:
         """The topic under `B`."""
         return self.publication.topic
+
+    def at(self, shift: int, clock: ClockState = "synced") -> LiveSample:
+        """Return it with the time that the clock tells now, as `QueuedSample.at` does."""
+        queued = self.queued.at(shift, clock)
+        payload = self.publication.payload
+        if queued is self.queued or not isinstance(payload, dict):
+            return self
+        sample = queued.sample
+        corrected = {**payload, "ts": sample.ts, "time": iso_time(sample.ts), "clock": sample.clock}
+        return LiveSample(replace(self.publication, payload=corrected, sample=sample), queued)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

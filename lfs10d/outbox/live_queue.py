@@ -6,9 +6,13 @@ A device that is polled often delays no other: each waits for at most one sample
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Iterator
 
 from lfs10d.outbox.items import LiveSample
+from lfs10d.system.clock_step import ClockState
+
+LIVE_FOR = 3.0
+"""Seconds after which a sample is history (contract, section 3)."""
 
 
 class LiveQueue:
@@ -58,8 +62,20 @@ class LiveQueue:
         """Return the sample that waits longest, None where none waits."""
         return next(iter(self._waiting), None)
 
-    def change(self, changed: Callable[[LiveSample], LiveSample]) -> None:
-        """Replace each sample by what `changed` makes of it; the turns stay."""
-        replaced = {live: changed(live) for live in self._waiting}
+    @property
+    def old_at(self) -> float | None:
+        """When the oldest sample becomes history; None: none waits."""
+        live = self.oldest()
+        return None if live is None else live.queued.since + LIVE_FOR
+
+    def take_old(self, now: float) -> Iterator[LiveSample]:
+        """Take the samples that are history by now."""
+        while (live := self.oldest()) is not None and now - live.queued.since > LIVE_FOR:
+            self.take_oldest()
+            yield live
+
+    def correct(self, shift: int, clock: ClockState = "synced") -> None:
+        """Give all the time that the clock tells now, as `QueuedSample.at` does; the turns stay."""
+        replaced = {live: live.at(shift, clock) for live in self._waiting}
         self._waiting = dict.fromkeys(replaced.values())
         self._devices = {device: deque(replaced[live] for live in waiting) for device, waiting in self._devices.items()}

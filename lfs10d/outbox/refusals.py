@@ -59,6 +59,7 @@ class Refusals:
         self._delay: dict[str, float] = {}
         self._bans: dict[str, float] = {}
         self._reported: set[str] = set()
+        self._unfit: set[str] = set()
 
     def refused(self, topic: str, reason: int, now: float) -> bool:
         """Pass over a topic whose message the broker refused, not as `UNFIT`; return True if it is to be reported."""
@@ -73,6 +74,12 @@ class Refusals:
             return False
         self._reported.add(topic)
         return True
+
+    def unfit(self, topic: str) -> bool:
+        """Note a message that is wrong in itself; return True if its topic is to be reported."""
+        reported = topic in self._unfit
+        self._unfit.add(topic)
+        return not reported
 
     def ban(self, topic: str, now: float) -> None:
         """Pass over a topic whose messages end the connection, over connects too."""
@@ -103,6 +110,7 @@ class Refusals:
         self._delay.clear()
         self._bans.clear()
         self._reported.clear()
+        self._unfit.clear()
         return self.connected(now)
 
     def due(self) -> float | None:

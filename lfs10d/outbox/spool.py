@@ -13,13 +13,11 @@ from dataclasses import dataclass, field
 from itertools import islice
 
 from lfs10d.outbox.history import History, QueuedSample
+from lfs10d.outbox.recent_acks import AGAIN_WITHIN
 from lfs10d.outbox.store.sample_file import StoredRow
 
 PAGE_ROWS = 3200
 """Samples of a page: for up to 32 devices its batches are full."""
-
-AGAIN_WITHIN = 10.0
-"""Seconds before a loss of the connection whose acknowledgements are not believed (contract, section 3)."""
 
 RELEASE_EVERY = 5.0
 """Seconds between two deletions."""
@@ -30,7 +28,7 @@ RELEASE_MOST = 2000
 
 @dataclass(slots=True)
 class Spool:
-    """`rows` and `oldest_ts` are as the store last told; `page` is what was taken from it and waits."""
+    """`rows` and `oldest_ts` are as the store last reported; `page` is what was taken from it and waits."""
 
     rows: int = 0
     oldest_ts: int | None = None
@@ -61,7 +59,7 @@ class Spool:
         lately = (row for _, rows in self._acknowledged for row in rows)
         return frozenset((*self._released, *self._again, *lately))
 
-    def told(self, rows: int, oldest_ts: int | None) -> None:
+    def update(self, rows: int, oldest_ts: int | None) -> None:
         """Take what the store says of itself."""
         self.rows, self.oldest_ts = rows, oldest_ts
 

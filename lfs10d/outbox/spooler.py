@@ -9,8 +9,9 @@ import asyncio
 import logging
 from collections.abc import Awaitable, Callable
 
-from lfs10d.outbox.backlog import SPILL_EVERY, Backlog
+from lfs10d.outbox.backlog import Backlog
 from lfs10d.outbox.outbox import Outbox
+from lfs10d.outbox.spill import SPILL_EVERY
 from lfs10d.outbox.spool import PAGE_ROWS
 from lfs10d.outbox.store.database import Limits
 from lfs10d.outbox.store.sample_file import StoreEntry
@@ -141,14 +142,14 @@ class Spooler:
             return float("-inf"), self._take_limits
         if self._right is not None:
             return float("-inf"), self._correct
-        spill, page, release = self._backlog.spill_due(), self._backlog.page_due(), self._backlog.spool.release_due()
+        spill, page, release = self._backlog.spill.due(), self._backlog.page_due(), self._backlog.spool.release_due()
         choices: list[tuple[float, Callable[[], Awaitable[None]]]] = [
             (never if page is None else page, self._take_page),
             (never if release is None else release, self._release),
         ]
         if self._store.open_for_more:
             choices.append((never if spill is None else spill, self._spill))
-            old = self._outbox.next_old() if self._backlog.away else None
+            old = self._outbox.next_old() if self._backlog.spill.away else None
             choices.append((self._losses_due, self._release))
             if spill is None and old is not None:
                 choices.append((max(old + NOTICED, self._now() + NOTICED), self._nothing))
@@ -177,7 +178,7 @@ class Spooler:
             self._opened = False
             self._open_at = self._now() + SPILL_EVERY
             self._tell_trouble(f"{error}; {FULL_DISK}")
-        self._backlog.spool.told(self._store.rows, self._store.oldest_ts)
+        self._backlog.spool.update(self._store.rows, self._store.oldest_ts)
         while self._store.reports:
             report = self._store.reports.popleft()
             log.warning("the backlog %s %s; it is put aside as %s", self._store.path, report.reason, report.path.name)
@@ -203,7 +204,7 @@ class Spooler:
         losses = await self._thread.call(self._store.open)
         self._opened = True
         spool = self._backlog.spool
-        spool.told(self._store.rows, self._store.oldest_ts)
+        spool.update(self._store.rows, self._store.oldest_ts)
         if self._first_opening:
             self._first_opening = False
             for loss in losses:
@@ -211,7 +212,7 @@ class Spooler:
             if spool.rows:
                 log.info("%d samples of before wait for the broker in %s", spool.rows, self._store.path)
         spool.more = spool.rows > 0
-        if self._backlog.spill_due() is None:
+        if self._backlog.spill.due() is None:
             self._works()
 
     async def _take_limits(self) -> None:
@@ -228,7 +229,9 @@ class Spooler:
 
     async def _spill(self) -> None:
         spool = self._backlog.spool
-        entries = [StoreEntry(queued.sample, queued.shift or 0, queued.repeated) for queued in self._backlog.spill()]
+        entries = [
+            StoreEntry(queued.sample, queued.shift or 0, queued.repeated) for queued in self._backlog.spill.take()
+        ]
         try:
             evicted = await self._thread.call(
                 self._store.append,
@@ -242,7 +245,7 @@ class Spooler:
         except StoreError:
             self._outbox.not_spilled(self._now())
             raise
-        spool.told(self._store.rows, self._store.oldest_ts)
+        spool.update(self._store.rows, self._store.oldest_ts)
         self._backlog.spilled(evicted, self._now())
         self._works()
         if evicted:
@@ -273,7 +276,7 @@ class Spooler:
         try:
             if not self._opened:
                 await self._open()
-            while self._store.open_for_more and self._backlog.spill_at_last():
+            while self._store.open_for_more and self._backlog.spill.at_last:
                 await self._spill()
             while self._backlog.spool.letting_go or self._losses_changed:
                 await self._release()

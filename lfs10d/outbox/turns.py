@@ -8,6 +8,31 @@ divided by w, rounded up, plus one for each other class.
 
 from __future__ import annotations
 
+CHANGES, MESSAGES, LIVE, HISTORY, REFRESHES, TRACES, CLEARINGS = range(7)
+"""The classes of the outbox."""
+
+FIRST_CLASSES = HISTORY
+"""Those below go before the others while the window has room for all."""
+
+WEIGHT = 8
+REFRESH_WEIGHT = 4
+LEAST_WEIGHT = 1
+"""Weights: of the first four classes, of refreshes, and of the rest."""
+
+
+def weight(number: int, *, bursting: bool, level: int) -> int:
+    """Return the weight of a class; `level` is that of `Drain`.
+
+    What is left of a burst has as much as samples and history together.
+    """
+    if number == CHANGES:
+        return 2 * WEIGHT if bursting else WEIGHT
+    if number == HISTORY:
+        return WEIGHT if bursting else WEIGHT * level
+    if number in (MESSAGES, LIVE):
+        return WEIGHT
+    return REFRESH_WEIGHT if number == REFRESHES else LEAST_WEIGHT
+
 
 class Turns:
     """The turns of `classes` classes, numbered from 0."""

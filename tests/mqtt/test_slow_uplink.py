@@ -16,7 +16,9 @@ from hypothesis import strategies as st
 from lfs10d.outbox.backlog import BATCH_MOST, HISTORY_AFTER, SAMPLE_EVERY, TURN_EVERY
 from lfs10d.outbox.drain import LEVEL_MOST
 from lfs10d.outbox.items import HistoryBatch, LiveSample, Message, OutboxItem, Retained, samples_of
-from lfs10d.outbox.outbox import BURST_FIRST, IN_FLIGHT_MOST, LEAST_WEIGHT, REFRESH_WEIGHT, WEIGHT, Outbox
+from lfs10d.outbox.outbox import IN_FLIGHT_MOST, Outbox
+from lfs10d.outbox.queues import BURST_FIRST
+from lfs10d.outbox.turns import LEAST_WEIGHT, REFRESH_WEIGHT, WEIGHT
 from lfs10d.telemetry import publication
 from lfs10d.telemetry.publication import Publication, PublicationKind, Sample
 

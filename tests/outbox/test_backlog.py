@@ -9,10 +9,11 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from lfs10d.outbox.backlog import AWAY_AFTER, HISTORY_AFTER, SPILL_EVERY, SPILL_MOST
+from lfs10d.outbox.backlog import HISTORY_AFTER
 from lfs10d.outbox.items import HistoryBatch, LiveSample, LossNotice, OutboxItem, samples_of
 from lfs10d.outbox.losses import DECLARED_EVERY, Loss
 from lfs10d.outbox.outbox import Outbox
+from lfs10d.outbox.spill import AWAY_AFTER, SPILL_EVERY, SPILL_MOST
 from lfs10d.outbox.store.sample_file import StoredRow
 from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry.publication import (
@@ -48,7 +49,7 @@ class MemoryStore:
     def spill(self, outbox: Outbox, now: float) -> bool:
         """Do what is due; return True if something was."""
         outbox.age(now)
-        due = outbox.backlog.spill_due()
+        due = outbox.backlog.spill.due()
         if due is None or due > now:
             return False
         self.take(outbox, now)
@@ -57,7 +58,7 @@ class MemoryStore:
     def take(self, outbox: Outbox, now: float) -> None:
         """Take what waits in memory."""
         backlog = outbox.backlog
-        queued = backlog.spill()
+        queued = backlog.spill.take()
         if self.broken:
             outbox.not_spilled(now)
             return
@@ -100,7 +101,7 @@ class MemoryStore:
     def tell(self, outbox: Outbox) -> None:
         """Tell what there is."""
         first = next((row.sample.ts for _, row in sorted(self.rows.items())), None)
-        outbox.backlog.spool.told(len(self.rows), first)
+        outbox.backlog.spool.update(len(self.rows), first)
 
     def opened(self, outbox: Outbox) -> None:
         """Begin with an outbox of the next life."""
@@ -145,7 +146,7 @@ def test_before_the_first_connect_what_is_older_than_three_seconds_is_kept_at_on
     assert store.spill(outbox, 3.1)
     outbox.add(sample(2), 3.1)
     outbox.age(7.0)
-    assert outbox.backlog.spill_due() == 3.1 + SPILL_EVERY
+    assert outbox.backlog.spill.due() == 3.1 + SPILL_EVERY
     assert not store.spill(outbox, 8.0)
     assert store.spill(outbox, 8.1)
     assert len(store.rows) == 2
@@ -158,7 +159,7 @@ def test_a_broker_that_is_back_within_three_seconds_costs_no_write() -> None:
     outbox.add(sample(1), 98.0)
     outbox.lost(100.0)
     outbox.age(102.9)
-    assert outbox.backlog.spill_due() == 100.0 + AWAY_AFTER
+    assert outbox.backlog.spill.due() == 100.0 + AWAY_AFTER
     connect(outbox, 102.95)
     assert not store.spill(outbox, 500.0)
 
@@ -189,10 +190,10 @@ def test_while_one_commit_is_under_way_no_other_begins() -> None:
     outbox = Outbox()
     outbox.add(sample(1), 0.0)
     outbox.age(4.0)
-    outbox.backlog.spill()
+    outbox.backlog.spill.take()
     outbox.add(sample(2), 4.0)
     outbox.age(10.0)
-    assert outbox.backlog.spill_due() is None
+    assert outbox.backlog.spill.due() is None
     assert outbox.depth == 2
     assert outbox.stats.oldest_ts == 1000
 
@@ -317,7 +318,7 @@ def test_samples_of_earlier_boots_come_first_and_never_in_one_batch_with_others(
 def heard_by_nobody(outbox: Outbox, now: float) -> None:
     item = outbox.next(now)
     assert isinstance(item, LiveSample)
-    outbox.on_ack(item, now, heard=False)
+    outbox.on_ack(item, now, nobody_listens=True)
 
 
 def test_what_nobody_listened_to_after_the_first_connect_of_a_life_goes_once_more_when_the_backlog_is_opened() -> None:
@@ -362,7 +363,7 @@ def test_what_nobody_listened_to_is_not_kept_on_disk_by_a_daemon_that_parts() ->
     heard_by_nobody(outbox, 1.0)
     outbox.backlog.part()
     outbox.lost(2.0)
-    assert not outbox.backlog.spill_at_last()
+    assert not outbox.backlog.spill.at_last
 
 
 # The clock
@@ -372,7 +373,7 @@ def test_a_clock_set_right_corrects_what_waits_wherever_it_waits_and_nothing_els
     outbox = Outbox()
     outbox.add(sample(1, clock="unsynced"), 0.0, shift=0)
     outbox.age(4.0)
-    outbox.backlog.spill()
+    outbox.backlog.spill.take()
     outbox.add(sample(2, clock="unsynced"), 4.0, shift=0)
     outbox.age(8.0)
     outbox.add(sample(3, clock="unsynced"), 8.0, shift=500)
@@ -424,7 +425,7 @@ def test_parting_from_a_broker_that_has_answered_leaves_nothing_to_repeat() -> N
     outbox.on_ack(item, 20.0)
     outbox.backlog.part()
     outbox.lost(20.1)
-    assert not outbox.backlog.spill_at_last()
+    assert not outbox.backlog.spill.at_last
 
 
 def test_what_is_still_to_be_repeated_is_kept_at_the_end() -> None:
@@ -438,7 +439,7 @@ def test_what_is_still_to_be_repeated_is_kept_at_the_end() -> None:
     connect(outbox, 21.0)
     outbox.backlog.part()
     outbox.lost(22.0)
-    assert outbox.backlog.spill_at_last()
+    assert outbox.backlog.spill.at_last
     store.take(outbox, 22.0)
     assert [row.repeated for row in store.rows.values()] == [True]
 
@@ -647,11 +648,11 @@ def test_what_was_acknowledged_before_is_no_loss_when_its_second_sending_is_unfi
 
 def test_the_broker_is_away_until_it_is_there_and_when_it_is_gone() -> None:
     outbox = Outbox()
-    told = [outbox.backlog.away]
+    told = [outbox.backlog.spill.away]
     connect(outbox, 0.0)
-    told.append(outbox.backlog.away)
+    told.append(outbox.backlog.spill.away)
     outbox.lost(1.0)
-    told.append(outbox.backlog.away)
+    told.append(outbox.backlog.spill.away)
     assert told == [True, False, True]
     assert outbox.stats == BacklogStats()
 
@@ -737,7 +738,7 @@ class PastLaws(RuleBasedStateMachine):
     def restart(self) -> None:
         """End in order while the broker is away, and begin anew."""
         self.outbox.age(float("inf"))
-        while self.outbox.backlog.spill_at_last():
+        while self.outbox.backlog.spill.at_last:
             self.store.take(self.outbox, self.now)
         self.store.losses = tuple(self.outbox.backlog.undeclared())
         gone = self.outbox.backlog.spool.releasing(self.now)

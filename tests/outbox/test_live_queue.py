@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from lfs10d.outbox.history import QueuedSample
 from lfs10d.outbox.items import LiveSample
-from lfs10d.outbox.live_queue import LiveQueue
+from lfs10d.outbox.live_queue import LIVE_FOR, LiveQueue
 from lfs10d.telemetry.publication import Publication, PublicationKind, Sample
 
 
@@ -62,15 +62,28 @@ def test_the_oldest_may_be_taken_out_of_its_turn() -> None:
     assert everything(queue) == [("b", 2)]
 
 
-def test_what_is_changed_keeps_its_turn() -> None:
+def test_what_is_corrected_keeps_its_turn() -> None:
     queue = LiveQueue()
     for device, seq in (("a", 1), ("a", 2), ("b", 1)):
-        queue.add(live(device, seq, 1.0))
-    queue.change(lambda each: replace(each, queued=replace(each.queued, since=2.0)))
+        item = live(device, seq, 1.0)
+        unsynced = replace(item.queued.sample, clock="unsynced")
+        queue.add(replace(item, queued=replace(item.queued, sample=unsynced, shift=0)))
+    queue.correct(60_000)
     oldest = queue.oldest()
     assert oldest is not None
-    assert oldest.queued.since == 2.0
+    assert (oldest.queued.sample.ts, oldest.queued.sample.clock) == (61_000, "synced")
     assert everything(queue) == [("a", 1), ("b", 1), ("a", 2)]
+
+
+def test_samples_are_old_after_three_seconds() -> None:
+    queue = LiveQueue()
+    assert [queue.old_at] == [None]
+    queue.add(live("a", 1, 1.0))
+    queue.add(live("a", 2, 2.0))
+    assert list(queue.take_old(4.0)) == []
+    assert [told(each) for each in queue.take_old(4.1)] == [("a", 1)]
+    oldest = queue.old_at
+    assert oldest == 2.0 + LIVE_FOR
 
 
 @given(st.lists(st.one_of(st.sampled_from("abc"), st.none(), st.just(""))))

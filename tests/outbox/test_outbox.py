@@ -14,19 +14,21 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 from lfs10d.outbox.backlog import BATCH_MOST, HISTORY_AFTER, SAMPLE_EVERY, TURN_EVERY
 from lfs10d.outbox.history import QueuedSample
 from lfs10d.outbox.items import HistoryBatch, LiveSample, LossNotice, Message, OutboxItem, Retained, samples_of
+from lfs10d.outbox.live_queue import LIVE_FOR
 from lfs10d.outbox.losses import DECLARED_EVERY, Loss
-from lfs10d.outbox.outbox import LIVE_FOR, MESSAGES_MOST, Outbox
+from lfs10d.outbox.message_queue import MESSAGES_MOST
+from lfs10d.outbox.outbox import Outbox
 from lfs10d.outbox.refusals import BANNED_FOR
 from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry import publication as telemetry
 from lfs10d.telemetry.publication import Publication, PublicationKind, Sample
 
-ARRAY_EVERY = BATCH_MOST * SAMPLE_EVERY
+BATCH_EVERY = BATCH_MOST * SAMPLE_EVERY
 NOT_AUTHORIZED = 0x87
 QUOTA_EXCEEDED = 0x97
 ONLINE = telemetry.retained("availability", "online")
 
-AnyLetter = TypeVar("AnyLetter", bound=OutboxItem)
+AnyItem = TypeVar("AnyItem", bound=OutboxItem)
 
 
 def sample(seq: int, device: str = "a") -> Publication:
@@ -49,7 +51,7 @@ def seqs(item: OutboxItem | None) -> list[int]:
     return [queued.sample.seq for queued in samples_of(item)]
 
 
-def take(outbox: Outbox, now: float, kind: type[AnyLetter]) -> AnyLetter:
+def take(outbox: Outbox, now: float, kind: type[AnyItem]) -> AnyItem:
     item = outbox.next(now)
     assert isinstance(item, kind)
     return item
@@ -256,7 +258,7 @@ def test_a_batch_has_at_most_100_samples_of_one_device_in_order() -> None:
         assert len({queued.sample.device for queued in item.samples}) == 1
         batches.append((item.topic, seqs(item)))
         outbox.on_ack(item, now)
-        now += ARRAY_EVERY
+        now += BATCH_EVERY
     assert sorted(len(each) for _, each in batches) == [50, 50, BATCH_MOST, BATCH_MOST]
     for device in "ab":
         told = [seq for topic, each in batches if topic == f"device/{device}/history" for seq in each]
@@ -273,8 +275,8 @@ def test_one_batch_is_under_way_at_a_time_and_a_thousand_samples_leave_in_a_seco
     assert outbox.due() == 60.0 + TURN_EVERY  # contract, section 3: one batch at least every 2 s, whatever is under way
     outbox.on_ack(first, 60.05)
     assert outbox.next(60.05) is None
-    assert outbox.due() == 60.0 + ARRAY_EVERY
-    assert isinstance(outbox.next(60.0 + ARRAY_EVERY), HistoryBatch)
+    assert outbox.due() == 60.0 + BATCH_EVERY
+    assert isinstance(outbox.next(60.0 + BATCH_EVERY), HistoryBatch)
 
 
 def test_live_samples_go_before_the_backlog() -> None:
@@ -871,7 +873,7 @@ def test_what_the_store_could_not_take_waits_in_memory_as_far_as_there_is_room()
     for seq in (1, 2):
         outbox.add(sample(seq), 0.0)
     outbox.age(4.0)
-    outbox.backlog.spill()
+    outbox.backlog.spill.take()
     outbox.backlog.history.add(QueuedSample(sample_of(3), 4.0))
     outbox.backlog.history.add(QueuedSample(sample_of(4), 4.0))
     outbox.not_spilled(4.0)
@@ -886,7 +888,7 @@ def sample_of(seq: int) -> Sample:
 
 def test_what_lies_in_the_store_counts_and_is_the_oldest() -> None:
     outbox = Outbox()
-    outbox.backlog.spool.told(5, 77)
+    outbox.backlog.spool.update(5, 77)
     outbox.add(sample(6), 0.0)
     assert outbox.stats == telemetry.BacklogStats(depth=6, oldest_ts=77, dropped=0)
 
@@ -1054,7 +1056,7 @@ def test_a_backlog_of_any_length_leaves_whole(count: int) -> None:
     while (item := outbox.next(now)) is not None:
         told += seqs(item)
         outbox.on_ack(item, now)
-        now += ARRAY_EVERY
+        now += BATCH_EVERY
     assert told == list(range(1, count + 1))
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from lfs10d.outbox.history import QueuedSample
-from lfs10d.outbox.spool import AGAIN_WITHIN, RELEASE_EVERY, RELEASE_MOST, Spool
+from lfs10d.outbox.recent_acks import AGAIN_WITHIN
+from lfs10d.outbox.spool import RELEASE_EVERY, RELEASE_MOST, Spool
 from lfs10d.outbox.store.sample_file import StoredRow
 from lfs10d.telemetry.publication import Sample
 
@@ -70,7 +71,7 @@ def test_acknowledged_rows_no_longer_count_and_leave_ten_seconds_later_in_batche
     assert spool.release_due() == 100.0 + AGAIN_WITHIN
     assert spool.releasing(110.05) == {1, 2}
     spool.deleted(frozenset({1, 2}))
-    spool.told(4, 3000)
+    spool.update(4, 3000)
     assert spool.depth == 2
     assert spool.release_due() == 110.05 + RELEASE_EVERY
     assert spool.releasing(115.1) == {3, 4}

@@ -12,11 +12,12 @@ from pathlib import Path
 
 import pytest
 
-from lfs10d.outbox.backlog import HISTORY_AFTER, SPILL_EVERY
+from lfs10d.outbox.backlog import HISTORY_AFTER
 from lfs10d.outbox.items import HistoryBatch, samples_of
 from lfs10d.outbox.losses import Loss
 from lfs10d.outbox.outbox import Outbox
-from lfs10d.outbox.spool import AGAIN_WITHIN
+from lfs10d.outbox.recent_acks import AGAIN_WITHIN
+from lfs10d.outbox.spill import SPILL_EVERY
 from lfs10d.outbox.spooler import Spooler
 from lfs10d.outbox.store.database import Limits
 from lfs10d.outbox.store.store import Store, StoreError

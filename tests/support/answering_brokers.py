@@ -13,11 +13,19 @@ BASE = "lfs10d/line0/"
 class Capricious:
     """Takes everything but what `answers` says: for a topic under `BASE`, what it gives instead of its PUBACK.
 
+    `receive_maximum` is announced and enforced: a client that exceeds it is thrown out (`exceeded` counts that),
+    and each PUBACK comes `delay` seconds late. `delay` None: none comes.
     In an answer `{mid}` stands for the packet identifier. An answer of no bytes, or a DISCONNECT, ends the connection;
     at the next one the will is published.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, receive_maximum: int | None = None, delay: float | None = 0.0) -> None:
+        self.exceeded = 0
+        self.disconnects = 0
+        """DISCONNECTs from clients."""
+        self._receive_maximum = receive_maximum
+        self._unacknowledged = 0
+        self.delay = delay
         self.answers: dict[str, bytes] = {}
         self.connects = 0
         self._published: list[tuple[str, bytes]] = []
@@ -61,7 +69,10 @@ class Capricious:
         match head >> 4:
             case 1:
                 self.connects += 1
-                client.sendall(b"\x20\x03\x00\x00\x00")
+                self._unacknowledged = 0
+                maximum = self._receive_maximum
+                properties = b"" if maximum is None else b"\x21" + maximum.to_bytes(2, "big")
+                client.sendall(bytes((0x20, 3 + len(properties), 0, 0, len(properties))) + properties)
             case 8:
                 filters = body.count(BASE.encode())
                 client.sendall(bytes((0x90, 3 + filters)) + body[:2] + b"\x00" + b"\x01" * filters)
@@ -75,6 +86,7 @@ class Capricious:
             case 12:
                 client.sendall(b"\xd0\x00")
             case 14:
+                self.disconnects += 1
                 return False
         return True
 
@@ -84,12 +96,27 @@ class Capricious:
         self._published.append((topic, body[end + len(mid) + 1 :]))  # behind the length of the properties, which is 0
         answer = self.answers.get(topic.removeprefix(BASE))
         if answer is None:
-            if mid:
-                client.sendall(b"\x40\x02" + mid)
-            return True
+            return not mid or self._acknowledge(client, mid)
         client.sendall(answer.replace(b"{mid}", mid))
         self._thrown_out = not answer.startswith(b"\x40")
         return not self._thrown_out
+
+    def _acknowledge(self, client: socket.socket, mid: bytes) -> bool:
+        self._unacknowledged += 1
+        if self._receive_maximum is not None and self._unacknowledged > self._receive_maximum:
+            self.exceeded += 1
+            client.sendall(b"\xe0\x02\x93\x00")
+            return False
+        if self.delay == 0:
+            self._send_ack(client, mid)
+        elif self.delay is not None:
+            threading.Timer(self.delay, self._send_ack, (client, mid)).start()
+        return True
+
+    def _send_ack(self, client: socket.socket, mid: bytes) -> None:
+        self._unacknowledged -= 1
+        with suppress(OSError):
+            client.sendall(b"\x40\x02" + mid)
 
 
 def _exactly(stream: socket.SocketIO, count: int) -> bytes:
