@@ -14,23 +14,22 @@ from bench.masters import DAEMON
 from bench.measure import measure
 from bench.programs import HERE
 from bench.report import Runs, markdown, results, table
-from bench.rows import FIRST_ROWS, ROWS, Row, engine_rows
+from bench.rows import FIRST_ROWS, ROWS, Row
 
 
 def chosen(options: argparse.Namespace) -> tuple[Row, ...]:
     """Return the rows asked for; rows that others are measured against come first, as listed."""
-    rows = engine_rows() if options.engine else ROWS
-    known = {row.name: row for row in rows}
+    known = {row.name: row for row in ROWS}
     if options.rows:
         names = options.rows.split(",")
         unknown = [name for name in names if name not in known]
         if unknown:
             sys.exit(f"no row named {', '.join(unknown)}; there are: {', '.join(known)}")
         names += [known[name].against for name in names if known[name].against in known]
-        return tuple(row for row in rows if row.name in names)
-    if options.quick and not options.engine:
-        return tuple(row for row in rows if row.name in FIRST_ROWS)
-    return rows
+        return tuple(row for row in ROWS if row.name in names)
+    if options.quick:
+        return tuple(row for row in ROWS if row.name in FIRST_ROWS)
+    return ROWS
 
 
 def run_rows(rows: tuple[Row, ...], options: argparse.Namespace) -> tuple[Runs, list[str]]:
@@ -64,7 +63,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m bench", description=__doc__)
     parser.add_argument("--rows", help="names, like 9600,noise (default: all)")
     parser.add_argument("--quick", action="store_true", help=f"only {', '.join(FIRST_ROWS)}")
-    parser.add_argument("--engine", action="store_true", help="ways to wait, without the daemon (decision 0001)")
     parser.add_argument("--runs", type=int, help="of each row (default: 5 of the first three, 2 of the others)")
     parser.add_argument("--seconds", type=float, help="length of a run, instead of the row's own")
     parser.add_argument("--daemon", help="command of the daemon (default: lfs10d beside this Python)")
@@ -77,7 +75,7 @@ def main() -> None:
     print(markdown(table(rows, runs)))
     if failures:
         sys.exit(f"{len(failures)} runs failed; bench/RESULTS.md is left as it was")
-    if not (options.no_write or options.engine):
+    if not options.no_write:
         when = dt.datetime.now(dt.UTC).date().isoformat()
         (HERE / "RESULTS.md").write_text(results(rows, runs, when))
 

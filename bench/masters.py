@@ -1,4 +1,4 @@
-"""Those who poll: the C reference, the engine probe and the daemon, each as a process with one command."""
+"""The masters that poll: the C reference and the daemon, each a process with one command."""
 
 from __future__ import annotations
 
@@ -36,13 +36,9 @@ def command(master: Master, row: Row, folder: Path, port: Path, broker: int, dae
         configuration = folder / "line0.yaml"
         configuration.write_text(json.dumps(daemon_configuration(row, port, broker), indent=2) + "\n")
         return [*daemon, "run", "-c", str(configuration), "--state-dir", str(folder / "state")]
-    rate = ["--baudrate", str(row.baudrate)]
-    if master == "reference":
-        publish = ["--mqtt", f"127.0.0.1:{broker}"] if MOSQUITTO_HEADER.exists() else []
-        return [str(build_reference()), *rate, "--ids", f"1-{row.sensors}", *publish, str(port)]
-    priority = ["--fifo"] if row.realtime else []
-    probe = [sys.executable, "-m", "bench.engine", master, str(port), *rate]
-    return [*probe, "--slaves", str(row.sensors), "--burst", *priority]
+    publish = ["--mqtt", f"127.0.0.1:{broker}"] if MOSQUITTO_HEADER.exists() else []
+    rate = str(row.baudrate)
+    return [str(build_reference()), "--baudrate", rate, "--ids", f"1-{row.sensors}", *publish, str(port)]
 
 
 def start(words: list[str], errors: Path) -> subprocess.Popen[str]:

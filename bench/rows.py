@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
-Master: TypeAlias = Literal["reference", "daemon", "thread", "selector", "epoll"]
+Master: TypeAlias = Literal["reference", "daemon"]
 
 BITS_PER_CHARACTER = 10
 REQUEST, ANSWER = 8, 9
@@ -115,14 +115,3 @@ ROWS = (
 
 FIRST_ROWS = ("9600", "19200", "115200")
 """What `python -m bench --quick` measures."""
-
-
-def engine_rows(baudrates: tuple[int, ...] = (9600, 19200, 115200)) -> tuple[Row, ...]:
-    """Return the rows of the engine probe: ways to wait, without any of the daemon's code."""
-    ways: tuple[Master, ...] = ("reference", "thread", "selector", "epoll")
-    plain = [Row(str(rate), f"engine at {rate}", baudrate=rate, masters=ways) for rate in baudrates]
-    ahead = [
-        replace(row, name=f"{row.name}-rt", title=f"{row.title}, SCHED_FIFO", masters=ways[:2], realtime=True)
-        for row in plain
-    ]
-    return tuple(replace(row, warm=1.0, seconds=8.0) for row in (*plain, *ahead))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import asyncio
 import signal
 from collections.abc import Coroutine
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
-from lfs10d.daemon.signals import ENDING
+ENDING: Final = (signal.SIGINT, signal.SIGTERM)
 
 T = TypeVar("T")
 

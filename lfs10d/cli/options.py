@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import click
-from click.shell_completion import CompletionItem
 
 from lfs10d.modbus.frames import Framing
 from lfs10d.modbus.port_settings import BAUDRATES, PARITIES, PortSettings
@@ -111,10 +110,7 @@ class SlaveId(click.IntRange):
         super().__init__(1, 255)
 
 
-def profile_names(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Return the built-in profiles that begin so, or else leave it to the shell: the path of a file."""
-    from click.shell_completion import CompletionItem  # noqa: PLC0415  # only when a shell asks
-
-    del context, parameter
-    fitting = [CompletionItem(name) for name in builtin_names() if name.startswith(incomplete)]
-    return fitting or [CompletionItem(incomplete, type="file")]
+def profile_names(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[Any]:
+    """Return the built-in profiles that begin so, or else leave it to the shell to complete a file's path."""
+    fitting = [name for name in builtin_names() if name.startswith(incomplete)]
+    return fitting or click.Path().shell_complete(context, parameter, incomplete)

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import click
-from click.shell_completion import CompletionItem
 from pydantic import ValidationError
 
 from lfs10d.cli import EXIT_FAILED, config_option, event_loop, json_option, request_words
@@ -68,20 +67,16 @@ def _name(context: click.Context, parameter: click.Parameter, value: str) -> str
     return value
 
 
-def _complete(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    from click.shell_completion import CompletionItem  # noqa: PLC0415  # only when a shell asks
-
+def _complete(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
     del context, parameter
-    return [CompletionItem(name) for name in sorted(REQUESTS) if name.startswith(incomplete)]
+    return [name for name in sorted(REQUESTS) if name.startswith(incomplete)]
 
 
-def _complete_parameter(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    from click.shell_completion import CompletionItem  # noqa: PLC0415  # only when a shell asks
-
+def _complete_parameter(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
     del parameter
     name, given = context.params.get("name") or "", context.params.get("parameters") or ()
     known = {"device": configured_devices(context.params.get("config")), "profile": builtin_names()}
-    return [CompletionItem(word) for word in request_words.completions(name, given, incomplete, known)]
+    return request_words.completions(name, given, incomplete, known)
 
 
 def configured_devices(file: object) -> tuple[str, ...]:

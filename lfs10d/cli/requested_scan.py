@@ -19,7 +19,6 @@ from lfs10d.cli.login import Login
 from lfs10d.cli.render import scan_findings
 from lfs10d.cli.render.response import told, verdict
 from lfs10d.cli.render.scan_progress import TELL_EVERY, progress_bar, span
-from lfs10d.cli.scan import show_table
 from lfs10d.errors import FailedError
 from lfs10d.mqtt.messages import Filter, Incoming
 from lfs10d.profiles.library import builtin_names, load_profile
@@ -79,7 +78,7 @@ def show(response: Mapping[str, Any], *, as_json: bool) -> int:
     if isinstance(data, dict) and isinstance(found, list):
         rows = [row(each) for each in found if isinstance(each, dict)]
         if rows:
-            show_table(rows)
+            scan_findings.show(rows)
         else:
             click.echo("Nobody was found.")
         rest = {key: value for key, value in data.items() if key != "found"}

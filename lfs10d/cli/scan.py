@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +16,6 @@ from lfs10d.cli.options import PORT, LineOptions, baudrate_of, line_options, tak
 from lfs10d.cli.port_holder import instead
 from lfs10d.cli.render import scan_findings, troubleshooting
 from lfs10d.cli.render.scan_progress import view
-from lfs10d.cli.render.table import columns
 from lfs10d.errors import PortBusyError, PortError
 from lfs10d.line.jobs.scan import Scan
 from lfs10d.line.jobs.scan_plan import FIRST_TIMEOUT, ScanPlan, ids_of
@@ -125,7 +123,7 @@ class _Result:
         """Print what was found, or what it means that nobody was."""
         found = self.scan.found
         if found:
-            show_table([scan_findings.row(finding) for finding in found])
+            scan_findings.show([scan_findings.row(finding) for finding in found])
             click.echo()
             click.echo("# To poll them, save this as lfs10d.yaml, then: lfs10d run -c lfs10d.yaml")
             for text in scan_findings.snippet(found, self.line, asked=self.asked):
@@ -178,26 +176,3 @@ def _scan(result: _Result, *, as_json: bool) -> int:
                 click.echo(text, err=True)
         return EXIT_UNAVAILABLE
     return 0 if scan.found else EXIT_FAILED
-
-
-def show_table(rows: list[tuple[str, ...]]) -> None:
-    """Print what was found."""
-    if not sys.stdout.isatty():
-        for text in columns(scan_findings.HEAD, rows, right=scan_findings.RIGHT):
-            click.echo(text)
-        return
-    # Only a terminal needs rich; importing it takes longer than the rest of the verb.
-    from rich import box  # noqa: PLC0415 - for a terminal only
-    from rich.console import Console  # noqa: PLC0415 - for a terminal only
-    from rich.table import Table  # noqa: PLC0415 - for a terminal only
-    from rich.text import Text  # noqa: PLC0415 - for a terminal only
-
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for index, head in enumerate(scan_findings.HEAD):
-        right = index in scan_findings.RIGHT
-        table.add_column(head, justify="right" if right else "left", no_wrap=right, style="cyan" if not index else None)
-    for row in rows:
-        *cells, remark = (Text(cell) for cell in row)
-        remark.stylize("yellow")
-        table.add_row(*cells, remark)
-    Console().print(table)

@@ -5,31 +5,25 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-import sys
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import click
 
 from lfs10d.cli import config_option, event_loop, json_option
 from lfs10d.cli.client import RETAINED_WITHIN, CommandClient, parsed
-from lfs10d.cli.json_text import json_text
 from lfs10d.cli.login import Login, login, login_options
-from lfs10d.cli.render.live_lines import LiveLines
 from lfs10d.cli.render.live_state import LiveState
-from lfs10d.cli.render.live_table import DataSource, age_text, screen
+from lfs10d.cli.render.live_table import DataSource, age_text
+from lfs10d.cli.render.live_view import LiveView, live_view
 from lfs10d.cli.render.spinner import spinning
 from lfs10d.daemon.state_directory import status_places
 from lfs10d.errors import BrokerError, FailedError
 from lfs10d.mqtt.messages import Filter, Incoming
 from lfs10d.system.regular_file import read_regular
 from lfs10d.telemetry import publication
-
-if TYPE_CHECKING:
-    from rich.live import Live as Screen
 
 EVERY: Final = 0.5
 """s between two looks: fast enough for a hand at a cup."""
@@ -65,13 +59,17 @@ def command(config: Path, username: str | None, password_file: Path | None, *, a
     with contextlib.suppress(KeyboardInterrupt):
         visited = login(config, "watch", username=username, password_file=password_file, needed=False)
         files = status_places(config, visited.config.line.name, os.environ)
-        event_loop.run(_Watch(visited, files).run(_output(as_json=as_json)))
+        event_loop.run(_watch(Watch(visited, files), as_json=as_json))
     return 0
 
 
-def _output(*, as_json: bool) -> Callable[[], _WatchLines | _Screen]:
-    terminal = sys.stdout.isatty() and os.environ.get("TERM") not in {None, "dumb"}
-    return _Screen if terminal and not as_json else lambda: _WatchLines(as_json=as_json)
+async def _watch(watch: Watch, *, as_json: bool) -> None:
+    """Show until cancelled; raises BrokerError where there is nothing to show."""
+    try:
+        await watch.find()
+        await watch.show(live_view(as_json=as_json))
+    finally:
+        await watch.disconnect()
 
 
 @dataclass(slots=True)
@@ -84,10 +82,10 @@ class _Status:
     """When it was written, epoch s."""
 
 
-class _Watch:
-    """Looks at both sources and shows the better one."""
+class Watch:
+    """Reads both sources, MQTT and the status file, and shows the better one."""
 
-    def __init__(self, visited: Login, files: tuple[Path, ...]) -> None:
+    def __init__(self, visited: Login, files: tuple[Path, ...] = ()) -> None:
         self._line = visited.config.line.name
         self._files = files
         self._live = LiveState(self._line)
@@ -110,19 +108,29 @@ class _Watch:
             visited, [Filter(topics.full(each), qos=0, retain_as_published=False) for each in filters], self._arrived
         )
 
-    async def run(self, output: Callable[[], _WatchLines | _Screen]) -> None:
-        """Show until cancelled; raises BrokerError where there is nothing to show."""
-        try:
-            await self._begin()
-            await self._show(output())
-        finally:
-            await self._visitor.leave()
+    @property
+    def live(self) -> LiveState:
+        """The line as MQTT shows it."""
+        return self._live
 
-    async def _begin(self) -> None:
-        """Wait for the first thing to show."""
+    @property
+    def online(self) -> bool:
+        """Whether the daemon is at the broker and its devices are known."""
+        return self._visitor.daemon_online and self._live.known
+
+    async def connect(self) -> None:
+        """Connect to the broker and subscribe; raises BrokerError, FailedError."""
+        await self._visitor.enter(CONNECTS_WITHIN)
+
+    async def disconnect(self) -> None:
+        """Disconnect from the broker."""
+        await self._visitor.leave()
+
+    async def find(self) -> None:
+        """Wait for the first thing to show; raises BrokerError where there is nothing."""
         async with spinning("looking for the daemon ..."):
             try:
-                await self._visitor.enter(CONNECTS_WITHIN)
+                await self.connect()
                 await self._visitor.until(lambda: self._live.known, RETAINED_WITHIN)
                 await self._visitor.find_daemon()
                 await asyncio.sleep(SETTLES_WITHIN)
@@ -134,18 +142,19 @@ class _Watch:
         places = " or ".join(str(path) for path in self._files)
         raise BrokerError(f"{self._why}; and no daemon on this machine has written its status to {places}")
 
-    async def _show(self, output: _WatchLines | _Screen) -> None:
-        with output:
+    async def show(self, view: LiveView) -> None:
+        """Show the better source until cancelled."""
+        with view:
             while True:
                 self._read()
                 live, source = self._best()
-                output.draw(live, source, now=time.monotonic(), wall=time.time())
+                view.draw(live, source, now=time.monotonic(), wall=time.time())
                 await asyncio.sleep(EVERY)
 
     def _best(self) -> tuple[LiveState, DataSource]:
         """Return the better source: the broker where the daemon is online there, else a file that is being written."""
         visitor, status = self._visitor, self._status
-        if visitor.daemon_online and self._live.known:
+        if self.online:
             return self._live, DataSource(f"live from {visitor.place}", alive=True)
         if not visitor.connected:
             why = visitor.ended_by or self._why
@@ -185,55 +194,3 @@ class _Watch:
             ts = status.get("ts")
             self._status = _Status(path, live, ts / 1000 if isinstance(ts, int) else 0.0)
             return
-
-
-class _WatchLines:
-    """For a pipe: each new value is one line, plain or JSON."""
-
-    def __init__(self, *, as_json: bool) -> None:
-        self._as_json = as_json
-        self._lines = LiveLines()
-
-    def __enter__(self) -> None:
-        """Begin."""
-
-    def __exit__(self, *_: object) -> None:
-        """End."""
-
-    def draw(self, live: LiveState, source: DataSource, *, now: float, wall: float) -> None:
-        """Print what is new."""
-        for plain, data in self._lines.news(live, source, now=now, wall=wall):
-            if self._as_json and data is not None:
-                click.echo(json_text(data))
-            elif not self._as_json:
-                click.echo(plain)
-
-
-class _Screen:
-    """For a terminal: the table on a screen of its own, and what it showed last when it ends."""
-
-    def __init__(self) -> None:
-        from rich.console import Console  # noqa: PLC0415  # for a terminal only
-        from rich.live import Live as Screen  # noqa: PLC0415 - for a terminal only
-
-        self._console = Console(highlight=False, markup=False, emoji=False)
-        self._screen: Screen = Screen(console=self._console, screen=True, auto_refresh=False)
-
-    def __enter__(self) -> None:
-        """Begin."""
-        self._screen.start()
-
-    def __exit__(self, *_: object) -> None:
-        """End."""
-        last = self._screen.renderable
-        self._screen.stop()
-        self._console.print(last)
-
-    def draw(self, live: LiveState, source: DataSource, *, now: float, wall: float) -> None:
-        """Draw it anew."""
-        from rich.text import Text  # noqa: PLC0415 - for a terminal only
-
-        size = self._console.size
-        lines = screen(live, source, (size.width, size.height), now=now, wall=wall)
-        text = Text("\n", no_wrap=True, overflow="crop").join(Text.assemble(*line) for line in lines)
-        self._screen.update(text, refresh=True)

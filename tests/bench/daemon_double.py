@@ -16,7 +16,7 @@ from pathlib import Path
 from paho.mqtt.client import Client
 from paho.mqtt.enums import CallbackAPIVersion, MQTTProtocolVersion
 
-from bench.engine import ANSWER, Wire
+from tests.support.plain_wire import ANSWER, Wire
 
 
 def poll(wire: Wire) -> bytes:

@@ -11,7 +11,7 @@ from bench.broker import Broker, Heard, missing_seqs
 from bench.line import Sent
 from bench.measure import Run, jitter, judge_samples, measure, rates
 from bench.report import markdown, results, table
-from bench.rows import ROWS, Master, Row, engine_rows
+from bench.rows import ROWS, Master, Row
 
 DOUBLE = (sys.executable, str(Path(__file__).with_name("daemon_double.py")))
 SHORT = Row("short", "two at 115200", baudrate=115200, sensors=2, warm=1.5, seconds=1.0)
@@ -143,13 +143,3 @@ def test_a_daemon_that_swaps_two_sensors_is_found_out(tmp_path: Path) -> None:
 def test_a_daemon_that_ends_is_reported_with_its_words(tmp_path: Path) -> None:
     with Broker(tmp_path) as broker, pytest.raises(RuntimeError, match="no such thing"):
         measure(SHORT, "daemon", broker.port, (sys.executable, "-c", "raise SystemExit('no such thing')"))
-
-
-@pytest.mark.needs("gcc", "mosquitto")
-@pytest.mark.parametrize("master", ["thread", "selector"])
-def test_the_engine_probe_keeps_the_gaps(tmp_path: Path, master: Master) -> None:
-    row = engine_rows((115200,))[0]
-    with Broker(tmp_path) as broker:
-        run = measure(row.lasting(1.0), master, broker.port, ())
-    assert run.rate > 0
-    assert run.violations == 0

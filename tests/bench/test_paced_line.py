@@ -9,8 +9,8 @@ from collections.abc import Callable
 
 import pytest
 
-from bench.engine import crc16
 from bench.line import PacedLine, read_log
+from tests.support.plain_wire import crc16
 from tests.support.terminals import CHARACTER, ID, T35, Terminal, request
 
 Starter = Callable[..., PacedLine]

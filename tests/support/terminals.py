@@ -9,8 +9,8 @@ import time
 import tty
 from typing import Self
 
-from bench.engine import crc16
 from bench.line import PacedLine
+from tests.support.plain_wire import crc16
 
 BAUDRATE = 1200
 CHARACTER = 10 / BAUDRATE

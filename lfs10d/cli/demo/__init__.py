@@ -41,7 +41,7 @@ def command(duration: float | None, broker: str) -> int:
     try:
         from lfs10d.cli.demo.runner import show  # noqa: PLC0415  # so that Ctrl-C is heard from here on
 
-        event_loop.run(show(duration=duration, broker=broker))
+        event_loop.run(show(duration=duration, wanted=broker))
     except KeyboardInterrupt:  # before, or after, the loop listens to signals
         pass
     return 0

@@ -67,7 +67,7 @@ def _command(name: str, port: int, children: Children) -> tuple[str, ...]:
         return (*PYTHON, "-m", "lfs10d.cli.demo.amqtt_broker", str(port))
     lines = [f"listener {port} {LOOPBACK}", "allow_anonymous true", "persistence false", "log_dest stderr"]
     if os.geteuid() == 0:
-        lines.append("user root")  # by itself it would change to another, and lose the leash that ties it to us
+        lines.append("user root")  # by itself it would change to another, and no longer end with its parent
     file = children.folder / "mosquitto.conf"
     file.write_text("\n".join(lines) + "\n")
     return (str(shutil.which(name, path=_PLACES)), "-c", str(file))

@@ -1,4 +1,4 @@
-"""Runs a program that the kernel kills when its parent is gone: `leash.py PARENT PROGRAM [ARGUMENT ...]`.
+"""Runs a program that the kernel kills when its parent is gone: `parent_guard.py PARENT PROGRAM [ARGUMENT ...]`.
 
 It is started as a file, without the package: nothing but the standard library, for it delays every start.
 """

@@ -1,7 +1,7 @@
 """The demo's processes and its folder; nothing of either outlives the demo, however that ends.
 
 In order: `end` asks the children to go and the folder is removed. Killed: the kernel kills the children
-(`leash`), and the caretaker, a shell in a session of its own that waits for the end of a pipe only we hold open,
+(`parent_guard`), and the caretaker, a shell in a session of its own that waits for the end of a pipe only we hold open,
 removes the folder. The caretaker is the only one to remove it, so that way is the one always taken.
 """
 
@@ -135,7 +135,7 @@ async def _comes_true(claim: Callable[[], bool], within: float) -> bool:
 
 
 @contextlib.contextmanager
-def passing_folder() -> Iterator[Path]:
+def temporary_folder() -> Iterator[Path]:
     """Give an empty folder that is gone afterwards, even if we are killed."""
     folder = tempfile.mkdtemp(prefix="lfs10d-demo-")
     caretaker = subprocess.Popen(  # noqa: S603  # a line of ours

@@ -1,107 +1,81 @@
-"""Runs the demo: starts its processes, listens to the broker, shows what it hears, ends everything."""
+"""Runs the demo: starts its processes, shows the live view of `lfs10d watch`, ends everything."""
 
 from __future__ import annotations
 
 import asyncio
-import os
 import select
 import signal
-import sys
 import time
 from collections.abc import Coroutine
-from contextlib import AbstractContextManager, suppress
-from typing import Final, Protocol
+from contextlib import suppress
+from typing import Final
 
 import click
 
 from lfs10d.cli.demo import texts
-from lfs10d.cli.demo.broker import LOOPBACK, Broker, start_broker
-from lfs10d.cli.demo.line_view import LinesView
-from lfs10d.cli.demo.processes import PYTHON, Children, passing_folder
-from lfs10d.cli.demo.scenario import BASE_TOPIC, BAUDRATE, LINE, configuration, faults, slaves
-from lfs10d.cli.demo.state import TOPICS, DemoState
+from lfs10d.cli.demo.broker import Broker, start_broker
+from lfs10d.cli.demo.processes import PYTHON, Children, temporary_folder
+from lfs10d.cli.demo.scenario import BAUDRATE, LINE, configuration, faults, slaves
+from lfs10d.cli.login import login
+from lfs10d.cli.render.live_state import LiveState
+from lfs10d.cli.render.live_table import DataSource
+from lfs10d.cli.render.live_view import LiveView, live_view
+from lfs10d.cli.render.spinner import spinning
+from lfs10d.cli.watch import Watch
 from lfs10d.errors import FailedError
-from lfs10d.mqtt.connection import Connection
-from lfs10d.mqtt.messages import Accepted, Filter, Incoming
-from lfs10d.mqtt.reasons import Disconnect
-from lfs10d.mqtt.settings import BrokerSettings, Version
-from lfs10d.mqtt.topics import Topics
 
 STANDARD_OUTPUT: Final = 1
 
 
-class DemoView(AbstractContextManager["DemoView"], Protocol):
-    """What shows the picture between enter and exit."""
+class DemoView:
+    """The live view with the demo's remarks; each time it is drawn, the demo's processes must still run."""
 
-    @property
-    def every(self) -> float:
-        """Seconds from one turn to the next."""
+    def __init__(self, broker: Broker, children: Children) -> None:
+        self._view = live_view(remarks=texts.remarks(broker))
+        self._children = children
 
-    def turn(self) -> None:
-        """Show what is known now."""
+    def __enter__(self) -> None:
+        """Begin."""
+        self._view.__enter__()
 
+    def __exit__(self, *error: object) -> None:
+        """End."""
+        self._view.__exit__(*error)
 
-class Subscriber:
-    """Listens to the broker as any other client would, and passes on to the picture what it hears."""
-
-    def __init__(self, broker: Broker, picture: DemoState) -> None:
-        self._picture = picture
-        self._topics = Topics.of(BASE_TOPIC, LINE)
-        self.gone: str | None = None
-        """Why the connection is over."""
-        settings = BrokerSettings(LOOPBACK, broker.port, f"lfs10d-demo-{os.getpid()}")
-        self._connection = Connection(settings, Version(broker.speaks), self)
-
-    def accepted(self, accepted: Accepted) -> None:
-        """Subscribe."""
-        del accepted
-        self._connection.subscribe([Filter(self._topics.full(topic)) for topic in TOPICS])
-
-    def arrived(self, message: Incoming) -> None:
-        """Pass it on."""
-        topic = self._topics.relative(message.topic)
-        if topic is not None:
-            self._picture.heard(topic, message.payload)
-
-    def ended(self, ended: Disconnect) -> None:
-        """Note why."""
-        self.gone = ended.message
-
-    def acknowledged(self, mid: int, reason: int) -> None:
-        """Nothing is published."""
-
-    def subscribed(self, mid: int, reasons: tuple[int, ...]) -> None:
-        """Without the subscription the table stays empty, which tells enough."""
-
-    def check(self) -> None:
-        """Raise FailedError if the connection is over."""
-        if self.gone is not None:
-            raise FailedError(f"the demo's view is cut off: {self.gone}")
-
-    def leave(self) -> None:
-        """Disconnect."""
-        self._connection.leave()
+    def draw(self, live: LiveState, source: DataSource, *, now: float, wall: float) -> None:
+        """Draw where the output takes it; raises FailedError if a process has ended."""
+        self._children.check()
+        if _is_writable():
+            self._view.draw(live, source, now=now, wall=wall)
 
 
-async def show(*, duration: float | None, broker: str) -> None:
+async def show(*, duration: float | None, wanted: str) -> None:
     """Run the demo for `duration` in seconds (None: on and on), or until Ctrl-C, SIGTERM or the terminal's end.
 
-    `broker` is auto, mosquitto or amqtt. Raises FailedError if a part of it cannot be started, or ends.
+    `wanted` is the broker: auto, mosquitto or amqtt. Raises FailedError if a part of it cannot be started, or ends.
     """
     over = asyncio.Event()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         asyncio.get_running_loop().add_signal_handler(number, over.set)
-    picture = DemoState()
     begun = time.monotonic()
-    with passing_folder() as folder:
+    last = LiveState(LINE)
+    with temporary_folder() as folder:
         children = Children(folder)
+
+        async def play() -> None:
+            nonlocal last
+            async with spinning("starting the simulated line, the broker and the daemon ..."):
+                watch, broker = await _start(children, wanted)
+            last = watch.live
+            await _show(watch, DemoView(broker, children), duration)
+
         try:
-            await _until(over, _play(children, picture, broker, duration))
+            await _until(over, play())
         finally:
             await children.end()
     with suppress(OSError):  # the terminal may be gone
-        if _is_taken():
-            click.echo(texts.summary(picture, time.monotonic() - begun))
+        if _is_writable():
+            click.echo(texts.summary(last, time.monotonic() - begun))
 
 
 async def _until(over: asyncio.Event, play: Coroutine[None, None, None]) -> None:
@@ -117,24 +91,17 @@ async def _until(over: asyncio.Event, play: Coroutine[None, None, None]) -> None
         await playing
 
 
-async def _play(children: Children, picture: DemoState, wanted: str, duration: float | None) -> None:
-    broker = await _start(children, wanted)
-    subscriber = Subscriber(broker, picture)
+async def _show(watch: Watch, view: LiveView, duration: float | None) -> None:
     try:
-        with _view(picture, broker) as view, suppress(TimeoutError):
+        with suppress(TimeoutError):
             async with asyncio.timeout(duration):
-                while True:
-                    await asyncio.sleep(view.every)
-                    children.check()
-                    subscriber.check()
-                    if _is_taken():
-                        view.turn()
+                await watch.show(view)
     finally:
-        subscriber.leave()
+        await watch.disconnect()
 
 
-async def _start(children: Children, wanted: str) -> Broker:
-    """Start line, broker and daemon."""
+async def _start(children: Children, wanted: str) -> tuple[Watch, Broker]:
+    """Start line, broker and daemon; return the broker and what watches the daemon there, connected."""
     link, faults_file, configuration_file = (children.folder / name for name in ("line", "faults.yaml", "lfs10d.yaml"))
     ours = (*PYTHON, "-m", "lfs10d")
     faults_file.write_text(faults())
@@ -147,21 +114,15 @@ async def _start(children: Children, wanted: str) -> Broker:
     if not await children.ready(simulator, link.is_symlink):
         raise FailedError(f"the demo's simulated line does not start: {simulator.last_words()}")
     configuration_file.write_text(configuration(link, broker.port, broker.speaks))
-    children.start("daemon", *ours, "run", "-c", str(configuration_file), "--state-dir", str(children.folder))
-    return broker
+    daemon = children.start("daemon", *ours, "run", "-c", str(configuration_file), "--state-dir", str(children.folder))
+    watch = Watch(login(configuration_file, "demo", username=None, password_file=None))
+    await watch.connect()
+    if not await children.ready(daemon, lambda: watch.online):
+        await watch.disconnect()
+        raise FailedError(f"the demo's daemon does not start: {daemon.last_words()}")
+    return watch, broker
 
 
-def _view(picture: DemoState, broker: Broker) -> DemoView:
-    """Return the table where there is a terminal that can show it, else the lines."""
-    if sys.stdout is not None and sys.stdout.isatty():
-        from lfs10d.cli.demo.table_view import TableView  # noqa: PLC0415  # a pipe needs nothing to draw with
-
-        table = TableView(picture, broker)
-        if table.fits:
-            return table
-    return LinesView(picture, broker)
-
-
-def _is_taken() -> bool:
-    """Say whether what is written would be taken at once: a stopped terminal or pager must not hold us up."""
+def _is_writable() -> bool:
+    """Return whether a write would return at once: a stopped terminal or pager must not block the demo."""
     return bool(select.select([], [STANDARD_OUTPUT], [], 0)[1])

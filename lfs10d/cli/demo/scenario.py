@@ -1,4 +1,4 @@
-"""The eight sensors of the demo, what ails two of them, and the files that say so to simulator and daemon."""
+"""The eight sensors of the demo, two of them faulty, and the files that configure simulator and daemon."""
 
 from __future__ import annotations
 
@@ -14,44 +14,46 @@ INTERVAL: Final = "500ms"
 
 
 @dataclass(frozen=True, slots=True)
-class Role:
-    """One sensor; `trouble` is a fault of the simulator's, `story` tells a person what it shows."""
+class DemoSensor:
+    """One sensor; `fault` is an entry of the simulator's fault file, `remark` says to a person what it shows."""
 
     slave: int
     name: str
     label: str
-    trouble: dict[str, object] | None = None
-    story: str | None = None
+    fault: dict[str, object] | None = None
+    remark: str | None = None
 
 
-CAST: Final = (
-    Role(2, "mast-top", "Mast, 10 m"),
-    Role(3, "mast-mid", "Mast, 6 m"),
-    Role(4, "mast-low", "Mast, 2 m"),
-    Role(5, "roof-n", "Roof, north"),
-    Role(6, "roof-s", "Roof, south"),
-    Role(
+SENSORS: Final = (
+    DemoSensor(2, "mast-top", "Mast, 10 m"),
+    DemoSensor(3, "mast-mid", "Mast, 6 m"),
+    DemoSensor(4, "mast-low", "Mast, 2 m"),
+    DemoSensor(5, "roof-n", "Roof, north"),
+    DemoSensor(6, "roof-s", "Roof, south"),
+    DemoSensor(
         7,
         "crane",
         "Crane jib",
         {"fault": "silent"},
-        "is silent, as if its cable were cut: it is asked rarely and delays nobody.",
+        "is silent, as if its cable were cut: it is polled rarely and delays no other.",
     ),
-    Role(
+    DemoSensor(
         8,
         "bridge",
         "Bridge",
         {"fault": "noisy", "rate": 0.25},
-        "is noisy, as beside a motor drive: a damaged answer is never published.",
+        "is noisy, as beside a motor drive: a damaged reply is never published.",
     ),
-    Role(9, "harbour", "Harbour gate"),
+    DemoSensor(9, "harbour", "Harbour gate"),
 )
 """Id 1, the factory's, stays free as on a real line."""
 
 
 def configuration(port: Path, broker_port: int, mqtt_version: str) -> str:
-    """Return the daemon's file, YAML."""
-    slaves = "".join(f'  - {{id: {role.slave}, name: {role.name}, label: "{role.label}"}}\n' for role in CAST)
+    """Return the daemon's configuration file, YAML."""
+    slaves = "".join(
+        f'  - {{id: {sensor.slave}, name: {sensor.name}, label: "{sensor.label}"}}\n' for sensor in SENSORS
+    )
     return (
         f"line: {{name: {LINE}, port: {json.dumps(str(port))}, baudrate: {BAUDRATE}}}\n"
         f"poll: {{interval: {INTERVAL}}}\n"
@@ -61,10 +63,12 @@ def configuration(port: Path, broker_port: int, mqtt_version: str) -> str:
 
 
 def faults() -> str:
-    """Return the simulator's faults file, YAML."""
-    return "slaves:\n" + "".join(f"  {role.slave}: {json.dumps(role.trouble)}\n" for role in CAST if role.trouble)
+    """Return the simulator's fault file, YAML."""
+    return "slaves:\n" + "".join(
+        f"  {sensor.slave}: {json.dumps(sensor.fault)}\n" for sensor in SENSORS if sensor.fault
+    )
 
 
 def slaves() -> str:
     """Return the ids as `lfs10d simulate --slaves` takes them."""
-    return ",".join(str(role.slave) for role in CAST)
+    return ",".join(str(sensor.slave) for sensor in SENSORS)

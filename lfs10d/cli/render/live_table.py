@@ -287,14 +287,27 @@ def _wrapped(line: Line, width: int) -> Iterable[Line]:
 
 
 def screen(
-    live: LiveState, source: DataSource, size: tuple[int, int], *, now: float, wall: float, zone: tzinfo | None = None
+    live: LiveState,
+    source: DataSource,
+    size: tuple[int, int],
+    *,
+    now: float,
+    wall: float,
+    zone: tzinfo | None = None,
+    remarks: Sequence[str] = (),
 ) -> list[Line]:
-    """Return everything for a terminal of `size` columns and lines; where lines are short, the worst rows first."""
+    """Return everything for a terminal of `size` columns and lines; where lines are short, the worst rows first.
+
+    `remarks` stand below where there is room for them and all rows.
+    """
     width, height = size
     shown = rows(live, source, now=now, wall=wall, zone=zone)
     above = [*header(live, source, width, wall=wall, zone=zone), ()]
+    below = [line for remark in remarks for line in _wrapped(((remark, ""),), width)]
     legend = f"> moved just now   + came   - went   times: {zone_name(wall * 1000, zone)}   Ctrl-C ends"
     room = max(1, height - len(above) - 3)
+    if below:
+        below = [(), *below] if len(shown) + len(below) + 1 <= room else []
     left = len(shown) - room
     if left > 0:
         kept = sorted(sorted(range(len(shown)), key=lambda place: _rank(shown[place]))[: room - 1])
@@ -302,7 +315,7 @@ def screen(
         well = sum(row.good and not row.stale for row in hidden)
         legend = f"{len(hidden)} more ({well} good): a taller window shows them   {legend}"
         shown = [shown[place] for place in kept]
-    return [*above, *table(shown, width), (), _cut(((legend, "dim"),), width)]
+    return [*above, *table(shown, width), (), _cut(((legend, "dim"),), width), *below]
 
 
 def _rank(row: TableRow) -> int:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import click
+
 from lfs10d.cli.options import LineOptions
+from lfs10d.cli.render.table import columns
 from lfs10d.line.jobs.identification import FoundDevice
 from lfs10d.modbus.frames import EXCEPTION_NAMES, Framing
 from lfs10d.schema.quantities import duration_text
@@ -29,6 +33,29 @@ def row(finding: FoundDevice) -> tuple[str, ...]:
     """Return a finding as a row of the table."""
     answers_in = f"{finding.rtt * 1e3:.0f} ms" if finding.rtt is not None else "-"
     return str(finding.slave), str(finding.baudrate), answers_in, what(finding), "; ".join(remarks(finding))
+
+
+def show(rows: list[tuple[str, ...]]) -> None:
+    """Print what was found."""
+    if not sys.stdout.isatty():
+        for text in columns(HEAD, rows, right=RIGHT):
+            click.echo(text)
+        return
+    # Only a terminal needs rich; importing it takes longer than the rest of the verb.
+    from rich import box  # noqa: PLC0415 - for a terminal only
+    from rich.console import Console  # noqa: PLC0415 - for a terminal only
+    from rich.table import Table  # noqa: PLC0415 - for a terminal only
+    from rich.text import Text  # noqa: PLC0415 - for a terminal only
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for index, head in enumerate(HEAD):
+        right = index in RIGHT
+        table.add_column(head, justify="right" if right else "left", no_wrap=right, style="cyan" if not index else None)
+    for row in rows:
+        *cells, remark = (Text(cell) for cell in row)
+        remark.stylize("yellow")
+        table.add_row(*cells, remark)
+    Console().print(table)
 
 
 def what(finding: FoundDevice) -> str:

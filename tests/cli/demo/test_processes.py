@@ -14,7 +14,7 @@ import pytest
 
 from lfs10d.cli.demo import processes
 from lfs10d.cli.demo.parent_guard import ITSELF
-from lfs10d.cli.demo.processes import Children, passing_folder
+from lfs10d.cli.demo.processes import Children, temporary_folder
 from lfs10d.errors import FailedError
 
 SLEEPS = (sys.executable, "-S", "-c", "import time; print('awake', flush=True); time.sleep(600)")
@@ -88,16 +88,16 @@ def test_a_child_is_led_to_no_file_of_a_real_daemon(tmp_path: Path, monkeypatch:
 
 def test_a_child_whose_parent_is_gone_does_not_begin(tmp_path: Path) -> None:
     trace = tmp_path / "trace"
-    leash = [sys.executable, "-I", "-S", str(ITSELF)]
+    guard = [sys.executable, "-I", "-S", str(ITSELF)]
     not_its_parent, program = str(os.getpid() + 1), ["/bin/sh", "-c", f"echo > '{trace}'"]
-    assert subprocess.run([*leash, not_its_parent, *program], check=False).returncode == 0
+    assert subprocess.run([*guard, not_its_parent, *program], check=False).returncode == 0
     assert not trace.exists()
-    assert subprocess.run([*leash, str(os.getpid()), *program], check=False).returncode == 0
+    assert subprocess.run([*guard, str(os.getpid()), *program], check=False).returncode == 0
     assert trace.exists()
 
 
 def test_the_folder_is_gone_afterwards_with_all_that_is_in_it() -> None:
-    with passing_folder() as folder:
+    with temporary_folder() as folder:
         (folder / "deep").mkdir()
         (folder / "deep" / "file").write_text("x")
     assert not folder.exists()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from lfs10d.cli.demo.scenario import CAST, configuration, faults, slaves
+from lfs10d.cli.demo.scenario import SENSORS, configuration, faults, slaves
 from lfs10d.config.loader import load
 from lfs10d.simulator.builder import slave_ids
 from lfs10d.simulator.fault_file import parse_faults
@@ -16,7 +16,7 @@ def test_the_daemon_accepts_its_file(tmp_path: Path) -> None:
     config = load(file).config
     assert config.line.port.endswith('a "line" of a user: #1')
     assert [(slave.id, slave.name, slave.label) for slave in config.slaves] == [
-        (role.slave, role.name, role.label) for role in CAST
+        (each.slave, each.name, each.label) for each in SENSORS
     ]
     assert (config.mqtt.host, config.mqtt.port, config.mqtt.version) == ("127.0.0.1", 18830, "3.1.1")
 
@@ -29,6 +29,6 @@ def test_the_simulator_accepts_its_faults_one_silent_one_noisy() -> None:
     }
 
 
-def test_whoever_is_ill_has_a_story() -> None:
-    assert [role.name for role in CAST if role.story] == [role.name for role in CAST if role.trouble]
-    assert len(CAST) == 8
+def test_each_faulty_sensor_has_a_remark() -> None:
+    assert [each.name for each in SENSORS if each.remark] == [each.name for each in SENSORS if each.fault]
+    assert len(SENSORS) == 8

@@ -231,3 +231,12 @@ def test_the_screen_fits_any_terminal(width: int, height: int, count: int) -> No
     assert all(len(line) <= width for line in lines)
     if width >= 80 and height >= 8:
         assert len(lines) <= height
+
+
+def test_remarks_stand_below_where_all_rows_and_they_fit() -> None:
+    shown = live(entry("a", 2), entry("b", 3))
+    whole = texts(screen(shown, HERE, (80, 12), now=0.0, wall=WALL, remarks=["first remark", "second remark"]))
+    assert whole[-3:] == ["", "first remark", "second remark"]
+    short = texts(screen(shown, HERE, (80, len(whole) - 1), now=0.0, wall=WALL, remarks=["first remark", "second"]))
+    assert not any("remark" in each for each in short)
+    assert len(short) == len(whole) - 3

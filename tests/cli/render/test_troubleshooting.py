@@ -13,6 +13,7 @@ OF_AN_EXCHANGE = [
     if code
     not in PORT_CODES
     | {
+        FaultCode.STARTING,
         FaultCode.DISABLED,
         FaultCode.OVERRUN,
         FaultCode.WRONG_RATE,

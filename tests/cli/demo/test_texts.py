@@ -1,0 +1,33 @@
+"""What the demo says below the table and at its end."""
+
+from __future__ import annotations
+
+import json
+
+from lfs10d.cli.demo.broker import Broker
+from lfs10d.cli.demo.texts import remarks, summary
+from lfs10d.cli.render.live_state import LiveState
+
+
+def test_the_remarks_name_the_faulty_sensors_and_how_to_subscribe() -> None:
+    text = "\n".join(remarks(Broker("mosquitto", "5", 18830)))
+    assert "mosquitto (MQTT 5, 127.0.0.1:18830)" in text
+    assert "crane is silent" in text
+    assert "bridge is noisy" in text
+    assert "mosquitto_sub -h 127.0.0.1 -p 18830 -t 'lfs10d/#' -v" in text
+    assert "Ctrl-C" in text
+
+
+def test_no_remark_is_wider_than_a_terminal() -> None:
+    assert max(map(len, remarks(Broker("mosquitto", "3.1.1", 65535)))) <= 80
+
+
+def test_the_summary_counts_samples_and_sensors() -> None:
+    live = LiveState("line0")
+    live.heard("devices", [{"name": "a", "id": 2}, {"name": "b", "id": 3}], old=False, now=0.0, wall=0.0)
+    for topic, payload in (
+        ("device/a/availability", "online"),
+        ("device/a/telemetry", json.loads('{"seq": 7, "boot": "b", "ts": 1, "wind_speed": 1.5, "quality": "good"}')),
+    ):
+        live.heard(topic, payload, old=False, now=0.0, wall=0.0)
+    assert summary(live, 4.2) == "lfs10d demo: 7 samples in 4 s, 1 of 2 sensors online; nothing is left running"
