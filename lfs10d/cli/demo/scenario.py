@@ -35,7 +35,7 @@ SENSORS: Final = (
         "crane",
         "Crane jib",
         {"fault": "silent"},
-        "is silent, as if its cable were cut: it is polled rarely and delays no other.",
+        "is silent, as if its cable were cut: it barely slows the others.",
     ),
     DemoSensor(
         8,
