@@ -17,7 +17,7 @@ from lfs10d.line.jobs.job import Job
 from lfs10d.line.jobs.poll import Poll
 from lfs10d.line.scheduler import Rest, Scheduler
 from lfs10d.modbus.ask import Ask
-from lfs10d.modbus.bus import Bus, LineRules, Order, Wait
+from lfs10d.modbus.bus import Bus, LineRules, Wait
 from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.reading import Event, Exchanged, Fault, FaultCode, PortChanged, Purpose, UartCounted, UartCounters
@@ -157,16 +157,7 @@ class Poller:
 
     def _ask(self, ask: Ask) -> None:
         self._purpose = self.scheduler.purpose
-        order = Order(
-            ask.request,
-            ask.codec,
-            ask.timeout,
-            ask.patience,
-            ask.baudrate,
-            self.scheduler.pending.earlier(ask.request.slave),
-            self.scheduler.pending.by_slave,
-        )
-        self.bus.ask(order)
+        self.bus.ask(ask, self.scheduler.pending.by_slave)
 
     def _settled(self, outcome: Outcome) -> None:
         now = self._clock()

@@ -1,13 +1,11 @@
-"""What is to be put on the line: a request, and what its exchange must know."""
+"""A request to put on the line, and the state of the line that its exchange must know. Plain values."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from lfs10d.modbus.echo import Echo
 from lfs10d.modbus.frames import Codec
-from lfs10d.modbus.pending import Pending
 from lfs10d.modbus.request import Request
 from lfs10d.modbus.timing import LineTiming
 
@@ -32,30 +30,19 @@ class Ask:
 
 
 @dataclass(frozen=True, slots=True)
-class Attempt:
-    """One request to be put on the line, and all that its exchange must know. Durations are seconds.
+class LineContext:
+    """What every exchange must know of the line at the moment. Durations are seconds.
 
-    `timeout` runs from the last bit of the request to the first byte of the answer; `patience` is the slave's
-    learned p99 of the same (None: not learned). `adapter_latency` is the longest pause that the adapter may put
-    into one answer. `earlier` are the requests to this slave whose answers may still come, the oldest first,
-    `elsewhere` those to any slave, by slave id. `turn` is how long to wait for
-    silence before giving up; `turnaround_delay` the silence after a broadcast. `gap` is the required silence
-    where it is longer than the timing's (a change of rate). `echo_proved`: that the adapter has no echo was observed,
-    not only configured. `paced`: the port is a real wire, on which nothing
-    arrives sooner than the rate allows (not so on a pseudo terminal or behind a network bridge).
+    `adapter_latency` is the longest pause that the adapter may put into one answer. `turnaround_delay` is the silence
+    after a broadcast. `gap` is the required silence where it is longer than the timing's (a change of rate).
+    `echo_proved`: that the adapter has no echo was observed, not only configured. `paced`: the port is a real wire, on
+    which nothing arrives sooner than the rate allows (not so on a pseudo terminal or behind a network bridge).
     """
 
-    request: Request
-    codec: Codec
     timing: LineTiming
-    timeout: float
-    patience: float | None
     echo: Echo
     adapter_latency: float
-    earlier: tuple[Pending, ...]
-    turn: float
     turnaround_delay: float = 0.1
     gap: float | None = None
     paced: bool = False
     echo_proved: bool = False
-    elsewhere: Mapping[int, tuple[Pending, ...]] = field(default_factory=dict)

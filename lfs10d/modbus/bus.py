@@ -8,20 +8,19 @@ time nobody does.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from math import inf
 from typing import Literal, NamedTuple, TypeAlias
 
 from lfs10d.errors import PortBusyError, PortError
-from lfs10d.modbus.ask import Attempt
+from lfs10d.modbus.ask import Ask, LineContext
 from lfs10d.modbus.echo import Echo, EchoLearner
 from lfs10d.modbus.exchange import Exchange, Listen, Quiet, Settled
-from lfs10d.modbus.frames import Codec
 from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.pending import Pending
 from lfs10d.modbus.port import Port
 from lfs10d.modbus.port_settings import PortSettings
-from lfs10d.modbus.request import ReadRegisters, Request
+from lfs10d.modbus.request import ReadRegisters
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.reading import Fault, FaultCode, PortChanged, UartCounters
 
@@ -54,22 +53,6 @@ class LineRules:
     echo: Literal["auto", "on", "off"] = "auto"
 
 
-@dataclass(frozen=True, slots=True)
-class Order:
-    """One request to put on the line; see `lfs10d.line.jobs.job.Ask`.
-
-    `earlier` are the requests to its slave whose answers may still come, `elsewhere` those to any slave.
-    """
-
-    request: Request
-    codec: Codec
-    timeout: float
-    patience: float | None = None
-    baudrate: int | None = None
-    earlier: tuple[Pending, ...] = ()
-    elsewhere: Mapping[int, tuple[Pending, ...]] = field(default_factory=dict)
-
-
 Step: TypeAlias = Wait | Outcome | PortChanged
 
 
@@ -87,7 +70,8 @@ class Bus:
         self._settings = port.settings
         self._clock = clock
         self._echo = EchoLearner(rules.echo)
-        self._order: Order | None = None
+        self._ask: Ask | None = None
+        self._pending: Mapping[int, tuple[Pending, ...]] = {}
         self._exchange: Exchange | None = None
         self._quiet_since = -inf
         self._gap: float | None = None
@@ -107,7 +91,7 @@ class Bus:
     @property
     def idle(self) -> bool:
         """Nothing is asked at the moment."""
-        return self._order is None
+        return self._ask is None
 
     @property
     def echo(self) -> Echo:
@@ -155,7 +139,7 @@ class Bus:
     def close(self) -> None:
         """Give the port back; what was asked is abandoned."""
         self.open = False
-        self._exchange = self._order = None
+        self._exchange = self._ask = None
         self.port.close()
 
     def retry(self, now: float) -> None:
@@ -191,9 +175,13 @@ class Bus:
 
     # -- one exchange
 
-    def ask(self, order: Order) -> None:
-        """Take what to put on the line next; `step` carries it out."""
-        self._order = order
+    def ask(self, ask: Ask, pending: Mapping[int, tuple[Pending, ...]]) -> None:
+        """Take what to put on the line next; `step` carries it out.
+
+        `pending` are the requests to any slave whose answers may still come, by slave id; it may change until then.
+        """
+        self._ask = ask
+        self._pending = pending
 
     def step(self, now: float, *, readable: bool) -> Step:
         """Do what can be done now; return the outcome when the exchange is over."""
@@ -212,22 +200,22 @@ class Bus:
                 self.unsolicited += len(heard)
                 self.strays.append((heard, now))
                 self._quiet_since = max(self._quiet_since, now)
-            if self._order is None:
+            if self._ask is None:
                 return Wait(inf, listen=True)
-            settings = self._settings_for(self._order)
+            settings = self._settings_for(self._ask)
             if settings != self.port.settings:
                 if now < self._quiet_since + RATE_SETTLE:
                     return Wait(self._quiet_since + RATE_SETTLE, listen=True)
                 self._change_rate(settings)
-            self._exchange = self._begin(self._order, now)
+            self._exchange = self._begin(self._ask, now)
         elif heard:
             self._exchange.received(heard, now)
         return self._carry_on(self._exchange, now)
 
-    def _settings_for(self, order: Order) -> PortSettings:
-        if order.baudrate is None or order.baudrate == self._settings.baudrate:
+    def _settings_for(self, ask: Ask) -> PortSettings:
+        if ask.baudrate is None or ask.baudrate == self._settings.baudrate:
             return self._settings
-        return replace(self._settings, baudrate=order.baudrate)
+        return replace(self._settings, baudrate=ask.baudrate)
 
     def _change_rate(self, settings: PortSettings) -> None:
         """Speak by other settings: let everything go out, then keep the longer of the two gaps once."""
@@ -239,24 +227,17 @@ class Bus:
         self._gap = self.timing.slower(before)
         self._quiet_since = self._clock() + RATE_SETTLE
 
-    def _begin(self, order: Order, now: float) -> Exchange:
-        attempt = Attempt(
-            request=order.request,
-            codec=order.codec,
+    def _begin(self, ask: Ask, now: float) -> Exchange:
+        line = LineContext(
             timing=self.timing,
-            timeout=order.timeout,
-            patience=order.patience,
             echo=self._echo.state,
-            echo_proved=self._echo.proved,
             adapter_latency=self.port.adapter_latency,
-            paced=self.port.paced,
-            earlier=order.earlier,
-            turn=order.timeout,
             turnaround_delay=self.rules.turnaround_delay,
             gap=self._gap,
-            elsewhere=order.elsewhere,
+            paced=self.port.paced,
+            echo_proved=self._echo.proved,
         )
-        return Exchange(attempt, asked=now, quiet_since=self._quiet_since)
+        return Exchange(ask, line, self._pending, asked=now, quiet_since=self._quiet_since)
 
     def _carry_on(self, exchange: Exchange, now: float) -> Wait | Outcome:
         while True:
@@ -279,7 +260,7 @@ class Bus:
             exchange.sent(begun, now)
 
     def _settled(self, outcome: Outcome) -> Outcome:
-        self._exchange = self._order = None
+        self._exchange = self._ask = None
         self._quiet_since = outcome.quiet_since
         if outcome.sent_end is not None:
             self._gap = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from lfs10d.modbus.ask import Attempt
+from lfs10d.modbus.ask import Ask
 from lfs10d.modbus.duplicates import Twice
 from lfs10d.modbus.frames import EXCEPTION_FLAG, EXCEPTION_NAMES, Codec
 from lfs10d.modbus.reception import Reception
@@ -27,30 +27,30 @@ def milliseconds(seconds: float) -> str:
     return f"{seconds * 1000:.1f}".removesuffix(".0") + " ms"
 
 
-def judge(attempt: Attempt, reception: Reception) -> Diagnosis | None:
+def judge(ask: Ask, reception: Reception) -> Diagnosis | None:
     """Name what went wrong when nothing more is to be expected; None where nothing did: a broadcast.
 
     The nearest thing to an answer counts: a frame with a right check, then a late answer, then broken bytes.
     """
     if reception.echo_changed:
         return changed_echo()
-    if attempt.request.slave == BROADCAST:
+    if ask.request.slave == BROADCAST:
         return None
     heard = reception.leftover()
     if heard and not reception.only_request:
-        found = stranger(attempt.request, attempt.codec, heard)
+        found = stranger(ask.request, ask.codec, heard)
         if found is not None:
             return found
         if reception.begun or not reception.late:
             return broken(heard, reception.expected, begun=reception.begun)
     if reception.late:
         return late(reception.late[-1].latency)
-    return silent(attempt.timeout, own=bool(heard))
+    return silent(ask.timeout, own=bool(heard))
 
 
-def stranger_spoke(attempt: Attempt, reception: Reception) -> bool:
+def stranger_spoke(ask: Ask, reception: Reception) -> bool:
     """Whether what came is a right frame that is no answer to us: ours may still follow."""
-    return stranger(attempt.request, attempt.codec, reception.leftover()) is not None
+    return stranger(ask.request, ask.codec, reception.leftover()) is not None
 
 
 def silent(timeout: float, *, own: bool = False) -> Diagnosis:
@@ -65,9 +65,9 @@ def late(latency: float) -> Diagnosis:
     return Diagnosis(FaultCode.LATE, f"only the answer to an earlier request came, {since} after it was asked")
 
 
-def babble(turn: float) -> Diagnosis:
-    """Judge that the line never fell silent for us."""
-    waited = milliseconds(turn)
+def babble(waited_for: float) -> Diagnosis:
+    """Judge that the line did not fall silent in `waited_for` s."""
+    waited = milliseconds(waited_for)
     return Diagnosis(
         FaultCode.COLLISION,
         f"the line did not fall silent in {waited}, nothing was sent: a second master, a babbling device or noise",

@@ -5,7 +5,7 @@
     state      what happened                                       next state
     ---------  --------------------------------------------------  ----------
     SILENCE    SILENT: the gap has passed without a byte           READY
-    SILENCE    BABBLED: the turn is over, still no silence         SETTLED
+    SILENCE    BABBLED: the time-out, still no silence            SETTLED
     READY      HEARD: a byte came before the request was written   SILENCE
     READY      SENT: the request was written                       LISTENING
     LISTENING  ANSWERED: a right frame is whole                    SETTLED
@@ -15,7 +15,7 @@
 Rules
 -----
 1. A request is preceded by `gap` of silence since the last byte heard or sent, wanted or not. If there is none
-   within `turn`, nothing is sent: `collision`.
+   within the time-out, nothing is sent: `collision`.
 2. A right frame (check, slave id, function and count, of a write the whole content) settles the exchange the
    moment its last byte is there, whatever noise lies before or behind it.
 3. Bytes that equal our request from its first byte on are echo, unless the adapter is known to have none. A write
@@ -45,11 +45,12 @@ from math import isfinite
 from typing import NamedTuple, TypeAlias
 
 from lfs10d.modbus import diagnosis
-from lfs10d.modbus.ask import Attempt
+from lfs10d.modbus.ask import Ask, LineContext
 from lfs10d.modbus.diagnosis import Diagnosis
 from lfs10d.modbus.frame_search import FoundFrame
 from lfs10d.modbus.frames import EXCEPTION_FLAG, Framing
 from lfs10d.modbus.outcome import Outcome
+from lfs10d.modbus.pending import Pending
 from lfs10d.modbus.reception import HEARD_KEPT, Reception
 from lfs10d.modbus.request import BROADCAST
 from lfs10d.reading import Fault
@@ -133,24 +134,34 @@ class MisuseError(RuntimeError):
 class Exchange:
     """One request and its answer. Call `step`, obey what it returns, tell what happened, call `step` again.
 
-    `asked` is when the line was given to it, `quiet_since` the last byte heard or sent before, wanted or not.
+    `pending` are the requests whose answers may still come, by slave id, each slave's oldest first. `asked` is when the
+    line was given to it, `quiet_since` the last byte heard or sent before, wanted or not.
     """
 
-    def __init__(self, attempt: Attempt, *, asked: float, quiet_since: float) -> None:
-        timing = attempt.timing
-        self._attempt = attempt
+    def __init__(
+        self,
+        ask: Ask,
+        line: LineContext,
+        pending: Mapping[int, tuple[Pending, ...]],
+        *,
+        asked: float,
+        quiet_since: float,
+    ) -> None:
+        timing = line.timing
+        self._ask = ask
+        self._line = line
         self._asked = asked
         self._quiet_since = quiet_since
         self._state = State.SILENCE
-        self._frame = attempt.codec.encode(attempt.request)
-        self._reception = Reception(attempt, self._frame)
-        self._answer_size = attempt.codec.answer_size(attempt.request)
-        self._gap = timing.gap if attempt.gap is None else max(timing.gap, attempt.gap)
+        self._frame = ask.codec.encode(ask.request)
+        self._reception = Reception(ask, line, pending, self._frame)
+        self._answer_size = ask.codec.answer_size(ask.request)
+        self._gap = timing.gap if line.gap is None else max(timing.gap, line.gap)
         # Silence that was still running when the line was given to us is no babble.
-        self._give_up = max(asked + attempt.turn, quiet_since + self._gap)
-        self._hush = ASCII_PAUSE if attempt.codec.framing is Framing.ASCII else timing.t35 + attempt.adapter_latency
-        patience = attempt.timeout if attempt.patience is None else attempt.patience
-        self._patience = min(patience, attempt.timeout)
+        self._give_up = max(asked + ask.timeout, quiet_since + self._gap)
+        self._hush = ASCII_PAUSE if ask.codec.framing is Framing.ASCII else timing.t35 + line.adapter_latency
+        patience = ask.timeout if ask.patience is None else ask.patience
+        self._patience = min(patience, ask.timeout)
         self._began = self._sent_end = self._last = quiet_since
         self._measured_gap: float | None = None
         self._outcome: Outcome | None = None
@@ -179,7 +190,7 @@ class Exchange:
         if now >= self._give_up:
             self._pass(Happening.BABBLED)
             self._reception.look_elsewhere()
-            return self._settle(now, None, diagnosis.babble(self._attempt.turn))
+            return self._settle(now, None, diagnosis.babble(self._ask.timeout))
         return Quiet(min(silent_at, self._give_up))
 
     def sent(self, begun: float, ended: float) -> None:
@@ -191,7 +202,7 @@ class Exchange:
         self._measured_gap = gap if isfinite(gap) else None
         self._began = begun
         # The latest its last bit can leave an adapter that holds nothing back: counted from after the write.
-        self._sent_end = ended + self._attempt.timing.transmission(len(self._frame))
+        self._sent_end = ended + self._line.timing.transmission(len(self._frame))
         self._quiet_since = self._last = self._sent_end
         self._reception.sent(begun)
 
@@ -224,15 +235,15 @@ class Exchange:
         if reception.displaced is not None:
             self._pass(Happening.DISPLACED)
             reception.look_elsewhere()
-            return self._settle(reception.displaced.last_at, None, diagnosis.displaced(self._attempt.request.slave))
+            return self._settle(reception.displaced.last_at, None, diagnosis.displaced(self._ask.request.slave))
         first, bound = self._limits()
         until = min(self._until(first), bound)
-        if until <= now < first and diagnosis.stranger_spoke(self._attempt, reception):
+        if until <= now < first and diagnosis.stranger_spoke(self._ask, reception):
             until = min(first, bound)
         if now >= until:
             self._pass(Happening.EXPIRED)
             reception.look_elsewhere()
-            return self._settle(now, reception.spare, diagnosis.judge(self._attempt, reception))
+            return self._settle(now, reception.spare, diagnosis.judge(self._ask, reception))
         return Listen(until, min(max(now, reception.whole_at), until))
 
     def _limits(self) -> tuple[float, float]:
@@ -240,20 +251,20 @@ class Exchange:
 
         A slave answers in order: after its late answer to an earlier request it gets its usual time again.
         """
-        attempt = self._attempt
-        if attempt.request.slave == BROADCAST:
-            over = self._sent_end + attempt.turnaround_delay
+        ask, line = self._ask, self._line
+        if ask.request.slave == BROADCAST:
+            over = self._sent_end + line.turnaround_delay
             return over, over
-        first = max(self._sent_end + attempt.timeout, self._reception.late_at + self._patience)
+        first = max(self._sent_end + ask.timeout, self._reception.late_at + self._patience)
         size = self._answer_size
-        if attempt.codec.framing is Framing.ASCII and self._reception.begun:
+        if ask.codec.framing is Framing.ASCII and self._reception.begun:
             return first, first + size * ASCII_PAUSE
-        return first, first + attempt.timing.transmission(size) + self._hush
+        return first, first + line.timing.transmission(size) + self._hush
 
     def _until(self, first: float) -> float:
         """Return when silence ends the exchange (rule 6)."""
         reception = self._reception
-        if self._attempt.request.slave == BROADCAST:
+        if self._ask.request.slave == BROADCAST:
             return first
         hushed = self._last + self._hush
         if reception.spare is None:
@@ -265,22 +276,22 @@ class Exchange:
 
     # -- the end
 
-    def _settle(self, ended: float, catch: FoundFrame | None, found: Diagnosis | None) -> Settled:
-        attempt, reception = self._attempt, self._reception
+    def _settle(self, ended: float, frame: FoundFrame | None, found: Diagnosis | None) -> Settled:
+        ask, reception = self._ask, self._reception
         sent, unsolicited = reception.sent_yet, reception.unsolicited
         answer: tuple[int, ...] | None = ()
         exception: int | None = None
-        if catch is not None:
-            answer, found = attempt.codec.decode(catch.body), None
-            if catch.body[1] & EXCEPTION_FLAG:
+        if frame is not None:
+            answer, found = ask.codec.decode(frame.body), None
+            if frame.body[1] & EXCEPTION_FLAG:
                 (exception,) = answer
-                found = diagnosis.refusal(exception, attempt.request)
+                found = diagnosis.refusal(exception, ask.request)
         fault = None
         if found is not None:
             answer = None
             fault = Fault(found.code, found.message, exception, bytes(reception.heard[-FAULT_HEARD:]))
         self._outcome = Outcome(
-            request=attempt.request,
+            request=ask.request,
             answer=answer,
             fault=fault,
             asked=self._asked,
@@ -288,8 +299,8 @@ class Exchange:
             sent_end=self._sent_end if sent else None,
             gap=self._measured_gap,
             ended=ended,
-            turnaround=max(0.0, catch.first_at - self._sent_end) if catch else None,
-            rtt=max(0.0, catch.last_at - self._began) if catch else None,
+            turnaround=max(0.0, frame.first_at - self._sent_end) if frame else None,
+            rtt=max(0.0, frame.last_at - self._began) if frame else None,
             answered=sent and reception.begun and reception.displaced is None,
             late=tuple(reception.late),
             echoed=reception.echoed if sent else None,

@@ -99,13 +99,13 @@ class FrameSearch:
     def _heard_at(self, position: int) -> float:
         return self._mark_times[bisect_right(self._mark_ends, position)]
 
-    def claim(self, catch: FoundFrame) -> None:
+    def claim(self, found: FoundFrame) -> None:
         """Take a frame out of what is left to explain."""
-        self._claims.append((catch.begin, catch.end))
+        self._claims.append((found.begin, found.end))
 
-    def claimed(self, catch: FoundFrame) -> bool:
+    def claimed(self, found: FoundFrame) -> bool:
         """Whether a byte of this frame belongs to a claimed one."""
-        return any(catch.begin < end and begin < catch.end for begin, end in self._claims)
+        return any(found.begin < end and begin < found.end for begin, end in self._claims)
 
     def unclaimed(self, start: int) -> bytes:
         """Return what was heard from `start` on and belongs to no claimed frame (of the last `KEPT`)."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from math import inf
 
-from lfs10d.modbus.ask import Attempt
+from lfs10d.modbus.ask import Ask, LineContext
 from lfs10d.modbus.echo import Echo
 from lfs10d.modbus.frame_search import ExpectedFrame, FoundFrame, FrameSearch
 from lfs10d.modbus.frames import EXCEPTION_FLAG, Shape
@@ -35,22 +35,25 @@ class Reception:
     the frame in progress can be whole.
     """
 
-    def __init__(self, attempt: Attempt, frame: bytes) -> None:
-        normal, exception = attempt.codec.shapes(attempt.request)
-        self._attempt = attempt
+    def __init__(self, ask: Ask, line: LineContext, pending: Mapping[int, tuple[Pending, ...]], frame: bytes) -> None:
+        normal, exception = ask.codec.shapes(ask.request)
+        self._ask = ask
+        self._line = line
+        self._pending_by_slave = pending
+        earlier = pending.get(ask.request.slave, ())
         self._frame = frame
         self._search = FrameSearch()
-        self._normal = ExpectedFrame(attempt.codec, normal)
-        self._exception = ExpectedFrame(attempt.codec, exception)
-        self._older = [older for pending in attempt.earlier for older in self._expected_of(pending)]
-        self._pending = list(attempt.earlier)
+        self._normal = ExpectedFrame(ask.codec, normal)
+        self._exception = ExpectedFrame(ask.codec, exception)
+        self._older = [older for each in earlier for older in self._expected_of(each)]
+        self._pending = list(earlier)
         self._held: list[tuple[bytes, float]] = []
         self._matched = self._missing = self._from = self._sent_at = self._early_end = 0
         self._earliest = -inf
         self._undecided = self._echo_whole = self._owes_another = False
         # Echo and answer of a write look the same.
-        self._expects_echo = attempt.echo is Echo.ON or (
-            attempt.echo is Echo.UNKNOWN and isinstance(attempt.request, WriteRegister)
+        self._expects_echo = line.echo is Echo.ON or (
+            line.echo is Echo.UNKNOWN and isinstance(ask.request, WriteRegister)
         )
         self.sent_yet = False
         self.heard = bytearray()
@@ -69,9 +72,9 @@ class Reception:
 
     def sent(self, begun: float) -> None:
         """Tell when the request was begun: from now on its echo and its answer may come."""
-        timing = self._attempt.timing
+        timing = self._line.timing
         self._earliest = begun + timing.transmission(len(self._frame) - EARLY_TOLERANCE)
-        self._undecided = self._attempt.echo is not Echo.OFF
+        self._undecided = self._line.echo is not Echo.OFF
         self._owes_another = self._foreign(0, self._search.end, unanswered=True)
         self._sent_at = self._early_end = self._search.end
         self._begin_at(self._sent_at)
@@ -83,7 +86,7 @@ class Reception:
         self.heard += data
         if len(self.heard) > 2 * HEARD_KEPT:
             del self.heard[:-HEARD_KEPT]
-        data = self._attempt.codec.fold(data)
+        data = self._ask.codec.fold(data)
         if self._undecided:
             data = self._compare(data, now)
         if data:
@@ -112,11 +115,11 @@ class Reception:
         early = self._too_early(len(data), now) if self.sent_yet else 0
         if early:
             self._early_end = self._search.end + early
-            if self._attempt.paced:
+            if self._line.paced:
                 self._begin_at(self._early_end)
         self._search.feed(data, now)
         self._seek_older(now)
-        if self.sent_yet and self._attempt.request.slave != BROADCAST:
+        if self.sent_yet and self._ask.request.slave != BROADCAST:
             self._seek_ours()
 
     def _begin_at(self, position: int) -> None:
@@ -131,59 +134,59 @@ class Reception:
         """
         if now < self._earliest:
             return count
-        if not self._attempt.paced:
+        if not self._line.paced:
             return 0
-        room = (now - self._earliest) / (RATE_TOLERANCE * self._attempt.timing.character)
+        room = (now - self._earliest) / (RATE_TOLERANCE * self._line.timing.character)
         return max(0, count - 1 - int(room))
 
     def _seek_older(self, now: float) -> None:
         """Drop the slave's answers to earlier requests; since it answers in order, none older can follow them."""
         for pending, expected in tuple(self._older):
-            if pending not in self._pending or (catch := self._search.seek(expected)) is None:
+            if pending not in self._pending or (found := self._search.seek(expected)) is None:
                 continue
-            self._search.claim(catch)
+            self._search.claim(found)
             for other in (self._normal, self._exception, *(other for _, other in self._older)):
-                other.skip(catch.end)
+                other.skip(found.end)
             del self._pending[: self._pending.index(pending) + 1]
             self._older = [older for older in self._older if older[0] in self._pending]
-            latency = max(0.0, catch.first_at - pending.sent_end)
+            latency = max(0.0, found.first_at - pending.sent_end)
             self.late.append(LateAnswer(pending.request, latency, pending.ours))
             self.late_at = now
 
     def look_elsewhere(self) -> None:
         """Drop the late answers of other slaves too; called once, at the end: they can be many and come seldom."""
-        if not self._attempt.elsewhere or not self.unsolicited:
+        if not self._pending_by_slave or not self.unsolicited:
             return
         rest = self._search.unclaimed(0)
-        for slave, pending in self._attempt.elsewhere.items():
-            if slave == self._attempt.request.slave:
+        for slave, pending in self._pending_by_slave.items():
+            if slave == self._ask.request.slave:
                 continue
             start = 0
             for each in pending:
                 shapes = [shape for shape in each.codec.shapes(each.request) if shape.head in rest]
                 candidates = [self._search.seek(ExpectedFrame(each.codec, shape, start)) for shape in shapes]
-                catch = min((catch for catch in candidates if catch), key=lambda catch: catch.begin, default=None)
-                if catch is not None and not self._search.claimed(catch):
-                    self._search.claim(catch)
-                    latency = max(0.0, catch.first_at - each.sent_end)
+                found = min((found for found in candidates if found), key=lambda found: found.begin, default=None)
+                if found is not None and not self._search.claimed(found):
+                    self._search.claim(found)
+                    latency = max(0.0, found.first_at - each.sent_end)
                     self.late.append(LateAnswer(each.request, latency, each.ours))
-                    start = catch.end
+                    start = found.end
 
     def _seek_ours(self) -> None:
         expected_frames = [self._normal, self._exception]
-        if self._expects_echo and not self._echo_whole and isinstance(self._attempt.request, WriteRegister):
+        if self._expects_echo and not self._echo_whole and isinstance(self._ask.request, WriteRegister):
             del expected_frames[0]
         for expected in expected_frames:
-            while self.answer is None and (catch := self._search.seek(expected)) is not None:
-                foreign = self._owes_another or self._foreign(self._sent_at, catch.begin)
-                self._search.claim(catch)
+            while self.answer is None and (found := self._search.seek(expected)) is not None:
+                foreign = self._owes_another or self._foreign(self._sent_at, found.begin)
+                self._search.claim(found)
                 if foreign:
-                    self.displaced = catch
+                    self.displaced = found
                     return
-                if catch.begin < self._early_end:
-                    self.spare = self.spare or catch
+                if found.begin < self._early_end:
+                    self.spare = self.spare or found
                 else:
-                    self.answer = catch
+                    self.answer = found
 
     def _foreign(self, start: int, end: int, *, unanswered: bool = False) -> bool:
         """Whether another master was heard asking the asked slave between two positions; for a read only.
@@ -191,15 +194,15 @@ class Reception:
         `unanswered`: and the slave was not heard to answer it. What equals our own request counts as its echo, once,
         unless it is known that the adapter has none.
         """
-        attempt = self._attempt
-        if end - start < attempt.codec.size(REQUEST_BODY) or not isinstance(attempt.request, ReadRegisters):
+        ask = self._ask
+        if end - start < ask.codec.size(REQUEST_BODY) or not isinstance(ask.request, ReadRegisters):
             return False
         heard = self._search.unclaimed_between(start, end)
         if self.sent_yet and self._echo_possible:
             heard = heard.replace(self._frame, b"", 1)
         found = False
-        for _, _, body in attempt.codec.frames(heard, attempt.request.slave, 0):
-            if body[0] == attempt.request.slave:
+        for _, _, body in ask.codec.frames(heard, ask.request.slave, 0):
+            if body[0] == ask.request.slave:
                 asks = len(body) == REQUEST_BODY and not body[1] & EXCEPTION_FLAG
                 found = asks or (found and not unanswered)
         return found
@@ -207,11 +210,11 @@ class Reception:
     def _foresee(self, now: float) -> None:
         """Reckon when the frame in progress can be whole: the soonest that any of its pieces lets expect."""
         if self._held:
-            missing = len(self._frame) - self._matched if self._attempt.echo is Echo.ON else 0
+            missing = len(self._frame) - self._matched if self._line.echo is Echo.ON else 0
         else:
             older = [expected for _, expected in self._older]
             missing = self._search.missing([self._normal, self._exception, *older])
-        expected = now + missing * self._attempt.timing.character
+        expected = now + missing * self._line.timing.character
         self.whole_at = min(self.whole_at, expected) if 0 < missing < self._missing else expected
         self._missing = missing
 
@@ -231,7 +234,7 @@ class Reception:
         """What belongs to no echo and to no answer, in pieces, with the times at which they were read."""
         if self._echo_possible:
             own = Shape(self._frame, len(self._frame), len(self._frame))
-            echo = self._search.seek(ExpectedFrame(self._attempt.codec, own, self._sent_at))
+            echo = self._search.seek(ExpectedFrame(self._ask.codec, own, self._sent_at))
             if echo is not None:
                 self._search.claim(echo)
         return tuple(self._search.pieces(0))
@@ -239,7 +242,7 @@ class Reception:
     @property
     def _echo_possible(self) -> bool:
         """Whether our own request among what was heard may be its echo: none was found, and there may be one."""
-        proved = self._attempt.echo is Echo.OFF and self._attempt.echo_proved
+        proved = self._line.echo is Echo.OFF and self._line.echo_proved
         return not (self._echo_whole or proved)
 
     @property
@@ -260,7 +263,7 @@ class Reception:
     @property
     def only_request(self) -> bool:
         """Whether nothing came but our own bytes."""
-        return self._attempt.codec.fold(bytes(self.heard)) == self._frame
+        return self._ask.codec.fold(bytes(self.heard)) == self._frame
 
     @property
     def echo_changed(self) -> bool:
@@ -273,12 +276,12 @@ class Reception:
     def echoed(self) -> bool | None:
         """Whether our own bytes came back; None without evidence, for only an answer proves that they did not."""
         caught = self.answer or self.spare
-        writes = isinstance(self._attempt.request, WriteRegister)
+        writes = isinstance(self._ask.request, WriteRegister)
         if self._echo_whole:
-            return None if writes and self._attempt.echo is Echo.UNKNOWN and caught is None else True
+            return None if writes and self._line.echo is Echo.UNKNOWN and caught is None else True
         if caught is None or writes:
             return None
-        heard = self._attempt.codec.fold(bytes(self.heard))
+        heard = self._ask.codec.fold(bytes(self.heard))
         if self._frame in heard:
             return True if heard.startswith(self._frame) else None
         return False
@@ -292,11 +295,11 @@ class Reception:
         caught = self.answer or self.spare
         if caught is None:
             return False
-        request = self._attempt.request
+        request = self._ask.request
         rivals = [each.request for each in self._pending if each.request.slave == request.slave]
         if caught.body[1] & EXCEPTION_FLAG:
             return any(rival.function == request.function for rival in rivals)
-        shapes = self._attempt.codec.shapes
+        shapes = self._ask.codec.shapes
         return any(rival != request and shapes(rival)[0] == self._normal.shape for rival in rivals)
 
     @property

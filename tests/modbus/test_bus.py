@@ -8,7 +8,8 @@ from math import inf
 import pytest
 
 from lfs10d.errors import PortBusyError, PortLostError
-from lfs10d.modbus.bus import AWAKE_BEFORE, RATE_SETTLE, REOPEN_FIRST, Bus, LineRules, Order, Wait
+from lfs10d.modbus.ask import Ask
+from lfs10d.modbus.bus import AWAKE_BEFORE, RATE_SETTLE, REOPEN_FIRST, Bus, LineRules, Wait
 from lfs10d.modbus.echo import Echo
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.outcome import Outcome
@@ -23,7 +24,7 @@ REQUEST = RTU.encode(WIND)
 ANSWER = bytes.fromhex("010304414FD70A002F")
 SETTINGS = PortSettings("/dev/line")
 T9600, T19200 = LineTiming.of(9600), LineTiming.of(19200)
-READ = Order(WIND, RTU, 0.2)
+READ = Ask(WIND, RTU, 0.2)
 
 
 class Clock:
@@ -113,9 +114,9 @@ class Rig:
         assert isinstance(wait, Wait)
         return wait.until - self.clock.now
 
-    def carry_out(self, order: Order, answer: bytes = ANSWER) -> Outcome:
+    def carry_out(self, ask: Ask, answer: bytes = ANSWER) -> Outcome:
         """Carry out an order that is answered after 20 ms."""
-        self.bus.ask(order)
+        self.bus.ask(ask, {})
         while not self.port.written:
             waited = self.step(0.001)
             assert isinstance(waited, Wait)
@@ -136,7 +137,7 @@ def test_at_rest_it_listens(rig: Rig) -> None:
 
 
 def test_an_order_waits_for_silence_is_sent_and_answered(rig: Rig) -> None:
-    rig.bus.ask(READ)
+    rig.bus.ask(READ, {})
     assert not rig.bus.idle
     assert rig.step() == Wait(100.0 + T9600.gap, listen=True)
     wait = rig.step(T9600.gap)
@@ -154,7 +155,7 @@ def test_an_order_waits_for_silence_is_sent_and_answered(rig: Rig) -> None:
 
 def test_it_knows_until_when_a_request_is_on_the_wire(rig: Rig) -> None:
     assert rig.bus.speaking_until < rig.clock.now
-    rig.bus.ask(READ)
+    rig.bus.ask(READ, {})
     rig.step()
     rig.step(T9600.gap)
     assert rig.bus.speaking_until == pytest.approx(rig.clock.now + T9600.transmission(len(REQUEST)))
@@ -163,12 +164,12 @@ def test_it_knows_until_when_a_request_is_on_the_wire(rig: Rig) -> None:
 def test_bytes_that_nobody_asked_for_restart_the_silence(rig: Rig) -> None:
     assert rig.step(1.0, b"\xff\xff") == Wait(inf, listen=True)
     assert rig.bus.unsolicited == 2
-    rig.bus.ask(READ)
+    rig.bus.ask(READ, {})
     assert rig.step(0.001) == Wait(101.0 + T9600.gap, listen=True)
 
 
 def test_it_looks_once_more_before_it_speaks(rig: Rig) -> None:
-    rig.bus.ask(READ)
+    rig.bus.ask(READ, {})
     rig.step()
     rig.clock.now += T9600.gap
     rig.port.incoming = b"\xff"
@@ -190,7 +191,7 @@ def test_the_echo_is_learned_from_reads_alone(rig: Rig) -> None:
 def test_another_rate_is_drained_flushed_and_begun_after_the_slower_gap(rig: Rig) -> None:
     rig.carry_out(READ)
     rig.port.calls.clear()
-    rig.bus.ask(replace(READ, baudrate=19200))
+    rig.bus.ask(replace(READ, baudrate=19200), {})
     heard = rig.clock.now
     assert rig.step(0.001) == Wait(heard + RATE_SETTLE, listen=True)
     assert rig.waits(0.004) == pytest.approx(RATE_SETTLE + T9600.gap)
@@ -198,7 +199,7 @@ def test_another_rate_is_drained_flushed_and_begun_after_the_slower_gap(rig: Rig
     rig.step(RATE_SETTLE + T9600.gap)
     assert rig.port.written == [REQUEST]
     assert isinstance(rig.step(0.02, ANSWER), Outcome)
-    rig.bus.ask(replace(READ, baudrate=19200))
+    rig.bus.ask(replace(READ, baudrate=19200), {})
     assert rig.waits() == pytest.approx(T19200.gap)
     assert rig.bus.line_timing == T9600
 
@@ -210,7 +211,7 @@ def test_its_own_rate_by_number_is_its_own_rate(rig: Rig) -> None:
 
 @pytest.mark.parametrize("trouble", [PortLostError("/dev/line", "gone"), PortBusyError("/dev/line", "taken")])
 def test_the_loss_of_the_port_is_told_once_per_reason_and_it_is_opened_again(rig: Rig, trouble: Exception) -> None:
-    rig.bus.ask(READ)
+    rig.bus.ask(READ, {})
     rig.step()
     rig.port.trouble = trouble
     changed = rig.step(0.5)
@@ -234,7 +235,7 @@ def test_the_loss_of_the_port_is_told_once_per_reason_and_it_is_opened_again(rig
 
 
 def test_a_port_that_is_lost_at_another_rate_comes_back_at_its_own(rig: Rig) -> None:
-    rig.bus.ask(replace(READ, baudrate=19200))
+    rig.bus.ask(replace(READ, baudrate=19200), {})
     rig.step(0.01)
     assert rig.port.settings.baudrate == 19200
     rig.port.trouble = PortLostError("/dev/line", "gone")
@@ -243,7 +244,7 @@ def test_a_port_that_is_lost_at_another_rate_comes_back_at_its_own(rig: Rig) -> 
     rig.clock.now += 1.0
     rig.opened()
     assert rig.port.calls[-1] == "open /dev/line 9600"
-    rig.bus.ask(READ)
+    rig.bus.ask(READ, {})
     assert rig.waits() == pytest.approx(T9600.gap)
 
 
@@ -285,7 +286,7 @@ def test_counters_are_none_where_there_is_no_port(rig: Rig) -> None:
 
 
 def test_a_babbling_line_ends_the_order_unsent(rig: Rig) -> None:
-    rig.bus.ask(READ)
+    rig.bus.ask(READ, {})
     told = [rig.step(0.002, b"\xff") for _ in range(120)]
     (collision,) = [each for each in told if isinstance(each, Outcome)]
     assert collision.fault is not None

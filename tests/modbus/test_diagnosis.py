@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lfs10d.modbus import diagnosis
-from lfs10d.modbus.ask import Attempt
 from lfs10d.modbus.duplicates import Twice
 from lfs10d.modbus.echo import Echo
 from lfs10d.modbus.frames import Codec, Framing
@@ -16,6 +15,7 @@ from lfs10d.modbus.reception import Reception
 from lfs10d.modbus.request import ReadRegisters, Request, WriteRegister
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.reading import FaultCode
+from tests.support.exchanges import Attempt
 
 RTU = Codec(Framing.RTU)
 WIND = ReadRegisters(3, 0x0001, 2)
@@ -123,9 +123,8 @@ def heard_by(request_: Request, echo: Echo, heard: bytes) -> Reception:
         echo=echo,
         adapter_latency=0.02,
         earlier=(Pending(ReadRegisters(3, 0x0005, 1), RTU, -0.5),),
-        turn=0.2,
     )
-    reception = Reception(attempt, RTU.encode(request_))
+    reception = attempt.reception()
     reception.sent(0.0)
     reception.take(heard, 0.03)
     return reception
@@ -152,14 +151,14 @@ def test_the_nearest_thing_to_an_answer_names_the_fault(
     request_: Request, echo: Echo, heard: bytes, code: FaultCode | None
 ) -> None:
     reception = heard_by(request_, echo, heard)
-    found = diagnosis.judge(reception._attempt, reception)
+    found = diagnosis.judge(reception._ask, reception)
     assert (found and found.code) == code
 
 
 @pytest.mark.parametrize(("heard", "spoke"), [(STRANGER, True), (b"\xff" + STRANGER, True), (BEGUN, False)])
 def test_a_right_frame_of_somebody_else_is_a_stranger(heard: bytes, *, spoke: bool) -> None:
     reception = heard_by(WIND, Echo.OFF, heard)
-    assert diagnosis.stranger_spoke(reception._attempt, reception) is spoke
+    assert diagnosis.stranger_spoke(reception._ask, reception) is spoke
 
 
 def test_the_remaining_faults_have_their_codes() -> None:
@@ -200,7 +199,7 @@ def test_a_frame_of_an_unknown_function_is_found_behind_noise_where_it_is_the_sl
 )
 def test_the_verdict_is_in_words(heard: bytes, message: str) -> None:
     reception = heard_by(WIND, Echo.OFF, heard)
-    found = diagnosis.judge(reception._attempt, reception)
+    found = diagnosis.judge(reception._ask, reception)
     assert found is not None
     assert found.message == message
 
@@ -215,7 +214,7 @@ def test_whatever_was_heard_there_is_one_verdict_in_words_that_can_be_printed(
     request_: Request, echo: Echo, pieces: list[bytes]
 ) -> None:
     reception = heard_by(request_, echo, b"".join(pieces))
-    found = diagnosis.judge(reception._attempt, reception)
+    found = diagnosis.judge(reception._ask, reception)
     assert (found is None) is (request_.slave == 0 and not reception.echo_changed)
     assert found is None or found.message.isprintable()
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import pytest
 
-from lfs10d.modbus.ask import Attempt
 from lfs10d.modbus.echo import Echo
 from lfs10d.reading import FaultCode
 from tests.support.exchanges import (
@@ -22,6 +21,7 @@ from tests.support.exchanges import (
     SENT_END,
     UNKNOWN,
     VALUES,
+    Attempt,
     attempt,
     byte_by_byte,
     carry_out,

@@ -81,7 +81,7 @@ def test_a_late_answer_of_another_slave_gives_ours_no_more_time() -> None:
 
 
 def test_late_answers_of_other_slaves_are_told_of_a_babbling_line_too() -> None:
-    each = replace(AFTER_OTHER, turn=0.01)
+    each = replace(AFTER_OTHER, timeout=0.01)
     outcome = carry_out(each, [(0.001, LATE_OTHER), *((0.002 * n, b"\xff") for n in range(1, 9))], quiet_since=0.0)
     assert code(outcome) is FaultCode.COLLISION
     assert [late.request for late in outcome.late] == [OTHER]

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
-from lfs10d.modbus.ask import Attempt
 from lfs10d.modbus.echo import Echo
 from lfs10d.modbus.frames import Checksum, Codec, Framing
 from lfs10d.modbus.pending import Pending
 from lfs10d.modbus.reception import HEARD_KEPT, Reception
 from lfs10d.modbus.request import ReadRegisters, Request, WriteRegister
 from lfs10d.modbus.timing import LineTiming
+from tests.support.exchanges import Attempt
 
 RTU, ASCII = Codec(Framing.RTU), Codec(Framing.ASCII)
 WIND, WHO, MOVE = ReadRegisters(1, 0x0001, 2), ReadRegisters(1, 0x0005, 1), WriteRegister(1, 0x0005, 7)
@@ -42,10 +40,9 @@ def reception(
         echo=echo,
         adapter_latency=0.02,
         earlier=tuple(Pending(each, codec, -0.5) for each in earlier),
-        turn=0.2,
         paced=paced,
     )
-    ear = Reception(attempt, codec.encode(request))
+    ear = attempt.reception()
     if sent:
         ear.sent(0.0)
     return ear
@@ -108,7 +105,7 @@ def elsewhere(*requests: Request, heard: bytes) -> Reception:
     pending: dict[int, tuple[Pending, ...]] = {}
     for each in requests:
         pending[each.slave] = (*pending.get(each.slave, ()), Pending(each, RTU, -0.5))
-    ear = Reception(replace(reception()._attempt, elsewhere=pending), REQUEST)
+    ear = Attempt(WIND, RTU, elsewhere=pending).reception(REQUEST)
     ear.sent(0.0)
     ear.take(heard, 0.05)
     ear.look_elsewhere()
@@ -125,7 +122,6 @@ def elsewhere(*requests: Request, heard: bytes) -> Reception:
         pytest.param((OTHER, OTHERS_ID), LATE_OTHER + LATE_ID, [OTHER, OTHERS_ID], b"", id="two of one slave"),
         pytest.param((OTHER, OTHER), LATE_OTHER, [OTHER], b"", id="asked twice, answered once"),
         pytest.param((OTHERS_ID, OTHER), LATE_OTHER + LATE_ID, [OTHERS_ID], LATE_OTHER, id="never out of turn"),
-        pytest.param((WHO,), LATE, [], LATE, id="the slave's own are not looked for here"),
     ],
 )
 def test_late_answers_of_other_slaves_are_found_in_what_belongs_to_nothing(
@@ -137,11 +133,17 @@ def test_late_answers_of_other_slaves_are_found_in_what_belongs_to_nothing(
     assert ear.late_at < 0
 
 
+def test_the_asked_slaves_own_late_answer_is_reported_once() -> None:
+    ear = elsewhere(WHO, heard=LATE)
+    assert [each.request for each in ear.late] == [WHO]
+    assert (ear.leftover(), ear.late_at) == (b"", 0.05)
+
+
 def test_a_frame_inside_our_answer_is_nobodys_late_answer() -> None:
     inner = RTU.wrap(bytes.fromhex("048302"))
     answer = RTU.wrap(bytes.fromhex("010306") + inner + b"\0")
     pending = {4: (Pending(OTHER, RTU, -0.5),)}
-    ear = Reception(replace(reception(ReadRegisters(1, 1, 3))._attempt, elsewhere=pending), REQUEST)
+    ear = Attempt(ReadRegisters(1, 1, 3), RTU, elsewhere=pending).reception(REQUEST)
     ear.sent(0.0)
     ear.take(b"\x04\x83" + answer, 0.05)
     ear.look_elsewhere()
@@ -303,7 +305,7 @@ def test_only_the_last_of_very_much_is_remembered() -> None:
 def test_a_slave_with_another_check_field_is_heard_late_too() -> None:
     summed = Codec(Framing.RTU, Checksum.SUM)
     pending = Pending(WHO, summed, -1.0)
-    ear = Reception(replace(reception()._attempt, earlier=(pending,)), REQUEST)
+    ear = Attempt(WIND, RTU, earlier=(pending,)).reception(REQUEST)
     ear.take(LATE, 0.4)
     assert not ear.late
     ear.take(summed.wrap(bytes.fromhex("0103020007")), 0.5)
@@ -382,7 +384,7 @@ REFUSED_OTHER = RTU.wrap(bytes.fromhex("048302"))
 def owed_by_two(*heard: bytes) -> Reception:
     """Return an ear that heard these bytes, one piece every 100 ms, while slaves 1 and 4 still owe answers."""
     owed = {1: (Pending(WHO, RTU, -0.5),), 4: (Pending(OTHER, RTU, -0.5),)}
-    ear = Reception(replace(reception()._attempt, elsewhere=owed), REQUEST)
+    ear = Attempt(WIND, RTU, elsewhere=owed).reception(REQUEST)
     ear.sent(0.0)
     for n, piece in enumerate(heard, 1):
         ear.take(piece, 0.1 * n)

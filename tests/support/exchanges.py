@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
-from lfs10d.modbus.ask import Attempt
+from lfs10d.modbus.ask import Ask, LineContext
 from lfs10d.modbus.echo import Echo
 from lfs10d.modbus.exchange import Exchange, Listen, Quiet, Send, Settled
 from lfs10d.modbus.frames import Checksum, Codec, Framing
 from lfs10d.modbus.outcome import Outcome
+from lfs10d.modbus.pending import Pending
+from lfs10d.modbus.reception import Reception
 from lfs10d.modbus.request import ReadRegisters, WriteRegister
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.reading import FaultCode
@@ -28,6 +31,50 @@ SENT_END = 8 * CHARACTER
 HUSH = T9600.t35 + 0.004
 
 
+@dataclass(frozen=True)
+class Attempt:
+    """All that one exchange is given, side by side, so that a test replaces what it means."""
+
+    request: ReadRegisters | WriteRegister
+    codec: Codec
+    timing: LineTiming = T9600
+    timeout: float = 0.2
+    patience: float | None = None
+    echo: Echo = Echo.OFF
+    adapter_latency: float = 0.02
+    earlier: tuple[Pending, ...] = ()
+    elsewhere: Mapping[int, tuple[Pending, ...]] = field(default_factory=dict)
+    gap: float | None = None
+    paced: bool = True
+    echo_proved: bool = False
+
+    @property
+    def ask(self) -> Ask:
+        return Ask(self.request, self.codec, self.timeout, self.patience)
+
+    @property
+    def line(self) -> LineContext:
+        return LineContext(
+            self.timing,
+            self.echo,
+            self.adapter_latency,
+            gap=self.gap,
+            paced=self.paced,
+            echo_proved=self.echo_proved,
+        )
+
+    @property
+    def pending(self) -> Mapping[int, tuple[Pending, ...]]:
+        return {self.request.slave: self.earlier, **self.elsewhere}
+
+    def exchange(self, *, asked: float = 0.0, quiet_since: float = -1.0) -> Exchange:
+        return Exchange(self.ask, self.line, self.pending, asked=asked, quiet_since=quiet_since)
+
+    def reception(self, frame: bytes | None = None) -> Reception:
+        sent = self.codec.encode(self.request) if frame is None else frame
+        return Reception(self.ask, self.line, self.pending, sent)
+
+
 def framed(body: str, codec: Codec = RTU) -> bytes:
     return codec.wrap(bytes.fromhex(body))
 
@@ -42,9 +89,6 @@ def attempt(request: ReadRegisters | WriteRegister = WIND, codec: Codec = RTU) -
         patience=0.03,
         echo=Echo.OFF,
         adapter_latency=0.004,
-        earlier=(),
-        turn=0.5,
-        paced=True,
     )
 
 
@@ -67,7 +111,7 @@ def carry_out(
     each: Attempt, arrivals: list[tuple[float, bytes]], *, asked: float = 0.0, quiet_since: float = -1.0
 ) -> Outcome:
     """Obey an exchange as the bus does: sleep, read what is there, step."""
-    exchange = Exchange(each, asked=asked, quiet_since=quiet_since)
+    exchange = each.exchange(asked=asked, quiet_since=quiet_since)
     waiting = sorted(arrivals, key=lambda arrival: arrival[0])
     now = asked
     while True:
@@ -92,7 +136,7 @@ def code(outcome: Outcome) -> FaultCode | None:
 
 def listening(each: Attempt = PLAIN) -> Exchange:
     """Return an exchange whose request was begun at 0 and written in no time."""
-    exchange = Exchange(each, asked=0.0, quiet_since=-1.0)
+    exchange = each.exchange()
     assert exchange.step(0.0) == Send(each.codec.encode(each.request))
     exchange.sent(0.0, 0.0)
     return exchange
