@@ -109,6 +109,10 @@ class IdentityQuery:
             yield Hold(until)
         return self._reply((yield self._ask(self._values_of(spot, block), spot, timeout)), values=True)
 
+    def answered_twice(self, spot: Endpoint) -> bool:
+        """Whether a second answer came to requests to this slave id: see `lfs10d.modbus.duplicates`."""
+        return self._pending.duplicates.known(spot.slave)
+
     def listen(
         self, silent: Endpoint, timeout: float, before: int
     ) -> Generator[Step, Outcome, tuple[IdentityReply, bool]]:

@@ -12,13 +12,15 @@ Rules
    and back between two groups: nine reads fall into two groups, the distance between these is more than `APART` times
    the width of each and more than `LEAST` of the profile's range, and it was crossed at least `CROSSINGS` times. Where
    the first three do not jump there and back, six more are not read.
-4. Two sensors that answer bit-identically at the same time are one to whoever listens.
+4. Two sensors share the id, too, where a second answer came to earlier requests: such a slave is left alone until
+   that one has come, so that nothing of it is received behind a read.
+5. Two sensors that answer bit-identically at the same time are one to whoever listens.
 """
 
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from lfs10d.line.jobs.identification import rate_fits
@@ -125,7 +127,14 @@ def _values_fit(block: Block, spot: Endpoint, asking: IdentityQuery) -> Generato
 
 
 def one_alone(spot: Endpoint, silent: Endpoint, asking: IdentityQuery) -> Generator[Step, Outcome, Look]:
-    """Find out whether one sensor is at a place, not two (rules 2 and 3); `silent` is a slave id that nobody has."""
+    """Find out whether one sensor is at a place, not two (rules 2 to 4); `silent` is a slave id that nobody has."""
+    look = yield from _looked_at(spot, silent, asking)
+    if look.twins is None and asking.answered_twice(spot):
+        return replace(look, twins="a second answer comes to each request")
+    return look
+
+
+def _looked_at(spot: Endpoint, silent: Endpoint, asking: IdentityQuery) -> Generator[Step, Outcome, Look]:
     value = asking.profile.values[0]
     block = next(block for block in asking.profile.reads() if value in block.values)
     numbers: list[float] = []

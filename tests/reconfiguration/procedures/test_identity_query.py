@@ -222,3 +222,13 @@ def test_a_rate_without_a_code_is_known_by_what_the_register_held(pretence: Pret
     assert knowing.profile.baudrate.codes == {9600: 1, 19200: 2, 4800: 7}
     assert knowing.clock is asking.clock
     assert pretence.carry_out(knowing.values(Endpoint(slave=3, baudrate=9600))).silent
+
+
+def test_a_place_is_answered_twice_after_two_second_answers() -> None:
+    pretence = Pretence()
+    asking, here = pretence.asking(), Endpoint(slave=3, baudrate=9600)
+    pretence.pending.duplicates.answered(3, 1.0)
+    pretence.pending.duplicates.second(3, 1.5)
+    assert not asking.answered_twice(here)
+    pretence.pending.duplicates.second(3, 1.7)
+    assert asking.answered_twice(here)

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from lfs10d.line.jobs.identification import rate_fits
 from lfs10d.modbus.ask import Ask
+from lfs10d.modbus.duplicates import TELLING
 from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.request import ReadRegisters
 from lfs10d.profiles.library import parse_profile
@@ -308,3 +309,15 @@ def test_what_only_rises_or_falls_never_takes_turns(numbers: list[float], tip: f
     assert jumps(WIND, sorted(numbers)) < CROSSINGS - 1
     assert jumps(WIND, sorted(numbers, reverse=True)) < CROSSINGS - 1
     assert jumps(WIND, [50 + each / 100 * LEAST * 100 * tip for each in numbers]) == 0
+
+
+def test_a_second_answer_to_earlier_requests_shows_two() -> None:
+    """The slave rests until that one has come, so that no read is followed by it."""
+    pretence = Pretence()
+    pretence.sensor(3)
+    assert look(pretence) == Look()
+    for _ in range(TELLING):
+        pretence.pending.duplicates.answered(3, pretence.clock.now)
+        pretence.pending.duplicates.second(3, pretence.clock.now + 0.75)
+        pretence.clock.now += 2.0
+    assert look(pretence).twins == "a second answer comes to each request"
