@@ -51,24 +51,30 @@ def _typed(value: object) -> str:
 
 
 WALK: Final = (
-    Step("health", "How the daemon, the line and every sensor are; on the command line it is a table.", {}),
-    Step("republish", "Every retained topic once more; the answer says how many.", {}),
-    Step("config/get", "The effective configuration without secrets, and where each value comes from.", {}),
-    Step("config/reload", "As SIGHUP does: what changed in the file is applied.", {}),
+    Step("health", "The state of the daemon, the line and every sensor; on the command line as a table.", {}),
+    Step("republish", "Publishes every retained topic again; the response gives their number.", {}),
+    Step("config/get", "The effective configuration without secrets, with the origin of each value.", {}),
+    Step("config/reload", "The same as SIGHUP: changes in the file take effect.", {}),
     Step(
-        "device/read", "Polled now, in turn with the others; the sample is on `telemetry` too.", {"device": "mast-top"}
+        "device/read",
+        "Polls the device now, in turn with the others. The sample is published on `telemetry` too.",
+        {"device": "mast-top"},
     ),
-    Step("device/read", "A name that nobody has:", {"device": "mast"}),
-    Step("device/add", "Slave 5 is asked first, and polled because it answers.", {"slave": 5, "name": "crane"}),
-    Step("device/add", "Nobody answers, so nothing is changed. With `probe` false it would be.", {"slave": 44}),
+    Step("device/read", "A name that no device has:", {"device": "mast"}),
+    Step("device/add", "Slave id 5 is asked first, and polled because it answers.", {"slave": 5, "name": "crane"}),
+    Step(
+        "device/add",
+        "No device answers, so nothing is changed. With `probe=false` it is added all the same.",
+        {"slave": 44},
+    ),
     Step(
         "device/options",
-        "Applied at once, kept across restarts.",
+        "Takes effect at once, and is kept across restarts.",
         {"device": "slave-3", "interval": "500ms", "label": "South"},
     ),
     Step(
         "config/reset",
-        "What requests changed of a device, or one key of it, is undone: the file holds again.",
+        "Takes back what requests changed of a device, or of one key of it: the file is valid again.",
         {"device": "slave-3"},
     ),
     Step("device/remove", "Its retained topics are cleared.", {"device": "crane"}),
@@ -78,25 +84,28 @@ WALK: Final = (
         "An LFS10 has no register that may be written this way:",
         {"device": "mast-top", "address": 5, "value": 9},
     ),
-    Step("line/trace", "Frames come on `B/trace` for so long; `lfs10d trace` shows them.", {"for": "10s"}),
-    Step("line/pause", "The port is free for another program, and taken back by itself.", {"for": "30s"}),
-    Step("line/cancel", "Ends both before their time.", {}),
+    Step("line/trace", "Publishes every frame on `B/trace` for this time; `lfs10d trace` shows them.", {"for": "10s"}),
+    Step("line/pause", "Frees the port for another program for this time.", {"for": "30s"}),
+    Step("line/cancel", "Ends the trace and the pause early.", {}),
     Step(
-        "line/scan", "Polling goes on; `event` tells how far it is.", {"ids": "2-6", "baudrates": [BAUDRATE]}, slow=True
+        "line/scan",
+        "Polling goes on; `scan_progress` events report the progress.",
+        {"ids": "2-6", "baudrates": [BAUDRATE]},
+        slow=True,
     ),
     Step(
         "device/readdress",
-        "First only whether it could be done:",
+        "First only a check whether it can be done:",
         {"device": "slave-3", "to": 9, "dry_run": True},
         slow=True,
     ),
     Step(
         "device/readdress",
-        "Then in earnest. The answer comes when the sensor has been heard at its new id: after 10 to 25 s.",
+        "Then for real. The response comes when the sensor has answered at its new id, after 10 to 25 s.",
         {"device": "slave-3", "to": 9},
         slow=True,
     ),
-    Step("device/readdress", "An id that is taken is refused at once:", {"device": "slave-3", "to": 2}),
+    Step("device/readdress", "An id that is in use is rejected at once:", {"device": "slave-3", "to": 2}),
     Step(
         "line/adopt",
         "The factory-new sensor, slave id 1 at 9600 baud, gets the next free id and the line's rate, in half a "
@@ -104,7 +113,7 @@ WALK: Final = (
         {"name": "north", "label": "North side"},
         slow=True,
     ),
-    Step("line/baudrate", "All sensors, the first as canary, and then the line itself.", {"to": 9600}, slow=True),
+    Step("line/baudrate", "Moves all sensors, the first one as a trial, and then the port.", {"to": 9600}, slow=True),
 )
 """In this order, for one leads to the next."""
 
