@@ -18,6 +18,7 @@ from lfs10d.config.changes import Changes
 from lfs10d.config.changes_file import ChangesFile
 from lfs10d.config.credentials import reason
 from lfs10d.config.effective import Effective, effective, merged_data
+from lfs10d.config.json_schema import json_schema
 from lfs10d.config.loader import LoadedConfig, leaves, load
 from lfs10d.config.models import Config, Section
 from lfs10d.daemon.state_directory import state_directory
@@ -37,12 +38,27 @@ Examples:
   lfs10d config           every value and its origin
   lfs10d config --merged  YAML to put into the file
   lfs10d config --json    for programs
+  lfs10d config --schema  JSON Schema of the file, for editors
 """
+
+
+def _print_schema(context: click.Context, _: click.Parameter, wanted: bool) -> None:  # noqa: FBT001 - as click calls it
+    if wanted:
+        click.echo(json.dumps(json_schema(), indent=2, ensure_ascii=False))
+        context.exit()
 
 
 @click.command("config", epilog=EXAMPLES)
 @config_option
 @click.option("--merged", is_flag=True, help="Print YAML to put into the file.")
+@click.option(
+    "--schema",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_print_schema,
+    help="Print the JSON Schema of the file; nothing is read.",
+)
 @click.option(
     "--state-dir",
     type=click.Path(path_type=Path, readable=False),  # whether it can be read is told in our words

@@ -9,10 +9,10 @@ from typing import Any
 import click
 
 from lfs10d.modbus.frames import Framing
-from lfs10d.modbus.port_settings import BAUDRATES, PARITIES, PortSettings
+from lfs10d.modbus.port_settings import PARITIES, PortSettings
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.library import builtin_names
-from lfs10d.schema.quantities import seconds
+from lfs10d.schema.quantities import BAUDRATES, seconds
 
 TIMEOUTS = (0.01, 10.0)
 """The shortest and the longest time-out that can be asked for, in s."""

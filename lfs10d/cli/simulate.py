@@ -15,9 +15,9 @@ import click
 from lfs10d.cli import json_option
 from lfs10d.cli.options import profile_names
 from lfs10d.profiles.library import load_profile
-from lfs10d.schema.quantities import seconds
+from lfs10d.schema.quantities import BAUDRATES, seconds
 from lfs10d.simulator.builder import LinePlan, build, slave_ids
-from lfs10d.simulator.fault_file import BAUDRATES, FaultFile, load_faults
+from lfs10d.simulator.fault_file import FaultFile, load_faults
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.registers import LFS10, blueprint_of

@@ -12,15 +12,14 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, ValidationError
-from pydantic_core import PydanticCustomError
 
 from lfs10d.config.changes import OPTIONS, Changes, DeviceChange, Place, Rate, Values, Verified
 from lfs10d.config.credentials import reason
-from lfs10d.config.models import LineConfig, Section, SlaveConfig
+from lfs10d.config.models import Section, SlaveConfig, SlaveId
 from lfs10d.errors import ConfigError, StateError
 from lfs10d.schema.document import LARGEST_FILE, decode, parse
-from lfs10d.schema.fields import Choice, Name, Whole
-from lfs10d.schema.quantities import duration_text
+from lfs10d.schema.fields import Choice, Name, Whole, plain_error
+from lfs10d.schema.quantities import BAUDRATES, duration_text
 from lfs10d.schema.yaml12 import render
 from lfs10d.system.disk import Disk
 
@@ -118,17 +117,13 @@ class ChangesFile:
 
 # -- the form
 
-_Id = Annotated[int, Whole(1, 255)]
-_Baudrate = Annotated[
-    int, next(kind for kind in LineConfig.model_fields["baudrate"].metadata if isinstance(kind, Choice))
-]
+_Baudrate = Annotated[int, Choice(BAUDRATES)]
 
 
 def _saying(value: object, *, keys: tuple[str, ...], whole: bool) -> Values:
     """Take what is said of a device in the words of the configuration."""
     if not isinstance(value, dict) or not set(value) <= set(keys) or ("id" in value) is not whole:
-        message = f"must be a mapping of {', '.join(keys)}" + (" with an id" if whole else "")
-        raise PydanticCustomError("plain", "{message}", {"message": message})
+        raise plain_error(f"must be a mapping of {', '.join(keys)}" + (" with an id" if whole else ""))
     slave = SlaveConfig.model_validate({"id": 1, **value})
     return {key: getattr(slave, key) for key in value}
 
@@ -139,7 +134,7 @@ _Options = Annotated[dict[str, Any], BeforeValidator(lambda value: _saying(value
 
 
 class _Place(Section):
-    id: _Id
+    id: SlaveId
     baudrate: _Baudrate | None = None
 
     def place(self) -> Place:
@@ -147,7 +142,7 @@ class _Place(Section):
 
 
 class _Verified(_Place):
-    file: _Id | None = None
+    file: SlaveId | None = None
 
 
 class _Device(Section):

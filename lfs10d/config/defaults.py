@@ -15,7 +15,8 @@ from lfs10d.config.models import (
     default_line_name,
     device_name,
 )
-from lfs10d.schema.fields import BaseTopic, FieldError, FieldKind, Text, quoted
+from lfs10d.schema.addresses import BaseTopic
+from lfs10d.schema.fields import FieldError, FieldKind, Text, quoted
 from lfs10d.schema.messages import KeyPath
 
 

@@ -9,27 +9,25 @@ file.
 from __future__ import annotations
 
 import re
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
-from pydantic_core import PydanticCustomError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, GetJsonSchemaHandler
+from pydantic_core import CoreSchema
 
+from lfs10d.schema.addresses import BaseTopic, Hosts, node_text, split_node
 from lfs10d.schema.fields import (
-    PLAIN_ERROR,
-    BaseTopic,
     Choice,
     Duration,
     FilePath,
     Flag,
-    Hosts,
     Name,
     Size,
     Text,
     Whole,
-    node_text,
+    plain_error,
     shown,
-    split_node,
 )
+from lfs10d.schema.quantities import BAUDRATES
 
 MINUTE, HOUR, DAY = 60.0, 3600.0, 86400.0
 PLAIN_PORT, TLS_PORT = 1883, 8883
@@ -43,7 +41,8 @@ DEFAULT_STEM = "lfs10d"
 
 DEFAULT_LINE = "line0"
 
-SlaveId: TypeAlias = Annotated[int, Whole(1, 255)]
+SLAVE_ID = Whole(1, 255)
+SlaveId: TypeAlias = Annotated[int, SLAVE_ID]
 Label: TypeAlias = Annotated[str | None, Text(200, null=True)]
 Interval: TypeAlias = Annotated[float, Duration(0.02, DAY, zero="as fast as the line allows")]
 ResponseTimeout: TypeAlias = Annotated[float | None, Duration(0.01, 10, auto="learned")]
@@ -58,10 +57,9 @@ class Section(BaseModel):
 
 
 def _items(value: object) -> object:
-    """Let a YAML list become a tuple; anything else is told in plain words."""
+    """Turn a YAML list into a tuple; refuse anything else."""
     if not isinstance(value, list | tuple):
-        message = f"must be a list, [] for none, not {shown(value)}"
-        raise PydanticCustomError(PLAIN_ERROR, "{message}", {"message": message})
+        raise plain_error(f"must be a list, [] for none, not {shown(value)}")
     return tuple(value)
 
 
@@ -85,7 +83,7 @@ class LineConfig(Section):
     port: Annotated[str, FilePath()] = Field(
         description="Path of the serial port; best one below /dev/serial/by-id, which stays the same when replugged."
     )
-    baudrate: Annotated[int, Choice((1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200))] = Field(
+    baudrate: Annotated[int, Choice(BAUDRATES)] = Field(
         9600, description="Bits per second. An LFS10 can do 9600 and 19200."
     )
     parity: Annotated[Literal["none", "even", "odd"], Choice(("none", "even", "odd"))] = Field(
@@ -176,9 +174,17 @@ def _slave(value: object) -> object:
     if isinstance(value, int) and not isinstance(value, bool):
         return {"id": value}
     if not isinstance(value, dict):
-        message = f"must be a slave id, a whole number from 1 to 255, or a mapping with an id, not {shown(value)}"
-        raise PydanticCustomError(PLAIN_ERROR, "{message}", {"message": message})
+        raise plain_error(
+            f"must be a slave id, a whole number from 1 to 255, or a mapping with an id, not {shown(value)}"
+        )
     return value
+
+
+class _OrBareId:
+    """Says in the JSON Schema what `_slave` permits."""
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        return {"anyOf": [SLAVE_ID.json_schema(), handler(schema)]}
 
 
 class TlsConfig(Section):
@@ -293,9 +299,9 @@ class Config(Section):
 
     line: LineConfig = Field(description="The RS485 line; at least `port`.")
     poll: PollConfig = Field(PollConfig(), description="How slaves are polled.")
-    slaves: Annotated[tuple[Annotated[SlaveConfig, BeforeValidator(_slave)], ...], BeforeValidator(_items)] = Field(
-        (), description="A list of slave ids, of mappings, or both; may be empty."
-    )
+    slaves: Annotated[
+        tuple[Annotated[SlaveConfig, BeforeValidator(_slave), _OrBareId()], ...], BeforeValidator(_items)
+    ] = Field((), description="A list of slave ids, of mappings, or both; may be empty.")
     mqtt: MqttConfig = Field(MqttConfig(), description="The broker.")
     commands: Annotated[tuple[CommandChoice, ...], BeforeValidator(_items)] = Field(
         ("polling", "sensors"),

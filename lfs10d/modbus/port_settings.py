@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-BAUDRATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
-"""Bits per second a line may run at."""
+from lfs10d.schema.quantities import BAUDRATES
 
 PARITIES = ("none", "even", "odd")
 DATABITS = (7, 8)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from lfs10d.config.models import MqttConfig
-from lfs10d.schema.fields import node_text
+from lfs10d.schema.addresses import node_text
 from lfs10d.system.secret import Secret
 
 

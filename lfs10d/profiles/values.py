@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Annotated, Literal, TypeAlias
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
-from pydantic_core import InitErrorDetails, PydanticCustomError
+from pydantic_core import InitErrorDetails
 
 from lfs10d.profiles.registers import WORDS, ByteOrder, Cell, Linear, RegisterType, WordOrder, span, spell
-from lfs10d.schema.fields import PLAIN_ERROR, FieldError, FieldKind, Text, Whole
+from lfs10d.schema.fields import FieldError, FieldKind, Text, Whole, plain_error
 
 Place: TypeAlias = tuple[str | int, ...]
 ReadFunction: TypeAlias = Literal[3, 4]
@@ -49,8 +49,7 @@ def refuse(problems: list[tuple[Place, str]]) -> None:
             "profile",
             [
                 InitErrorDetails(
-                    # As a value of the context: braces in the message are no placeholders.
-                    type=PydanticCustomError(PLAIN_ERROR, "{message}", {"message": message}),
+                    type=plain_error(message),
                     loc=place,
                     input=None,
                 )

@@ -1,4 +1,4 @@
-"""What one value in a file or a request may be, each kind with words for the person who wrote another.
+"""Kinds of values in files and requests, each with its error message and its JSON Schema.
 
 A kind is the metadata of an annotated pydantic field: `interval: Annotated[float, Duration(0.02, 86400)]`.
 Its `words` complete "must be ..." and are what the reference documentation prints.
@@ -12,17 +12,22 @@ import unicodedata
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Any
 
-from pydantic import GetCoreSchemaHandler, TypeAdapter
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from lfs10d.schema.quantities import duration_text, seconds, size, size_text
+from lfs10d.schema.quantities import DURATION_PATTERN, SIZE_PATTERN, duration_text, seconds, size, size_text
 
 _SHOWN_CHARACTERS = 40
 
 PLAIN_ERROR = "plain"
 """The type of a pydantic error whose message is already meant for a person."""
+
+
+def plain_error(message: str) -> PydanticCustomError:
+    """Return the error with this message, in which braces are no placeholders."""
+    return PydanticCustomError(PLAIN_ERROR, "{message}", {"message": message})
 
 
 def shown(value: object) -> str:
@@ -66,22 +71,33 @@ class FieldKind:
 
     @abstractmethod
     def accept(self, value: object) -> object:
-        """Return the value as the program uses it; raise RefusedError with the whole message otherwise."""
+        """Return the value as the program uses it; raise FieldError with the whole message otherwise."""
 
     def refusal(self, value: object) -> FieldError:
         """Return the error for this value."""
         return FieldError(f"must be {self.words}, not {shown(value)}")
 
+    def json_schema(self) -> dict[str, Any]:
+        """Return the JSON Schema of the ways to write it in a file; {} where there is none."""
+        return {}
+
     def _validated(self, value: object) -> object:
         try:
             return self.accept(value)
         except FieldError as error:
-            # As a value of the context: braces in the message are no placeholders.
-            raise PydanticCustomError(PLAIN_ERROR, "{message}", {"message": str(error)}) from None
+            raise plain_error(str(error)) from None
 
     def __get_pydantic_core_schema__(self, source: object, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Let pydantic validate with `accept` alone."""
         return core_schema.no_info_plain_validator_function(self._validated)
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Return `json_schema`, whatever type the field has."""
+        return self.json_schema()
+
+
+def _or_null(schema: dict[str, Any], *, null: bool) -> dict[str, Any]:
+    return {"anyOf": [schema, {"type": "null"}]} if null else schema
 
 
 @dataclass(frozen=True)
@@ -102,6 +118,10 @@ class Whole(FieldKind):
             raise self.refusal(value)
         return value
 
+    def json_schema(self) -> dict[str, Any]:
+        """Return an integer with its range."""
+        return {"type": "integer", "minimum": self.first, "maximum": self.last}
+
 
 @dataclass(frozen=True)
 class Flag(FieldKind):
@@ -117,6 +137,10 @@ class Flag(FieldKind):
         if not isinstance(value, bool):
             raise self.refusal(value)
         return value
+
+    def json_schema(self) -> dict[str, Any]:
+        """Return a boolean."""
+        return {"type": "boolean"}
 
 
 @dataclass(frozen=True)
@@ -143,6 +167,10 @@ class Choice(FieldKind):
             if value in self.values:
                 return value
         raise self.refusal(value)
+
+    def json_schema(self) -> dict[str, Any]:
+        """Return the values, every way of writing each."""
+        return {"enum": [*dict.fromkeys((*self.values, *self.meaning)), *([None] if self.null else [])]}
 
 
 @dataclass(frozen=True)
@@ -174,6 +202,12 @@ class Duration(FieldKind):
             raise self.refusal(value)
         return duration
 
+    def json_schema(self) -> dict[str, Any]:
+        """Return a number of seconds within the range, or text of the form."""
+        number = {"type": "number", "minimum": self.first, "maximum": self.last}
+        others = [{"const": word} for word, allowed in ((0, self.zero), ("auto", self.auto)) if allowed]
+        return {"anyOf": [number, {"type": "string", "pattern": DURATION_PATTERN}, *others]}
+
 
 @dataclass(frozen=True)
 class Size(FieldKind):
@@ -197,6 +231,11 @@ class Size(FieldKind):
             raise self.refusal(value)
         return count
 
+    def json_schema(self) -> dict[str, Any]:
+        """Return a number of bytes within the range, or text of the form."""
+        number = {"type": "integer", "minimum": self.first, "maximum": self.last}
+        return {"anyOf": [number, {"type": "string", "pattern": SIZE_PATTERN}]}
+
 
 @dataclass(frozen=True)
 class Name(FieldKind):
@@ -214,6 +253,10 @@ class Name(FieldKind):
         if not isinstance(value, str) or self.pattern.fullmatch(value) is None:
             raise self.refusal(value)
         return value
+
+    def json_schema(self) -> dict[str, Any]:
+        """Return text with the pattern."""
+        return {"type": "string", "pattern": f"^{self.pattern.pattern}$"}
 
 
 @dataclass(frozen=True)
@@ -234,12 +277,17 @@ class Text(FieldKind):
         """Take text that prints on one line."""
         if value is None and self.null:
             return None
-        if not isinstance(value, str) or not 1 <= len(value) <= self.longest or not _one_line(value):
+        if not isinstance(value, str) or not 1 <= len(value) <= self.longest or not one_line(value):
             raise self.refusal(value)
         return value
 
+    def json_schema(self) -> dict[str, Any]:
+        """Return text with its length."""
+        return _or_null({"type": "string", "minLength": 1, "maxLength": self.longest}, null=self.null)
 
-def _one_line(text: str) -> bool:
+
+def one_line(text: str) -> bool:
+    """Return whether text has no control character and no line break."""
     return all(unicodedata.category(character) not in {"Cc", "Cs", "Zl", "Zp"} for character in text)
 
 
@@ -257,119 +305,7 @@ class FilePath(Text):
             raise FieldError("must be a path in the file system; network addresses are not supported")
         return path
 
-
-@dataclass(frozen=True)
-class Host(FieldKind):
-    """A host name or an address. A wrong one is never shown: it may hold a login."""
-
-    pattern = re.compile(r"[\w.-]{1,253}|[0-9A-Fa-f]*:[0-9A-Fa-f:.]*:[0-9A-Fa-f:.]*(%[\w.-]+)?")
-
-    @property
-    def words(self) -> str:
-        """Its form."""
-        return "a host name or address, such as localhost or 192.0.2.7 (no mqtt://, no port, no login)"
-
-    def accept(self, value: object) -> str:
-        """Take text that fits."""
-        if not isinstance(value, str) or self.pattern.fullmatch(value) is None:
-            raise FieldError(f"must be {self.words}")
-        return value
-
-
-@dataclass(frozen=True)
-class Node(Host):
-    """One node of several: a host, with its port where it is not everybody's. A wrong one is never shown."""
-
-    @property
-    def words(self) -> str:
-        """Its form."""
-        return (
-            'a host name or address, with a port or without, such as broker-b, "broker-b:8884" or "[2001:db8::7]:1883"'
-        )
-
-    def accept(self, value: object) -> str:
-        """Take text that fits."""
-        if isinstance(value, str):
-            host, port = split_node(value)
-            if self.pattern.fullmatch(host) and (port is None or 1 <= port <= LAST_PORT):
-                return value
-        raise FieldError(f"must be {self.words} (no mqtt://, no login)")
-
-
-LAST_PORT = 65_535
-
-_NODE = re.compile(
-    r"\[(?P<six>[^\[\]]*:[^\[\]]*)\](:(?P<port6>[0-9]{1,5}))?|(?P<host>[^:\[\]]*)(:(?P<port>[0-9]{1,5}))?"
-)
-
-
-def split_node(text: str) -> tuple[str, int | None]:
-    """Return host and port (None: not given) of one node as it is written; a host that is none stays as it is."""
-    found = _NODE.fullmatch(text)
-    if found is None:
-        return text, None  # an IPv6 address without brackets, or nonsense
-    port = found["port6"] or found["port"]
-    return found["six"] or found["host"], None if port is None else int(port)
-
-
-def node_text(host: str, port: int) -> str:
-    """Return a node as it is written, an IPv6 address in brackets (RFC 3986, section 3.2.2)."""
-    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
-
-
-@dataclass(frozen=True)
-class Hosts(FieldKind):
-    """One host, or a list of nodes. A wrong one is never shown: it may hold a login."""
-
-    most: int = 16
-
-    @property
-    def words(self) -> str:
-        """Its form."""
-        return f"{Host().words}; or a list of 1 to {self.most}, each with a port of its own where it needs one"
-
-    def accept(self, value: object) -> str | tuple[str, ...]:
-        """Take one host or several nodes."""
-        if not isinstance(value, list | tuple):
-            return Host().accept(value)
-        nodes = tuple(Node().accept(each) for each in value)
-        if not 1 <= len(nodes) <= self.most or len({split_node(each) for each in nodes}) < len(nodes):
-            raise FieldError(f"must be a list of 1 to {self.most} nodes, each once")
-        return nodes
-
-    def _validated(self, value: object) -> object:
-        if isinstance(value, list | tuple):
-            _NODES.validate_python(tuple(value))  # its errors have the places of wrong nodes
-        return super()._validated(value)
-
-
-_NODES: TypeAdapter[tuple[str, ...]] = TypeAdapter(tuple[Annotated[str, Node()], ...])
-
-
-@dataclass(frozen=True)
-class BaseTopic(FieldKind):
-    """The first levels of every topic (MQTT 5.0, section 4.7: no wildcards, and `$` is the broker's)."""
-
-    longest: int = 200
-
-    @property
-    def words(self) -> str:
-        """Its form."""
-        return (
-            f"1 to {self.longest} characters as levels joined by /, such as site/%H: "
-            "no + or #, no empty level, not beginning with $ (%H is the host name)"
-        )
-
-    def accept(self, value: object) -> str:
-        """Take text that can begin a topic."""
-        if (
-            not isinstance(value, str)
-            or not 1 <= len(value) <= self.longest
-            or not _one_line(value)
-            or "+" in value
-            or "#" in value
-            or value.startswith("$")
-            or "" in value.split("/")
-        ):
-            raise self.refusal(value)
-        return value
+    def json_schema(self) -> dict[str, Any]:
+        """Return text with its length and without ://."""
+        text = {"type": "string", "minLength": 1, "maxLength": self.longest, "pattern": "^(?!.*://)"}
+        return _or_null(text, null=self.null)

@@ -1,4 +1,4 @@
-"""What pydantic finds, in words for the person who wrote the file."""
+"""The errors that pydantic finds, as messages for the person who wrote the file."""
 
 from __future__ import annotations
 
@@ -45,15 +45,16 @@ def _models_at(model: type[BaseModel], path: KeyPath) -> list[type[BaseModel]]:
                 inner
                 for outer in models
                 if step in outer.model_fields
-                for inner in _models_in(outer.model_fields[step].annotation)
+                for inner in models_in(outer.model_fields[step].annotation)
             ]
     return models
 
 
-def _models_in(annotation: object) -> list[type[BaseModel]]:
+def models_in(annotation: object) -> list[type[BaseModel]]:
+    """Return the models that an annotation is or holds."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
-    return [model for argument in get_args(annotation) for model in _models_in(argument)]
+    return [model for argument in get_args(annotation) for model in models_in(argument)]
 
 
 _WORDS = {

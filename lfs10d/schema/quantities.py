@@ -1,9 +1,12 @@
-"""Durations and sizes as people write them: `250ms`, `24h`, `512MB`; and back again."""
+"""Durations and sizes as people write them (`250ms`, `24h`, `512MB`) and back; the baud rates of a line."""
 
 from __future__ import annotations
 
 import re
 from decimal import Decimal
+
+BAUDRATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
+"""Bits per second a line may run at."""
 
 _SECONDS_PER_UNIT = {
     "ms": Decimal("0.001"),
@@ -17,6 +20,10 @@ _BYTES_PER_UNIT = {"B": 1, "kB": 10**3, "KB": 10**3, "MB": 10**6, "GB": 10**9, "
 # Twenty digits are more than anyone means; longer ones would only cost time.
 _DURATION = re.compile(r"([0-9]{1,20}(?:\.[0-9]{1,20})?)(ms|s|m|h|d)")
 _SIZE = re.compile(r"([0-9]{1,20}(?:\.[0-9]{1,20})?)(B|kB|KB|MB|GB|TB)")
+
+DURATION_PATTERN = f"^{_DURATION.pattern}$"
+SIZE_PATTERN = f"^{_SIZE.pattern}$"
+"""The same forms for a JSON Schema."""
 
 
 def seconds(value: object) -> float:

@@ -28,12 +28,12 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from lfs10d.errors import ConfigError, Problem
 from lfs10d.schema.document import decode, parse
 from lfs10d.schema.fields import Choice, Duration, Flag, Whole
+from lfs10d.schema.quantities import BAUDRATES
 from lfs10d.simulator.faults import Ailment, FaultKind, ailment
 
 DAY = 86400
 MOST_COPIES = 8
 LONGEST_NOISE = 256
-BAUDRATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
 
 Time: TypeAlias = Annotated[float, Duration(0, DAY)]
 Share: TypeAlias = Annotated[float, Field(ge=0, le=1)]

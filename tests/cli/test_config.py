@@ -12,6 +12,7 @@ from lfs10d.cli.config import command
 from lfs10d.config.changes import Changes
 from lfs10d.config.changes_file import FILE_NAME, ChangesFile
 from lfs10d.config.effective import said
+from lfs10d.config.json_schema import json_schema
 from lfs10d.config.loader import load
 from lfs10d.errors import FailedError, StateError
 from lfs10d.system.disk import Disk
@@ -169,3 +170,9 @@ def test_a_list_of_nodes_is_shown_and_merged_as_one_would_write_it() -> None:
     Path("lfs10d.yaml").write_text(merged)
     assert load(Path("lfs10d.yaml"), environment={}, host="gateway").config == before
     assert json.loads(config("--json", text=text))["config"]["mqtt"]["host"] == ["a", "b:8884", "[::1]"]
+
+
+def test_the_schema_is_printed_whatever_file_there_is() -> None:
+    result = CliRunner().invoke(command, ["--schema", "-c", "missing.yaml", "--merged"], catch_exceptions=False)
+    assert result.exit_code == 0
+    assert json.loads(result.stdout) == json_schema()

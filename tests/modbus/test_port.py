@@ -18,7 +18,8 @@ from lfs10d.errors import PortBusyError, PortError, PortLostError
 from lfs10d.modbus import port as module
 from lfs10d.modbus import port_lock
 from lfs10d.modbus.port import Port, SerialPort
-from lfs10d.modbus.port_settings import BAUDRATES, PortSettings, Rs485
+from lfs10d.modbus.port_settings import PortSettings, Rs485
+from lfs10d.schema.quantities import BAUDRATES
 from tests.support.far_end import FarEnd
 
 FRAME = bytes.fromhex("01 03 00 01 00 02 95 CB")

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from lfs10d.modbus.port_settings import BAUDRATES, PortSettings
+from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.modbus.termios_attributes import (
     CC,
     CFLAG,
@@ -21,6 +21,7 @@ from lfs10d.modbus.termios_attributes import (
     attributes,
     differences,
 )
+from lfs10d.schema.quantities import BAUDRATES
 
 
 def cooked() -> list[Any]:

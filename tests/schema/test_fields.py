@@ -1,4 +1,4 @@
-"""What one value may be, and what is said about another."""
+"""Kinds of values: what each accepts, and the message for what it does not."""
 
 from __future__ import annotations
 
@@ -10,25 +10,20 @@ from hypothesis import strategies as st
 from pydantic import BaseModel, ValidationError
 
 from lfs10d.schema.fields import (
-    BaseTopic,
     Choice,
     Duration,
     FieldError,
     FieldKind,
     FilePath,
     Flag,
-    Host,
-    Hosts,
     Name,
-    Node,
     Size,
     Text,
     Whole,
-    node_text,
     quoted,
     shown,
-    split_node,
 )
+from lfs10d.schema.quantities import DURATION_PATTERN, SIZE_PATTERN
 
 DURATION = Duration(0.02, 86400.0, zero="as fast as can be", auto="learned")
 KINDS: tuple[FieldKind, ...] = (
@@ -44,10 +39,6 @@ KINDS: tuple[FieldKind, ...] = (
     Text(5),
     Text(5, null=True),
     FilePath(),
-    Host(),
-    Hosts(),
-    Node(),
-    BaseTopic(),
 )
 
 
@@ -71,12 +62,6 @@ KINDS: tuple[FieldKind, ...] = (
         (Text(5, null=True), None, None),
         (FilePath(), "/dev/ttyUSB0", "/dev/ttyUSB0"),
         (FilePath(null=True), None, None),
-        (Host(), "broker.local", "broker.local"),
-        (Host(), "192.0.2.7", "192.0.2.7"),
-        (Hosts(), "192.0.2.7", "192.0.2.7"),
-        (Hosts(), ["a", "a:1884"], ("a", "a:1884")),
-        (Host(), "fe80::1%eth0", "fe80::1%eth0"),
-        (BaseTopic(), "site/%H/wind", "site/%H/wind"),
     ],
 )
 def test_what_is_of_the_kind_is_taken(kind: FieldKind, value: object, meant: object) -> None:
@@ -136,20 +121,6 @@ def test_the_refusal_says_what_is_wrong_and_what_would_be_right(kind: FieldKind,
     assert str(refused.value).endswith(message)
 
 
-@pytest.mark.parametrize("topic", ["a//b", "/a", "a/", "a/#", "+", "$SYS", "a\0", "a" * 201, "", 5, None])
-def test_a_base_topic_can_begin_every_topic(topic: object) -> None:
-    with pytest.raises(FieldError, match="must be 1 to 200 characters as levels joined by /"):
-        BaseTopic().accept(topic)
-
-
-@pytest.mark.parametrize("host", ["mqtt://me:hunter2@broker", "me:hunter2@broker", "broker:1883", "a b", "", 5])
-def test_a_wrong_host_is_not_shown_for_it_may_hold_a_login(host: object) -> None:
-    with pytest.raises(FieldError) as refused:
-        Host().accept(host)
-    assert "hunter2" not in str(refused.value)
-    assert "no login" in str(refused.value)
-
-
 @pytest.mark.parametrize(
     ("value", "words"),
     [(False, "false"), (float("inf"), ".inf"), (float("-inf"), "-.inf"), (float("nan"), ".nan"), ((), "a list")],
@@ -194,58 +165,52 @@ def test_pydantic_validates_by_the_kind_alone_and_keeps_braces_in_the_message() 
 
 
 @pytest.mark.parametrize(
-    ("text", "host", "port"),
+    ("kind", "schema"),
     [
-        ("broker-a", "broker-a", None),
-        ("broker-b:8884", "broker-b", 8884),
-        ("192.0.2.7:1", "192.0.2.7", 1),
-        ("2001:db8::7", "2001:db8::7", None),
-        ("::1", "::1", None),
-        ("[2001:db8::7]", "2001:db8::7", None),
-        ("[2001:db8::7]:1883", "2001:db8::7", 1883),
-        ("[fe80::1%eth0]:65535", "fe80::1%eth0", 65535),
+        (Whole(1, 9), {"type": "integer", "minimum": 1, "maximum": 9}),
+        (Flag(), {"type": "boolean"}),
+        (Choice(("3.1.1", "5"), meaning={5: "5", "5": "5"}), {"enum": ["3.1.1", "5", 5]}),
+        (Choice(("crc",), null=True), {"enum": ["crc", None]}),
+        (
+            Duration(1.0, 2.0),
+            {
+                "anyOf": [
+                    {"type": "number", "minimum": 1.0, "maximum": 2.0},
+                    {"type": "string", "pattern": DURATION_PATTERN},
+                ]
+            },
+        ),
+        (
+            Size(0, 9),
+            {"anyOf": [{"type": "integer", "minimum": 0, "maximum": 9}, {"type": "string", "pattern": SIZE_PATTERN}]},
+        ),
+        (Name(), {"type": "string", "pattern": "^[a-z0-9_-]{1,32}$"}),
+        (Text(5), {"type": "string", "minLength": 1, "maxLength": 5}),
+        (Text(5, null=True), {"anyOf": [{"type": "string", "minLength": 1, "maxLength": 5}, {"type": "null"}]}),
+        (FilePath(), {"type": "string", "minLength": 1, "maxLength": 4096, "pattern": "^(?!.*://)"}),
     ],
 )
-def test_a_node_may_have_a_port_of_its_own(text: str, host: str, port: int | None) -> None:
-    assert Node().accept(text) == text
-    assert split_node(text) == (host, port)
-    if port is not None:
-        assert node_text(host, port) == text
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        *("", ":1883", "a:", "a:0", "a:65536", "a:123456", "a:b", "mqtt://a", "me:hunter2@a", "a b"),
-        *("[a]:1", "[::1", "::1]:1", "[]:1", "[::1]1883", "[[::1]]:1"),
-    ],
-)
-def test_a_wrong_node_is_refused_and_never_shown(text: str) -> None:
-    with pytest.raises(FieldError) as refused:
-        Node().accept(text)
-    assert str(refused.value) == f"must be {Node().words} (no mqtt://, no login)"
-
-
-@pytest.mark.parametrize("value", [[], ["a", "b", "a"], ["a", "[::1]", "::1"], [f"a{count}" for count in range(17)]])
-def test_nodes_are_at_least_one_not_many_and_each_once(value: list[str]) -> None:
-    with pytest.raises(FieldError, match="must be a list of 1 to 16 nodes, each once"):
-        Hosts().accept(value)
-
-
-def test_a_wrong_node_in_a_list_is_found_by_its_place() -> None:
+def test_the_json_schema_is_that_of_the_kind_whatever_the_type_of_the_field(
+    kind: FieldKind, schema: dict[str, object]
+) -> None:
     class Model(BaseModel):
-        host: Annotated[str | tuple[str, ...], Hosts()]
+        value: Annotated[int | str | None, kind]
 
-    with pytest.raises(ValidationError) as refused:
-        Model.model_validate({"host": ["a", "b:0", 7]})
-    assert [each["loc"] for each in refused.value.errors()] == [("host", 1), ("host", 2)]
+    assert kind.json_schema() == schema
+    assert Model.model_json_schema()["properties"]["value"] == {"title": "Value", **schema}
 
 
-def test_a_list_of_nodes_stays_as_it_is_written() -> None:
-    class Model(BaseModel):
-        host: Annotated[str | tuple[str, ...], Hosts()]
+def test_the_json_schema_has_the_words_for_zero_and_auto() -> None:
+    assert DURATION.json_schema()["anyOf"][2:] == [{"const": 0}, {"const": "auto"}]
 
-    for host in (["a", "a:1884"], ("a",)):
-        assert Model.model_validate({"host": host}).host == tuple(host)
-    assert Hosts().accept(["a", "a:1884"]) == ("a", "a:1884")
-    assert Model.model_validate({"host": "a"}).host == "a"
+
+def test_a_kind_without_a_json_schema_permits_anything_there() -> None:
+    class Odd(FieldKind):
+        @property
+        def words(self) -> str:
+            return "odd"
+
+        def accept(self, value: object) -> object:
+            return value
+
+    assert Odd().json_schema() == {}

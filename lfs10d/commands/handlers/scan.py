@@ -17,8 +17,9 @@ from lfs10d.line.jobs.identification import FoundDevice
 from lfs10d.line.jobs.scan import Scan
 from lfs10d.line.jobs.scan_plan import LAST_ID, ids_of
 from lfs10d.schema.fields import Choice, FieldKind, Flag, Whole
+from lfs10d.schema.quantities import BAUDRATES
 
-BAUDRATES = Choice((1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200))
+RATES = Choice(BAUDRATES)
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ class ScanRates(FieldKind):
     @property
     def words(self) -> str:
         """How to write them."""
-        return f"a list such as [9600, 19200] of the rates {BAUDRATES.words}; or null"
+        return f"a list such as [9600, 19200] of the rates {RATES.words}; or null"
 
     def accept(self, value: object) -> tuple[int, ...] | None:
         """Take a list; return its rates in their order, each once."""
@@ -58,7 +59,7 @@ class ScanRates(FieldKind):
             return None
         if not isinstance(value, list) or not value:
             raise self.refusal(value)
-        return tuple(dict.fromkeys(int(BAUDRATES.accept(each) or 0) for each in value))
+        return tuple(dict.fromkeys(int(RATES.accept(each) or 0) for each in value))
 
 
 class WhomToFind(Parameters):
