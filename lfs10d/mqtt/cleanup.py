@@ -16,64 +16,64 @@ log = logging.getLogger(__name__)
 
 
 class Cleanup:
-    """`stands_behind()` returns the retained topics that are ours; `clear` is given those that nobody's are."""
+    """`owned()` returns the retained topics that are ours; `clear` is given the others."""
 
     def __init__(
         self,
         topics: Topics,
         *,
-        stands_behind: Callable[[], AbstractSet[str]],
+        owned: Callable[[], AbstractSet[str]],
         clear: Callable[[Iterable[str]], None],
     ) -> None:
         self.wanted = False
         """To be begun as soon as what we clear ourselves has gone out: else the broker would show it as left over."""
         self._topics = topics
-        self._stands_behind = stands_behind
+        self._owned = owned
         self._clear = clear
         self._standing: Connection | None = None
-        self._sweep: OrphanSearch | None = None
+        self._search: OrphanSearch | None = None
 
     @property
     def under_way(self) -> bool:
         """The broker is sending what it retains."""
-        return self._sweep is not None
+        return self._search is not None
 
     def begin(self, standing: Connection | None) -> None:
         """Have the broker send what it retains, unless that is under way or it is away."""
         self.wanted = False
-        if standing is None or self._sweep is not None:
+        if standing is None or self._search is not None:
             return
         loop = asyncio.get_running_loop()
-        self._standing, self._sweep = standing, OrphanSearch(self._topics, loop.time())
+        self._standing, self._search = standing, OrphanSearch(self._topics, loop.time())
         standing.subscribe(
             [
                 Filter(topic, qos=0, retain_as_published=False, no_local=True)
                 for topic in self._topics.retained_of_devices
             ]
         )
-        loop.call_at(self._sweep.due, self._end, self._sweep)
+        loop.call_at(self._search.due, self._end, self._search)
 
     def lost(self) -> None:
         """Abandon it: the connection is gone."""
-        self._standing = self._sweep = None
+        self._standing = self._search = None
 
-    def heard(self, message: Incoming) -> bool:
+    def on_message(self, message: Incoming) -> bool:
         """Take a message; return whether it was one of those looked for."""
-        if not message.retained or self._sweep is None:
+        if not message.retained or self._search is None:
             return False
-        return self._sweep.heard(message.topic, message.payload, asyncio.get_running_loop().time())
+        return self._search.on_message(message.topic, message.payload, asyncio.get_running_loop().time())
 
-    def _end(self, sweep: OrphanSearch) -> None:
+    def _end(self, search: OrphanSearch) -> None:
         standing = self._standing
-        if standing is None or sweep is not self._sweep:
+        if standing is None or search is not self._search:
             return
         loop = asyncio.get_running_loop()
-        if loop.time() < sweep.due:
-            loop.call_at(sweep.due, self._end, sweep)
+        if loop.time() < search.due:
+            loop.call_at(search.due, self._end, search)
             return
-        self._standing = self._sweep = None
+        self._standing = self._search = None
         standing.unsubscribe(self._topics.retained_of_devices)
-        orphans = sweep.orphans(self._stands_behind())
+        orphans = search.orphans(self._owned())
         if orphans:
             log.info("clearing %d retained topics of devices that are no longer configured", len(orphans))
             self._clear(orphans)

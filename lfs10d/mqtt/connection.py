@@ -4,7 +4,7 @@ A thread of its own, gone afterwards, does what may block: the password and the 
 resolved, the socket is connected, TLS is agreed upon, CONNECT is sent. A thread that hangs there is left to itself.
 From then on paho runs in the asyncio loop (`pump`): a thread for it would wake twice for every message. Its callbacks
 only note what happened, to be dealt with when paho is done: to publish inside a callback would wait for paho itself.
-It keeps no queue and reconnects nothing here. What paho does not do, `pahoclient` adds.
+It keeps no queue and reconnects nothing here. What paho does not do, `paho_client` adds.
 """
 
 from __future__ import annotations
@@ -18,14 +18,13 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from paho.mqtt.client import Client, ConnectFlags, DisconnectFlags, MQTTMessage
-from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode, MQTTProtocolVersion
+from paho.mqtt.enums import MQTTErrorCode
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.properties import Properties
 from paho.mqtt.reasoncodes import ReasonCode
-from paho.mqtt.subscribeoptions import SubscribeOptions
 
 from lfs10d.mqtt.messages import RECEIVE_MAXIMUM_UNSAID, Accepted, Events, Filter, Incoming, Will
-from lfs10d.mqtt.paho_client import LARGEST_PACKET, BoundedClient
+from lfs10d.mqtt.paho_client import BoundedClient, build_client, properties_of, subscriptions
 from lfs10d.mqtt.pump import Pump
 from lfs10d.mqtt.reasons import (
     KEEP_ALIVE_TIMEOUT,
@@ -40,14 +39,8 @@ from lfs10d.mqtt.reasons import (
 from lfs10d.mqtt.settings import BrokerSettings, Version
 from lfs10d.mqtt.tls import tls_context
 
-CONNECT_TIMEOUT = 5.0
-"""Seconds for each address of the broker to answer, and for each step of the TLS handshake."""
-
 CONNACK_TIMEOUT = 5.0
 """Seconds from an open connection to the broker's CONNACK; amqtt 0.12 leaves a CONNECT of MQTT 5 unanswered."""
-
-RECEIVE_MAXIMUM = 64
-"""Requests the broker may have under way to us: a flood waits there, not in our memory."""
 
 
 class Connection:
@@ -69,20 +62,7 @@ class Connection:
         threading.Thread(target=self._connect, name="connect", daemon=True).start()
 
     def _build(self, will: Will | None) -> BoundedClient:
-        settings = self._settings
-        five = self._version is Version.V5
-        client = BoundedClient(
-            CallbackAPIVersion.VERSION2,
-            settings.client_id,
-            clean_session=None if five else True,
-            protocol=MQTTProtocolVersion.MQTTv5 if five else MQTTProtocolVersion.MQTTv311,
-            reconnect_on_failure=False,
-            manual_ack=True,
-        )
-        client.connect_timeout = CONNECT_TIMEOUT
-        client.max_inflight_messages_set(0)  # the outbox counts
-        if will is not None:
-            client.will_set(will.topic, will.payload, qos=1, retain=True)
+        client = build_client(self._settings, self._version, will)
         client.on_socket_open = self._on_socket_open
         client.on_socket_close = self._on_socket_close
         client.on_connect = self._on_connect
@@ -90,15 +70,6 @@ class Connection:
         client.on_publish = self._on_publish
         client.on_subscribe = self._on_subscribe
         client.on_message = self._on_message
-        if five:
-            properties = _properties(PacketTypes.CONNECT)
-            properties.ReceiveMaximum = RECEIVE_MAXIMUM
-            properties.MaximumPacketSize = LARGEST_PACKET
-            client.connect_async(
-                settings.host, settings.port, settings.keepalive, clean_start=True, properties=properties
-            )
-        else:
-            client.connect_async(settings.host, settings.port, settings.keepalive)
         return client
 
     # From the loop
@@ -119,7 +90,7 @@ class Connection:
         """
         properties = None
         if self._version is Version.V5 and (response_topic is not None or correlation is not None):
-            properties = _properties(PacketTypes.PUBLISH)
+            properties = properties_of(PacketTypes.PUBLISH)
             if response_topic is not None:
                 properties.ResponseTopic = response_topic
             if correlation is not None:
@@ -141,23 +112,7 @@ class Connection:
 
     def subscribe(self, filters: Sequence[Filter]) -> int | None:
         """Subscribe, retained messages first; return the id, None where there is no connection now."""
-        if self._version is Version.V5:
-            _, mid = self._client.subscribe(
-                [
-                    (
-                        each.topic,
-                        SubscribeOptions(
-                            qos=each.qos,
-                            noLocal=each.no_local,
-                            retainAsPublished=each.retain_as_published,
-                            retainHandling=SubscribeOptions.RETAIN_SEND_ON_SUBSCRIBE,
-                        ),
-                    )
-                    for each in filters
-                ]
-            )
-        else:
-            _, mid = self._client.subscribe([(each.topic, each.qos) for each in filters])
+        _, mid = self._client.subscribe(subscriptions(filters, self._version))
         self._pump.watch_writing()
         return mid
 
@@ -354,7 +309,3 @@ class Connection:
                 )
             )
         self._client.ack(message.mid, message.qos)
-
-
-def _properties(packet: int) -> Properties:
-    return Properties(packet)  # type: ignore[no-untyped-call]  # paho leaves it untyped

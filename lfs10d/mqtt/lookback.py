@@ -29,7 +29,7 @@ class Lookback:
     wanted: AbstractSet[str]
     begun: float
     found: dict[str, bytes] = field(default_factory=dict)
-    _heard: float | None = None
+    _last_at: float | None = None
     _quiet: float = QUIET_MOST
     _refused: bool = False
 
@@ -40,15 +40,15 @@ class Lookback:
 
     def subscribed(self, now: float, *, refused: bool) -> None:
         """Take the broker's answer; `refused` if nothing will come."""
-        self._heard = now
+        self._last_at = now
         self._quiet = min(QUIET_MOST, QUIET_LEAST + QUIET_ROUNDS * (now - self.begun))
         self._refused = refused
 
-    def heard(self, topic: str, payload: bytes, now: float) -> None:
+    def on_message(self, topic: str, payload: bytes, now: float) -> None:
         """Take one retained message; what is not wanted is passed over, and no reason to wait longer."""
         relative = self.topics.relative(topic)
         if relative is not None and relative in self.wanted:
-            self._heard = now
+            self._last_at = now
             self.found[relative] = payload
 
     def due(self, now: float) -> float:
@@ -56,4 +56,4 @@ class Lookback:
         if self._refused or self.wanted <= self.found.keys():
             return now
         latest = self.begun + LONGEST
-        return latest if self._heard is None else min(self._heard + self._quiet, latest)
+        return latest if self._last_at is None else min(self._last_at + self._quiet, latest)

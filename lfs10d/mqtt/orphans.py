@@ -1,4 +1,4 @@
-"""Retained topics that a daemon left behind and nobody stands behind any more. Pure."""
+"""Retained topics that a daemon left behind, whose devices are no longer configured. Pure."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ QUIET = 0.5
 """Seconds without a retained message after which the broker has sent them all."""
 
 LONGEST = 120.0
-"""Seconds after which a sweep ends in any case; a slow gateway takes 30 s for 60 000 messages, which come anyway."""
+"""Seconds after which a search ends in any case; a slow gateway takes 30 s for 60 000 messages, which come anyway."""
 
 
 @dataclass(slots=True)
@@ -21,17 +21,17 @@ class OrphanSearch:
     topics: Topics
     begun: float
     _found: set[str] = field(default_factory=set)
-    _heard: float = 0.0
+    _last_at: float = 0.0
 
     def __post_init__(self) -> None:
-        self._heard = self.begun
+        self._last_at = self.begun
 
-    def heard(self, topic: str, payload: bytes, now: float) -> bool:
+    def on_message(self, topic: str, payload: bytes, now: float) -> bool:
         """Take one retained message; return False if it is not one of a device's topics."""
         relative = self.topics.relative(topic)
         if relative is None or not self.topics.is_owned(relative):
             return False
-        self._heard = now
+        self._last_at = now
         if payload:
             self._found.add(relative)
         return True
@@ -39,8 +39,8 @@ class OrphanSearch:
     @property
     def due(self) -> float:
         """When it is over."""
-        return min(self._heard + QUIET, self.begun + LONGEST)
+        return min(self._last_at + QUIET, self.begun + LONGEST)
 
-    def orphans(self, stands_behind: AbstractSet[str]) -> tuple[str, ...]:
+    def orphans(self, owned: AbstractSet[str]) -> tuple[str, ...]:
         """Return the topics under `B` to be cleared, in order."""
-        return tuple(sorted(self._found - stands_behind))
+        return tuple(sorted(self._found - owned))

@@ -7,12 +7,23 @@ table, for it calls that packet malformed; and it says only in its log what went
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from paho.mqtt.client import Client, MQTTMessage
-from paho.mqtt.enums import MQTTErrorCode, MQTTProtocolVersion
+from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode, MQTTProtocolVersion
 from paho.mqtt.packettypes import PacketTypes
+from paho.mqtt.properties import Properties
 from paho.mqtt.reasoncodes import ReasonCode
+from paho.mqtt.subscribeoptions import SubscribeOptions
+
+from lfs10d.mqtt.messages import Filter, Will
+from lfs10d.mqtt.settings import BrokerSettings, Version
+
+CONNECT_TIMEOUT = 5.0
+"""Seconds for each address of the broker to answer, and for each step of the TLS handshake."""
+
+RECEIVE_MAXIMUM = 64
+"""Requests the broker may have under way to us: a flood waits there, not in our memory."""
 
 LARGEST_PACKET = 128 * 1024
 """Bytes of a packet that are taken, the rest is passed over. By MQTT 5 the broker is asked to send none larger."""
@@ -118,3 +129,53 @@ class BoundedClient(Client):
                 return MQTTErrorCode.MQTT_ERR_CONN_LOST
             self._passing_over -= passed
         return MQTTErrorCode.MQTT_ERR_AGAIN
+
+
+def build_client(settings: BrokerSettings, version: Version, will: Will | None) -> BoundedClient:
+    """Return a client that `reconnect()` connects, without callbacks."""
+    five = version is Version.V5
+    client = BoundedClient(
+        CallbackAPIVersion.VERSION2,
+        settings.client_id,
+        clean_session=None if five else True,
+        protocol=MQTTProtocolVersion.MQTTv5 if five else MQTTProtocolVersion.MQTTv311,
+        reconnect_on_failure=False,
+        manual_ack=True,
+    )
+    client.connect_timeout = CONNECT_TIMEOUT
+    client.max_inflight_messages_set(0)  # the outbox counts
+    if will is not None:
+        client.will_set(will.topic, will.payload, qos=1, retain=True)
+    if five:
+        properties = properties_of(PacketTypes.CONNECT)
+        properties.ReceiveMaximum = RECEIVE_MAXIMUM
+        properties.MaximumPacketSize = LARGEST_PACKET
+        client.connect_async(settings.host, settings.port, settings.keepalive, clean_start=True, properties=properties)
+    else:
+        client.connect_async(settings.host, settings.port, settings.keepalive)
+    return client
+
+
+def subscriptions(
+    filters: Sequence[Filter], version: Version
+) -> list[tuple[str, int]] | list[tuple[str, SubscribeOptions]]:
+    """Return subscriptions as paho takes them: the broker sends what it retains for each."""
+    if version is not Version.V5:
+        return [(each.topic, each.qos) for each in filters]
+    return [
+        (
+            each.topic,
+            SubscribeOptions(
+                qos=each.qos,
+                noLocal=each.no_local,
+                retainAsPublished=each.retain_as_published,
+                retainHandling=SubscribeOptions.RETAIN_SEND_ON_SUBSCRIBE,
+            ),
+        )
+        for each in filters
+    ]
+
+
+def properties_of(packet: int) -> Properties:
+    """Return an empty set of MQTT 5 properties for a packet type."""
+    return Properties(packet)  # type: ignore[no-untyped-call]  # paho leaves it untyped

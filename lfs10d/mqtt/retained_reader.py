@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import logging
 from collections.abc import Awaitable, Callable, Mapping
 from collections.abc import Set as AbstractSet
 
@@ -13,47 +12,46 @@ from lfs10d.mqtt.lookback import Lookback
 from lfs10d.mqtt.messages import Filter, Incoming
 from lfs10d.mqtt.reasons import REFUSED_FROM
 from lfs10d.mqtt.topics import Topics
-
-log = logging.getLogger(__name__)
+from lfs10d.system.tasks import BackgroundTasks
 
 
 class RetainedReader:
-    """Used in the thread of the asyncio loop; `told` is given what was found, by topic under `B`, once."""
+    """Used in the thread of the asyncio loop; `on_found` is given what was found, by topic under `B`, once."""
 
     def __init__(
-        self, topics: Topics, wanted: AbstractSet[str], told: Callable[[Mapping[str, bytes]], Awaitable[None]]
+        self, topics: Topics, wanted: AbstractSet[str], on_found: Callable[[Mapping[str, bytes]], Awaitable[None]]
     ) -> None:
         self._topics = topics
         self._wanted = wanted
-        self._told = told
+        self._on_found = on_found
         self._lookback: Lookback | None = None
         self._subscription: int | None = None
-        self._heard = asyncio.Event()
+        self._progress = asyncio.Event()
+        self._tasks = BackgroundTasks()
         self._task: asyncio.Task[None] | None = None
         self._then: Callable[[], None] = lambda: None
         self.over = False
-        """It has been told; nothing is to be read any more."""
+        """`on_found` is done; nothing is to be read any more."""
 
     def begin(self, connection: Connection, then: Callable[[], None]) -> None:
         """Read over this connection; `then()` is called when it is over, unless the connection is lost before."""
         self._then = then
         if self._task is not None:
-            return  # it is being told already
+            return  # `on_found` runs already
         self._lookback = Lookback(self._topics, self._wanted, self._now())
-        self._task = asyncio.create_task(self._read(connection, self._lookback), name="earlier life")
-        self._task.add_done_callback(self._ended)
+        self._task = self._tasks.start("reading retained topics", self._read(connection, self._lookback), self._ended)
 
     def subscribed(self, mid: int, reasons: tuple[int, ...]) -> None:
         """Take the broker's answer to a subscription."""
         if self._lookback is not None and mid == self._subscription:
             self._lookback.subscribed(self._now(), refused=all(reason >= REFUSED_FROM for reason in reasons))
-            self._heard.set()
+            self._progress.set()
 
     def arrived(self, message: Incoming) -> None:
         """Take a message."""
         if self._lookback is not None and message.retained:
-            self._lookback.heard(message.topic, message.payload, self._now())
-            self._heard.set()
+            self._lookback.on_message(message.topic, message.payload, self._now())
+            self._progress.set()
 
     def lost(self) -> None:
         """Note that the connection is lost: what it said is read anew over the next one."""
@@ -69,19 +67,17 @@ class RetainedReader:
             [Filter(each, qos=0, retain_as_published=False, no_local=True) for each in lookback.filters]
         )
         while (wait := lookback.due(self._now()) - self._now()) > 0:
-            self._heard.clear()
+            self._progress.clear()
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(wait):
-                    await self._heard.wait()
+                    await self._progress.wait()
         self._lookback = None
         connection.unsubscribe(lookback.filters)
-        await self._told(lookback.found)
+        await self._on_found(lookback.found)
 
     def _ended(self, task: asyncio.Task[None]) -> None:
         if task is not self._task:
             return
-        if not task.cancelled() and (mistake := task.exception()) is not None:
-            log.error("what was retained could not be used, by a mistake of ours", exc_info=mistake)
         self.over = True
         self._then()
 

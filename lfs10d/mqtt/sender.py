@@ -9,15 +9,15 @@ import asyncio
 import logging
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import islice
 
+from lfs10d.mqtt.batch_assembly import BatchAssembly, room_for_batch
 from lfs10d.mqtt.connection import Connection
-from lfs10d.mqtt.encoding import array, encode, packet_size
+from lfs10d.mqtt.encoding import encode, packet_size
 from lfs10d.mqtt.messages import Accepted
 from lfs10d.mqtt.reasons import NO_MATCHING_SUBSCRIBERS, REFUSED_FROM, Disconnect, reason_in_words
 from lfs10d.mqtt.topics import Topics
-from lfs10d.outbox.backlog import BATCH_BYTES
 from lfs10d.outbox.items import HistoryBatch, LiveSample, LossNotice, Message, OutboxItem, Retained
 from lfs10d.outbox.outbox import IN_FLIGHT_MOST, Outbox
 from lfs10d.outbox.refusals import Refusal, refusal_of
@@ -28,9 +28,6 @@ log = logging.getLogger(__name__)
 
 ITEMS_AT_ONCE = 4
 """Items handed to paho in one go of the loop, about 50 us each."""
-
-SAMPLES_AT_ONCE = 16
-"""Samples of a history batch serialised in one go; a whole batch would take a millisecond."""
 
 ACKNOWLEDGED_WITHIN = 60.0
 """Seconds after which a broker that answers pings but acknowledges nothing is given up."""
@@ -52,16 +49,6 @@ class _Sent:
     size: int
     qos: int
     number: int
-
-
-@dataclass(slots=True)
-class _Assembly:
-    """A history batch that is being serialised; `size` is its bytes so far, `most` its greatest."""
-
-    item: HistoryBatch
-    most: int
-    parts: list[bytes] = field(default_factory=list)
-    size: int = 1
 
 
 class Sender:
@@ -88,7 +75,7 @@ class Sender:
         self._acknowledged = 0
         self._unproved: deque[_Sent] = deque(maxlen=UNPROVED_MOST)
         self._swallowed: dict[str, int] = {}
-        self._assembly: _Assembly | None = None
+        self._assembly: BatchAssembly | None = None
         self._turn: asyncio.Handle | None = None
         self._sending = False
         self._alarm: asyncio.TimerHandle | None = None
@@ -217,8 +204,9 @@ class Sender:
             if item is None:
                 return True
             if isinstance(item, HistoryBatch):
-                self._assembly = _Assembly(item, self._room(item))
-                asyncio.get_running_loop().call_soon(self._assemble, item)
+                room = room_for_batch(self._topics.full(item.topic), self._accepted)
+                self._assembly = BatchAssembly(item, room)
+                asyncio.get_running_loop().call_soon(self._assemble, self._assembly)
             else:
                 self._send_encoded(item)
         return False
@@ -244,32 +232,17 @@ class Sender:
             self._encoded = payload, encode(payload)
         return self._encoded[1]
 
-    def _room(self, item: HistoryBatch) -> int:
-        """Return how many bytes the payload of a batch may have."""
-        accepted = self._accepted
-        if accepted is None or accepted.maximum_packet_size is None:
-            return BATCH_BYTES
-        around = packet_size(self._topics.full(item.topic), b"", version=accepted.version)
-        # The remaining length may take three bytes more than that of an empty payload.
-        return min(BATCH_BYTES, accepted.maximum_packet_size - around - 3)
-
-    def _assemble(self, item: HistoryBatch) -> None:
-        assembly = self._assembly
-        if assembly is None or assembly.item is not item:
+    def _assemble(self, assembly: BatchAssembly) -> None:
+        if assembly is not self._assembly:
             return  # the connection is another one now, and the samples wait again
-        parts = assembly.parts
-        for queued in item.samples[len(parts) : len(parts) + SAMPLES_AT_ONCE]:
-            part = encode(queued.sample.payload(self._line, historical=True))
-            assembly.size += len(part) + 1  # the comma, or the bracket behind it
-            if parts and assembly.size > assembly.most:
-                item = self._outbox.shorten(item, len(parts))
-                break
-            parts.append(part)
-        if len(parts) < len(item.samples):
-            asyncio.get_running_loop().call_soon(self._assemble, item)
-        else:
+        count = assembly.serialise_some(self._line)
+        if count is not None:
+            assembly.batch = self._outbox.shorten(assembly.batch, count)
+        if assembly.complete:
             self._assembly = None
-            self._send(item, array(parts))
+            self._send(assembly.batch, assembly.payload)
+        else:
+            asyncio.get_running_loop().call_soon(self._assemble, assembly)
 
     def _send(self, item: OutboxItem, payload: bytes) -> None:
         if self._connection is None or self._accepted is None:

@@ -32,6 +32,23 @@ LONGEST_TOPIC = 65_535
 
 
 @dataclass(frozen=True, slots=True)
+class InboundRequest:
+    """One message under `B/request`.
+
+    `levels` follow `request/`: `("device", "read")`; any number, of any text. `topic` and `response_topic` are
+    under `B`; `response_topic` is None where the request names none, or an invalid one. By MQTT 3.1.1
+    `retained` is True only for what was retained before we subscribed.
+    """
+
+    topic: str
+    levels: tuple[str, ...]
+    payload: bytes = field(repr=False)
+    retained: bool
+    response_topic: str | None = None
+    correlation: bytes | None = field(default=None, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
 class Topics:
     """The topics of one line under `base`, which is `B`: `lfs10d/line0`."""
 
@@ -74,17 +91,25 @@ class Topics:
             case _:
                 return False
 
-    def request_levels(self, topic: str) -> tuple[str, ...] | None:
-        """Return the levels under `B/request/`, None for a topic that is no request.
+    def command(self, message: Incoming) -> InboundRequest | None:
+        """Return the request a message is, None for a message that is no request.
 
-        `B/request/device/read` is `("device", "read")`. The filter `B/request/#` also matches `B/request`
-        itself, which has no level: `()`.
+        The filter `B/request/#` also matches `B/request` itself, which has no level: `()`.
         """
-        relative = self.relative(topic)
+        relative = self.relative(message.topic)
         if relative is None:
             return None
         first, *levels = relative.split("/")
-        return tuple(levels) if first == REQUEST else None
+        if first != REQUEST:
+            return None
+        return InboundRequest(
+            relative,
+            tuple(levels),
+            message.payload,
+            message.retained,
+            self.response_topic(message.response_topic),
+            message.correlation,
+        )
 
     def response(self, *levels: str) -> str:
         """Return the topic under `B` that answers the request of these levels: `response/device/read`."""
@@ -102,36 +127,3 @@ class Topics:
         if any(each in relative for each in "+#\0") or len(asked.encode()) > LONGEST_TOPIC:
             return None
         return relative
-
-
-@dataclass(frozen=True, slots=True)
-class InboundRequest:
-    """One message under `B/request`.
-
-    `levels` follow `request/`: `("device", "read")`; any number, of any text. `topic` and `response_topic` are
-    under `B`; `response_topic` is None where the request names none, or an invalid one. By MQTT 3.1.1
-    `retained` is True only for what was retained before we subscribed.
-    """
-
-    topic: str
-    levels: tuple[str, ...]
-    payload: bytes = field(repr=False)
-    retained: bool
-    response_topic: str | None = None
-    correlation: bytes | None = field(default=None, repr=False)
-
-
-def inbound(message: Incoming, topics: Topics) -> InboundRequest | None:
-    """Return the request a message is, None for a message that is no request."""
-    levels = topics.request_levels(message.topic)
-    relative = topics.relative(message.topic)
-    if levels is None or relative is None:
-        return None
-    return InboundRequest(
-        relative,
-        levels,
-        message.payload,
-        message.retained,
-        topics.response_topic(message.response_topic),
-        message.correlation,
-    )

@@ -12,18 +12,19 @@ import logging
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from collections.abc import Set as AbstractSet
 from functools import partial
-from typing import Protocol
 
 from lfs10d.mqtt.broker_client import BrokerClient
 from lfs10d.mqtt.cleanup import Cleanup
 from lfs10d.mqtt.connection import Connection
+from lfs10d.mqtt.farewell import Farewell
 from lfs10d.mqtt.messages import Accepted, Filter, Incoming, Will
 from lfs10d.mqtt.reasons import REFUSED_FROM, Disconnect, reason_in_words
 from lfs10d.mqtt.retained_reader import RetainedReader
 from lfs10d.mqtt.retained_requests import RetainedRequests
 from lfs10d.mqtt.sender import Sender
 from lfs10d.mqtt.settings import BrokerSettings, Version
-from lfs10d.mqtt.topics import OFFLINE, ONLINE, InboundRequest, Topics, inbound
+from lfs10d.mqtt.topics import OFFLINE, ONLINE, Topics
+from lfs10d.mqtt.uplink_events import UplinkEvents
 from lfs10d.outbox.outbox import Outbox
 from lfs10d.outbox.spooler import Spooler
 from lfs10d.outbox.store.database import Limits
@@ -34,43 +35,11 @@ from lfs10d.telemetry.publication import Publication, PublicationKind
 
 log = logging.getLogger(__name__)
 
-DRAIN_WITHIN = 0.4
-FAREWELL_WITHIN = 0.6
-LEAVE_WITHIN = 0.3
 KEEP_WITHIN = 0.6
-"""Seconds of a clean exit: for what still waits, for `offline` to be acknowledged, for the connection to close; and
-for the disk to keep what the broker did not take."""
+"""Seconds of a clean exit for the disk to keep what the broker did not take."""
 
 _ONLINE = telemetry.retained(telemetry.AVAILABILITY, ONLINE)
 _OFFLINE = telemetry.retained(telemetry.AVAILABILITY, OFFLINE)
-
-
-class UplinkEvents(Protocol):
-    """What the uplink publishes at each connect, and what it reports. Called in the thread of the asyncio loop."""
-
-    def burst(self) -> Iterable[Publication]:
-        """Return every retained topic but `availability`, as it is now."""
-        ...
-
-    def topics(self) -> AbstractSet[str]:
-        """Return the retained topics under `B` that are ours, but for `availability`."""
-        ...
-
-    def on_request(self, request: InboundRequest) -> None:
-        """Take a request."""
-        ...
-
-    def on_uplink_change(self) -> None:
-        """Take that a connect, loss, takeover or subscription changed the properties of the uplink."""
-        ...
-
-    def on_announced(self) -> None:
-        """Take that the broker has the whole burst after a connect."""
-        ...
-
-    def on_spool_trouble(self, trouble: str | None) -> None:
-        """Take why the disk does not keep what waits; None when it does again."""
-        ...
 
 
 class Uplink:
@@ -90,9 +59,8 @@ class Uplink:
         connect: type[Connection] = Connection,
     ) -> None:
         self._topics = Topics(base)
-        self._events: UplinkEvents
-        """Given at the start."""
-        self._cleanup = Cleanup(self._topics, stands_behind=self._owned_topics, clear=self._clear_orphans)
+        self._events: UplinkEvents  # given at the start
+        self._cleanup: Cleanup  # built at the start
         self._retained_requests = RetainedRequests(self._ask_for_retained_requests)
         self._announcing = False
         self._client = BrokerClient(
@@ -104,13 +72,20 @@ class Uplink:
         )
         self._outbox = Outbox(detection=2.0 * settings.keepalive)
         line = base.rpartition("/")[2]
-        self._sender = Sender(self._outbox, self._topics, line, epoch_ms=epoch_ms, stuck=self._acknowledges_nothing)
+        self._sender = Sender(
+            self._outbox,
+            self._topics,
+            line,
+            epoch_ms=epoch_ms,
+            stuck=lambda: self._client.drop("no acknowledgement for 60 s"),
+        )
         self._subscription: int | None = None
         self._leaving = False
-        self._progress = asyncio.Event()
+        self._farewell = Farewell(self._client, self._outbox, self._sender.wake)
         self._drop_told = False
         self._epoch_ms = epoch_ms
-        self._spooler = None if store is None else self._keep_in(store)
+        self._store = store
+        self._spooler: Spooler | None = None
         self._retained_reader: RetainedReader | None = None
         self.requests_denied = False
         """The broker refused the subscription to requests: none will come over this connection."""
@@ -143,33 +118,25 @@ class Uplink:
     async def start(self, events: UplinkEvents) -> None:
         """Begin to connect; what is published before waits."""
         self._events = events
-        if self._spooler is not None:
+        self._cleanup = Cleanup(self._topics, owned=events.topics, clear=self._clear_orphans)
+        if self._store is not None:
+            self._spooler = Spooler(
+                self._outbox,
+                self._store,
+                epoch_ms=self._epoch_ms,
+                wake=self._sender.wake,
+                on_trouble=events.on_spool_trouble,
+                publish=lambda event: self.publish([event]),
+            )
             self._spooler.start()
         self._client.start()
 
-    def _keep_in(self, store: Store) -> Spooler:
-        """Return what keeps on disk what the broker does not take."""
-        return Spooler(
-            self._outbox,
-            store,
-            epoch_ms=self._epoch_ms,
-            wake=self._sender.wake,
-            troubled=self._spool_trouble,
-            tell=lambda event: self.publish([event]),
-        )
-
-    def _spool_trouble(self, trouble: str | None) -> None:
-        self._events.on_spool_trouble(trouble)
-
-    def _owned_topics(self) -> AbstractSet[str]:
-        return self._events.topics()
-
-    def read_back(self, wanted: AbstractSet[str], told: Callable[[Mapping[str, bytes]], Awaitable[None]]) -> None:
+    def read_back(self, wanted: AbstractSet[str], on_found: Callable[[Mapping[str, bytes]], Awaitable[None]]) -> None:
         """Read these retained topics under `B` before the first burst is published over them; before `start`.
 
-        `told` is given what was found, and the burst waits for it; at most 5 s for what the broker says.
+        `on_found` is given what was found, and the burst waits for it; at most 5 s for what the broker says.
         """
-        self._retained_reader = RetainedReader(self._topics, wanted, told)
+        self._retained_reader = RetainedReader(self._topics, wanted, on_found)
 
     def send_samples(self, *, telemetry: bool) -> None:
         """Take whether samples are sent: `telemetry`, and as `history` what waits; the rest is sent in any case."""
@@ -186,10 +153,7 @@ class Uplink:
         self._correct("synced")
 
     def stepped(self) -> None:
-        """Note that somebody has set the wall clock, which is not known to be synchronised.
-
-        What waits from before the step is given the time of after it, and marked as `unsynced`.
-        """
+        """Note that the wall clock was set by hand: what waits from before is corrected, and marked `unsynced`."""
         self._correct("unsynced")
 
     def _correct(self, clock: ClockState) -> None:
@@ -208,7 +172,8 @@ class Uplink:
 
     async def stop(self) -> None:
         """Send what waits, say `offline`, disconnect, keep the rest; at most 1.9 s, whatever broker and disk do."""
-        await self._part()
+        self._leaving = True
+        await self._farewell.part(_OFFLINE)
         if self._spooler is not None:
             await self._spooler.stop(KEEP_WITHIN)
 
@@ -216,7 +181,8 @@ class Uplink:
         """Try again what the broker refused, clear what nobody stands behind; connect anew if given settings."""
         refused = self._outbox.reload(asyncio.get_running_loop().time())
         if settings is not None:
-            await self._part()
+            self._leaving = True
+            await self._farewell.part(_OFFLINE)
             self._leaving = False
             self._client.renew(settings)
             return
@@ -256,40 +222,13 @@ class Uplink:
         """Clear a retained topic under `B`, a retained request for example."""
         self.publish([telemetry.retained(topic, None)])
 
-    # The end
-
-    async def _part(self) -> None:
-        loop = asyncio.get_running_loop()
-        self._leaving = True
-        await self._until(lambda: self._outbox.idle, loop.time() + DRAIN_WITHIN)
-        if not self.connected:
-            await self._client.leave(LEAVE_WITHIN)
-            return
-        parting = self._outbox.part(_OFFLINE)
-        self._sender.wake()
-        if await self._until(lambda: parting.over, loop.time() + FAREWELL_WITHIN):
-            self._outbox.backlog.part()
-        # Where the window had no room for it, the broker says it for us.
-        await self._client.leave(LEAVE_WITHIN, will=not parting.sent)
-
-    async def _until(self, reached: Callable[[], bool], deadline: float) -> bool:
-        """Wait until this is so; return False if it is not by the deadline, or the connection is lost."""
-        try:
-            async with asyncio.timeout_at(deadline):
-                while self.connected and not reached():
-                    self._progress.clear()
-                    await self._progress.wait()
-        except TimeoutError:
-            log.debug("the broker does not answer in time")
-        return self.connected and reached()
-
     # Events of the client
 
     def accepted(self, accepted: Accepted) -> None:
-        """Read what an earlier life published, if that is wanted; then subscribe, and send the burst."""
-        standing = self._client.standing
-        if standing is not None and self._retained_reader is not None and not self._retained_reader.over:
-            self._retained_reader.begin(standing, partial(self._begin, accepted))
+        """Read our retained topics back, if that is wanted; then subscribe, and send the burst."""
+        standing, reader = self._client.standing, self._retained_reader
+        if standing is not None and reader is not None and not reader.over:
+            reader.begin(standing, partial(self._begin, accepted))
         else:
             self._begin(accepted)
 
@@ -315,12 +254,12 @@ class Uplink:
         self._cleanup.lost()
         self._retained_requests.lost()
         self._drop_told = False
-        self._progress.set()
+        self._farewell.on_progress()
         self._poke()
         self._events.on_uplink_change()
 
     def acknowledged(self, mid: int, reason: int) -> None:
-        """Send on."""
+        """Send what may go now."""
         self._sender.acknowledged(mid, reason)
         if self._outbox.backlog.spool.rows:
             self._poke()
@@ -329,10 +268,10 @@ class Uplink:
                 self._announcing = False
                 self._events.on_announced()
             self._clear_if_out()
-        self._progress.set()
+        self._farewell.on_progress()
 
     def subscribed(self, mid: int, reasons: tuple[int, ...]) -> None:
-        """Complain once about requests that will never come."""
+        """Report a refused subscription."""
         if self._retained_reader is not None:
             self._retained_reader.subscribed(mid, reasons)
         if mid == self._subscription:
@@ -343,16 +282,16 @@ class Uplink:
             self._events.on_uplink_change()
 
     def arrived(self, message: Incoming) -> None:
-        """Take a request, or somebody's word that we are offline, or what is retained."""
+        """Take a request, an `offline` about us, or a retained topic."""
         if message.topic == self._topics.availability:
             if message.payload == OFFLINE.encode() and not self._leaving:
-                self._heard_offline()
+                self._on_offline()
             return
         if self._retained_reader is not None:
             self._retained_reader.arrived(message)
-        if self._cleanup.heard(message):
+        if self._cleanup.on_message(message):
             return
-        request = inbound(message, self._topics)
+        request = self._topics.command(message)
         if request is not None:
             self._retained_requests.received(request, self.version)
             self._events.on_request(request)
@@ -361,17 +300,15 @@ class Uplink:
         if (standing := self._client.standing) is not None:
             standing.subscribe([Filter(self._topics.requests)])
 
-    def _heard_offline(self) -> None:
-        """Contradict the will of our connection before, or somebody's mistake; the burst will do so by itself."""
+    def _on_offline(self) -> None:
+        """Contradict the will of our earlier connection, or another client; the burst will do so by itself."""
         if self._outbox.announced:
             self.publish([_ONLINE])
         else:
             self._client.missed()
 
-    def _acknowledges_nothing(self) -> None:
-        self._client.drop("acknowledges nothing any more")
-
-    # What is left over
+    def _on_stuck(self) -> None:
+        self._client.drop("no acknowledgement for 60 s")
 
     def _clear_if_out(self) -> None:
         if self._cleanup.wanted and self._outbox.retained_out:

@@ -17,6 +17,7 @@ from lfs10d.outbox.store.database import Limits
 from lfs10d.outbox.store.sample_file import StoreEntry
 from lfs10d.outbox.store.store import Store, StoreError
 from lfs10d.system.clock_step import ClockState
+from lfs10d.system.tasks import BackgroundTasks
 from lfs10d.system.threads import WorkerThread
 from lfs10d.telemetry import publication
 from lfs10d.telemetry.publication import Publication
@@ -26,13 +27,13 @@ log = logging.getLogger(__name__)
 NOTICED = 0.02
 """Seconds after a sample has become old at which it is looked for."""
 
-FULL_DISK = "samples that the broker does not take wait in memory, where 10 000 have room"
+FULL_DISK = "samples wait in memory, which has room for 10 000"
 
 
 class Spooler:
     """`epoch_ms()` is the wall clock; `wake()` is called when there is more to send.
 
-    `troubled` is told why the store cannot keep anything, and None when it can again; `tell` takes events.
+    `on_trouble` is given the reason why the store keeps nothing, and None when it does again; `publish` takes events.
     """
 
     def __init__(
@@ -42,17 +43,18 @@ class Spooler:
         *,
         epoch_ms: Callable[[], int],
         wake: Callable[[], None],
-        troubled: Callable[[str | None], None],
-        tell: Callable[[Publication], None],
+        on_trouble: Callable[[str | None], None],
+        publish: Callable[[Publication], None],
     ) -> None:
         self._outbox = outbox
         self._store = store
         self._epoch_ms = epoch_ms
         self._wake = wake
-        self._troubled = troubled
-        self._tell = tell
+        self._on_trouble = on_trouble
+        self._publish = publish
         self._thread = WorkerThread("store")
         self._poked = asyncio.Event()
+        self._tasks = BackgroundTasks(self._failed)
         self._task: asyncio.Task[None] | None = None
         self._ending = False
         self._opened = False
@@ -69,13 +71,10 @@ class Spooler:
 
     def start(self) -> None:
         """Open the store, and begin."""
-        self._task = asyncio.get_running_loop().create_task(self._run(), name="store")
-        self._task.add_done_callback(self._over)
+        self._task = self._tasks.start("keeping samples on disk", self._run())
 
-    def _over(self, task: asyncio.Task[None]) -> None:
-        if not task.cancelled() and (mistake := task.exception()) is not None:
-            log.error("nothing is kept on disk any more, by a mistake of ours", exc_info=mistake)
-            self._tell_trouble(f"nothing is kept on disk until a restart; {FULL_DISK}")
+    def _failed(self) -> None:
+        self._report_trouble(f"nothing is kept on disk until a restart; {FULL_DISK}")
 
     async def stop(self, within: float) -> None:
         """Keep what waits on disk, in at most `within` seconds."""
@@ -177,26 +176,26 @@ class Spooler:
         except StoreError as error:
             self._opened = False
             self._open_at = self._now() + SPILL_EVERY
-            self._tell_trouble(f"{error}; {FULL_DISK}")
+            self._report_trouble(f"{error}; {FULL_DISK}")
         self._backlog.spool.update(self._store.rows, self._store.oldest_ts)
         while self._store.reports:
             report = self._store.reports.popleft()
             log.warning("the backlog %s %s; it is put aside as %s", self._store.path, report.reason, report.path.name)
-            self._tell(
+            self._publish(
                 publication.event("store_put_aside", self._epoch_ms(), file=report.path.name, reason=report.reason)
             )
 
-    def _tell_trouble(self, trouble: str | None) -> None:
+    def _report_trouble(self, trouble: str | None) -> None:
         if trouble == self._trouble:
             return
         self._trouble = trouble
-        self._troubled(trouble)
+        self._on_trouble(trouble)
 
     def _works(self) -> None:
         """Note that something could be written."""
         if self._trouble is not None:
             log.info("the backlog %s can be written again", self._store.path)
-        self._tell_trouble(None)
+        self._report_trouble(None)
 
     # How it is done
 
@@ -210,7 +209,9 @@ class Spooler:
             for loss in losses:
                 self._backlog.losses.restore(loss)
             if spool.rows:
-                log.info("%d samples of before wait for the broker in %s", spool.rows, self._store.path)
+                log.info(
+                    "%d samples from before the restart are waiting for the broker in %s", spool.rows, self._store.path
+                )
         spool.more = spool.rows > 0
         if self._backlog.spill.due() is None:
             self._works()

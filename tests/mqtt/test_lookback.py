@@ -18,9 +18,9 @@ def test_two_filters_hold_all_that_is_wanted() -> None:
 
 def test_it_is_over_at_once_when_all_is_found() -> None:
     lookback = begun()
-    lookback.heard("b/line0/line/state", b"{}", 10.1)
+    lookback.on_message("b/line0/line/state", b"{}", 10.1)
     assert lookback.due(10.1) > 10.1
-    lookback.heard("b/line0/device/a/config", b"1", 10.2)
+    lookback.on_message("b/line0/device/a/config", b"1", 10.2)
     assert lookback.due(10.2) == 10.2
     assert lookback.found == {"line/state": b"{}", "device/a/config": b"1"}
 
@@ -28,8 +28,8 @@ def test_it_is_over_at_once_when_all_is_found() -> None:
 def test_what_is_not_wanted_is_passed_over_and_delays_nothing() -> None:
     lookback = begun()
     lookback.subscribed(10.2, refused=False)
-    lookback.heard("b/line0/device/stranger/config", b"{}", 10.4)
-    lookback.heard("elsewhere/line/state", b"{}", 10.4)
+    lookback.on_message("b/line0/device/stranger/config", b"{}", 10.4)
+    lookback.on_message("elsewhere/line/state", b"{}", 10.4)
     assert lookback.found == {}
     assert lookback.due(10.4) == 10.2 + QUIET_MOST
 
@@ -38,14 +38,14 @@ def test_it_is_over_when_the_broker_has_answered_and_fallen_silent() -> None:
     lookback = begun()
     lookback.subscribed(10.2, refused=False)
     assert lookback.due(10.2) == 10.2 + QUIET_MOST
-    lookback.heard("b/line0/line/state", b"{}", 10.3)
+    lookback.on_message("b/line0/line/state", b"{}", 10.3)
     assert lookback.due(10.3) == 10.3 + QUIET_MOST
 
 
 def test_a_broker_that_never_answers_is_waited_for_five_seconds() -> None:
     lookback = begun()
     assert lookback.due(12.0) == 10.0 + LONGEST == 15.0
-    lookback.heard("b/line0/line/state", b"{}", 14.9)
+    lookback.on_message("b/line0/line/state", b"{}", 14.9)
     assert lookback.due(14.9) == 15.0
 
 

@@ -8,35 +8,35 @@ from lfs10d.mqtt.topics import Topics
 B = Topics("b/line0")
 
 
-def test_what_nobody_stands_behind_is_an_orphan() -> None:
+def test_what_nobody_owned_is_an_orphan() -> None:
     sweep = OrphanSearch(B, 0.0)
-    assert sweep.heard("b/line0/device/gone/state", b"{}", 0.1)
-    assert sweep.heard("b/line0/device/gone/config", b"{}", 0.1)
-    assert sweep.heard("b/line0/device/here/state", b"{}", 0.1)
+    assert sweep.on_message("b/line0/device/gone/state", b"{}", 0.1)
+    assert sweep.on_message("b/line0/device/gone/config", b"{}", 0.1)
+    assert sweep.on_message("b/line0/device/here/state", b"{}", 0.1)
     assert sweep.orphans(frozenset({"device/here/state"})) == ("device/gone/config", "device/gone/state")
 
 
 def test_other_topics_are_left_alone() -> None:
     sweep = OrphanSearch(B, 0.0)
-    assert not sweep.heard("b/line1/device/gone/state", b"{}", 0.1)
-    assert not sweep.heard("b/line0/device/gone/notes", b"{}", 0.1)
+    assert not sweep.on_message("b/line1/device/gone/state", b"{}", 0.1)
+    assert not sweep.on_message("b/line0/device/gone/notes", b"{}", 0.1)
     assert sweep.orphans(frozenset()) == ()
 
 
 def test_a_clearing_message_leaves_nothing_to_clear() -> None:
     sweep = OrphanSearch(B, 0.0)
-    assert sweep.heard("b/line0/device/gone/state", b"", 0.1)
+    assert sweep.on_message("b/line0/device/gone/state", b"", 0.1)
     assert sweep.orphans(frozenset()) == ()
 
 
 def test_it_is_over_when_the_broker_has_fallen_silent() -> None:
     sweep = OrphanSearch(B, 10.0)
     assert sweep.due == 10.0 + QUIET
-    sweep.heard("b/line0/device/gone/state", b"{}", 10.3)
+    sweep.on_message("b/line0/device/gone/state", b"{}", 10.3)
     assert sweep.due == 10.3 + QUIET
 
 
 def test_it_is_over_after_two_minutes_in_any_case() -> None:
     sweep = OrphanSearch(B, 10.0)
-    sweep.heard("b/line0/device/gone/state", b"{}", 129.9)
+    sweep.on_message("b/line0/device/gone/state", b"{}", 129.9)
     assert sweep.due == 10.0 + LONGEST

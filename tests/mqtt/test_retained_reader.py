@@ -147,4 +147,4 @@ def test_a_mistake_in_what_is_made_of_it_keeps_nobody_offline(caplog: pytest.Log
 
     with caplog.at_level(logging.ERROR):
         asyncio.run(scenario())
-    assert "by a mistake of ours" in caplog.text
+    assert "an internal error" in caplog.text

@@ -10,10 +10,11 @@ from dataclasses import dataclass, field
 
 import pytest
 
+from lfs10d.mqtt.batch_assembly import SAMPLES_AT_ONCE
 from lfs10d.mqtt.connection import Connection
 from lfs10d.mqtt.messages import Accepted
 from lfs10d.mqtt.reasons import NO_MATCHING_SUBSCRIBERS, Disconnect, DisconnectReason, reason_in_words
-from lfs10d.mqtt.sender import ACKNOWLEDGED_WITHIN, ITEMS_AT_ONCE, SAMPLES_AT_ONCE, Sender
+from lfs10d.mqtt.sender import ACKNOWLEDGED_WITHIN, ITEMS_AT_ONCE, Sender
 from lfs10d.mqtt.settings import Version
 from lfs10d.mqtt.topics import Topics
 from lfs10d.outbox.backlog import BATCH_BYTES, HISTORY_AFTER

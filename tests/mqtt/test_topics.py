@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lfs10d.mqtt.messages import Incoming
 from lfs10d.mqtt.topics import LONGEST_TOPIC, OWNED_LEAVES, Topics
 
 B = Topics.of("site/roof", "line0")
@@ -36,7 +37,7 @@ def test_full_and_relative_are_inverse(relative: str) -> None:
 @pytest.mark.parametrize("topic", ["site/roof/line00/x", "site/roof/line0", "other/line0/x", ""])
 def test_a_topic_not_under_b_is_nobodys(topic: str) -> None:
     assert B.relative(topic) is None
-    assert B.request_levels(topic) is None
+    assert B.command(Incoming(topic, b"", retained=False)) is None
 
 
 @pytest.mark.parametrize(
@@ -52,7 +53,8 @@ def test_a_topic_not_under_b_is_nobodys(topic: str) -> None:
     ],
 )
 def test_levels_of_a_request(relative: str, levels: tuple[str, ...] | None) -> None:
-    assert B.request_levels(B.full(relative)) == levels
+    command = B.command(Incoming(B.full(relative), b"", retained=False))
+    assert (None if command is None else command.levels) == levels
 
 
 def test_a_response_has_the_levels_of_its_request() -> None:

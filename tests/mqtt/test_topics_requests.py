@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from lfs10d.mqtt.messages import Incoming
-from lfs10d.mqtt.topics import InboundRequest, Topics, inbound
+from lfs10d.mqtt.topics import InboundRequest, Topics
 
 B = Topics("b/line0")
 
@@ -12,20 +12,20 @@ def test_everything_about_a_request_is_kept() -> None:
     message = Incoming(
         "b/line0/request/device/read", b"{}", retained=True, response_topic="b/line0/response/x", correlation=b"\0"
     )
-    assert inbound(message, B) == InboundRequest(
+    assert B.command(message) == InboundRequest(
         "request/device/read", ("device", "read"), b"{}", retained=True, response_topic="response/x", correlation=b"\0"
     )
 
 
 def test_a_foreign_response_topic_is_ignored() -> None:
-    request = inbound(Incoming("b/line0/request/health", b"", retained=False, response_topic="c/d"), B)
+    request = B.command(Incoming("b/line0/request/health", b"", retained=False, response_topic="c/d"))
     assert request is not None
     assert request.response_topic is None
 
 
 def test_other_messages_are_no_requests() -> None:
-    assert inbound(Incoming("b/line0/availability", b"offline", retained=True), B) is None
-    assert inbound(Incoming("c/request/health", b"", retained=False), B) is None
+    assert B.command(Incoming("b/line0/availability", b"offline", retained=True)) is None
+    assert B.command(Incoming("c/request/health", b"", retained=False)) is None
 
 
 def test_a_payload_is_not_printed() -> None:

@@ -493,7 +493,7 @@ def test_a_connection_of_no_use_is_made_anew(mosquitto: Mosquitto) -> None:
         site = Site(mosquitto.port)
         async with running(site) as uplink:
             await online(listener)
-            uplink._acknowledges_nothing()
+            uplink._on_stuck()
             assert site.changes == [True, False]
             await online(listener, 2)
 

@@ -13,6 +13,7 @@ from lfs10d.mqtt.uplink import Uplink
 from lfs10d.telemetry import publication
 from lfs10d.telemetry.publication import Publication
 from tests.support.answering_brokers import BASE, Capricious
+from tests.support.brokers import eventually
 
 EVENTS = 3
 
@@ -67,6 +68,7 @@ def test_offline_waits_for_its_turn_where_one_message_may_be_under_way(strict: C
         await uplink.stop()
 
     asyncio.run(scenario())
+    eventually(lambda: strict.gone == 1, "the connection is over")
     assert strict.exceeded == 0
     assert strict.taken("availability") == [b"online", b"offline"]
     assert len(strict.taken("event")) == EVENTS
@@ -83,6 +85,7 @@ def test_what_cannot_go_in_time_makes_no_room_for_anything_else(strict: Capricio
         await uplink.stop()
 
     asyncio.run(scenario())
+    eventually(lambda: strict.gone == 1, "the connection is over")
     assert strict.exceeded == 0
     assert strict.taken("availability")[-1] == b"offline"
     assert 1 <= len(strict.taken("event")) <= EVENTS
@@ -97,6 +100,7 @@ def test_where_the_window_never_opens_the_broker_publishes_the_will(strict: Capr
         await uplink.stop()
 
     asyncio.run(scenario())
+    eventually(lambda: strict.gone == 1, "the connection is over")
     assert strict.exceeded == 0
     assert strict.taken("availability") == [b"online"]
     assert strict.disconnects == 0, "a DISCONNECT would make the broker drop the will"

@@ -68,8 +68,8 @@ class Place:
             self.store,
             epoch_ms=lambda: self.epoch_ms,
             wake=self.wake,
-            troubled=self.troubles.append,
-            tell=self.events.append,
+            on_trouble=self.troubles.append,
+            publish=self.events.append,
         )
 
     def wake(self) -> None:
@@ -365,4 +365,4 @@ def test_a_mistake_of_ours_is_told_and_ends_nothing_else(
         await place.spooler.stop(PATIENCE)
 
     play(scenario())
-    assert "by a mistake of ours" in caplog.text
+    assert "an internal error" in caplog.text

@@ -23,6 +23,8 @@ class Capricious:
         self.exceeded = 0
         self.disconnects = 0
         """DISCONNECTs from clients."""
+        self.gone = 0
+        """Connections that are over."""
         self._receive_maximum = receive_maximum
         self._unacknowledged = 0
         self.delay = delay
@@ -58,6 +60,7 @@ class Capricious:
             while self._answer(client, client.makefile("rb", buffering=0)):
                 pass
             client.shutdown(socket.SHUT_RDWR)
+        self.gone += 1
 
     def _answer(self, client: socket.socket, stream: socket.SocketIO) -> bool:
         head = _exactly(stream, 1)[0]

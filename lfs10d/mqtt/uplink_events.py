@@ -1,0 +1,38 @@
+"""What the uplink needs of whoever starts it, and what it reports to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from collections.abc import Set as AbstractSet
+from typing import Protocol
+
+from lfs10d.mqtt.topics import InboundRequest
+from lfs10d.telemetry.publication import Publication
+
+
+class UplinkEvents(Protocol):
+    """What the uplink publishes at each connect, and what it reports. Called in the thread of the asyncio loop."""
+
+    def burst(self) -> Iterable[Publication]:
+        """Return every retained topic but `availability`, as it is now."""
+        ...
+
+    def topics(self) -> AbstractSet[str]:
+        """Return the retained topics under `B` that are ours, but for `availability`."""
+        ...
+
+    def on_request(self, request: InboundRequest) -> None:
+        """Take a request."""
+        ...
+
+    def on_uplink_change(self) -> None:
+        """Take that a connect, loss, takeover or subscription changed the properties of the uplink."""
+        ...
+
+    def on_announced(self) -> None:
+        """Take that the broker has the whole burst after a connect."""
+        ...
+
+    def on_spool_trouble(self, trouble: str | None) -> None:
+        """Take why the disk does not keep what waits; None when it does again."""
+        ...
