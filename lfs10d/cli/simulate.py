@@ -101,12 +101,12 @@ class Wanted:
 @click.option("--parity", type=click.Choice(["none", "even", "odd"]), default="none", show_default=True)
 @click.option("--stopbits", type=click.Choice(["1", "2"]), default="1", show_default=True)
 @click.option("--framing", type=click.Choice(["rtu", "ascii"]), default="rtu", show_default=True)
-@click.option("--faults", type=click.Path(path_type=Path), metavar="FILE", help="What ails whom (YAML).")
+@click.option("--faults", type=click.Path(path_type=Path), metavar="FILE", help="A faults file (YAML).")
 @click.option(
     "--profile",
     metavar="NAME",
     shell_complete=profile_names,
-    help="Another device than lfs10: a profile's name or file.",
+    help="A profile's name or file, in place of lfs10.",
 )
 @click.option(
     "--turnaround",
@@ -114,18 +114,23 @@ class Wanted:
     metavar="DURATION",
     default="5ms",
     show_default=True,
-    help="Before an answer begins.",
+    help="Time before an answer begins.",
 )
 @click.option(
-    "--jitter", callback=_time, metavar="DURATION", default="0ms", show_default=True, help="Up to so much more."
+    "--jitter",
+    callback=_time,
+    metavar="DURATION",
+    default="0ms",
+    show_default=True,
+    help="Random additional time, up to this.",
 )
 @click.option(
-    "--latency", callback=_time, metavar="DURATION", default=None, help="The adapter delivers in pieces so far apart."
+    "--latency", callback=_time, metavar="DURATION", default=None, help="Interval at which the adapter delivers bytes."
 )
 @click.option("--echo", is_flag=True, help="The adapter returns the master's own bytes.")
 @click.option("--values", type=click.Choice(["wind", "unique"]), default="wind", show_default=True)
-@click.option("--seed", type=int, default=1, show_default=True, help="Of wind and faults.")
-@click.option("--interval", callback=_time, metavar="DURATION", default=None, help="Print the figures so often.")
+@click.option("--seed", type=int, default=1, show_default=True, help="Seed of wind and faults.")
+@click.option("--interval", callback=_time, metavar="DURATION", default=None, help="Print the counts at this interval.")
 @json_option
 def command(**options: Any) -> None:  # noqa: ANN401  # sixteen options; `Wanted` names and types them
     """Run a line full of simulated sensors on a pseudo terminal, and judge who polls it.

@@ -81,7 +81,7 @@ class LineConfig(Section):
         "Default: line0 for lfs10d.yaml, else the file's name without .yaml.",
     )
     port: Annotated[str, FilePath()] = Field(
-        description="Path of the serial port; best one below /dev/serial/by-id, which stays the same when replugged."
+        description="Path of the serial port, best below /dev/serial/by-id: it stays the same after replugging."
     )
     baudrate: Annotated[int, Choice(BAUDRATES)] = Field(
         9600, description="Bits per second. An LFS10 can do 9600 and 19200."
@@ -98,16 +98,16 @@ class LineConfig(Section):
         0.0, description="Added to the 3.5 characters of silence before each request."
     )
     turnaround_delay: Annotated[float, Duration(0, 10)] = Field(
-        0.1, description="Silence after a broadcast, which nobody answers."
+        0.1, description="Silence after a broadcast, which no slave answers."
     )
     echo: Annotated[Literal["auto", "on", "off"], Choice(("auto", "on", "off"))] = Field(
-        "auto", description="Does the adapter return our own bytes? auto finds out."
+        "auto", description="Whether the adapter returns the bytes it sends; auto is found out."
     )
     low_latency: Annotated[bool, Flag()] = Field(
-        default=True, description="Ask the driver for its low-latency mode where it has one."
+        default=True, description="Use the low-latency mode of the driver, if it has one."
     )
     realtime: Annotated[bool, Flag()] = Field(
-        default=False, description="SCHED_FIFO for the thread that owns the line, where the system permits it."
+        default=False, description="SCHED_FIFO for the line thread, if the system permits it."
     )
     rs485: Rs485Config | None = Field(
         None, description="Let the driver switch the transceiver by RTS; null leaves the driver as it is."
@@ -120,7 +120,7 @@ class PollConfig(Section):
     interval: Interval = Field(
         1.0,
         description="Time between two polls of one slave; 0 is as fast as the line allows, "
-        "in turn with what the others leave.",
+        "in the time that slaves with an interval leave.",
     )
     response_timeout: Annotated[float | None, Duration(0.01, 10, auto="learned per slave")] = Field(
         None,
@@ -129,8 +129,8 @@ class PollConfig(Section):
     )
     retries: Annotated[int, Whole(0, 10)] = Field(
         1,
-        description="Further exchanges within one poll that failed; "
-        "never for a write, an offline or a never-heard slave.",
+        description="Retries within one failed poll; none for writes, for offline slaves and for slaves "
+        "that never answered.",
     )
     offline_after: Annotated[int, Whole(1, 1000)] = Field(
         3, description="Consecutive failed polls after which a device is offline."
@@ -145,11 +145,11 @@ class PollConfig(Section):
 class SlaveConfig(Section):
     """One device on the line."""
 
-    id: SlaveId = Field(description="Slave id, 1 to 255; a profile may narrow it.")
+    id: SlaveId = Field(description="Slave id, 1 to 255; a profile may allow fewer.")
     name: Annotated[str, Name()] = Field(
         "", description="Part of its topics, stable for life. Default: slave-<id as in the file>."
     )
-    label: Label = Field(None, description="For people: free text, never in a topic.")
+    label: Label = Field(None, description="Free text for people, never in a topic.")
     profile: Annotated[str, FilePath()] = Field(
         "lfs10",
         description="lfs10, ld-e, fuling-dzb, eh600, or the path of a profile YAML, relative to this file.",
@@ -157,15 +157,16 @@ class SlaveConfig(Section):
     interval: Interval = Field(1.0, description="Time between two polls. Default: poll.interval.")
     enabled: Annotated[bool, Flag()] = Field(default=True, description="Whether it is polled.")
     response_timeout: ResponseTimeout = Field(
-        None, description="Time to its answer's first byte. Default: poll.response_timeout."
+        None,
+        description="From the last bit of the request to the first byte of the answer. Default: poll.response_timeout.",
     )
     checksum: Annotated[Literal["crc", "sum"] | None, Choice(("crc", "sum"), null=True)] = Field(
-        None, description="Check of its rtu frames; null is the profile's."
+        None, description="Check of its rtu frames; null: the first of the profile."
     )
     request_gap: Annotated[float, Duration(0, 60)] = Field(
         0.0,
         description="Rest before each request to it, counted from the end of the exchange with it before; "
-        "the greater of this and the profile's.",
+        "the longer of this and the profile's.",
     )
 
 
@@ -191,11 +192,11 @@ class TlsConfig(Section):
     """TLS to the broker; paths are relative to the file."""
 
     ca: Annotated[str | None, FilePath(null=True)] = Field(
-        None, description="File of the authorities to trust; null is the system's."
+        None, description="File of the trusted authorities; null: those of the system."
     )
-    cert: Annotated[str | None, FilePath(null=True)] = Field(None, description="File of our own certificate.")
+    cert: Annotated[str | None, FilePath(null=True)] = Field(None, description="File of the client certificate.")
     key: Annotated[str | None, FilePath(null=True)] = Field(
-        None, description="File of our own key, unless it is in cert."
+        None, description="File of the client key, unless it is in cert."
     )
 
 
@@ -204,17 +205,17 @@ class MqttConfig(Section):
 
     host: Annotated[str | tuple[str, ...], Hosts()] = Field(
         "localhost",
-        description="Host name or address of the broker; or a list of its nodes, tried in turn until one accepts us, "
-        "then kept until it is gone.",
+        description="Host name or address of the broker; or a list of its nodes, tried in turn until one accepts, "
+        "then kept while it is there.",
     )
     port: Annotated[int, Whole(1, 65535)] = Field(
         PLAIN_PORT,
-        description="Port of the broker, of each node that has none of its own. "
+        description="Port of the broker, and of each node without its own. "
         f"Default: {PLAIN_PORT}, {TLS_PORT} with tls.",
     )
     version: Annotated[Literal["5", "3.1.1"], Choice((5, "3.1.1"), meaning={5: "5", "5": "5"})] = Field(
         "5",
-        description="MQTT version. A broker that refuses 5 is spoken to in 3.1.1, with one warning.",
+        description="MQTT version. If the broker refuses 5, 3.1.1 is used, with one warning.",
     )
     base_topic: Annotated[str, BaseTopic()] = Field(
         "lfs10d", description="First part of every topic; may have several levels; %H is the host name."
@@ -225,11 +226,11 @@ class MqttConfig(Section):
     telemetry: Annotated[bool, Flag()] = Field(
         default=True,
         description="false: no `telemetry` and no `history`, only states, errors, statistics, events and responses; "
-        "for a slow or dear uplink.",
+        "for a slow or expensive connection.",
     )
     state_every: Annotated[float, Duration(1, HOUR)] = Field(
         1.0,
-        description="`state` of a device at most so often; a change of quality or error at once.",
+        description="Shortest time between two `state` of a device; a change of quality or error is published at once.",
     )
     username: Annotated[str | None, Text(200, null=True)] = Field(None, description="Login name; null for none.")
     password_file: Annotated[str | None, FilePath(null=True)] = Field(
@@ -237,9 +238,9 @@ class MqttConfig(Section):
         description="File with the password in its first line, relative to this file; "
         "null is the systemd credential mqtt-password, if there is one.",
     )
-    tls: TlsConfig | None = Field(None, description="null for none; {} uses the system's authorities.")
+    tls: TlsConfig | None = Field(None, description="null for none; {} trusts the authorities of the system.")
     keepalive: Annotated[float, Duration(1, 65535)] = Field(
-        20.0, description="Longest silence before the connection is tried; whole seconds, rounded up."
+        20.0, description="Time without traffic after which the connection is tested; whole seconds, rounded up."
     )
 
     @property
@@ -256,10 +257,10 @@ class MqttConfig(Section):
 
 
 class StoreConfig(Section):
-    """The backlog on disk while the broker is away."""
+    """The backlog on disk while the broker is unreachable."""
 
     max_size: Annotated[int, Size(0, 10**13)] = Field(
-        512 * 10**6, description="Largest size on disk; below 1MB memory alone."
+        512 * 10**6, description="Largest size on disk; below 1MB the backlog is in memory only."
     )
     max_age: Annotated[float, Duration(1, 3650 * DAY)] = Field(7 * DAY, description="Older samples are dropped.")
 
@@ -268,10 +269,10 @@ class LogConfig(Section):
     """What is logged."""
 
     level: Annotated[Literal["debug", "info", "warning", "error"], Choice(("debug", "info", "warning", "error"))] = (
-        Field("info", description="Least severity that is logged; debug shows every frame.")
+        Field("info", description="Lowest severity that is logged; debug logs every frame.")
     )
     format: Annotated[Literal["auto", "journal", "text"], Choice(("auto", "journal", "text"))] = Field(
-        "auto", description="auto is journal priorities under systemd, coloured text on a terminal."
+        "auto", description="auto: journal priorities under systemd, coloured text on a terminal."
     )
 
 
@@ -305,12 +306,12 @@ class Config(Section):
     mqtt: MqttConfig = Field(MqttConfig(), description="The broker.")
     commands: Annotated[tuple[CommandChoice, ...], BeforeValidator(_items)] = Field(
         ("polling", "sensors"),
-        description="Classes of requests obeyed: polling (what is polled and how), sensors (what changes or searches "
-        "the line), registers (raw access); [] for none.",
+        description="Classes of requests that are accepted: polling (what is polled and how), sensors (changes and "
+        "scans of the line), registers (raw access); [] for none.",
     )
     homeassistant: HomeassistantConfig = Field(HomeassistantConfig(), description="Home Assistant (later).")
     wind: WindConfig = Field(WindConfig(), description="Wind statistics (later).")
-    store: StoreConfig = Field(StoreConfig(), description="The backlog on disk while the broker is away.")
+    store: StoreConfig = Field(StoreConfig(), description="The backlog on disk while the broker is unreachable.")
     log: LogConfig = Field(LogConfig(), description="What is logged.")
 
 

@@ -48,7 +48,7 @@ class WindowEntry(_Entry):
     """When something holds; without times always."""
 
     after: Time = Field(0.0, description="When it begins, after the simulator's start.")
-    lasts: Time | None = Field(None, alias="for", description="How long it lasts; for ever if left out.")
+    lasts: Time | None = Field(None, alias="for", description="How long it lasts; without it, for ever.")
     every: Time | None = Field(None, description="How long from one beginning to the next.")
 
     @model_validator(mode="after")
@@ -66,16 +66,16 @@ class WindowEntry(_Entry):
 class FaultEntry(WindowEntry):
     """One fault of a sensor."""
 
-    fault: Annotated[str, Choice(tuple(kind.value for kind in FaultKind))] = Field(description="What ails it.")
-    rate: Share = Field(1.0, description="In what share of its answers it shows.")
+    fault: Annotated[str, Choice(tuple(kind.value for kind in FaultKind))] = Field(description="Kind of fault.")
+    rate: Share = Field(1.0, description="Share of its answers that have the fault.")
     delay: Time | None = Field(
-        None, description="Of late, slow_bytes, slow_flash, needs_rest, sleeps, twin, repeated and gateway."
+        None, description="For late, slow_bytes, slow_flash, needs_rest, sleeps, twin, repeated and gateway."
     )
-    code: Annotated[int, Whole(1, 255)] | None = Field(None, description="Of exception, dip_locked and gateway.")
-    id: Annotated[int, Whole(0, 255)] | None = Field(None, description="Of wrong_id.")
-    bytes: Length | None = Field(None, description="Of garbage, truncated, leading_noise and trailing_noise.")
-    answer: Literal["echo", "exception"] = Field("echo", description="How one that is dip_locked answers a write.")
-    reads: Literal["old", "new"] = Field("old", description="What its id register holds then.")
+    code: Annotated[int, Whole(1, 255)] | None = Field(None, description="For exception, dip_locked and gateway.")
+    id: Annotated[int, Whole(0, 255)] | None = Field(None, description="For wrong_id.")
+    bytes: Length | None = Field(None, description="For garbage, truncated, leading_noise and trailing_noise.")
+    answer: Literal["echo", "exception"] = Field("echo", description="For dip_locked: how it answers a write.")
+    reads: Literal["old", "new"] = Field("old", description="For dip_locked: what its id register holds then.")
 
     @property
     def ailment(self) -> Ailment:
@@ -109,11 +109,11 @@ Faults: TypeAlias = Annotated[
 class SlaveEntry(_Entry):
     """One sensor's faults, and where it differs from the others."""
 
-    faults: Faults = Field((), description="What ails it.")
+    faults: Faults = Field((), description="Its faults.")
     turnaround: Time | None = Field(None, description="From a request's last bit to its answer's first.")
-    jitter: Time | None = Field(None, description="Up to so much more, drawn each time.")
-    baudrate: Annotated[int, Choice(BAUDRATES)] | None = Field(None, description="If not the line's.")
-    copies: Annotated[int, Whole(1, MOST_COPIES)] = Field(1, description="How many sensors have this id.")
+    jitter: Time | None = Field(None, description="Random additional time, up to this.")
+    baudrate: Annotated[int, Choice(BAUDRATES)] | None = Field(None, description="Its rate, if not the line's.")
+    copies: Annotated[int, Whole(1, MOST_COPIES)] = Field(1, description="Number of sensors with this id.")
 
 
 def _slave(item: object) -> object:
@@ -125,38 +125,40 @@ def _slave(item: object) -> object:
 class NoiseEntry(WindowEntry):
     """Stray bytes after requests."""
 
-    rate: Share = Field(1.0, description="After what share of the requests.")
-    bytes: Length = Field(3, description="How many.")
-    delay: Time = Field(0.001, description="How long after the request.")
+    rate: Share = Field(1.0, description="Share of requests that are followed by noise.")
+    bytes: Length = Field(3, description="Number of bytes.")
+    delay: Time = Field(0.001, description="Time after the request.")
 
 
 class SecondMasterEntry(_Entry):
     """Another master that does not listen before it speaks."""
 
-    slave: Annotated[int, Whole(0, 255)] = Field(description="Whom it reads.")
-    every: Annotated[float, Duration(0.01, DAY)] = Field(description="How often.")
-    after: Time = Field(0.0, description="From when on.")
+    slave: Annotated[int, Whole(0, 255)] = Field(description="Slave id that it reads.")
+    every: Annotated[float, Duration(0.01, DAY)] = Field(description="Time between two requests.")
+    after: Time = Field(0.0, description="Time of its first request.")
 
 
 class LineEntry(_Entry):
     """What troubles the whole line."""
 
-    echo: Annotated[bool, Flag()] = Field(default=False, description="The adapter returns the master's bytes.")
-    latency: Annotated[float, Duration(0, 1)] = Field(0.0, description="The adapter delivers in pieces so far apart.")
-    babble: Annotated[tuple[WindowEntry, ...], Field(strict=False)] = Field((), description="Bytes without a pause.")
-    noise: Annotated[tuple[NoiseEntry, ...], Field(strict=False)] = Field((), description="Stray bytes.")
+    echo: Annotated[bool, Flag()] = Field(default=False, description="The adapter returns the bytes of the master.")
+    latency: Annotated[float, Duration(0, 1)] = Field(0.0, description="Interval at which the adapter delivers bytes.")
+    babble: Annotated[tuple[WindowEntry, ...], Field(strict=False)] = Field(
+        (), description="Times of bytes without a pause."
+    )
+    noise: Annotated[tuple[NoiseEntry, ...], Field(strict=False)] = Field((), description="Stray bytes after requests.")
     second_master: Annotated[tuple[SecondMasterEntry, ...], Field(strict=False)] = Field(
-        (), description="Another master."
+        (), description="Other masters on the line."
     )
 
 
 class FaultFile(_Entry):
     """The whole file."""
 
-    line: LineEntry = Field(LineEntry(), description="What troubles the line.")
-    all: Faults = Field((), description="What ails every sensor.")
+    line: LineEntry = Field(LineEntry(), description="Faults of the line.")
+    all: Faults = Field((), description="Faults of every sensor.")
     slaves: dict[Annotated[int, Whole(1, 255)], Annotated[SlaveEntry, BeforeValidator(_slave)]] = Field(
-        {}, description="By slave id."
+        {}, description="Faults of single sensors, by slave id."
     )
 
 

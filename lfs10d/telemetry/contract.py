@@ -52,7 +52,7 @@ def _device(leaf: str) -> str:
 
 
 CHANGE = "connect, change"
-RISE = "rise, change of code, clear"
+RISE = "active, change of code, cleared"
 
 OUTBOUND = (
     Outbound(publication.INFO, Info, retain=True, qos=1, when=CHANGE),
@@ -73,7 +73,7 @@ OUTBOUND = (
         Annotated[list[SamplePayload], Field(max_length=100)],
         retain=False,
         qos=1,
-        when="what is older than 3 s; what may have been lost at a reconnect",
+        when="samples older than 3 s; samples that a reconnect may have lost",
     ),
     Outbound(_device(publication.CONFIG), DeviceConfig, retain=True, qos=1, when=CHANGE),
     Outbound(_device(publication.AVAILABILITY), Availability, retain=True, qos=1, when=CHANGE),

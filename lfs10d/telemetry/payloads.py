@@ -15,8 +15,8 @@ from lfs10d.system.clock_step import ClockState
 
 Milliseconds = Annotated[int, Field(description="epoch milliseconds, UTC")]
 Count = Annotated[int, Field(ge=0, description="since boot")]
-Version = Annotated[Literal[1], Field(description="of the payload's form")]
-Clock = Annotated[ClockState, Field(description="how far the wall clock can be trusted")]
+Version = Annotated[Literal[1], Field(description="version of the payload")]
+Clock = Annotated[ClockState, Field(description="state of the wall clock")]
 Errors = Annotated[dict[FaultCode, Count], Field(description="how often each failure happened")]
 
 
@@ -35,16 +35,16 @@ class SamplePayload(Payload):
     v: Version
     line: str
     device: str
-    boot: str = Field(min_length=8, max_length=8, description="one life of the daemon, sortable by start")
-    seq: int = Field(ge=0, description="from 1 per device and boot, without gaps; 0 only in a first state")
+    boot: str = Field(min_length=8, max_length=8, description="one run of the daemon, sortable by start")
+    seq: int = Field(ge=0, description="from 1 per device and boot, without gaps; 0 only in the first state")
     ts: Milliseconds
     time: str = Field(pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z$", description="`ts` in ISO 8601")
     clock: Clock
     unit: str | None = Field(None, description="unit of the one value")
-    units: dict[str, str] | None = Field(None, description="units by name, where there are several values")
+    units: dict[str, str] | None = Field(None, description="units by name, if there are several values")
     quality: Literal["good", "bad"] = Field(description="of the value")
     error: FaultCode | None = Field(description="why there is no value")
-    rtt_ms: float | None = Field(ge=0, description="first bit of the request to last of the answer")
+    rtt_ms: float | None = Field(ge=0, description="first bit of the request to last bit of the answer")
     historical: Literal[True] | None = Field(None, description="set on `history`")
 
     @property
@@ -68,27 +68,29 @@ class SamplePayload(Payload):
 
 
 class ActiveError(Payload):
-    """An error that holds."""
+    """An active error."""
 
     v: Version
     active: Literal[True]
     code: FaultCode
-    also: list[FaultCode] = Field(description="other codes of this run of failures, or what else ails the line")
+    also: list[FaultCode] = Field(description="other codes of these failures, or other errors of the line")
     message: str = Field(description="for people")
     exception_code: int | None = Field(ge=0, le=255, description="of a Modbus exception")
-    heard: str = Field(pattern=r"^([0-9A-F]{2}( [0-9A-F]{2}){0,31})?$", description="the last 32 bytes, in hex")
+    heard: str = Field(
+        pattern=r"^([0-9A-F]{2}( [0-9A-F]{2}){0,31})?$", description="the last 32 bytes received, in hex"
+    )
     since: Milliseconds
     last: Milliseconds
     count: int = Field(ge=1, description="failures since then")
 
 
 class NoError(Payload):
-    """All is well."""
+    """No error."""
 
     v: Version
     active: Literal[False]
     code: None
-    last_code: FaultCode | None = Field(description="what it was")
+    last_code: FaultCode | None = Field(description="code of the last error")
     cleared: Milliseconds | None
 
 
@@ -98,13 +100,13 @@ class Info(Payload):
     v: Version
     version: str = Field(description="of lfs10d")
     host: str = Field(description="name of the gateway")
-    boot: str = Field(description="this life of the daemon, sortable by start")
-    previous_boot: str | None = Field(description="the one before; null: not known")
+    boot: str = Field(description="this run of the daemon, sortable by start")
+    previous_boot: str | None = Field(description="the run before; null: unknown")
     started: Milliseconds
-    config_hash: str = Field(description="differs where the effective configuration differs")
-    changes: int = Field(ge=0, description="changes made by requests that the file does not say")
+    config_hash: str = Field(description="changes with the effective configuration")
+    changes: int = Field(ge=0, description="changes made by requests that are not in the file")
     mqtt: dict[str, Any] = Field(description="protocol in use")
-    features: list[str] = Field(description="what this daemon can do")
+    features: list[str] = Field(description="optional functions of this daemon")
     clock: Clock
 
 
@@ -116,7 +118,7 @@ class DeviceEntry(Payload):
     label: str | None
     profile: str
     enabled: bool
-    interval: float = Field(ge=0, description="s")
+    interval: float = Field(ge=0, description="in s")
 
 
 class LineStatePayload(Payload):
@@ -131,7 +133,9 @@ class LineStatePayload(Payload):
     framing: Literal["rtu", "ascii"]
     open: bool = Field(description="the port can be used")
     activity: str = Field(description="polling, scanning, changing_baudrate, paused ...")
-    requests: Literal["ok", "denied"] = Field(description="denied: the broker refused us `B/request/#`")
+    requests: Literal["ok", "denied"] = Field(
+        description="denied: the broker refused the subscription to `B/request/#`"
+    )
 
 
 class Gaps(Payload):
@@ -164,16 +168,16 @@ class LineStats(Payload):
 
     v: Version
     ts: Milliseconds
-    load_pct: float | None = Field(ge=0, le=100, description="share of the time in which the line is in use")
+    load_pct: float | None = Field(ge=0, le=100, description="share of time in which the line is in use")
     polls_per_s: float | None = Field(ge=0, description="good and failed")
     cycle_s: float | None = Field(ge=0, description="longest time between two polls of one device")
     gap_required_us: float = Field(description="silence kept before each request")
-    gap_us: Gaps = Field(description="silence measured before our requests")
+    gap_us: Gaps = Field(description="silence measured before requests")
     exchanges: Count
     errors: Errors
-    unsolicited_bytes: int = Field(ge=0, description="heard and part of no answer, since boot")
-    uart: Uart | None = Field(description="errors the driver counted; null where it does not")
-    store: StoreStats = Field(description="what waits for the broker")
+    unsolicited_bytes: int = Field(ge=0, description="received and part of no answer, since boot")
+    uart: Uart | None = Field(description="errors counted by the driver; null: it does not count")
+    store: StoreStats = Field(description="samples waiting for the broker")
 
 
 class DeviceConfig(Payload):
@@ -183,9 +187,9 @@ class DeviceConfig(Payload):
     slave: int = Field(ge=1, le=255, description="slave id")
     label: str | None
     profile: str
-    interval: float = Field(ge=0, description="s")
+    interval: float = Field(ge=0, description="in s")
     enabled: bool
-    response_timeout: float | Literal["auto"] = Field(description="s; auto: learned")
+    response_timeout: float | Literal["auto"] = Field(description="in s; auto: learned")
     request_gap: float = Field(ge=0, description="rest before each request to it in s, as set or learned")
 
 
@@ -204,7 +208,7 @@ class DeviceStats(Payload):
     polls: Count
     good: Count
     errors: Errors
-    rtt_ms: RoundTrip = Field(description="times of its last 100 answers")
+    rtt_ms: RoundTrip = Field(description="of its last 100 answers")
     response_timeout_ms: float | None = Field(description="as set or learned")
     request_gap_ms: float = Field(ge=0, description="rest before each request to it, as set or learned")
     last_good_ts: Milliseconds | None
@@ -250,18 +254,18 @@ class RequestError(Payload):
 
 
 class Response(Payload):
-    """The one answer to a request."""
+    """The response to a request."""
 
     v: Version
     id: str | int | None = Field(description="as in the request")
-    transaction: str | int | None = Field(None, description="as in the request, where it had one")
+    transaction: str | int | None = Field(None, description="as in the request, if it had one")
     request: str | None = Field(description="its name")
     status: Literal["ok", "rejected", "failed"] = Field(
         description="rejected: no write was sent and nothing changed; failed: a write may have been sent"
     )
-    data: Any = Field(description="what was asked for")
+    data: Any = Field(description="the result")
     error: RequestError | None
-    took_ms: float = Field(ge=0, description="from its arrival to this answer")
+    took_ms: float = Field(ge=0, description="from its arrival to this response")
 
 
 class TracePayload(Payload):
@@ -269,7 +273,7 @@ class TracePayload(Payload):
 
     v: Version
     ts: Milliseconds
-    direction: Literal["tx", "rx"] = Field(description="tx: sent by us")
+    direction: Literal["tx", "rx"] = Field(description="tx: sent by the daemon")
     gap_us: float | None = Field(description="silence before it")
     hex: str = Field(description="its bytes")
     text: str = Field(description="its meaning, for people")
