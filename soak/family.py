@@ -170,8 +170,8 @@ class Life:
         self._judge()
 
     def _alone(self, name: str, fault: Fault) -> None:
-        for kind, particulars in (fault.ailments or {}).items():
-            self.line.sensor(ILL).ail(kind, **particulars)
+        for kind, particulars in (fault.faults or {}).items():
+            self.line.sensor(ILL).add_fault(kind, **particulars)
         if fault.begin is not None:
             fault.begin(self.daemon, ALONE)
         self._spell(name, fault, ALONE)
@@ -180,7 +180,7 @@ class Life:
         begun = self.daemon.clock.now
         self.daemon.go(seconds)
         for sensor in self.line.sensors:
-            sensor.heal()
+            sensor.clear_faults()
             sensor.hung = False  # not by a power cycle: its registers know no 115200 baud
         ended = self.daemon.clock.now
         self.daemon.go(CALM)

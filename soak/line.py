@@ -32,19 +32,19 @@ PATIENCE = 5.0
 
 def ail(line: SimulatedLine) -> None:
     """Give each sensor but the first what ails it, and the line its stray bytes."""
-    line.sensor(2).ail(FaultKind.NOISY, 0.03)
-    line.sensor(2).ail(FaultKind.GARBAGE, 0.01)
-    line.sensor(3).ail(FaultKind.LATE, 0.01, delay=0.6)
-    line.sensor(3).ail(FaultKind.LATE, 0.01, delay=0.15)
-    line.sensor(4).ail(FaultKind.SILENT, first=20.0, last=26.0, every=60.0)
+    line.sensor(2).add_fault(FaultKind.NOISY, 0.03)
+    line.sensor(2).add_fault(FaultKind.GARBAGE, 0.01)
+    line.sensor(3).add_fault(FaultKind.LATE, 0.01, delay=0.6)
+    line.sensor(3).add_fault(FaultKind.LATE, 0.01, delay=0.15)
+    line.sensor(4).add_fault(FaultKind.SILENT, first=20.0, last=26.0, every=60.0)
     for kind in (FaultKind.NAN, FaultKind.INFINITE, FaultKind.OUT_OF_RANGE, FaultKind.SUBNORMAL):
-        line.sensor(5).ail(kind, 0.01)
+        line.sensor(5).add_fault(kind, 0.01)
     for kind in (FaultKind.TRUNCATED, FaultKind.LEADING_NOISE, FaultKind.TRAILING_NOISE):
-        line.sensor(6).ail(kind, 0.01)
+        line.sensor(6).add_fault(kind, 0.01)
     for kind in (FaultKind.WRONG_ID, FaultKind.WRONG_FUNCTION, FaultKind.EXCEPTION):
-        line.sensor(7).ail(kind, 0.01)
-    line.sensor(8).ail(FaultKind.SLOW_BYTES, 0.01)
-    line.sensor(8).ail(FaultKind.SILENT, 0.02)
+        line.sensor(7).add_fault(kind, 0.01)
+    line.sensor(8).add_fault(FaultKind.SLOW_BYTES, 0.01)
+    line.sensor(8).add_fault(FaultKind.SILENT, 0.02)
     stray(line, 0.005)
 
 

@@ -26,7 +26,7 @@ POLLED = 3
 class Fault:
     """One fault alone. `first` is the code of the first bad sample, `also` what may follow; no code: all good.
 
-    `ailments` are of one sensor, `begin` of the whole line. `must`: codes that have to be seen. `neighbours`: codes
+    `faults` are of one sensor, `begin` of the whole line. `must`: codes that have to be seen. `neighbours`: codes
     that the others may show. With `also` there may be good samples besides.
     `in_pieces`: what may come instead where the adapter delivers in pieces, whose pauses look like silence.
     """
@@ -34,7 +34,7 @@ class Fault:
     first: frozenset[str] = frozenset()
     also: frozenset[str] = frozenset()
     must: frozenset[str] = frozenset()
-    ailments: Mapping[str, Particulars] | None = None
+    faults: Mapping[str, Particulars] | None = None
     begin: Begin | None = None
     neighbours: frozenset[str] = frozenset()
     in_pieces: frozenset[str] = frozenset()
@@ -44,8 +44,8 @@ def _codes(words: str) -> frozenset[str]:
     return frozenset(words.split())
 
 
-def _ill(first: str = "", also: str = "", must: str = "", neighbours: str = "", **ailments: Particulars) -> Fault:
-    return Fault(_codes(first), _codes(also), _codes(must or first), ailments, neighbours=_codes(neighbours))
+def _ill(first: str = "", also: str = "", must: str = "", neighbours: str = "", **faults: Particulars) -> Fault:
+    return Fault(_codes(first), _codes(also), _codes(must or first), faults, neighbours=_codes(neighbours))
 
 
 def _stray(daemon: DaemonInMemory, seconds: float) -> None:
@@ -75,17 +75,17 @@ STRUCK = "timeout late malformed crc collision wrong_slave wrong_function"
 """Where two speak at once anything but a wrong value may come of it."""
 
 
-def _late(delay: float, also: str = "", **ailments: Particulars) -> Fault:
+def _late(delay: float, also: str = "", **faults: Particulars) -> Fault:
     """Return one that is late: whether its polls fail, and how, depends on the time-out, and that is learned."""
     return Fault(
-        _codes(LATE + also), _codes(LATE + also), ailments={"late": {"delay": delay}, **ailments},
+        _codes(LATE + also), _codes(LATE + also), faults={"late": {"delay": delay}, **faults},
         neighbours=_codes(LATE),
     )  # fmt: skip
 
 
 def _second(kind: str, delay: int) -> Fault:
     """Return one to whose requests a second answer comes after so many ms: it may run into what neighbours are sent."""
-    return Fault(_codes(STRUCK), _codes(STRUCK), ailments={kind: {"delay": delay / 1000}}, neighbours=_codes(STRUCK))
+    return Fault(_codes(STRUCK), _codes(STRUCK), faults={kind: {"delay": delay / 1000}}, neighbours=_codes(STRUCK))
 
 
 FAMILY: Mapping[str, Fault] = {
@@ -101,7 +101,7 @@ FAMILY: Mapping[str, Fault] = {
     "cut short": _ill("malformed", truncated={"length": 5}),
     "another slave's id": _ill("wrong_slave", wrong_id={"value": STRANGER}),
     "another function": _ill("wrong_function", wrong_function={}),
-    "another count": Fault(_codes("malformed late"), ailments={"wrong_count": {}}),  # a barrier's is late
+    "another count": Fault(_codes("malformed late"), faults={"wrong_count": {}}),  # a barrier's is late
     "noise before the answer": _ill(leading_noise={}),
     "noise behind the answer": _ill(trailing_noise={}),
     "not a number": _ill("not_finite", nan={}),
@@ -163,7 +163,7 @@ def mix(daemon: DaemonInMemory, random: Random, seconds: float) -> str:
                 particulars["delay"] = random.choice((0.02, 0.1, 0.25, 0.6, 1.3))
             elif kind == "exception":
                 particulars["code"] = random.choice((2, 3, 6))
-            sensor.ail(kind, rate, **particulars)
+            sensor.add_fault(kind, rate, **particulars)
             words.append(f"{sensor.slave} {kind} {rate} {particulars}")
     for trouble, share in ((_stray, 0.3), (_babble, 0.1), (_second_master, 0.15), (_unplugged, 0.05), (_away, 0.2)):
         if random.random() < share:

@@ -43,7 +43,7 @@ def build(plan: LinePlan, faults: FaultFile | None = None, *, keep_log: bool = F
         entry = faults.slaves.get(slave, SlaveEntry())
         for copy in range(entry.copies):
             sensor = line.add(_sensor(plan, slave, entry, plan.seed + copy))
-            sensor.ailments += [fault.ailment for fault in (*faults.all, *entry.faults)]
+            sensor.faults += [fault.sensor_fault for fault in (*faults.all, *entry.faults)]
     for spell in faults.line.babble:
         babble(line, spell.after, spell.last, spell.every)
     for noise in faults.line.noise:

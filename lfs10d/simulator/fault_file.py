@@ -1,4 +1,4 @@
-"""The faults file: what ails which sensor and the line, in YAML, with the place of every mistake.
+"""The faults file in YAML: the faults of each sensor and of the line; errors have a line and column.
 
 ::
 
@@ -29,7 +29,7 @@ from lfs10d.errors import ConfigError, Problem
 from lfs10d.schema.document import decode, parse
 from lfs10d.schema.fields import Choice, Duration, Flag, Whole
 from lfs10d.schema.quantities import BAUDRATES
-from lfs10d.simulator.faults import Ailment, FaultKind, ailment
+from lfs10d.simulator.faults import FaultKind, SensorFault, sensor_fault
 
 DAY = 86400
 MOST_COPIES = 8
@@ -78,9 +78,9 @@ class FaultEntry(WindowEntry):
     reads: Literal["old", "new"] = Field("old", description="For dip_locked: what its id register holds then.")
 
     @property
-    def ailment(self) -> Ailment:
+    def sensor_fault(self) -> SensorFault:
         """The fault as the simulator plays it."""
-        return ailment(
+        return sensor_fault(
             self.fault,
             self.rate,
             delay=self.delay,

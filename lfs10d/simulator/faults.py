@@ -1,16 +1,17 @@
-"""What can ail a sensor or a line: kinds, how often, and when.
+"""The faults of a simulated sensor or line: kinds, how often, and when.
 
-An ailment without times is always there; `first` and `last` bound it, `every` repeats that window. Times are
+A fault without times is always there; `first` and `last` bound it, `every` repeats that window. Times are
 integer nanoseconds of the line's clock. Whether it strikes is drawn per request from the sensor's own,
 seeded random source, so a run can be repeated exactly.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from random import Random
-from typing import Literal
+from typing import Literal, TypeAlias
 
 from lfs10d.simulator.wire import nanoseconds
 
@@ -86,9 +87,6 @@ class FaultKind(StrEnum):
     """Without power during the window; afterwards stored settings take effect."""
 
 
-STRIKES_VALUES = frozenset(
-    {FaultKind.NAN, FaultKind.INFINITE, FaultKind.OUT_OF_RANGE, FaultKind.SUBNORMAL, FaultKind.STUCK}
-)
 STRIKES_ANSWERS = frozenset({FaultKind.WRONG_ID, FaultKind.WRONG_FUNCTION, FaultKind.WRONG_COUNT, FaultKind.WRONG_ECHO})
 STRIKES_FRAMES = frozenset(
     {FaultKind.NOISY, FaultKind.GARBAGE, FaultKind.TRUNCATED, FaultKind.LEADING_NOISE, FaultKind.TRAILING_NOISE},
@@ -104,7 +102,7 @@ class Window:
     every: int | None = None
 
     def covers(self, now: int) -> bool:
-        """Say whether it holds at `now`."""
+        """Return whether it holds at `now`."""
         if now < self.first or self.last is None:
             return now >= self.first
         if self.every is not None:
@@ -122,7 +120,7 @@ ALWAYS = Window()
 
 
 def window(first: float = 0.0, last: float | None = None, every: float | None = None) -> Window:
-    """Return a window told in seconds."""
+    """Return a window with times in seconds."""
     return Window(
         nanoseconds(first),
         None if last is None else nanoseconds(last),
@@ -131,7 +129,7 @@ def window(first: float = 0.0, last: float | None = None, every: float | None = 
 
 
 @dataclass(frozen=True, slots=True)
-class Ailment:
+class SensorFault:
     """One fault of one sensor: what, in how many of its answers, when, and its particulars."""
 
     kind: FaultKind
@@ -152,6 +150,9 @@ class Ailment:
         return self.window.covers(now) and (self.rate >= 1.0 or random.random() < self.rate)
 
 
+ActiveFaults: TypeAlias = Mapping[FaultKind, SensorFault]
+"""The faults that show in the reply to one request."""
+
 DEFAULT_DELAYS = {
     FaultKind.LATE: 0.6,
     FaultKind.SLOW_BYTES: 0.001,
@@ -165,7 +166,7 @@ DEFAULT_DELAYS = {
 """Seconds, where none is given."""
 
 
-def ailment(
+def sensor_fault(
     kind: FaultKind | str,
     rate: float = 1.0,
     *,
@@ -174,12 +175,12 @@ def ailment(
     last: float | None = None,
     every: float | None = None,
     **particulars: int | str | None,
-) -> Ailment:
-    """Return an ailment told in seconds; `particulars` are code, value, length, answer and reads.
+) -> SensorFault:
+    """Return a fault with times in seconds; `particulars` are code, value, length, answer and reads.
 
     Raises ValueError for an unknown kind, TypeError for an unknown particular.
     """
     kind = FaultKind(kind)
     seconds = DEFAULT_DELAYS.get(kind, 0.0) if delay is None else delay
-    plain = Ailment(kind, rate, window(first, last, every), nanoseconds(seconds))
+    plain = SensorFault(kind, rate, window(first, last, every), nanoseconds(seconds))
     return replace(plain, **particulars)  # type: ignore[arg-type]  # replace checks the names, the kinds use them

@@ -85,7 +85,7 @@ def test_a_sensor_that_answers_at_the_second_attempt_is_read(lfs10d: Lfs10d, sen
 
 
 def test_garbled_answers_are_shown_in_hex_and_explained(lfs10d: Lfs10d, sensors: PtyLine) -> None:
-    sensors.line.add(Sensor(3)).ail("noisy")
+    sensors.line.add(Sensor(3)).add_fault("noisy")
     done = lfs10d("read", sensors.path, "3")
     assert done.returncode == 1
     assert "Bytes came, as many as an answer has, but their check is wrong." in done.stderr
@@ -94,7 +94,7 @@ def test_garbled_answers_are_shown_in_hex_and_explained(lfs10d: Lfs10d, sensors:
 
 
 def test_a_refusal_is_explained_at_once(lfs10d: Lfs10d, sensors: PtyLine) -> None:
-    sensors.line.add(Sensor(3)).ail("exception")
+    sensors.line.add(Sensor(3)).add_fault("exception")
     done = lfs10d("read", sensors.path, "3")
     assert done.returncode == 1
     assert "after 1 attempt: exception 02 illegal register address" in done.stderr
@@ -102,7 +102,7 @@ def test_a_refusal_is_explained_at_once(lfs10d: Lfs10d, sensors: PtyLine) -> Non
 
 
 def test_a_busy_device_is_asked_again(lfs10d: Lfs10d, sensors: PtyLine) -> None:
-    sensors.line.add(Sensor(3)).ail("exception", code=6)
+    sensors.line.add(Sensor(3)).add_fault("exception", code=6)
     assert "after 3 attempts: exception 06 busy" in lfs10d("read", sensors.path, "3").stderr
 
 

@@ -27,7 +27,7 @@ from tests.support.verbs import AtTerminal, Lfs10d
 
 def wild(slave: int) -> Sensor:
     sensor = Sensor(slave)
-    sensor.ail("wildcard")
+    sensor.add_fault("wildcard")
     return sensor
 
 

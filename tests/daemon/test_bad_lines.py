@@ -65,15 +65,15 @@ class Recorded:
 def ail(line: SimulatedLine, kind: str) -> None:
     """Let two neighbours show it now and then, and nobody anything else."""
     for sensor in line.sensors:
-        sensor.heal()
+        sensor.clear_faults()
         sensor.hung = False
     for slave in (2, 3):
-        line.sensor(slave).ail(kind, SHARE, **KINDS[kind])
+        line.sensor(slave).add_fault(kind, SHARE, **KINDS[kind])
 
 
 def heal(line: SimulatedLine) -> None:
     for sensor in line.sensors:
-        sensor.heal()
+        sensor.clear_faults()
         sensor.hung = False
 
 

@@ -22,7 +22,7 @@ def test_a_sensor_that_dies_fails_three_times_then_is_offline_and_reported_once(
     view.wait("device/slave-2/state", good)
     view.wait_samples("slave-2", 3)
 
-    tell(served, lambda line: line.sensor(2).ail(FaultKind.SILENT))
+    tell(served, lambda line: line.sensor(2).add_fault(FaultKind.SILENT))
     error = view.wait("device/slave-2/error", failing)
     view.wait("device/slave-2/availability", "offline".__eq__)
 
@@ -37,7 +37,7 @@ def test_a_sensor_that_dies_fails_three_times_then_is_offline_and_reported_once(
     assert view.newest("line/error")["active"] is False
     assert view.newest("device/slave-1/availability") == "online"
 
-    tell(served, lambda line: line.sensor(2).heal())
+    tell(served, lambda line: line.sensor(2).clear_faults())
     cleared = view.wait("device/slave-2/error", lambda error: not failing(error) and error["last_code"])
     view.wait("device/slave-2/availability", "online".__eq__)
 
@@ -59,7 +59,7 @@ def test_what_proves_a_sensor_alive_leaves_it_online(
     site.run()
     view.wait_samples("slave-2", 3, good)
 
-    tell(served, lambda line: line.sensor(2).ail(kind))
+    tell(served, lambda line: line.sensor(2).add_fault(kind))
     error = view.wait("device/slave-2/error", failing)
 
     assert error["code"] == code
@@ -75,7 +75,7 @@ def test_a_sensor_that_says_it_is_busy_is_neither_failing_nor_offline(site: Site
     site.run()
     view.wait_samples("slave-2", 3, good)
 
-    tell(served, lambda line: line.sensor(2).ail(FaultKind.EXCEPTION, code=6))
+    tell(served, lambda line: line.sensor(2).add_fault(FaultKind.EXCEPTION, code=6))
     view.wait_samples("slave-2", 6, lambda one: one["error"] == "exception")
 
     assert not any(failing(each) for each in view.history_of("device/slave-2/error"))

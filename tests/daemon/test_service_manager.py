@@ -72,7 +72,7 @@ def fed(run: Run) -> list[float]:
 
 def test_ready_comes_after_the_first_exchange(site: Site) -> None:
     served = site.line((1,))
-    served.line.sensor(1).ail(FaultKind.SILENT)
+    served.line.sensor(1).add_fault(FaultKind.SILENT)
     site.write(slaves=[{"id": 1, "response_timeout": "1500ms"}])
     run = site.run()
     eventually(lambda: served.line.judge.requests, "a request")

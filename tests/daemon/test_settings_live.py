@@ -132,7 +132,7 @@ def test_a_failed_poll_is_asked_again_as_often_as_told(site: Site, view: View) -
     site.run()
     view.wait_samples("slave-1", 3, good)
 
-    tell(served, lambda line: line.sensor(1).ail(FaultKind.NOISY))
+    tell(served, lambda line: line.sensor(1).add_fault(FaultKind.NOISY))
     asked = len(served.line.log)
     error = view.wait("device/slave-1/error", lambda error: error["active"])
 

@@ -43,7 +43,7 @@ def test_the_example_is_a_faults_file() -> None:
     (text,) = re.findall(r"^```yaml\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
     faults = parse_faults(text, "faults.yaml", range(1, 9))
     assert faults.line.echo
-    assert faults.slaves[4].faults[1].ailment.rate == 0.05
+    assert faults.slaves[4].faults[1].sensor_fault.rate == 0.05
 
 
 def test_a_key_without_description_is_refused() -> None:

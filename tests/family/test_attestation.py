@@ -21,10 +21,10 @@ READ = bytes((3, 0, 1, 0, 2))
 class Wire:
     """A line with sensors 1 and 2 that a test asks by hand, at 1, 2, 3 ... s."""
 
-    def __init__(self, **ailments: float) -> None:
+    def __init__(self, **faults: float) -> None:
         self.line = SimulatedLine([Sensor(1), Sensor(2)])
-        for kind, rate in ailments.items():
-            self.line.sensor(1).ail(kind, rate)
+        for kind, rate in faults.items():
+            self.line.sensor(1).add_fault(kind, rate)
         self.clock = VirtualClock()
         self.port = SimulatedPort(self.line, self.clock, PortSettings("/dev/simulated", 9600))
         self.port.open()

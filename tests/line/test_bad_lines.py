@@ -77,7 +77,7 @@ def test_each_fault_of_a_sensor_has_its_code_and_spares_the_others(rigs: Rigs, n
     bad = FAMILY[name]
     rig = rigs(4, interval=0.25, response_timeout=fixed)
     rig.run(2.0)
-    rig.line.sensor(ILL).ail(bad.kind, bad.rate, **bad.particulars)
+    rig.line.sensor(ILL).add_fault(bad.kind, bad.rate, **bad.particulars)
     rig.run(LASTS).prove()
     assert rig.codes(ILL, since=3.0).keys() <= bad.codes
     if bad.codes != LATENESS:  # that is learned
@@ -95,7 +95,7 @@ def test_a_fault_in_a_third_of_the_answers_never_yields_a_wrong_value(rigs: Rigs
     bad = FAMILY[name]
     rig = rigs(3, interval=0.0, rules=PollRules(retries=0), in_turn=True)
     for sensor in rig.line.sensors:
-        sensor.ail(bad.kind, 0.33, **bad.particulars)
+        sensor.add_fault(bad.kind, 0.33, **bad.particulars)
     rig.run(15.0).prove()
     assert all(rig.good(slave) for slave in (1, 2, 3))
     seen = {code for slave in (1, 2, 3) for code in rig.codes(slave)}
@@ -104,7 +104,7 @@ def test_a_fault_in_a_third_of_the_answers_never_yields_a_wrong_value(rigs: Rigs
 
 def test_a_busy_sensor_stays_online_and_is_no_error_of_the_line(rigs: Rigs) -> None:
     rig = rigs(1, interval=0.25)
-    rig.line.sensor(1).ail("exception", code=6)
+    rig.line.sensor(1).add_fault("exception", code=6)
     rig.run(10.0).prove()
     assert all(reading.fault and reading.fault.busy and reading.online for reading in rig.of(1))
 
@@ -112,11 +112,11 @@ def test_a_busy_sensor_stays_online_and_is_no_error_of_the_line(rigs: Rigs) -> N
 def test_a_sensor_that_hangs_is_offline_until_its_power_is_cycled(rigs: Rigs) -> None:
     rig = rigs(2, interval=0.25)
     rig.run(5.0)
-    rig.line.sensor(1).ail("exception")
-    rig.line.sensor(1).ail("hangs")
+    rig.line.sensor(1).add_fault("exception")
+    rig.line.sensor(1).add_fault("hangs")
     rig.run(20.0)
     assert not rig.of(1)[-1].online
-    rig.line.sensor(1).heal()
+    rig.line.sensor(1).clear_faults()
     rig.line.sensor(1).power_cycle()
     rig.run(40.0).prove()
     assert rig.good(1, since=37.0)
@@ -213,7 +213,7 @@ KINDS = sorted({bad.kind for bad in FAMILY.values()} - {"wrong_id"})
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_any_mix_of_faults_yields_no_wrong_value_and_always_a_code(
     rigs: Rigs,
-    ailments: list[list[tuple[str, float, float]]],
+    faults: list[list[tuple[str, float, float]]],
     fixed: float | None,
     interval: float,
     echo: bool,  # noqa: FBT001  # drawn
@@ -222,7 +222,7 @@ def test_any_mix_of_faults_yields_no_wrong_value_and_always_a_code(
     seed: int,
 ) -> None:
     rig = rigs(
-        len(ailments),
+        len(faults),
         interval=interval,
         response_timeout=fixed,
         echo=echo,
@@ -232,9 +232,9 @@ def test_any_mix_of_faults_yields_no_wrong_value_and_always_a_code(
         rules=PollRules(retries=retries),
         in_turn=True,
     )
-    for sensor, kinds in zip(rig.line.sensors, ailments, strict=True):
+    for sensor, kinds in zip(rig.line.sensors, faults, strict=True):
         for kind, rate, delay in kinds:
-            sensor.ail(kind, rate, delay=delay if kind == "late" else 0.003)
+            sensor.add_fault(kind, rate, delay=delay if kind == "late" else 0.003)
     rig.run(12.0).prove()
     expected = codes("timeout", "late", "crc", "malformed", "wrong_slave", "wrong_function", "collision") | ALIVE_CODES
     for reading in rig.readings:

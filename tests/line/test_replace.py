@@ -59,10 +59,10 @@ def test_a_requested_poll_is_done_once_whatever_the_device_is(rigs: Rigs, state:
     specs = [rigs.spec(slave, 10.0, enabled=(slave, state) != (1, "disabled")) for slave in (1, 2)]
     rig = rigs(2, polled=specs)
     if state == "offline":
-        rig.line.sensor(1).ail("silent")
+        rig.line.sensor(1).add_fault("silent")
         rig.run(41.0)
         assert not rig.of(1)[-1].online
-        rig.line.sensor(1).heal()
+        rig.line.sensor(1).clear_faults()
     elif state != "unheard":
         rig.run(41.0)
     asked = rig.clock.now
@@ -75,7 +75,7 @@ def test_a_requested_poll_is_done_once_whatever_the_device_is(rigs: Rigs, state:
 
 def test_a_requested_poll_waits_for_the_exchange_in_progress_only(rigs: Rigs) -> None:
     rig = rigs(32, interval=0.0)
-    rig.line.sensor(5).ail("silent")
+    rig.line.sensor(5).add_fault("silent")
     waits = []
     for n in range(50):
         rig.run(30.0 + n * 0.4371)  # no probe of 1 s falls into what follows
@@ -93,7 +93,7 @@ def test_a_requested_poll_waits_for_the_exchange_in_progress_only(rigs: Rigs) ->
 def test_a_requested_poll_ends_with_the_port_and_is_told_at_once_while_it_is_lost(rigs: Rigs) -> None:
     specs = [rigs.spec(1, 10.0), rigs.spec(2, 10.0, enabled=False)]
     rig = rigs(2, polled=specs)
-    rig.line.sensor(2).ail("silent")
+    rig.line.sensor(2).add_fault("silent")
     rig.run(5.0)
     requested(rig, 2, 1)
     rig.run(5.1)
@@ -109,7 +109,7 @@ def test_a_requested_poll_ends_with_the_port_and_is_told_at_once_while_it_is_los
 
 def test_a_requested_poll_of_a_device_that_is_removed_in_between_is_dropped(rigs: Rigs) -> None:
     rig = rigs(2, interval=10.0).run(5.0)
-    rig.line.sensor(1).ail("silent")
+    rig.line.sensor(1).add_fault("silent")
     requested(rig, 1, 1)
     rig.run(5.01)
     rig.poller.replace([rigs.spec(2, 10.0)], RULES)
@@ -146,10 +146,10 @@ def change(rigs: Rigs, rig: Rig, step: list[tuple[int, float, bool, str]] | str,
         case "find":
             rig.port.replug()
         case "silence":
-            rig.line.sensor(number % 5 + 1).ail("silent")
+            rig.line.sensor(number % 5 + 1).add_fault("silent")
         case "heal":
             for sensor in rig.line.sensors:
-                sensor.heal()
+                sensor.clear_faults()
         case _:
             for slave in range(1, 6):
                 if f"slave-{slave}" in rig.poller.scheduler.devices:

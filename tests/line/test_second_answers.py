@@ -25,7 +25,7 @@ def test_a_late_twin_or_a_repeater_is_told_and_yields_no_value(
     rigs: Rigs, kind: str, delay: float, slaves: int, interval: float, turnaround: float
 ) -> None:
     rig = rigs(slaves, turnaround=turnaround, interval=interval)
-    rig.line.sensor(1).ail(kind, delay=delay)
+    rig.line.sensor(1).add_fault(kind, delay=delay)
     rig.run(15.0).prove()
     twice = told(rig)[0]
     assert (twice.device, twice.slave) == ("slave-1", 1)
@@ -42,9 +42,9 @@ def test_a_late_twin_or_a_repeater_is_told_and_yields_no_value(
 @pytest.mark.parametrize("kind", ["twin", "repeated"])
 def test_it_is_over_when_no_second_answer_comes_any_more(rigs: Rigs, kind: str) -> None:
     rig = rigs(1, interval=0.25)
-    rig.line.sensor(1).ail(kind)
+    rig.line.sensor(1).add_fault(kind)
     rig.run(5.0)
-    rig.line.sensor(1).heal()
+    rig.line.sensor(1).clear_faults()
     rig.run(20.0).prove()
     begun, over = told(rig)
     assert begun.fault is not None
@@ -65,7 +65,7 @@ def test_a_well_line_is_asked_as_often_as_before_but_once_after_the_first_answer
 
 def test_a_sensor_that_is_late_is_no_second_one(rigs: Rigs) -> None:
     rig = rigs(2, interval=0.25, in_turn=True)
-    rig.line.sensor(1).ail("late", 0.2, delay=0.4)
+    rig.line.sensor(1).add_fault("late", 0.2, delay=0.4)
     rig.run(60.0).prove()
     assert told(rig) == []
 
@@ -77,7 +77,7 @@ def test_what_a_gateways_target_says_after_an_exception_is_never_the_next_answer
     rigs: Rigs, code: int, interval: float, delay: float
 ) -> None:
     rig = rigs(2, interval=interval, in_turn=True)
-    rig.line.sensor(1).ail("gateway", 0.1, code=code, delay=delay)
+    rig.line.sensor(1).add_fault("gateway", 0.1, code=code, delay=delay)
     rig.run(40.0).prove()
     assert rig.codes(1)[FaultCode.EXCEPTION] > 0
     assert rig.codes(1).keys() <= {
@@ -94,11 +94,11 @@ def test_what_a_gateways_target_says_after_an_exception_is_never_the_next_answer
 
 def test_a_gateway_that_always_refuses_is_asked_once_per_poll(rigs: Rigs) -> None:
     rig = rigs(1, interval=0.25)
-    rig.line.sensor(1).ail("exception", code=11)
+    rig.line.sensor(1).add_fault("exception", code=11)
     rig.run(10.0).prove()
     assert rig.codes(1) == {FaultCode.EXCEPTION: len(rig.of(1))}
     assert len(rig.exchanges) == len(rig.of(1)) >= 35
-    rig.line.sensor(1).heal()
+    rig.line.sensor(1).clear_faults()
     rig.run(15.0).prove()
     assert len(rig.good(1, since=11.5)) > 12
 

@@ -25,28 +25,28 @@ def healthy(rigs: Rigs) -> Rig:
 
 def late_answer(rigs: Rigs) -> Rig:
     rig = rigs(2, interval=1.0, response_timeout=0.5, in_turn=True).run(1.9)
-    rig.line.sensor(1).ail("late", delay=0.55, last=2.5)
+    rig.line.sensor(1).add_fault("late", delay=0.55, last=2.5)
     return rig.run(4.3)
 
 
 def broken_answers(rigs: Rigs) -> Rig:
     rig = rigs(2, interval=1.0).run(0.9)
-    rig.line.sensor(1).ail("noisy", last=1.03)
-    rig.line.sensor(2).ail("truncated", length=4, last=1.6)
+    rig.line.sensor(1).add_fault("noisy", last=1.03)
+    rig.line.sensor(2).add_fault("truncated", length=4, last=1.6)
     return rig.run(2.3)
 
 
 def dead(rigs: Rigs) -> Rig:
     rig = rigs(2, interval=1.0, rules=PollRules(retries=0, offline_after=2)).run(0.9)
-    rig.line.sensor(1).ail("silent", last=5.0)
+    rig.line.sensor(1).add_fault("silent", last=5.0)
     return rig.run(7.9)
 
 
 def refusals(rigs: Rigs) -> Rig:
     rig = rigs(1, interval=0.5).run(0.4)
-    rig.line.sensor(1).ail("exception", last=0.9)
-    rig.line.sensor(1).ail("exception", code=6, first=0.9, last=1.4)
-    rig.line.sensor(1).ail("nan", first=1.4, last=1.9)
+    rig.line.sensor(1).add_fault("exception", last=0.9)
+    rig.line.sensor(1).add_fault("exception", code=6, first=0.9, last=1.4)
+    rig.line.sensor(1).add_fault("nan", first=1.4, last=1.9)
     return rig.run(2.4)
 
 

@@ -60,7 +60,7 @@ def test_a_newcomer_gets_the_next_free_id_and_the_lines_rate(bench: Bench, manne
     bench.go(life, 3.0)
     sensor = plugged(bench)
     if manner:
-        sensor.ail(manner)
+        sensor.add_fault(manner)
     answer = adopted(bench, life, label="Mast, 10 m")
     assert (answer.status, answer.data) == ("ok", {"device": "slave-3", "slave": 3, "from": 1})
     assert (sensor.slave, sensor.format.baudrate) == (3, baudrate)
@@ -68,7 +68,7 @@ def test_a_newcomer_gets_the_next_free_id_and_the_lines_rate(bench: Bench, manne
     slave = life.running.now.slave("slave-3")
     assert slave is not None
     assert (slave.id, slave.label) == (3, "Mast, 10 m")
-    sensor.heal()
+    sensor.clear_faults()
     before = len(life.readings)
     bench.go(life, 10.0)
     assert len([each for each in life.readings[before:] if each.device == "slave-3" and each.values]) >= 8
@@ -121,7 +121,7 @@ def test_a_newcomer_that_wants_a_power_cycle_is_polled_after_it(bench: Bench, ba
     life = bench.sensors(2, baudrate=baudrate)
     bench.go(life, 3.0)
     sensor = plugged(bench)
-    sensor.ail("power_cycle")
+    sensor.add_fault("power_cycle")
     for _ in range(3):
         if adopted(bench, life).code != "power_cycle_needed":
             break
@@ -240,7 +240,7 @@ def test_one_of_another_profile_is_adopted_at_its_factorys_rate(
     life = bench.sensors(names=False, baudrate=line)
     vane = renke(bench, codes)
     if manner:
-        vane.ail(manner)
+        vane.add_fault(manner)
     bench.go(life, 3.0)
     answer = adopted(bench, life, profile="renke.yaml", name="vane")
     assert (answer.status, answer.data) == ("ok", {"device": "vane", "slave": 2, "from": 1})

@@ -37,13 +37,13 @@ def test_every_sensor_and_the_port_move(bench: Bench, manner: str | None, echo: 
     bench.go(life, 5.0)
     for sensor in bench.line.sensors:
         if manner:
-            sensor.ail(manner)
+            sensor.add_fault(manner)
     answer = change(bench, life)
     assert (answer.status, answer.data) == ("ok", {"from": 9600, "to": 19200, "pending": []})
     assert rates(bench) == [19200] * 3
     assert life.told("baudrate_changed") == [{"from": 9600, "to": 19200}]
     for sensor in bench.line.sensors:
-        sensor.heal()
+        sensor.clear_faults()
     assert life.running.now.config.line.baudrate == 19200
     assert min(fresh(bench, life).values()) >= 8
     bench.cut()
@@ -59,20 +59,18 @@ def test_a_dry_run_writes_nothing(bench: Bench) -> None:
 
 def test_nothing_is_written_unless_every_sensor_answers(bench: Bench) -> None:
     life = bench.sensors(3, 4)
-    bench.line.sensor(4).ail("silent")
+    bench.line.sensor(4).add_fault("silent")
     bench.go(life, 3.0)
     answer = change(bench, life)
     assert (answer.status, answer.code) == ("rejected", "timeout")
     assert not [request for request in bench.line.log if request.body[1:2] == b"\x06"]
 
 
-@pytest.mark.parametrize("ailment", ["power_cycle", "stores_but_ignores"])
-def test_a_canary_that_wants_a_power_cycle_is_written_back_and_nobody_else_is_touched(
-    bench: Bench, ailment: str
-) -> None:
+@pytest.mark.parametrize("fault", ["power_cycle", "stores_but_ignores"])
+def test_a_canary_that_wants_a_power_cycle_is_written_back_and_nobody_else_is_touched(bench: Bench, fault: str) -> None:
     life = bench.sensors(3, 4)
     for sensor in bench.line.sensors:
-        sensor.ail(ailment)
+        sensor.add_fault(fault)
     bench.go(life, 3.0)
     answer = change(bench, life)
     assert (answer.status, answer.code) == ("failed", "power_cycle_needed")
@@ -84,26 +82,26 @@ def test_a_canary_that_wants_a_power_cycle_is_written_back_and_nobody_else_is_to
     assert min(fresh(bench, life).values()) >= 8
 
 
-@pytest.mark.parametrize(("ailment", "code"), [("silent", "not_verified"), ("power_cycle", "rolled_back")])
-def test_where_a_later_one_fails_the_others_are_moved_back(bench: Bench, ailment: str, code: str) -> None:
+@pytest.mark.parametrize(("fault", "code"), [("silent", "not_verified"), ("power_cycle", "rolled_back")])
+def test_where_a_later_one_fails_the_others_are_moved_back(bench: Bench, fault: str, code: str) -> None:
     life = bench.sensors(3, 4, 5)
     bench.go(life, 3.0)
     second = bench.line.sensor(4)
-    if ailment == "silent":
+    if fault == "silent":
         struck: list[object] = []
 
         def strike(request: HeardRequest) -> None:
             if request.body[:2] == b"\x04\x06" and not struck:
-                struck.append(second.ail("silent"))
+                struck.append(second.add_fault("silent"))
 
         bench.line.after_each_request(strike)
     else:
-        second.ail(ailment)
+        second.add_fault(fault)
     answer = change(bench, life)
     assert (answer.status, answer.code) == ("failed", code)
     where: dict[str, Any] = {"s3": 9600, "s4": None if code == "not_verified" else 9600, "s5": 9600}
     assert answer.data == {"where": where}
-    second.heal()
+    second.clear_faults()
     second.power_cycle()
     bench.go(life, 120.0)
     assert rates(bench) == [9600] * 3
@@ -114,7 +112,7 @@ def test_where_a_later_one_fails_the_others_are_moved_back(bench: Bench, ailment
 def test_with_power_cycle_all_are_written_and_followed_until_they_come_up(bench: Bench) -> None:
     life = bench.sensors(3, 4)
     for sensor in bench.line.sensors:
-        sensor.ail("power_cycle")
+        sensor.add_fault("power_cycle")
     bench.go(life, 3.0)
     answer = change(bench, life, power_cycle=True)
     assert (answer.status, answer.data) == ("ok", {"from": 9600, "to": 19200, "pending": ["s3", "s4"]})
@@ -136,7 +134,7 @@ def test_with_power_cycle_all_are_written_and_followed_until_they_come_up(bench:
 def test_two_sensors_of_one_id_of_which_one_moves_are_told_and_moved_back(bench: Bench) -> None:
     life = bench.sensors(3, 4)
     twin = bench.line.add(Sensor(4))
-    twin.ail("power_cycle")
+    twin.add_fault("power_cycle")
     bench.go(life, 3.0)
     answer = change(bench, life)
     assert (answer.status, answer.code) == ("failed", "duplicate_id")
@@ -149,7 +147,7 @@ def test_two_sensors_of_one_id_of_which_one_moves_are_told_and_moved_back(bench:
 def test_while_sensors_are_still_to_come_up_nothing_else_is_done_to_them(bench: Bench) -> None:
     life = bench.sensors(3, 4, 5)
     for sensor in bench.line.sensors[:2]:
-        sensor.ail("power_cycle")
+        sensor.add_fault("power_cycle")
     bench.go(life, 3.0)
     assert change(bench, life, power_cycle=True).data == {"from": 9600, "to": 19200, "pending": ["s3", "s4"]}
     assert life.running.now.config.line.baudrate == 19200, "s5 is there already"
@@ -168,7 +166,7 @@ def test_while_sensors_are_still_to_come_up_nothing_else_is_done_to_them(bench: 
 def test_the_rate_of_now_is_not_called_settled_while_sensors_may_come_up_at_another(bench: Bench) -> None:
     life = bench.sensors(3, 4)
     for sensor in bench.line.sensors:
-        sensor.ail("power_cycle")
+        sensor.add_fault("power_cycle")
     bench.go(life, 3.0)
     assert change(bench, life, power_cycle=True).status == "ok"
     answer = change(bench, life, to=9600)

@@ -59,6 +59,6 @@ def test_sensors_that_are_dead_are_found_nowhere(bench: Bench) -> None:
     life = bench.sensors(3, 4)
     told = looking_out(bench, life)
     for sensor in bench.line.sensors:
-        sensor.ail("silent")
+        sensor.add_fault("silent")
     bench.go(life, 60.0)
     assert told == []

@@ -39,8 +39,8 @@ class Case:
         bench.go(life, 3.0)
         if self.newcomer is not None:
             bench.line.add(Sensor(1, format=Format(self.newcomer)))
-        for slave, ailment in self.ails.items():
-            bench.line.sensor(slave).ail(ailment)
+        for slave, fault in self.ails.items():
+            bench.line.sensor(slave).add_fault(fault)
         return life
 
     def ask(self, bench: Bench, life: Life) -> None:
@@ -61,7 +61,7 @@ class Case:
         life = bench.begin()
         bench.go(life, 8.0)
         for sensor in bench.line.sensors:
-            sensor.heal()
+            sensor.clear_faults()
             sensor.power_cycle()
         until = bench.clock.now + SETTLED_WITHIN
         while bench.clock.now < until and (life.physical.open or bench.clock.now < until - SETTLED_WITHIN + 3):

@@ -42,7 +42,7 @@ AILMENTS: list[tuple[str, dict[str, Any]]] = [
     ("late", {"delay": 0.35}),
     ("late", {"delay": 0.75}),
 ]
-SPEAKING = [ailment for ailment in AILMENTS if ailment[0] != "silent"]
+SPEAKING = [sensor_fault for sensor_fault in AILMENTS if sensor_fault[0] != "silent"]
 ENDS = st.one_of(
     st.just(("finish", 0)),
     st.just(("finish", 0)),

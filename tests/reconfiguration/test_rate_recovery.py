@@ -13,11 +13,11 @@ AT_ONCE = 3.0
 """s after the start within which everybody who answers is written back: a look at each, 32 ms, and at one lost."""
 
 
-def cut_short(bench: Bench, how: str, *, ailment: str = "power_cycle", written: int = 6) -> None:
+def cut_short(bench: Bench, how: str, *, sensor_fault: str = "power_cycle", written: int = 6) -> None:
     """Begin a change of eight sensors to 19200 and end the daemon when so many have been written."""
     life = bench.sensors(*SLAVES)
     for sensor in bench.line.sensors:
-        sensor.ail(ailment)
+        sensor.add_fault(sensor_fault)
     bench.go(life, 5.0)
     life.request("line/baudrate", id="c1", to=19200, power_cycle=True)
     while sum(sensor.words[4] != CODE_9600 for sensor in bench.line.sensors) < written:
@@ -46,7 +46,7 @@ def test_one_that_is_lost_does_not_keep_the_others_from_being_put_back_at_once(
 ) -> None:
     cut_short(bench, how)
     straggler = bench.line.sensor(lost)
-    straggler.ail("silent")
+    straggler.add_fault("silent")
     life = bench.begin()
     bench.go(life, AT_ONCE)
     assert stored(bench) == {lost}
@@ -58,7 +58,7 @@ def test_one_that_is_lost_does_not_keep_the_others_from_being_put_back_at_once(
         f"s{slave}": True for slave in SLAVES if slave != lost
     }
     assert life.physical.open, "it is still looked for"
-    straggler.heal("silent")
+    straggler.clear_faults("silent")
     bench.go(life, 30.0)
     assert stored(bench) == set()
     assert not life.physical.open
@@ -67,8 +67,8 @@ def test_one_that_is_lost_does_not_keep_the_others_from_being_put_back_at_once(
 
 
 def test_of_sensors_that_obeyed_at_once_those_that_answer_are_moved_back_before_one_that_is_lost(bench: Bench) -> None:
-    cut_short(bench, "sigterm", ailment="at_once")
-    bench.line.sensor(3).ail("silent")
+    cut_short(bench, "sigterm", sensor_fault="at_once")
+    bench.line.sensor(3).add_fault("silent")
     life = bench.begin()
     bench.go(life, 20.0)
     assert stored(bench) == {3}
@@ -77,7 +77,7 @@ def test_of_sensors_that_obeyed_at_once_those_that_answer_are_moved_back_before_
 
 def test_the_request_is_answered_once_though_one_is_never_found(bench: Bench) -> None:
     cut_short(bench, "cut")
-    bench.line.sensor(4).ail("silent")
+    bench.line.sensor(4).add_fault("silent")
     life = bench.begin()
     bench.go(life, 100.0)
     (response,) = bench.responses
@@ -89,7 +89,7 @@ def test_the_request_is_answered_once_though_one_is_never_found(bench: Bench) ->
 
 def test_a_lost_one_is_asked_at_the_line_s_own_rate_first(bench: Bench) -> None:
     cut_short(bench, "sigterm")
-    bench.line.sensor(5).ail("silent")
+    bench.line.sensor(5).add_fault("silent")
     life = bench.begin()
     before = len(bench.line.log)
     bench.go(life, 60.0)
@@ -108,7 +108,7 @@ def test_where_the_line_s_rate_had_moved_it_moves_back_before_the_last_one_is_fo
     bench.go(life, 15.0)
     assert life.running.now.config.line.baudrate == 9600
     assert {name: count >= 8 for name, count in fresh(bench, life).items()} == {"s3": True, "s4": True}
-    bench.line.sensor(5).heal()
+    bench.line.sensor(5).clear_faults()
     bench.go(life, 60.0)
     assert not life.physical.open
     assert stored(bench) == set()
@@ -129,7 +129,7 @@ def moved_but_not_closed(bench: Bench) -> Life:
         except PowerCutError:
             pass
         bench.cut(*bench.files.seen)
-        bench.line.sensor(5).ail("silent")
+        bench.line.sensor(5).add_fault("silent")
         life = bench.begin()
         if life.running.now.config.line.baudrate == 19200 and life.physical.open:
             return life

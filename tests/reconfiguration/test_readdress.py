@@ -26,14 +26,14 @@ def test_a_sensor_that_obeys_is_moved_and_polled_at_its_new_id(bench: Bench, man
     life = bench.sensors(3, 4, echo=echo)
     bench.go(life, 5.0)
     if manner:
-        bench.line.sensor(3).ail(manner)
+        bench.line.sensor(3).add_fault(manner)
     answer = bench.readdress(life, "s3", 9)
     assert (answer.status, answer.code, answer.data) == ("ok", None, {"device": "s3", "from": 3, "to": 9})
     assert {sensor.slave for sensor in bench.line.sensors} == {9, 4}
     assert life.place("s3") == 9
     assert life.told("readdressed") == [{"device": "s3", "from": 3, "to": 9}]
     assert not life.physical.reserved()
-    bench.line.sensor(9).heal()
+    bench.line.sensor(9).clear_faults()
     before = len(life.readings)
     bench.go(life, 10.0)
     after = [reading for reading in life.readings[before:] if reading.device == "s3"]
@@ -43,7 +43,7 @@ def test_a_sensor_that_obeys_is_moved_and_polled_at_its_new_id(bench: Bench, man
 
 
 @pytest.mark.parametrize(
-    ("ailment", "particulars", "code"),
+    ("sensor_fault", "particulars", "code"),
     [
         ("dip_locked", {"answer": "echo", "reads": "old"}, "dip_switch"),
         ("dip_locked", {"answer": "echo", "reads": "new"}, "power_cycle_needed"),
@@ -54,10 +54,10 @@ def test_a_sensor_that_obeys_is_moved_and_polled_at_its_new_id(bench: Bench, man
     ],
 )
 def test_one_that_does_not_obey_stays_and_the_answer_says_why(
-    bench: Bench, ailment: str, particulars: dict[str, Any], code: str
+    bench: Bench, sensor_fault: str, particulars: dict[str, Any], code: str
 ) -> None:
     life = bench.sensors(3, 4)
-    bench.line.sensor(3).ail(ailment, **particulars)
+    bench.line.sensor(3).add_fault(sensor_fault, **particulars)
     bench.go(life, 5.0)
     answer = bench.readdress(life, "s3", 9)
     assert (answer.status, answer.code) == ("failed", code)
@@ -77,12 +77,12 @@ def test_two_sensors_that_part_are_told_and_do_not_meet_again_at_a_power_cycle(b
     life = bench.sensors(3, 4)
     calm(bench)  # two that answer bit-identically cannot be told apart before
     twin = bench.line.add(Sensor(3, source=lambda _: 0.0))
-    twin.ail(manner)
+    twin.add_fault(manner)
     bench.go(life, 3.0)
     answer = bench.readdress(life, "s3", 9)
     assert (answer.status, answer.code) == ("failed", "duplicate_id")
     assert life.told("duplicate_id") == [{"device": "s3", "slave": 9, "from": 3}]
-    twin.heal()
+    twin.clear_faults()
     for sensor in bench.line.sensors:
         sensor.power_cycle()
     bench.go(life, 30.0)

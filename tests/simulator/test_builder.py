@@ -20,7 +20,7 @@ def ask(line: SimulatedLine, body: str, now: int) -> None:
 def test_a_well_line_needs_no_file() -> None:
     line = build(LinePlan((1, 2, 255)))
     assert [sensor.slave for sensor in line.sensors] == [1, 2, 255]
-    assert not any(sensor.ailments for sensor in line.sensors)
+    assert not any(sensor.faults for sensor in line.sensors)
     assert not line.keep_log
 
 
@@ -39,7 +39,7 @@ def test_the_file_says_where_a_sensor_differs() -> None:
     assert [sensor.slave for sensor in two] == [2, 2]
     assert {(sensor.turnaround, sensor.jitter, sensor.format) for sensor in two} == {(0.02, 0.001, Format(19200))}
     assert (one.turnaround, one.jitter, one.format) == (0.005, 0.0, Format())
-    assert all(len(sensor.ailments) == 1 for sensor in line.sensors)
+    assert all(len(sensor.faults) == 1 for sensor in line.sensors)
 
 
 def test_the_file_says_what_troubles_the_line() -> None:

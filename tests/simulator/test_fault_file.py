@@ -8,7 +8,7 @@ import pytest
 
 from lfs10d.errors import ConfigError
 from lfs10d.simulator.fault_file import FaultFile, load_faults, parse_faults
-from lfs10d.simulator.faults import FaultKind, ailment
+from lfs10d.simulator.faults import FaultKind, sensor_fault
 
 
 def problems(text: str) -> list[str]:
@@ -20,30 +20,30 @@ def problems(text: str) -> list[str]:
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("slaves: {3: silent}", (ailment("silent"),)),
-        ("slaves: {3: [silent, nan]}", (ailment("silent"), ailment("nan"))),
-        ("slaves: {3: {fault: late, delay: 700ms, rate: 0.1}}", (ailment("late", 0.1, delay=0.7),)),
-        ("slaves: {3: {faults: [{fault: exception, code: 6}]}}", (ailment("exception", code=6),)),
+        ("slaves: {3: silent}", (sensor_fault("silent"),)),
+        ("slaves: {3: [silent, nan]}", (sensor_fault("silent"), sensor_fault("nan"))),
+        ("slaves: {3: {fault: late, delay: 700ms, rate: 0.1}}", (sensor_fault("late", 0.1, delay=0.7),)),
+        ("slaves: {3: {faults: [{fault: exception, code: 6}]}}", (sensor_fault("exception", code=6),)),
         (
             "slaves: {3: {faults: {fault: silent, after: 10s, for: 5s, every: 1m}}}",
-            (ailment("silent", first=10, last=15, every=60),),
+            (sensor_fault("silent", first=10, last=15, every=60),),
         ),
         (
             "slaves: {3: [{fault: dip_locked, answer: exception, reads: new}, {fault: wrong_id, id: 7}]}",
-            (ailment("dip_locked", answer="exception", reads="new"), ailment("wrong_id", value=7)),
+            (sensor_fault("dip_locked", answer="exception", reads="new"), sensor_fault("wrong_id", value=7)),
         ),
-        ("slaves: {3: {fault: garbage, bytes: 12}}", (ailment("garbage", length=12),)),
+        ("slaves: {3: {fault: garbage, bytes: 12}}", (sensor_fault("garbage", length=12),)),
     ],
 )
 def test_faults_can_be_written_short_or_long(text: str, expected: tuple[object, ...]) -> None:
     faults = parse_faults(text, "f.yaml", [3])
-    assert tuple(fault.ailment for fault in faults.slaves[3].faults) == expected
+    assert tuple(fault.sensor_fault for fault in faults.slaves[3].faults) == expected
 
 
 @pytest.mark.parametrize("kind", list(FaultKind))
 def test_every_kind_can_be_named(kind: FaultKind) -> None:
     (fault,) = parse_faults(f"all: {kind}", "f.yaml", []).all
-    assert fault.ailment.kind is kind
+    assert fault.sensor_fault.kind is kind
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.simulator.faults import ALWAYS, FaultKind, Window, ailment, window
+from lfs10d.simulator.faults import ALWAYS, FaultKind, Window, sensor_fault, window
 from lfs10d.simulator.wire import SECOND
 
 TIMES = st.integers(min_value=0, max_value=1000)
@@ -47,27 +47,27 @@ def test_a_window_in_seconds_can_repeat() -> None:
 
 def test_a_rate_is_the_share_of_answers() -> None:
     random = Random(1)  # noqa: S311  # a repeatable draw
-    one = ailment("noisy", 0.25)
+    one = sensor_fault("noisy", 0.25)
     assert 200 < sum(one.strikes(0, random) for _ in range(1000)) < 300
 
 
 def test_outside_its_window_nothing_strikes() -> None:
-    one = ailment("noisy", first=5.0)
+    one = sensor_fault("noisy", first=5.0)
     assert not one.strikes(0, Random(1))  # noqa: S311  # a repeatable draw
     assert one.strikes(5 * SECOND, Random(1))  # noqa: S311  # a repeatable draw
 
 
 def test_late_has_a_delay_of_its_own_unless_told() -> None:
-    assert ailment(FaultKind.LATE).delay == SECOND * 6 // 10
-    assert ailment(FaultKind.LATE, delay=0.1).delay == SECOND // 10
-    assert ailment(FaultKind.NOISY).delay == 0
+    assert sensor_fault(FaultKind.LATE).delay == SECOND * 6 // 10
+    assert sensor_fault(FaultKind.LATE, delay=0.1).delay == SECOND // 10
+    assert sensor_fault(FaultKind.NOISY).delay == 0
 
 
 def test_an_unknown_kind_is_refused() -> None:
     with pytest.raises(ValueError, match="sleepy"):
-        ailment("sleepy")
+        sensor_fault("sleepy")
 
 
 def test_an_unknown_particular_is_refused() -> None:
     with pytest.raises(TypeError, match="colour"):
-        ailment("noisy", colour="red")
+        sensor_fault("noisy", colour="red")

@@ -63,7 +63,7 @@ def test_a_sensor_at_another_rate_is_never_understood_and_never_understands(benc
 def test_a_broken_request_upsets_nobody_at_another_rate(bench: Maker) -> None:
     line = bench(Sensor(1), Sensor(2, format=Format(19200)))
     for sensor in line.line.sensors:
-        sensor.ail("hangs")
+        sensor.add_fault("hangs")
     line.port.write(b"\x01\x03")
     line.listen(0.1)
     assert [sensor.hung for sensor in line.line.sensors] == [True, False]

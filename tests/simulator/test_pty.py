@@ -91,7 +91,7 @@ def test_a_master_that_returns_is_answered_again(line: SimulatedLine) -> None:
 
 
 def test_what_comes_while_nobody_listens_is_lost(line: SimulatedLine) -> None:
-    line.sensor(1).ail("late", delay=0.2)
+    line.sensor(1).add_fault("late", delay=0.2)
     with PtyLine(line) as port:
         with opened(port.path) as descriptor:
             os.write(descriptor, REQUEST)

@@ -12,7 +12,7 @@ LASTS = Format().span(9)
 
 def test_an_answer_waits_until_the_one_before_is_over_and_silence_was_kept() -> None:
     sensor = QueuedSensor(1, turnaround=0.005)
-    sensor.ail("late", delay=0.5, last=1.0)
+    sensor.add_fault("late", delay=0.5, last=1.0)
     first = sensor.hear(READ, 900_000_000)
     second = sensor.hear(READ, 1_100_000_000)
     assert first is not None

@@ -102,7 +102,7 @@ def test_a_rate_written_anew_changes_nothing(bench: Maker) -> None:
 
 def test_one_that_obeys_at_once_echoes_from_the_new_place(bench: Maker) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).ail("at_once")
+    line.line.sensor(1).add_fault("at_once")
     assert line.write(1, ID, 9) == bytes.fromhex("09 06 00 05 00 09")
     assert line.write(9, RATE, 2) is None
     assert line.heard  # the echo, at 19200: noise
@@ -111,7 +111,7 @@ def test_one_that_obeys_at_once_echoes_from_the_new_place(bench: Maker) -> None:
 def test_power_cycle_needing_ones_read_new_and_answer_at_the_old_place(bench: Maker) -> None:
     line = bench(Sensor(1))
     sensor = line.line.sensor(1)
-    sensor.ail("power_cycle")
+    sensor.add_fault("power_cycle")
     line.write(1, ID, 9)
     assert line.id_of(1) == 9
     assert line.id_of(9) is None
@@ -122,7 +122,7 @@ def test_power_cycle_needing_ones_read_new_and_answer_at_the_old_place(bench: Ma
 def test_one_that_stores_but_ignores_never_obeys(bench: Maker) -> None:
     line = bench(Sensor(1))
     sensor = line.line.sensor(1)
-    sensor.ail("stores_but_ignores")
+    sensor.add_fault("stores_but_ignores")
     line.write(1, ID, 9)
     sensor.power_cycle()
     assert line.id_of(1) == 9
@@ -134,7 +134,7 @@ def test_one_that_stores_but_ignores_never_obeys(bench: Maker) -> None:
 def test_the_dip_switch_wins_in_every_variant(bench: Maker, reads: str, answer: str) -> None:
     line = bench(Sensor(1))
     sensor = line.line.sensor(1)
-    sensor.ail("dip_locked", answer=answer, reads=reads, code=3)
+    sensor.add_fault("dip_locked", answer=answer, reads=reads, code=3)
     echo = bytes.fromhex("01 06 00 05 00 09")
     assert line.write(1, ID, 9) == (echo if answer == "echo" else bytes.fromhex("01 86 03"))
     assert line.id_of(1) == (9 if reads == "new" else 1)
@@ -146,7 +146,7 @@ def test_the_dip_switch_wins_in_every_variant(bench: Maker, reads: str, answer: 
 
 def test_a_lost_echo_does_not_undo_the_write(bench: Maker) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).ail("echo_losing")
+    line.line.sensor(1).add_fault("echo_losing")
     assert line.write(1, ID, 9) is None
     assert line.id_of(9) == 9
     assert line.exchange(bytes.fromhex("09 06 00 03 00 01")) == bytes.fromhex("09 86 02")
@@ -154,7 +154,7 @@ def test_a_lost_echo_does_not_undo_the_write(bench: Maker) -> None:
 
 def test_slow_flash_is_silent_after_the_echo_of_a_change_only(bench: Maker) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).ail("slow_flash", delay=3.0)
+    line.line.sensor(1).add_fault("slow_flash", delay=3.0)
     assert line.write(1, ID, 1) is not None
     assert line.id_of(1) == 1
     assert line.write(1, ID, 9) is not None
@@ -173,14 +173,14 @@ def test_silence_begins_and_ends_when_told(bench: Maker) -> None:
     assert heard == [True, False, False, True]
 
 
-def test_a_healed_sensor_keeps_its_other_ailments() -> None:
+def test_a_healed_sensor_keeps_its_other_faults() -> None:
     sensor = Sensor(1)
-    sensor.ail("silent")
-    kept = sensor.ail("noisy", 0.5)
-    sensor.heal("silent")
-    assert sensor.ailments == [kept]
-    sensor.heal()
-    assert sensor.ailments == []
+    sensor.add_fault("silent")
+    kept = sensor.add_fault("noisy", 0.5)
+    sensor.clear_faults("silent")
+    assert sensor.faults == [kept]
+    sensor.clear_faults()
+    assert sensor.faults == []
 
 
 def test_without_power_nothing_answers(bench: Maker) -> None:
@@ -195,8 +195,8 @@ def test_without_power_nothing_answers(bench: Maker) -> None:
 def test_a_scheduled_power_cut_makes_it_obey_what_was_stored(bench: Maker) -> None:
     line = bench(Sensor(1))
     sensor = line.line.sensor(1)
-    sensor.ail("power_cycle")
-    sensor.ail("power_cut", first=5.0, last=6.0)
+    sensor.add_fault("power_cycle")
+    sensor.add_fault("power_cut", first=5.0, last=6.0)
     line.write(1, ID, 9)
     line.reach(5.0)
     assert line.id_of(1) is None
@@ -207,7 +207,7 @@ def test_a_scheduled_power_cut_makes_it_obey_what_was_stored(bench: Maker) -> No
 def test_one_that_hangs_is_silent_after_an_exception_until_the_next_power_cycle(bench: Maker) -> None:
     line = bench(Sensor(1))
     sensor = line.line.sensor(1)
-    sensor.ail("hangs")
+    sensor.add_fault("hangs")
     assert line.id_of(1) == 1
     assert line.read(1, 3, 1) == bytes.fromhex("01 83 02")
     assert line.id_of(1) is None
@@ -217,7 +217,7 @@ def test_one_that_hangs_is_silent_after_an_exception_until_the_next_power_cycle(
 
 def test_one_that_hangs_is_silent_after_a_frame_it_could_not_read(bench: Maker) -> None:
     line = bench(Sensor(1), Sensor(2))
-    line.line.sensor(1).ail("hangs")
+    line.line.sensor(1).add_fault("hangs")
     line.port.write(b"\x01\x03\x00\x01")
     line.listen(0.1)
     assert line.id_of(1) is None
@@ -226,7 +226,7 @@ def test_one_that_hangs_is_silent_after_a_frame_it_could_not_read(bench: Maker) 
 
 def test_a_shy_sensor_ignores_the_request_after_one_to_the_dead(bench: Maker) -> None:
     line = bench(Sensor(1), Sensor(2))
-    line.line.sensor(1).ail("shy")
+    line.line.sensor(1).add_fault("shy")
     line.read(77)
     assert line.id_of(1) is None
     assert line.id_of(1) == 1
@@ -236,7 +236,7 @@ def test_a_shy_sensor_ignores_the_request_after_one_to_the_dead(bench: Maker) ->
 
 def test_a_sensor_that_needs_rest_ignores_what_comes_too_soon_after_its_answer(bench: Maker) -> None:
     line = bench(Sensor(1), Sensor(2))
-    line.line.sensor(1).ail("needs_rest", delay=0.2)
+    line.line.sensor(1).add_fault("needs_rest", delay=0.2)
     assert line.id_of(1) == 1
     assert line.id_of(1) is None
     for _ in range(20):
@@ -246,7 +246,7 @@ def test_a_sensor_that_needs_rest_ignores_what_comes_too_soon_after_its_answer(b
 
 def test_a_sensor_that_sleeps_loses_the_request_that_wakes_it(bench: Maker) -> None:
     line = bench(Sensor(1), Sensor(2))
-    line.line.sensor(1).ail("sleeps", delay=0.2)
+    line.line.sensor(1).add_fault("sleeps", delay=0.2)
     assert line.id_of(1) is None
     assert line.id_of(1) == 1
     for _ in range(20):
@@ -264,7 +264,7 @@ def test_a_broadcast_is_obeyed_by_all_and_answered_by_nobody(bench: Maker) -> No
 
 def test_an_echo_at_once_of_a_broadcast_is_none(bench: Maker) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).ail("at_once")
+    line.line.sensor(1).add_fault("at_once")
     line.write(0, ID, 4)
     assert line.heard == b""
     assert line.id_of(4) == 4
@@ -273,7 +273,7 @@ def test_an_echo_at_once_of_a_broadcast_is_none(bench: Maker) -> None:
 def test_a_wildcard_answers_255_too(bench: Maker) -> None:
     line = bench(Sensor(1))
     assert line.id_of(255) is None
-    line.line.sensor(1).ail("wildcard")
+    line.line.sensor(1).add_fault("wildcard")
     assert line.id_of(255) == 1
     assert line.id_of(254) is None
 
@@ -289,20 +289,20 @@ def test_a_wildcard_answers_255_too(bench: Maker) -> None:
 )
 def test_a_broken_value_is_sent_as_such(bench: Maker, kind: str, holds: Callable[[float], bool]) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).ail(kind)
+    line.line.sensor(1).add_fault(kind)
     assert holds(wind_in(line.read(1)))
     assert line.answer.values == ()
 
 
 def test_a_stuck_sensor_repeats_its_value(bench: Maker) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).ail("stuck")
+    line.line.sensor(1).add_fault("stuck")
     assert wind_in(line.read(1)) == wind_in(line.read(1))
 
 
 def test_a_refusal_has_the_code_it_was_given(bench: Maker) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).ail("exception", code=6)
+    line.line.sensor(1).add_fault("exception", code=6)
     assert line.read(1) == bytes.fromhex("01 83 06")
 
 
@@ -318,7 +318,7 @@ def test_a_refusal_has_the_code_it_was_given(bench: Maker) -> None:
 )
 def test_a_wrong_answer_has_a_right_check(bench: Maker, kind: str, particulars: dict[str, int], first: str) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).ail(kind, **particulars)
+    line.line.sensor(1).add_fault(kind, **particulars)
     body = line.read(1)
     assert body is not None
     assert body[:3] == bytes.fromhex(first)
@@ -328,15 +328,15 @@ def test_a_wrong_answer_has_a_right_check(bench: Maker, kind: str, particulars: 
 
 def test_a_wrong_echo_carries_another_value(bench: Maker) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).ail("wrong_echo")
-    line.line.sensor(1).ail("wrong_count")
+    line.line.sensor(1).add_fault("wrong_echo")
+    line.line.sensor(1).add_fault("wrong_count")
     assert line.write(1, ID, 1) == bytes.fromhex("01 06 00 05 00 00")
 
 
 @pytest.mark.parametrize("framing", ["rtu", "ascii"])
 def test_a_noisy_answer_never_passes_its_check(bench: Maker, framing: str) -> None:
     line = bench(Sensor(1, framing=framing), framing=framing)  # type: ignore[arg-type]  # a literal
-    line.line.sensor(1).ail("noisy")
+    line.line.sensor(1).add_fault("noisy")
     for _ in range(200):
         assert line.read(1) is None
         assert line.heard
@@ -356,7 +356,7 @@ def test_a_spoilt_answer_has_the_length_it_was_given(
     bench: Maker, kind: str, particulars: dict[str, int], lengths: set[int]
 ) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).ail(kind, **particulars)
+    line.line.sensor(1).add_fault(kind, **particulars)
     seen = set()
     for _ in range(100):
         assert line.read(1) is None
@@ -367,7 +367,7 @@ def test_a_spoilt_answer_has_the_length_it_was_given(
 @pytest.mark.parametrize(("kind", "part"), [("leading_noise", slice(5, None)), ("trailing_noise", slice(9))])
 def test_noise_around_an_answer_leaves_it_whole(bench: Maker, kind: str, part: slice) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).ail(kind, length=5)
+    line.line.sensor(1).add_fault(kind, length=5)
     line.read(1)
     assert len(line.heard) == 14
     assert unseal(line.heard[part]) is not None
@@ -376,7 +376,7 @@ def test_noise_around_an_answer_leaves_it_whole(bench: Maker, kind: str, part: s
 
 def test_a_late_answer_comes_into_the_next_request(bench: Maker) -> None:
     line = bench(Sensor(1), Sensor(2))
-    line.line.sensor(1).ail("late", delay=0.2)
+    line.line.sensor(1).add_fault("late", delay=0.2)
     assert line.read(1, wait=0.1) is None
     assert line.read(2, wait=0.05) is not None
     line.listen(0.1)
@@ -386,15 +386,15 @@ def test_a_late_answer_comes_into_the_next_request(bench: Maker) -> None:
 
 def test_bytes_can_come_with_pauses(bench: Maker) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).ail("slow_bytes", delay=0.002)
+    line.line.sensor(1).add_fault("slow_bytes", delay=0.002)
     line.read(1)
     ends = line.answer.burst.ends
     assert {after - before for before, after in pairwise(ends)} <= {3_041_666, 3_041_667}
 
 
-def test_an_ailment_shows_at_its_rate(bench: Maker) -> None:
+def test_a_fault_shows_at_its_rate(bench: Maker) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).ail("silent", 0.3)
+    line.line.sensor(1).add_fault("silent", 0.3)
     answers = sum(line.id_of(1) is not None for _ in range(300))
     assert 170 < answers < 250
 
@@ -417,7 +417,7 @@ def test_other_devices_are_just_data(bench: Maker) -> None:
     assert line.read(5, 30, 1) == bytes.fromhex("05 03 02 00 08")
     sensor.power_cycle()
     assert repr(sensor) == "<Sensor 5 at 9600>"
-    sensor.ail(FaultKind.NAN)
+    sensor.add_fault(FaultKind.NAN)
     assert line.read(5, 10, 1) == bytes.fromhex("05 03 02 FF FF")
 
 

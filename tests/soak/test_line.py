@@ -31,7 +31,7 @@ def asked(sensor: Sensor, *requests: tuple[float, bytes], stray: float | None = 
 def late(delay: float) -> Sensor:
     """Return a sensor that answers late."""
     sensor = Sensor(1)
-    sensor.ail(FaultKind.LATE, delay=delay)
+    sensor.add_fault(FaultKind.LATE, delay=delay)
     return sensor
 
 
@@ -56,7 +56,7 @@ def test_a_struck_answer_is_not_believable() -> None:
 
 def test_answers_without_a_value_are_none() -> None:
     broken = Sensor(1)
-    broken.ail(FaultKind.NAN)
+    broken.add_fault(FaultKind.NAN)
     assert asked(broken, (1.0, WIND)) == []
     assert asked(Sensor(1), (1.0, ID)) == []
 
@@ -64,4 +64,4 @@ def test_answers_without_a_value_are_none() -> None:
 def test_one_sensor_of_the_line_is_well_and_the_others_are_not() -> None:
     line = SimulatedLine([Sensor(slave) for slave in SLAVES])
     ail(line)
-    assert [slave for slave in SLAVES if not line.sensor(slave).ailments] == [1]
+    assert [slave for slave in SLAVES if not line.sensor(slave).faults] == [1]

@@ -281,11 +281,11 @@ def _fall_ill(made: Recording) -> None:
     def ail(sensors: SimulatedLine) -> None:
         for slave, kind in ill.items():
             sensor = sensors.sensor(slave)
-            sensor.ail("exception", code=6) if kind == "busy" else sensor.ail(kind)
+            sensor.add_fault("exception", code=6) if kind == "busy" else sensor.add_fault(kind)
 
     def heal(sensors: SimulatedLine) -> None:
         for sensor in sensors.sensors:
-            sensor.heal()
+            sensor.clear_faults()
 
     tell(line, ail)
     view.wait("device/laser-a/error", lambda error: error["active"])

@@ -76,8 +76,8 @@ class Story:
         self.twin: Sensor | None = None
         self.hushed = ails[0][0] == "silent"
         """Nobody can hear s3 beside its twin, for some time or ever: then the daemon may take the twin for it."""
-        for sensor, ailment in zip(bench.line.sensors, ails, strict=True):
-            _ail(sensor, ailment)
+        for sensor, sensor_fault in zip(bench.line.sensors, ails, strict=True):
+            _ail(sensor, sensor_fault)
         for slave, its in ((3, twin), (9, stranger)):
             if its is not None:
                 other = bench.line.add(Sensor(slave, format=Format(9600), turnaround=turnaround))
@@ -118,7 +118,7 @@ class Story:
                 self._powered()
                 self.sensors[one % len(self.sensors)].power_cycle()
             case "heal":
-                self.sensors[one % len(self.sensors)].heal()
+                self.sensors[one % len(self.sensors)].clear_faults()
             case "wait":
                 bench.go(self.life, one)
             case "unplug":
@@ -165,7 +165,7 @@ class Story:
         if self.twin is None or (one.slave, one.format) != (self.twin.slave, self.twin.format):
             return ()
         pair = (one, self.twin)
-        mute = any(each.deaf_until > now or any(ail.kind == "silent" for ail in each.ailments) for each in pair)
+        mute = any(each.deaf_until > now or any(ail.kind == "silent" for ail in each.faults) for each in pair)
         return () if mute else pair
 
     @property
@@ -188,7 +188,7 @@ class Story:
         """Heal everybody, switch the power of all off and on, take the others off, and wait until nothing is open."""
         self._powered()
         for sensor in self.sensors:
-            sensor.heal()
+            sensor.clear_faults()
             sensor.power_cycle()
         for other in (*self.others, *self.foreigners):
             self.bench.line.sensors.remove(other)
@@ -310,7 +310,7 @@ class Story:
         return sum(request.body[1:2] == b"\x06" for request in self.bench.line.log)
 
 
-def _ail(sensor: Sensor, ailment: tuple[str, dict[str, Any]]) -> None:
-    kind, particulars = ailment
+def _ail(sensor: Sensor, sensor_fault: tuple[str, dict[str, Any]]) -> None:
+    kind, particulars = sensor_fault
     if kind != "none":
-        sensor.ail(kind, **particulars)
+        sensor.add_fault(kind, **particulars)

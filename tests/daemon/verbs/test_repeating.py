@@ -31,10 +31,10 @@ def mounted(site: Site, **mqtt: Any) -> tuple[PtyLine, Run]:  # noqa: ANN401 - a
     return served, run
 
 
-def plug(served: PtyLine, ailment: str | None = None, baudrate: int = 9600) -> Sensor:
+def plug(served: PtyLine, fault: str | None = None, baudrate: int = 9600) -> Sensor:
     sensor = Sensor(1, format=Format(baudrate), turnaround=0.003)
-    if ailment is not None:
-        sensor.ail(ailment)
+    if fault is not None:
+        sensor.add_fault(fault)
     tell(served, lambda line: line.add(sensor))
     return sensor
 

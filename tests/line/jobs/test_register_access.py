@@ -125,7 +125,7 @@ def test_a_register_that_does_not_exist_is_refused_at_once() -> None:
 @pytest.mark.parametrize("profile", [VANE, None])
 def test_a_silent_slave_is_asked_with_growing_patience(profile: Profile | None) -> None:
     rig = Rig()
-    rig.vane.ail("silent")
+    rig.vane.add_fault("silent")
     access = rig.do(read(), profile)
     assert (access.end, access.sent) == (End.UNANSWERED, False)
     assert access.fault is not None
@@ -136,14 +136,14 @@ def test_a_silent_slave_is_asked_with_growing_patience(profile: Profile | None) 
 
 def test_a_fixed_time_out_holds_for_every_try() -> None:
     rig = Rig()
-    rig.vane.ail("silent")
+    rig.vane.add_fault("silent")
     rig.do(read(), timeout=0.3)
     assert [each.at - each.asked for each in rig.exchanges] == pytest.approx([0.3] * 3, abs=0.02)
 
 
 def test_noise_is_asked_again_and_told_as_what_it_is() -> None:
     rig = Rig()
-    rig.vane.ail("noisy")
+    rig.vane.add_fault("noisy")
     access = rig.do(read())
     assert access.end is End.UNANSWERED
     assert access.fault is not None
@@ -153,24 +153,24 @@ def test_noise_is_asked_again_and_told_as_what_it_is() -> None:
 
 def test_a_busy_slave_is_asked_later_and_told_as_busy() -> None:
     rig = Rig()
-    rig.vane.ail("exception", code=6, last=0.2)
+    rig.vane.add_fault("exception", code=6, last=0.2)
     assert rig.do(read()).end is End.DONE
     assert rig.exchanges[1].asked - rig.exchanges[0].at > 0.29
-    rig.vane.ail("exception", code=6)
+    rig.vane.add_fault("exception", code=6)
     access = rig.do(read(), None)
     assert (access.end, access.fault and access.fault.busy) == (End.BUSY, True)
 
 
 def test_which_exception_means_busy_is_the_profiles_word() -> None:
     rig = Rig()
-    rig.vane.ail("exception", code=6)
+    rig.vane.add_fault("exception", code=6)
     assert rig.do(read(), VANE.model_copy(update={"busy_exceptions": (5,)})).end is End.REFUSED
 
 
 def test_an_answer_that_comes_too_late_never_passes_for_the_next_one() -> None:
     rig = Rig()
     rig.vane.words[AVERAGING] = 17
-    rig.vane.ail("late", delay=0.35, last=0.1)
+    rig.vane.add_fault("late", delay=0.35, last=0.1)
     access = rig.do(read(0x07D0))
     assert (access.end, access.registers) == (End.DONE, (7,))
     assert rig.asked[1] == bytes.fromhex("03 0000 0002")  # another shape: the barrier is as long as what is read
@@ -178,7 +178,7 @@ def test_an_answer_that_comes_too_late_never_passes_for_the_next_one() -> None:
 
 def test_a_slave_without_a_known_second_shape_is_left_alone_until_nothing_can_come() -> None:
     rig = Rig()
-    rig.vane.ail("late", delay=0.35, last=0.1)
+    rig.vane.add_fault("late", delay=0.35, last=0.1)
     assert rig.do(read(), None).registers == (1,)
     first, second = rig.exchanges
     assert second.asked - first.at > 0.75
@@ -187,21 +187,21 @@ def test_a_slave_without_a_known_second_shape_is_left_alone_until_nothing_can_co
 
 def test_the_values_shape_is_asked_by_the_barrier_first() -> None:
     rig = Rig()
-    rig.vane.ail("silent", last=0.1)
+    rig.vane.add_fault("silent", last=0.1)
     assert rig.do(read(0x0000, 2)).end is End.DONE
     assert rig.asked[1:2] == [bytes.fromhex("03 07D0 0001")]
 
 
 def test_a_profile_without_a_barrier_lends_the_shape_of_a_poll() -> None:
     rig = Rig()
-    rig.vane.ail("silent", last=0.1)
+    rig.vane.add_fault("silent", last=0.1)
     assert rig.do(read(), VANE.model_copy(update={"barrier": None})).end is End.DONE
     assert rig.asked[1:2] == [bytes.fromhex("03 0000 0002")]
 
 
 def test_two_shapes_unanswered_leave_nothing_to_ask_for_a_while() -> None:
     rig = Rig()
-    rig.vane.ail("silent", last=0.5)
+    rig.vane.add_fault("silent", last=0.5)
     assert rig.do(read()).end is End.DONE
     assert rig.asked[:3] == [bytes.fromhex(each) for each in ("03 0010 0001", "03 0000 0002", "03 0010 0001")]
     assert rig.exchanges[2].asked - rig.exchanges[1].asked > 0.75
@@ -236,21 +236,21 @@ def test_where_the_echo_cannot_be_learned_nothing_is_written() -> None:
 
 def test_a_slave_that_falls_silent_while_the_echo_is_learned_is_not_written() -> None:
     rig = Rig(echo="auto")
-    rig.vane.ail("silent", first=0.04)
+    rig.vane.add_fault("silent", first=0.04)
     access = rig.do(write())
     assert (access.end, access.sent, access.before, rig.writes) == (End.UNANSWERED, False, 1, [])
 
 
 def test_a_silent_slave_is_not_written() -> None:
     rig = Rig()
-    rig.vane.ail("silent")
+    rig.vane.add_fault("silent")
     access = rig.do(write())
     assert (access.end, access.sent, rig.writes) == (End.UNANSWERED, False, [])
 
 
 def test_a_busy_slave_is_not_written() -> None:
     rig = Rig()
-    rig.vane.ail("exception", code=6)
+    rig.vane.add_fault("exception", code=6)
     access = rig.do(write())
     assert (access.end, access.sent, rig.writes) == (End.BUSY, False, [])
 
@@ -273,7 +273,7 @@ def test_a_register_that_can_be_written_but_not_read_is_not_verified() -> None:
 
 def test_a_write_that_is_answered_busy_is_not_tried_again() -> None:
     rig = Rig()
-    rig.vane.ail("exception", code=6, first=0.03)
+    rig.vane.add_fault("exception", code=6, first=0.03)
     access = rig.do(write())
     assert (access.end, access.sent, len(rig.writes)) == (End.BUSY, True, 1)
     assert rig.asked[-1] == rig.writes[0]
@@ -290,21 +290,21 @@ def test_a_write_that_the_slave_confirms_but_does_not_make_is_not_verified() -> 
 @pytest.mark.parametrize("kind", ["echo_losing", "wrong_echo"])
 def test_a_write_without_its_answer_is_sent_once_and_read_back(kind: str) -> None:
     rig = Rig()
-    rig.vane.ail(kind)
+    rig.vane.add_fault(kind)
     access = rig.do(write(10))
     assert (access.end, access.registers, len(rig.writes)) == (End.DONE, (10,), 1)
 
 
 def test_a_slave_that_stores_slowly_is_asked_until_it_answers() -> None:
     rig = Rig()
-    rig.vane.ail("slow_flash", delay=4.0)
+    rig.vane.add_fault("slow_flash", delay=4.0)
     access = rig.do(write(10))
     assert (access.end, access.registers, len(rig.writes)) == (End.DONE, (10,), 1)
 
 
 def test_a_slave_silent_after_a_write_is_given_up_after_a_while() -> None:
     rig = Rig()
-    rig.vane.ail("slow_flash", delay=60.0)
+    rig.vane.add_fault("slow_flash", delay=60.0)
     access = rig.do(write(10))
     assert (access.end, access.sent, access.registers) == (End.UNANSWERED, True, None)
     assert VERIFY_WITHIN < rig.clock.now < VERIFY_WITHIN + 3
@@ -312,7 +312,7 @@ def test_a_slave_silent_after_a_write_is_given_up_after_a_while() -> None:
 
 def test_a_lost_port_ends_it_and_says_whether_a_write_was_sent() -> None:
     rig = Rig()
-    rig.vane.ail("slow_flash", delay=60.0)
+    rig.vane.add_fault("slow_flash", delay=60.0)
     access = rig.begin(write(10))
     rig.pass_time(0.5)
     rig.port.unplug()
@@ -326,10 +326,10 @@ def test_nobody_polls_the_slave_between_a_write_and_its_verification() -> None:
     rig = Rig(polled=True)
     rig.pass_time(2.0)
     begun = len(rig.events)
-    rig.vane.ail("slow_flash", delay=1.0)
+    rig.vane.add_fault("slow_flash", delay=1.0)
     rig.do(write(10))
     assert {each.purpose for each in rig.events[begun:] if isinstance(each, Exchanged)} == {Purpose.REQUEST}
-    rig.vane.heal()
+    rig.vane.clear_faults()
     rig.pass_time(1.0)
     assert [each.fault for each in rig.events if isinstance(each, Reading)][-1] is None
 

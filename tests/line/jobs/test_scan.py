@@ -52,7 +52,7 @@ def line_of(*sensors: Sensor | int) -> SimulatedLine:
 
 def ill(slave: int, kind: str, **particulars: float) -> Sensor:
     sensor = Sensor(slave)
-    sensor.ail(kind, **particulars)
+    sensor.add_fault(kind, **particulars)
     return sensor
 
 
