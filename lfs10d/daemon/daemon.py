@@ -155,13 +155,13 @@ class Daemon:
         self._line = Line(config.line)
         self._line.take(self._physical.polled(), loaded.profiles)
         if self._running.missing:
-            recalling = Restore(
+            restore = Restore(
                 running=lambda: self._running.now,
                 learn=self._learn,
                 devices=lambda: tuple(self._line.poller.scheduler.devices.values()),
-                tell=self._powers.tell,
+                announce=self._powers.tell,
             )
-            self._uplink.read_back(recalling.wanted, recalling.take)
+            self._uplink.read_back(restore.topics, restore.on_retained)
         file = status_file(loaded.path, config.line.name, os.environ, root=os.geteuid() == 0)
         self._supervision = Supervision(
             notifier,

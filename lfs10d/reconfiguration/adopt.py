@@ -192,10 +192,10 @@ class Adopt:
         command: CommandRecord,
     ) -> Result:
         """Put on the disk what came of it; return the result."""
-        runner, ending = self._runner, report.verdict.ending
+        runner, ending = self._runner, report.readdress.ending
         to = report.to or 0
         name = request.name or default_device_name(to)
-        result = _result(name, wish.factory, to, report.verdict, profile, written=change is not None)
+        result = _result(name, wish.factory, to, report.readdress, profile, written=change is not None)
         if ending is ReaddressEnding.TWINS:
             rate = report.old.baudrate if report.old else None
             runner.announce("duplicate_id", {"slave": wish.factory, "baudrate": rate})
@@ -215,13 +215,13 @@ class Adopt:
 
     async def _save(self, name: str, report: adopt.AdoptReport, change: OpenAdopt, record: ResultRecord | None) -> None:
         """Put on the disk where the sensor is, or that it is still to be found."""
-        runner, verdict = self._runner, report.verdict
+        runner, readdress = self._runner, report.readdress
         journal, journalled = runner.journal, runner.journalled
-        if verdict.ending is ReaddressEnding.MOVED:
+        if readdress.ending is ReaddressEnding.MOVED:
             (move,) = change.moves
             await runner.save_endpoint(name, move.new, added=entry(change))
-        elif verdict.stays_open:
-            if verdict.ending is not ReaddressEnding.NOWHERE and report.at_rate:
+        elif readdress.stays_open:
+            if readdress.ending is not ReaddressEnding.NOWHERE and report.at_rate:
                 await journalled(partial(journal.amend, change.number, (_at_rate(change),)))
             await journalled(partial(journal.keep, change.number, record))
             return
@@ -291,16 +291,16 @@ def _unfit(profile: Profile, line: LineConfig) -> str | None:
     return None
 
 
-def _result(name: str, old: int, to: int, verdict: ReaddressReport, profile: Profile, *, written: bool) -> Result:
+def _result(name: str, old: int, to: int, report: ReaddressReport, profile: Profile, *, written: bool) -> Result:
     """Return the result of `line/adopt`; `written`: something was written to the sensor."""
-    if verdict.ending is ReaddressEnding.MOVED:
+    if report.ending is ReaddressEnding.MOVED:
         return ok({"device": name, "slave": to, "from": old})
-    code, text = _ERRORS[verdict.ending]
-    refusal = "" if verdict.exception is None else f" (exception {verdict.exception:02X})"
+    code, text = _ERRORS[report.ending]
+    refusal = "" if report.exception is None else f" (exception {report.exception:02X})"
     lock = (profile.slave_id and profile.slave_id.locked_by) or "address switch"
     title = profile.title
-    message = text.format(old=old, to=to, at=verdict.at, why=verdict.why, refusal=refusal, lock=lock, title=title)
-    facts: dict[str, Any] = {} if verdict.exception is None else {"exception_code": verdict.exception}
+    message = text.format(old=old, to=to, at=report.at, why=report.why, refusal=refusal, lock=lock, title=title)
+    facts: dict[str, Any] = {} if report.exception is None else {"exception_code": report.exception}
     if not written:
         return rejected(code, message, param=None, **facts)
     return failed(code, message, data={"device": name, "from": old, "to": to}, **facts)

@@ -11,7 +11,7 @@ from lfs10d.line.device import Device
 from lfs10d.line.jobs.procedure import Finished, ProcedureClock
 from lfs10d.reading import Purpose
 from lfs10d.reconfiguration.procedure_run import ProcedureRun
-from lfs10d.reconfiguration.procedures.find_baudrate import in_words, seek
+from lfs10d.reconfiguration.procedures.find_baudrate import find_other_rates, message
 from lfs10d.system.tasks import BackgroundTasks
 
 log = logging.getLogger(__name__)
@@ -56,12 +56,12 @@ class BaudrateWatch:
 
     async def _look_out(self, rate: int, run: ProcedureRun) -> None:
         clock = ProcedureClock()
-        run.begin(seek(self._devices, clock, rate), clock, line_rate=rate, share=1.0, purpose=Purpose.PROBE)
+        run.begin(find_other_rates(self._devices, clock, rate), clock, line_rate=rate, share=1.0, purpose=Purpose.PROBE)
         while not isinstance(found := await run.next_await(), Finished):
             if isinstance(found, dict):
                 now = self._running()
                 polled = sum(slave.enabled for slave in now.config.slaves)
-                self._say(in_words(found, rate, polled, filed=now.said.baudrate) if found else None)
+                self._say(message(found, rate, polled, filed=now.said.baudrate) if found else None)
             run.resume()
 
     def _say(self, words: str | None) -> None:

@@ -112,19 +112,21 @@ class Locator:
         if isinstance(awaited.result, Endpoint):
             await self._found(name, known, awaited.result)
 
-    async def _found(self, name: str, known: list[Endpoint], spot: Endpoint) -> None:
+    async def _found(self, name: str, known: list[Endpoint], endpoint: Endpoint) -> None:
         def edit(now: Effective) -> Changes:
             if now.slave(name) is None:
                 return now.changes
-            changes = now.changes.moving(name, Place(spot.slave), now.said)
+            changes = now.changes.moving(name, Place(endpoint.slave), now.said)
             filed = now.said.baudrate
-            if spot.baudrate != now.config.line.baudrate or changes.baudrate is not None:
-                changes = replace(changes, baudrate=None if spot.baudrate == filed else Rate(filed, spot.baudrate))
+            if endpoint.baudrate != now.config.line.baudrate or changes.baudrate is not None:
+                changes = replace(
+                    changes, baudrate=None if endpoint.baudrate == filed else Rate(filed, endpoint.baudrate)
+                )
             return changes
 
         self._searches.pop(name, None)  # it is found: another configuration ends no search any more
         await self._runner.learn(edit)
-        self._tell(name, known, spot)
+        self._tell(name, known, endpoint)
         self._repoll()
         self.begin()
 

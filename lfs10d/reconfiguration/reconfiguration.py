@@ -18,7 +18,8 @@ from lfs10d.reconfiguration import adopt, baudrate, readdress
 from lfs10d.reconfiguration.adopt import Adopt, AdoptRequest
 from lfs10d.reconfiguration.baudrate import BaudrateChange
 from lfs10d.reconfiguration.baudrate_recovery import BaudrateRecovery
-from lfs10d.reconfiguration.journal import Journal, OpenChange, command_record
+from lfs10d.reconfiguration.journal import Journal, OpenChange
+from lfs10d.reconfiguration.journal_commands import command_record
 from lfs10d.reconfiguration.locate import Locator
 from lfs10d.reconfiguration.procedure_run import ProcedureRun, Wire
 from lfs10d.reconfiguration.readdress import Readdress

@@ -13,7 +13,8 @@ from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Purpose
 from lfs10d.reconfiguration import adopt, readdress_answers
 from lfs10d.reconfiguration.baudrate_recovery import BaudrateRecovery
-from lfs10d.reconfiguration.journal import Endpoint, Move, OpenAdopt, OpenChange, OpenReaddress, command_of
+from lfs10d.reconfiguration.journal import Endpoint, Move, OpenAdopt, OpenChange, OpenReaddress
+from lfs10d.reconfiguration.journal_commands import command_of
 from lfs10d.reconfiguration.procedure_run import ProcedureRun
 from lfs10d.reconfiguration.procedures.follow import follow
 from lfs10d.reconfiguration.procedures.readdress import ReaddressEnding, ReaddressReport, ReaddressWish

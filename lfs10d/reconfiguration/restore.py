@@ -1,13 +1,14 @@
-"""Where the devices were when an earlier life published it: our own retained topics, when `changes.yaml` is gone. Pure.
+"""Restores where the devices were from the daemon's own retained topics, when `changes.yaml` is gone.
 
 Rules
 -----
-1. What a broker retains is a stranger's word: what is not exactly in our form, or out of a profile's range, is no word.
+1. What a broker retains is not trusted: a payload that is not exactly in our form, or out of a profile's range, counts
+   as absent.
 2. It counts for the devices of the file alone, and only where no change says where they are.
-3. One id told of two devices is told of neither of them, unless the file says the same of one: that one keeps it.
-4. A device that answers at the file's place is there, and so is the line's rate; that is told, and nothing is kept.
-   Not so where another device is told to have been at that id: then who answers there is not known yet.
-5. The others are kept as verified there once (rule 3 of `lfs10d.config.merge`): the line is asked, the file's place
+3. An id that was published for two devices counts for neither, unless the file has one of them there: it keeps it.
+4. A device that answers at the file's place is there, and so is the line's rate; that is announced, and nothing is
+   kept. Not so where another device was published at that id: then it is not known yet which of them answers there.
+5. The others are kept as verified there once (rule 3 of `lfs10d.config.merge`): the line is queried, the file's place
    first.
 """
 
@@ -18,38 +19,40 @@ from collections import Counter
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from typing import Annotated, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import from_json
 
 from lfs10d.config.changes import Changes, Place, Rate, Verified
-from lfs10d.config.effective import Effective
-from lfs10d.config.live_config import Edit
+from lfs10d.config.effective import Edit, Effective
 from lfs10d.config.models import LineConfig
 from lfs10d.line.device import Device
 from lfs10d.schema.fields import Choice, Whole
 from lfs10d.telemetry.publication import CONFIG, LINE_STATE, device_of, device_topic
 
+log = logging.getLogger(__name__)
+
 LARGEST = 4096
-"""Bytes of a payload that is looked at; ours have a few hundred."""
+"""Bytes of the longest payload that is read; ours have a few hundred."""
 
 _Baudrate = Annotated[
     int, next(kind for kind in LineConfig.model_fields["baudrate"].metadata if isinstance(kind, Choice))
 ]
+M = TypeVar("M", bound="_Payload")
 
 
-class _Word(BaseModel):
-    """What we read of a payload; another version of lfs10d may say more in it."""
+class _Payload(BaseModel):
+    """The keys that are read of a payload; another version of lfs10d may have more."""
 
     model_config = ConfigDict(strict=True, extra="ignore", frozen=True)
 
 
-class _Config(_Word):
+class _Config(_Payload):
     slave: Annotated[int, Whole(1, 255)]
 
 
-class _LineState(_Word):
+class _LineState(_Payload):
     baudrate: _Baudrate
 
 
@@ -70,101 +73,10 @@ class ConfirmedPlace:
     last: Place
 
 
-def topics(now: Effective) -> frozenset[str]:
-    """Return the topics under `B` that tell where the file's devices were."""
-    return frozenset((LINE_STATE, *(device_topic(name, CONFIG) for name in now.said.slaves)))
-
-
-def recollect(payloads: Mapping[str, bytes]) -> RetainedState:
-    """Return what is said on `topics`; of what is not in our form, nothing."""
-    slaves: dict[str, int] = {}
-    baudrate = None
-    for topic, payload in payloads.items():
-        if topic == LINE_STATE:
-            state = _understood(_LineState, payload)
-            baudrate = None if state is None else state.baudrate
-        elif (device := device_of(topic, CONFIG)) is not None and (word := _understood(_Config, payload)) is not None:
-            slaves[device] = word.slave
-    return RetainedState(slaves, baudrate)
-
-
-def _understood(form: type[Any], payload: bytes) -> Any:  # noqa: ANN401 - an instance of `form`, or None
-    if len(payload) > LARGEST:
-        return None
-    try:
-        return form.model_validate(from_json(payload, allow_inf_nan=False))
-    except (ValueError, ValidationError):
-        return None
-
-
-def remembering(
-    now: Effective, recalled: RetainedState, answering: AbstractSet[str]
-) -> tuple[Changes, tuple[ConfirmedPlace, ...]]:
-    """Return the changes with what is to be asked for, and what is settled already.
-
-    `answering` are the devices that answer at the file's place now.
-    """
-    filed = {name: entry["id"] for name, entry in now.said.slaves.items() if now.slave(name) is not None}
-    open_ones = {name for name in filed if _unproven(now.changes, name)}
-    elsewhere = _elsewhere(now, recalled, {name: slave for name, slave in filed.items() if name in open_ones})
-    changes, rate = now.changes, now.said.baudrate
-    last_rate = rate
-    if recalled.baudrate is not None and recalled.baudrate in _rates(now) and changes.baudrate is None:
-        last_rate = recalled.baudrate
-    known = open_ones & answering
-    claimed = set(elsewhere.values())
-    there = [name for name in filed if name in known and filed[name] not in claimed]
-    moved = [name for name in there if name in elsewhere]
-    if last_rate != rate and known and not moved:
-        moved = [name for name in filed if name in known][:1]  # the rate is the line's: told once
-    for name, last in elsewhere.items():
-        if name not in there:
-            changes = changes.with_device(name, replace(changes.of(name), verified=Verified(Place(last))))
-    if last_rate != rate and not known:
-        changes = replace(changes, baudrate=Rate(last_rate, last_rate))
-    settled = (
-        ConfirmedPlace(name, Place(filed[name], rate), Place(elsewhere.get(name, filed[name]), last_rate))
-        for name in moved
-    )
-    return changes, tuple(settled)
-
-
-def _elsewhere(now: Effective, recalled: RetainedState, filed: Mapping[str, int]) -> dict[str, int]:
-    """Return the devices last published at another id than the file's, with that id (rules 1 to 3)."""
-    told = {name: recalled.slaves[name] for name in filed if name in recalled.slaves}
-    times = Counter(told.values())
-    return {
-        name: slave
-        for name, slave in told.items()
-        if slave != filed[name] and times[slave] == 1 and _settable(now, name, slave)
-    }
-
-
-def _rates(now: Effective) -> frozenset[int]:
-    """Return the rates that a request can have given to the line."""
-    used = (now.loaded.profiles[slave.profile].baudrate for slave in now.config.slaves)
-    return frozenset(rate for baudrate in used if baudrate is not None for rate in baudrate.codes)
-
-
-def _unproven(changes: Changes, name: str) -> bool:
-    """Tell whether no change says where a device of the file is."""
-    change = changes.of(name)
-    return change.verified is None and change.added is None
-
-
-def _settable(now: Effective, name: str, slave: int) -> bool:
-    """Tell whether a request can have given this id to the device."""
-    profile = now.loaded.profiles[next(each.profile for each in now.config.slaves if each.name == name)]
-    return profile.slave_id is not None and profile.ids[0] <= slave <= profile.ids[1]
-
-
-log = logging.getLogger(__name__)
-
-
 class Restore:
     """Used in the thread of the asyncio loop.
 
-    `learn` puts into force what is to be asked for; `devices()` are those of the line's thread; `tell` publishes an
+    `learn` puts into force what is to be queried; `devices()` are those of the line's thread; `announce` publishes an
     event.
     """
 
@@ -174,38 +86,126 @@ class Restore:
         running: Callable[[], Effective],
         learn: Callable[[Edit], Awaitable[object]],
         devices: Callable[[], Iterable[Device]],
-        tell: Callable[[str, Mapping[str, object]], None],
+        announce: Callable[[str, Mapping[str, object]], None],
     ) -> None:
         self._running = running
         self._learn = learn
         self._devices = devices
-        self._tell = tell
+        self._announce = announce
 
     @property
-    def wanted(self) -> frozenset[str]:
+    def topics(self) -> frozenset[str]:
         """The topics under `B` to be read."""
         return topics(self._running())
 
-    async def take(self, payloads: Mapping[str, bytes]) -> None:
+    async def on_retained(self, payloads: Mapping[str, bytes]) -> None:
         """Take what is retained on those topics."""
-        recalled = recollect(payloads)
-        answering = {device.spec.name for device in self._devices() if device.online}
-        settled: tuple[ConfirmedPlace, ...] = ()
+        state = retained_state(payloads)
+        online = {device.spec.name for device in self._devices() if device.online}
+        confirmed: tuple[ConfirmedPlace, ...] = ()
 
         def edit(now: Effective) -> Changes:
-            nonlocal settled
-            changes, settled = remembering(now, recalled, answering)
+            nonlocal confirmed
+            changes, confirmed = restored(now, state, online)
             return changes
 
         await self._learn(edit)
-        for each in settled:
-            facts = {"device": each.device, "file": _spot(each.file), "last": _spot(each.last)}
-            self._tell("change_conflict", {**facts, "used": _spot(each.file)})
+        for each in confirmed:
+            facts = {"device": each.device, "file": _fields(each.file), "last": _fields(each.last)}
+            self._announce("change_conflict", {**facts, "used": _fields(each.file)})
             log.warning(
-                "%s answers at slave id %d, %s baud, as the file says; it was last published at %d, %s",
+                "%s answers at slave id %d, %s baud, as in the file; it was last published at %d, %s",
                 each.device, each.file.id, each.file.baudrate, each.last.id, each.last.baudrate,
             )  # fmt: skip
 
 
-def _spot(place: Place) -> dict[str, int | None]:
+def topics(now: Effective) -> frozenset[str]:
+    """Return the topics under `B` that say where the file's devices were."""
+    return frozenset((LINE_STATE, *(device_topic(name, CONFIG) for name in now.said.slaves)))
+
+
+def retained_state(payloads: Mapping[str, bytes]) -> RetainedState:
+    """Return what the payloads on `topics` say; those not in our form say nothing."""
+    slaves: dict[str, int] = {}
+    baudrate = None
+    for topic, payload in payloads.items():
+        if topic == LINE_STATE:
+            state = _parsed(_LineState, payload)
+            baudrate = None if state is None else state.baudrate
+        elif (device := device_of(topic, CONFIG)) is not None and (config := _parsed(_Config, payload)) is not None:
+            slaves[device] = config.slave
+    return RetainedState(slaves, baudrate)
+
+
+def _parsed(model: type[M], payload: bytes) -> M | None:
+    if len(payload) > LARGEST:
+        return None
+    try:
+        return model.model_validate(from_json(payload, allow_inf_nan=False))
+    except (ValueError, ValidationError):
+        return None
+
+
+def restored(
+    now: Effective, state: RetainedState, online: AbstractSet[str]
+) -> tuple[Changes, tuple[ConfirmedPlace, ...]]:
+    """Return the changes with what is to be queried, and the places that are confirmed already.
+
+    `online` are the devices that answer at the file's place now.
+    """
+    filed = {name: entry["id"] for name, entry in now.said.slaves.items() if now.slave(name) is not None}
+    unproven = {name: slave for name, slave in filed.items() if _unproven(now.changes, name)}
+    elsewhere = _elsewhere(now, state, unproven)
+    answering = unproven.keys() & online
+    claimed = frozenset(elsewhere.values())
+    there = [name for name in filed if name in answering and filed[name] not in claimed]
+    rate, last_rate = now.said.baudrate, _last_rate(now, state)
+    changes = now.changes
+    for name, last in elsewhere.items():
+        if name not in there:
+            changes = changes.with_device(name, replace(changes.of(name), verified=Verified(Place(last))))
+    if last_rate != rate and not answering:
+        changes = replace(changes, baudrate=Rate(last_rate, last_rate))
+    confirmed = [name for name in there if name in elsewhere]
+    if last_rate != rate and answering and not confirmed:
+        confirmed = [name for name in filed if name in answering][:1]  # the rate is the line's: announced once
+    return changes, tuple(
+        ConfirmedPlace(name, Place(filed[name], rate), Place(elsewhere.get(name, filed[name]), last_rate))
+        for name in confirmed
+    )
+
+
+def _elsewhere(now: Effective, state: RetainedState, filed: Mapping[str, int]) -> dict[str, int]:
+    """Return the devices last published at another id than the file's, with that id (rules 1 to 3)."""
+    published = {name: state.slaves[name] for name in filed if name in state.slaves}
+    times = Counter(published.values())
+    return {
+        name: slave
+        for name, slave in published.items()
+        if slave != filed[name] and times[slave] == 1 and _settable(now, name, slave)
+    }
+
+
+def _last_rate(now: Effective, state: RetainedState) -> int:
+    """Return the rate last published where a command can have given it to the line, else the file's."""
+    if state.baudrate is None or now.changes.baudrate is not None:
+        return now.said.baudrate
+    used = (now.loaded.profiles[slave.profile].baudrate for slave in now.config.slaves)
+    settable = frozenset(rate for baudrate in used if baudrate is not None for rate in baudrate.codes)
+    return state.baudrate if state.baudrate in settable else now.said.baudrate
+
+
+def _unproven(changes: Changes, name: str) -> bool:
+    """Whether no change says where a device of the file is."""
+    change = changes.of(name)
+    return change.verified is None and change.added is None
+
+
+def _settable(now: Effective, name: str, slave: int) -> bool:
+    """Whether a command can have given this id to the device."""
+    profile = now.loaded.profiles[next(each.profile for each in now.config.slaves if each.name == name)]
+    return profile.slave_id is not None and profile.ids[0] <= slave <= profile.ids[1]
+
+
+def _fields(place: Place) -> dict[str, int | None]:
     return {"slave": place.id, "baudrate": place.baudrate}

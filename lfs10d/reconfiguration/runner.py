@@ -31,10 +31,8 @@ from lfs10d.reconfiguration.journal import (
     Journal,
     OpenChange,
     ResultRecord,
-    command_of,
-    result_of,
-    result_record,
 )
+from lfs10d.reconfiguration.journal_commands import command_of, result_of, result_record
 from lfs10d.reconfiguration.procedure_run import ProcedureRun, Wire
 from lfs10d.reconfiguration.procedures.identity_query import IdentityQuery
 from lfs10d.reconfiguration.reservations import Reservations

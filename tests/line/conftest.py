@@ -8,7 +8,7 @@ import pytest
 
 from lfs10d.modbus.outcome import Outcome
 from tests.support.lines import Rigs
-from tests.support.sensors import Pretence, heard
+from tests.support.sensors import Pretence, outcome_of
 
 
 @pytest.fixture
@@ -24,4 +24,4 @@ def pretence() -> Pretence:
 @pytest.fixture(name="heard")
 def _heard() -> Callable[..., Outcome]:
     """Give the function that makes outcomes."""
-    return heard
+    return outcome_of

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lfs10d.command import Command, Result, failed, ok, rejected
-from lfs10d.reconfiguration.journal import command_of, command_record, result_of, result_record
+from lfs10d.reconfiguration.journal_commands import command_of, command_record, result_of, result_record
 
 KEYS = st.none() | st.text(max_size=64) | st.integers()
 CALLS = st.builds(

@@ -21,16 +21,16 @@ def recalled(bench: Bench, life: Life, baudrate: int = 9600, **slaves: int) -> N
     """Give a daemon what the broker retained, as at its first connect."""
 
     async def told() -> None:
-        recalling = Restore(
+        restore = Restore(
             running=lambda: life.running.now,
             learn=life.running.learn,
             devices=life.poller.scheduler.devices.values,
-            tell=lambda kind, facts: life.events.append((kind, facts)),
+            announce=lambda kind, facts: life.events.append((kind, facts)),
         )
         payloads = {"line/state": json.dumps({"v": 1, "baudrate": baudrate}).encode()}
         payloads |= {f"device/{name}/config": json.dumps({"slave": at}).encode() for name, at in slaves.items()}
-        assert payloads.keys() <= recalling.wanted
-        await recalling.take(payloads)
+        assert payloads.keys() <= restore.topics
+        await restore.on_retained(payloads)
 
     bench.ask(life, told())  # type: ignore[arg-type]  # it answers nothing
 

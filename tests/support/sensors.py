@@ -79,7 +79,7 @@ class Pretence:
     pending: PendingRequests = field(default_factory=PendingRequests)
     line_rate: int = 9600
     asked: list[Ask] = field(default_factory=list)
-    aside: list[object] = field(default_factory=list)
+    awaited: list[object] = field(default_factory=list)
     answer: object = None
     """What is said to what goes aside: None, or why it failed."""
     later: list[tuple[float, Callable[[], object]]] = field(default_factory=list)
@@ -95,7 +95,7 @@ class Pretence:
         self.sensors.append(Mimic(slave, **facts))
         return self.sensors[-1]
 
-    def asking(self, profile: Profile = LFS10) -> IdentityQuery:
+    def query(self, profile: Profile = LFS10) -> IdentityQuery:
         """Return what asks sensors of this profile."""
         return IdentityQuery(profile, CODEC, self.pending, self.clock, line_rate=self.line_rate)
 
@@ -127,7 +127,7 @@ class Pretence:
                     self.clock.now, value = max(self.clock.now, step.until), None
                 else:
                     assert isinstance(step, Await)
-                    self.aside.append(step.what)
+                    self.awaited.append(step.what)
                     value = self.answer
         except StopIteration as end:
             result: T = end.value
@@ -145,16 +145,16 @@ class Pretence:
         slave, rate = ask.request.slave, ask.baudrate or self.line_rate
         there = [each for each in self.sensors if (each.slave, each.baudrate) == (slave, rate) and not each.silent]
         if (slave, rate) in self.noise:
-            return self.settle(ask, heard(ask.request, FaultCode.CRC))
+            return self.settle(ask, outcome_of(ask.request, FaultCode.CRC))
         if not there:
-            return self.settle(ask, heard(ask.request, FaultCode.TIMEOUT, took=ask.timeout))
+            return self.settle(ask, outcome_of(ask.request, FaultCode.TIMEOUT, took=ask.timeout))
         answers = {self._reply(each, ask.request) for each in there}
         if len(answers) > 1:
-            return self.settle(ask, heard(ask.request, FaultCode.CRC))
+            return self.settle(ask, outcome_of(ask.request, FaultCode.CRC))
         (answer,) = answers
         if isinstance(answer, int):
-            return self.settle(ask, heard(ask.request, exception=answer, turnaround=self.turnaround))
-        return self.settle(ask, heard(ask.request, answer=answer, turnaround=self.turnaround))
+            return self.settle(ask, outcome_of(ask.request, exception=answer, turnaround=self.turnaround))
+        return self.settle(ask, outcome_of(ask.request, answer=answer, turnaround=self.turnaround))
 
     def _reply(self, sensor: Mimic, request: Request) -> tuple[int, ...] | int:
         if isinstance(request, WriteRegister):
@@ -171,7 +171,7 @@ class Pretence:
         return moved
 
 
-def heard(
+def outcome_of(
     request: Request,
     code: FaultCode = FaultCode.TIMEOUT,
     *,

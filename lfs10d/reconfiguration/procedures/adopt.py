@@ -20,7 +20,7 @@ from typing import Any
 
 from lfs10d.line.jobs.procedure import Await, LineLostError, Step
 from lfs10d.reconfiguration.journal import Endpoint
-from lfs10d.reconfiguration.procedures.baudrate import RateSensor, restored, shifted
+from lfs10d.reconfiguration.procedures.baudrate import RateSensor, restore_rate, write_rate
 from lfs10d.reconfiguration.procedures.identity_query import IdentityQuery
 from lfs10d.reconfiguration.procedures.readdress import (
     ECHO_READS,
@@ -30,12 +30,12 @@ from lfs10d.reconfiguration.procedures.readdress import (
     alone,
     free,
     judge,
-    parted,
     present,
-    verified,
-    written,
+    undo_stored_id,
+    verify,
+    write,
 )
-from lfs10d.reconfiguration.procedures.recognition import recognised
+from lfs10d.reconfiguration.procedures.recognition import recognise
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class AdoptWish:
 class AdoptReport:
     """How it ended: the sensor was at `old`, and was to get `to` (None: no id is free)."""
 
-    verdict: ReaddressReport
+    readdress: ReaddressReport
     old: Endpoint | None = None
     to: int | None = None
     at_rate: bool = True
@@ -64,42 +64,42 @@ class AdoptReport:
     """What its register of the rate held when it was recognised."""
 
 
-def adopt(wish: AdoptWish, asking: IdentityQuery, echo_known: Callable[[], bool]) -> Generator[Step, Any, AdoptReport]:
+def adopt(wish: AdoptWish, query: IdentityQuery, echo_known: Callable[[], bool]) -> Generator[Step, Any, AdoptReport]:
     """Carry it out; see the rules."""
     try:
-        looked = yield from _looked_before(wish, asking, echo_known)
-        if looked.verdict.ending is not ReaddressEnding.FREE or looked.old is None or looked.to is None:
+        looked = yield from _check_before_write(wish, query, echo_known)
+        if looked.readdress.ending is not ReaddressEnding.FREE or looked.old is None or looked.to is None:
             return looked
         old, to = looked.old, looked.to
         new = Endpoint(slave=to, baudrate=wish.line_rate)
-        why = yield Await(IdWrite(old, new, looked.verdict.register))
+        why = yield Await(IdWrite(old, new, looked.readdress.register))
         if why is not None:
             return AdoptReport(ReaddressReport(ReaddressEnding.UNWRITTEN, why=str(why)), old, to)
     except LineLostError:
         return AdoptReport(ReaddressReport(ReaddressEnding.LOST_BEFORE))
     try:
         if old.baudrate != wish.line_rate:
-            verdict = yield from _at_line_rate(old, wish.line_rate, asking.knowing(old.baudrate, looked.rate_code))
-            if verdict is not None:
-                return AdoptReport(verdict, old, to, at_rate=False)
+            report = yield from _at_line_rate(old, wish.line_rate, query.knowing(old.baudrate, looked.rate_code))
+            if report is not None:
+                return AdoptReport(report, old, to, at_rate=False)
         here = Endpoint(slave=old.slave, baudrate=wish.line_rate)
-        exception = yield from written(here, asking.id_register, to, asking)
-        found = yield from verified(here, new, asking)
-        verdict = judge(found, looked.verdict.register, exception, to)
-        return AdoptReport((yield from parted(verdict, here, to, asking)), old, to)
+        exception = yield from write(here, query.id_register, to, query)
+        found = yield from verify(here, new, query)
+        report = judge(found, looked.readdress.register, exception, to)
+        return AdoptReport((yield from undo_stored_id(report, here, to, query)), old, to)
     except LineLostError:
         return AdoptReport(ReaddressReport(ReaddressEnding.NOWHERE, stays_open=True), old, to)
 
 
-def _looked_before(
-    wish: AdoptWish, asking: IdentityQuery, echo_known: Callable[[], bool]
+def _check_before_write(
+    wish: AdoptWish, query: IdentityQuery, echo_known: Callable[[], bool]
 ) -> Generator[Step, Any, AdoptReport]:
     """Find the newcomer and a free id; `FREE` where it may be written."""
-    newcomer = yield from _newcomer(wish, asking)
+    newcomer = yield from _newcomer(wish, query)
     old = newcomer.old
-    if newcomer.verdict.ending is not ReaddressEnding.FREE or old is None:
+    if newcomer.readdress.ending is not ReaddressEnding.FREE or old is None:
         return newcomer
-    to, refusal = yield from _free_id(wish, old, asking)
+    to, refusal = yield from _free_id(wish, old, query)
     if to is None:
         return AdoptReport(
             ReaddressReport(ReaddressEnding.TAKEN, at=old.baudrate), old, next(iter(wish.candidates), None)
@@ -109,40 +109,40 @@ def _looked_before(
     for _ in range(ECHO_READS):
         if echo_known():
             break
-        yield from asking.who(old)
+        yield from query.read_register(old)
     if not echo_known():
         return AdoptReport(ReaddressReport(ReaddressEnding.DEAF), old, to)
-    again = yield from present(old, asking)
-    if not again.answers or not (yield from asking.settle(old)):
+    again = yield from present(old, query)
+    if not again.answers or not (yield from query.settle(old)):
         return AdoptReport(ReaddressReport(ReaddressEnding.ABSENT), old, to)
-    return AdoptReport(newcomer.verdict, old, to, rate_code=newcomer.rate_code)
+    return AdoptReport(newcomer.readdress, old, to, rate_code=newcomer.rate_code)
 
 
-def _newcomer(wish: AdoptWish, asking: IdentityQuery) -> Generator[Step, Any, AdoptReport]:
+def _newcomer(wish: AdoptWish, query: IdentityQuery) -> Generator[Step, Any, AdoptReport]:
     """Find the one sensor at the factory id; `FREE` if there is just one, and it is recognised."""
     found: list[AdoptReport] = []
     for rate in wish.rates:
-        spot = Endpoint(slave=wish.factory, baudrate=rate)
-        reply = yield from present(spot, asking)
+        endpoint = Endpoint(slave=wish.factory, baudrate=rate)
+        reply = yield from present(endpoint, query)
         if reply.silent:
             continue
         ending, why, code = ReaddressEnding.BOTH, "", None
         if reply.answers:
-            recognition = yield from recognised(spot, reply, asking)
+            recognition = yield from recognise(endpoint, reply, query)
             why, code = recognition.why or "", recognition.rate_code
             if not recognition.spoilt:  # the winds of two differ, though both say the same id
                 ending = ReaddressEnding.UNRECOGNISED if why else ReaddressEnding.FREE
-        verdict = ReaddressReport(ending, reply.register, reply.exception, rate, why)
-        found.append(AdoptReport(verdict, spot, rate_code=code))
+        report = ReaddressReport(ending, reply.register, reply.exception, rate, why)
+        found.append(AdoptReport(report, endpoint, rate_code=code))
     if not found:
         return AdoptReport(ReaddressReport(ReaddressEnding.ABSENT))
     if len(found) > 1:
-        return AdoptReport(ReaddressReport(ReaddressEnding.BOTH, at=found[0].verdict.at), found[0].old)
+        return AdoptReport(ReaddressReport(ReaddressEnding.BOTH, at=found[0].readdress.at), found[0].old)
     return found[0]
 
 
 def _free_id(
-    wish: AdoptWish, old: Endpoint, asking: IdentityQuery
+    wish: AdoptWish, old: Endpoint, query: IdentityQuery
 ) -> Generator[Step, Any, tuple[int | None, ReaddressReport | None]]:
     """Return the first candidate at which nothing is heard, None if there is none, and why it must not be written.
 
@@ -152,26 +152,26 @@ def _free_id(
         clear = True
         for rate in wish.rates:
             if rate != old.baudrate:
-                clear = clear and (yield from free(Endpoint(slave=candidate, baudrate=rate), asking))
-        refusal = (yield from alone(old, candidate, asking)) if clear else ReaddressReport(ReaddressEnding.TAKEN)
+                clear = clear and (yield from free(Endpoint(slave=candidate, baudrate=rate), query))
+        refusal = (yield from alone(old, candidate, query)) if clear else ReaddressReport(ReaddressEnding.TAKEN)
         if refusal is None or refusal.ending is not ReaddressEnding.TAKEN:
             return candidate, refusal
     return None, None
 
 
-def _at_line_rate(old: Endpoint, rate: int, asking: IdentityQuery) -> Generator[Step, Any, ReaddressReport | None]:
+def _at_line_rate(old: Endpoint, rate: int, query: IdentityQuery) -> Generator[Step, Any, ReaddressReport | None]:
     """Bring the newcomer to the line's rate; return why that failed, None if it did not."""
-    sensor = RateSensor("", old.slave, asking)
-    exception, at, twins = yield from shifted(sensor, old.baudrate, rate)
+    sensor = RateSensor("", old.slave, query)
+    exception, at, twins = yield from write_rate(sensor, old.baudrate, rate)
     if twins:
-        back = yield from restored(sensor, old.baudrate, rate)
+        back = yield from restore_rate(sensor, old.baudrate, rate)
         return ReaddressReport(ReaddressEnding.BOTH, at=old.baudrate, stays_open=back is None)
     if at == rate:
         return None
     if at is None:
         return ReaddressReport(ReaddressEnding.NOWHERE, exception=exception, stays_open=True)
     if exception is not None:
-        back = yield from restored(sensor, old.baudrate, rate)
+        back = yield from restore_rate(sensor, old.baudrate, rate)
         return ReaddressReport(ReaddressEnding.REFUSED, exception=exception, stays_open=back is None)
     # What it stored may stay: after a power cycle the same request finds it at the line's rate.
     return ReaddressReport(ReaddressEnding.PENDING)

@@ -24,7 +24,7 @@ from lfs10d.line.jobs.job import Hold
 from lfs10d.line.jobs.procedure import Await, LineLostError, Step
 from lfs10d.reconfiguration.journal import Endpoint
 from lfs10d.reconfiguration.procedures.identity_query import PATIENT, IdentityQuery
-from lfs10d.reconfiguration.procedures.readdress import ECHO_READS, TRIES, VERIFY, present, verified, written
+from lfs10d.reconfiguration.procedures.readdress import ECHO_READS, TRIES, VERIFY, present, verify, write
 
 ROLL_BACK = 60.0
 """How long sensors are moved back, in s."""
@@ -66,7 +66,7 @@ class RateSensor:
 
     name: str
     slave: int
-    asking: IdentityQuery
+    query: IdentityQuery
 
     def at(self, baudrate: int) -> Endpoint:
         """Return the place at a rate."""
@@ -74,13 +74,13 @@ class RateSensor:
 
     def code(self, baudrate: int) -> int:
         """Return what its register says for a rate."""
-        register = self.asking.profile.baudrate
+        register = self.query.profile.baudrate
         return -1 if register is None else register.codes[baudrate]
 
     @property
     def register(self) -> int:
         """Where its rate is set."""
-        register = self.asking.profile.baudrate
+        register = self.query.profile.baudrate
         return -1 if register is None else register.register
 
 
@@ -128,7 +128,7 @@ class WriteRates:
 def change_rate(wish: RateWish, echo_known: Callable[[], bool]) -> Generator[Step, Any, BaudrateReport]:
     """Carry it out; see the rules."""
     try:
-        refusal = yield from _looked_before(wish, echo_known)
+        refusal = yield from _check_before_write(wish, echo_known)
         if refusal is not None:
             return refusal
         why = yield Await(WriteRates())
@@ -145,11 +145,11 @@ def change_rate(wish: RateWish, echo_known: Callable[[], bool]) -> Generator[Ste
         return BaudrateReport(BaudrateEnding.UNVERIFIED, dict.fromkeys(where))
 
 
-def _looked_before(wish: RateWish, echo_known: Callable[[], bool]) -> Generator[Step, Any, BaudrateReport | None]:
+def _check_before_write(wish: RateWish, echo_known: Callable[[], bool]) -> Generator[Step, Any, BaudrateReport | None]:
     absent = []
     for sensor in wish.sensors:
-        reply = yield from present(sensor.at(wish.old), sensor.asking)
-        if reply.register is None or not (yield from sensor.asking.settle(sensor.at(wish.old))):
+        reply = yield from present(sensor.at(wish.old), sensor.query)
+        if reply.register is None or not (yield from sensor.query.settle(sensor.at(wish.old))):
             absent.append(sensor.name)
     if absent:
         return BaudrateReport(BaudrateEnding.ABSENT, names=tuple(absent))
@@ -157,7 +157,7 @@ def _looked_before(wish: RateWish, echo_known: Callable[[], bool]) -> Generator[
         if echo_known() or not wish.sensors:
             break
         sensor = wish.sensors[n % len(wish.sensors)]
-        yield from sensor.asking.who(sensor.at(wish.old))
+        yield from sensor.query.read_register(sensor.at(wish.old))
     if wish.sensors and not echo_known():
         return BaudrateReport(BaudrateEnding.DEAF)
     return BaudrateReport(BaudrateEnding.FREE) if wish.dry_run else None
@@ -165,14 +165,14 @@ def _looked_before(wish: RateWish, echo_known: Callable[[], bool]) -> Generator[
 
 def _one_by_one(wish: RateWish, where: dict[str, int | None]) -> Generator[Step, Any, BaudrateReport]:
     for n, sensor in enumerate(wish.sensors):
-        exception, rate, twins = yield from shifted(sensor, wish.old, wish.to)
+        exception, rate, twins = yield from write_rate(sensor, wish.old, wish.to)
         where[sensor.name] = rate
         if twins:
             return (yield from _twins(wish, n, where))
         if rate == wish.to:
             continue
         if n == 0 and rate == wish.old:
-            back = yield from restored(sensor, wish.old, wish.to)
+            back = yield from restore_rate(sensor, wish.old, wish.to)
             where[sensor.name] = back
             if back != wish.old:
                 return BaudrateReport(BaudrateEnding.UNVERIFIED, where, (sensor.name,), exception)
@@ -180,83 +180,83 @@ def _one_by_one(wish: RateWish, where: dict[str, int | None]) -> Generator[Step,
             canary = BaudrateReport(ended, where, (sensor.name,), exception)
             if wish.touched(n) == (sensor,):
                 return canary
-            verdict = yield from rolled_back(wish.touched(n), wish.old, wish.to, where)
-            return canary if verdict.restored else verdict
-        return (yield from rolled_back(wish.touched(n), wish.old, wish.to, where))
+            report = yield from roll_back(wish.touched(n), wish.old, wish.to, where)
+            return canary if report.restored else report
+        return (yield from roll_back(wish.touched(n), wish.old, wish.to, where))
     return BaudrateReport(BaudrateEnding.MOVED, where)
 
 
 def _twins(wish: RateWish, last: int, where: dict[str, int | None]) -> Generator[Step, Any, BaudrateReport]:
     """Bring everybody back, for the last one written is two."""
-    verdict = yield from rolled_back(wish.touched(last), wish.old, wish.to, where)
+    report = yield from roll_back(wish.touched(last), wish.old, wish.to, where)
     names = (wish.sensors[last].name,)
-    return replace(verdict, ended=BaudrateEnding.TWINS, names=names) if verdict.restored else verdict
+    return replace(report, ended=BaudrateEnding.TWINS, names=names) if report.restored else report
 
 
 def _all_written(wish: RateWish, where: dict[str, int | None]) -> Generator[Step, Any, BaudrateReport]:
     for n, sensor in enumerate(wish.sensors):
-        exception = yield from written(sensor.at(wish.old), sensor.register, sensor.code(wish.to), sensor.asking)
-        says, rate = yield from found_at(sensor, (wish.to, wish.old))
+        exception = yield from write(sensor.at(wish.old), sensor.register, sensor.code(wish.to), sensor.query)
+        says, rate = yield from find_rate(sensor, (wish.to, wish.old))
         where[sensor.name] = rate
         if exception is not None or rate is None or says != sensor.code(wish.to):
-            return (yield from rolled_back(wish.touched(n), wish.old, wish.to, where))
-        if rate == wish.to and (yield from sensor.asking.who(sensor.at(wish.old))).answers:
+            return (yield from roll_back(wish.touched(n), wish.old, wish.to, where))
+        if rate == wish.to and (yield from sensor.query.read_register(sensor.at(wish.old))).answers:
             return (yield from _twins(wish, n, where))
     pending = tuple(name for name, rate in where.items() if rate != wish.to)
     return BaudrateReport(BaudrateEnding.PENDING if pending else BaudrateEnding.MOVED, where, pending)
 
 
-def shifted(sensor: RateSensor, old: int, to: int) -> Generator[Step, Any, tuple[int | None, int | None, bool]]:
+def write_rate(sensor: RateSensor, old: int, to: int) -> Generator[Step, Any, tuple[int | None, int | None, bool]]:
     """Write another rate to a sensor; return the code of an exception, and the rate at which it answers then.
 
     The third says that it answers at both: there are two of this slave id.
     """
-    exception = yield from written(sensor.at(old), sensor.register, sensor.code(to), sensor.asking)
-    found = yield from verified(sensor.at(old), sensor.at(to), sensor.asking)
+    exception = yield from write(sensor.at(old), sensor.register, sensor.code(to), sensor.query)
+    found = yield from verify(sensor.at(old), sensor.at(to), sensor.query)
     if found.new.answers:
         return exception, to, found.old.answers
     return exception, old if found.old.answers else None, False
 
 
-def found_at(
+def find_rate(
     sensor: RateSensor, rates: Sequence[int], *, tries: int = TRIES, timeout: float | None = None
 ) -> Generator[Step, Any, tuple[int | None, int | None]]:
     """Look for a sensor at these rates; return what its register of the rate says, and the rate it answers at."""
     for _ in range(tries):
         for rate in rates:
-            reply = yield from sensor.asking.who(sensor.at(rate), timeout, register=sensor.register)
+            reply = yield from sensor.query.read_register(sensor.at(rate), timeout, register=sensor.register)
             if reply.answers:
                 return reply.register, rate
     return None, None
 
 
-def restored(sensor: RateSensor, rate: int, other: int) -> Generator[Step, Any, int | None]:
+def restore_rate(sensor: RateSensor, rate: int, other: int) -> Generator[Step, Any, int | None]:
     """Bring one sensor to `rate`, and its register; return the rate it answers at, None if it is not found."""
-    says, at = yield from found_at(sensor, (other, rate))  # there first: of two of this id one may have moved
+    says, at = yield from find_rate(sensor, (other, rate))  # there first: of two of this id one may have moved
     if at is None or (at == rate and says == sensor.code(rate)):
         return at
     if at == other:
-        _, at, _ = yield from shifted(sensor, other, rate)
+        _, at, _ = yield from write_rate(sensor, other, rate)
         if at != rate:
             return at
         # Of two of this id the other one may have stored the rate and be here still.
-        reply = yield from sensor.asking.who(sensor.at(rate), PATIENT, register=sensor.register)
+        reply = yield from sensor.query.read_register(sensor.at(rate), PATIENT, register=sensor.register)
         if reply.register == sensor.code(rate):
             return rate
-    return rate if (yield from written_back(sensor, rate)) else None
+    return rate if (yield from write_back(sensor, rate)) else None
 
 
-def written_back(sensor: RateSensor, rate: int) -> Generator[Step, Any, bool]:
+def write_back(sensor: RateSensor, rate: int) -> Generator[Step, Any, bool]:
     """Have a sensor that answers at `rate` store it too; whether its register says so then."""
-    yield from written(sensor.at(rate), sensor.register, sensor.code(rate), sensor.asking)
+    yield from write(sensor.at(rate), sensor.register, sensor.code(rate), sensor.query)
     for _ in range(TRIES):
-        reply = yield from sensor.asking.who(sensor.at(rate), PATIENT, register=sensor.register)
+        reply = yield from sensor.query.read_register(sensor.at(rate), PATIENT, register=sensor.register)
         if reply.register == sensor.code(rate):
             return True
     return False
 
 
-def rolled_back(
+def roll_back(
     sensors: Sequence[RateSensor], rate: int, other: int, where: dict[str, int | None]
 ) -> Generator[Step, Any, BaudrateReport]:
     """Bring these sensors to `rate`, for up to `ROLL_BACK`; `where` learns where they are.
@@ -267,15 +267,15 @@ def rolled_back(
     missing = list(sensors)
     while missing:
         for sensor in tuple(missing):
-            where[sensor.name] = yield from restored(sensor, rate, other)
+            where[sensor.name] = yield from restore_rate(sensor, rate, other)
             if where[sensor.name] == rate:
                 missing.remove(sensor)
-            now = sensor.asking.clock.now
+            now = sensor.query.clock.now
             until = now + ROLL_BACK if until is None else until
             if now > until:
                 return BaudrateReport(BaudrateEnding.UNVERIFIED, where, tuple(each.name for each in missing))
         if missing:
-            yield Hold(missing[0].asking.clock.now + FIRST_PAUSE)
+            yield Hold(missing[0].query.clock.now + FIRST_PAUSE)
         else:
             missing = yield from _left_behind(sensors, other)
     return BaudrateReport(BaudrateEnding.ROLLED_BACK, where)
@@ -283,10 +283,10 @@ def rolled_back(
 
 def _left_behind(sensors: Sequence[RateSensor], rate: int) -> Generator[Step, Any, list[RateSensor]]:
     """Return the sensors that somebody answers for at a rate they all have left: he was deaf after his last write."""
-    yield Hold(sensors[0].asking.clock.now + VERIFY)
+    yield Hold(sensors[0].query.clock.now + VERIFY)
     left = []
     for sensor in sensors:
-        reply = yield from sensor.asking.who(sensor.at(rate))
+        reply = yield from sensor.query.read_register(sensor.at(rate))
         if reply.answers:
             left.append(sensor)
     return left

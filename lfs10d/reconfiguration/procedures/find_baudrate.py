@@ -27,7 +27,9 @@ Found: TypeAlias = "dict[str, int]"
 """The rate at which each device answered that did."""
 
 
-def seek(devices: Callable[[], Iterable[Device]], clock: ProcedureClock, line_rate: int) -> Generator[Step, Any, None]:
+def find_other_rates(
+    devices: Callable[[], Iterable[Device]], clock: ProcedureClock, line_rate: int
+) -> Generator[Step, Any, None]:
     """Ask one device after the other, between the probes, at each other rate of its profile; tell what was found.
 
     What goes aside is `Found`, anew whenever it changes; it is empty again when somebody answers at the line's rate.
@@ -60,7 +62,7 @@ def seek(devices: Callable[[], Iterable[Device]], clock: ProcedureClock, line_ra
                 yield Await(dict(found))
 
 
-def in_words(found: Found, line_rate: int, polled: int, *, filed: int) -> str:
+def message(found: Found, line_rate: int, polled: int, *, filed: int) -> str:
     """Return the message for a person: what was found, and what to do.
 
     `filed` is `line.baudrate` of the file; it differs from the `line_rate` where line/baudrate has moved the line.

@@ -28,9 +28,9 @@ from lfs10d.reconfiguration.procedures.readdress import (
     ReaddressFinding,
     ReaddressReport,
     judge,
-    parted,
-    told,
-    verified,
+    read_both,
+    undo_stored_id,
+    verify,
 )
 
 FIRST_PAUSE = 1.0
@@ -43,7 +43,7 @@ DECIDED = frozenset({ReaddressEnding.MOVED, ReaddressEnding.LOCKED})
 def follow(
     old: Endpoint,
     new: Endpoint,
-    asking: IdentityQuery,
+    query: IdentityQuery,
     *,
     longest_pause: float,
     before: Endpoint | None = None,
@@ -53,25 +53,25 @@ def follow(
 
     `before` is where it was before it came to `old`: it may be there still. `newcomer`: `old` is a factory's id.
     """
-    found = yield from verified(old, new, asking, QUICK_LOOK)
-    verdict = yield from _judged(found, before, old, new, asking, newcomer=newcomer)
+    found = yield from verify(old, new, query, QUICK_LOOK)
+    report = yield from _judged(found, before, old, new, query, newcomer=newcomer)
     pause = min(FIRST_PAUSE, longest_pause)
-    while verdict.ending not in DECIDED:
-        yield Await(verdict)
+    while report.ending not in DECIDED:
+        yield Await(report)
         while True:
-            yield Hold(asking.clock.now + pause)
+            yield Hold(query.clock.now + pause)
             pause = min(2 * pause, longest_pause)
-            at_new = yield from asking.who(new)
+            at_new = yield from query.read_register(new)
             if not at_new.silent:
                 break  # the full look asks the old place too, and silence is dear
-            at_old = yield from asking.who(old)
+            at_old = yield from query.read_register(old)
             if at_old.answers and at_old.register != new.slave:
                 break
-            if at_old.silent and (yield from _still_there(before, new, asking)):
+            if at_old.silent and (yield from _still_there(before, new, query)):
                 break
-        found = yield from told(old, new, asking)
-        verdict = yield from _judged(found, before, old, new, asking, newcomer=newcomer)
-    return verdict
+        found = yield from read_both(old, new, query)
+        report = yield from _judged(found, before, old, new, query, newcomer=newcomer)
+    return report
 
 
 def _judged(
@@ -79,25 +79,25 @@ def _judged(
     before: Endpoint | None,
     old: Endpoint,
     new: Endpoint,
-    asking: IdentityQuery,
+    query: IdentityQuery,
     *,
     newcomer: bool,
 ) -> Generator[Step, Any, ReaddressReport]:
     if newcomer and found.new.answers and not found.spoilt and found.old.register != new.slave:
         return ReaddressReport(ReaddressEnding.MOVED, found.new.register)
-    verdict = yield from parted(judge(found, None, None, new.slave), old, new.slave, asking)
-    if verdict.ending is ReaddressEnding.NOWHERE:
-        return (yield from _still_there(before, new, asking)) or verdict
-    return verdict
+    report = yield from undo_stored_id(judge(found, None, None, new.slave), old, new.slave, query)
+    if report.ending is ReaddressEnding.NOWHERE:
+        return (yield from _still_there(before, new, query)) or report
+    return report
 
 
 def _still_there(
-    before: Endpoint | None, new: Endpoint, asking: IdentityQuery
+    before: Endpoint | None, new: Endpoint, query: IdentityQuery
 ) -> Generator[Step, Any, ReaddressReport | None]:
     """Ask the place of before, while the later ones are silent; return that the sensor stays there, None if not."""
     if before is None:
         return None
-    reply = yield from asking.who(before)
+    reply = yield from query.read_register(before)
     return (
         ReaddressReport(ReaddressEnding.LOCKED, reply.register)
         if reply.answers and reply.register != new.slave

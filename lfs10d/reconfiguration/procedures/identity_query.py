@@ -75,15 +75,15 @@ class IdentityQuery:
         self._pending = pending
         self.line_rate = line_rate
 
-    def who(
-        self, spot: Endpoint, timeout: float | None = None, *, register: int | None = None
+    def read_register(
+        self, endpoint: Endpoint, timeout: float | None = None, *, register: int | None = None
     ) -> Generator[Step, Outcome, IdentityReply]:
         """Ask a place for its id register, or for another one."""
-        identity = ReadRegisters(spot.slave, self.id_register if register is None else register, 1)
-        allowed = yield from self._allowed(identity, spot, timeout)
+        identity = ReadRegisters(endpoint.slave, self.id_register if register is None else register, 1)
+        allowed = yield from self._allowed(identity, endpoint, timeout)
         if allowed is not None:
             return allowed
-        return self._reply((yield self._ask(identity, spot, timeout)))
+        return self._reply((yield self._ask(identity, endpoint, timeout)))
 
     def knowing(self, baudrate: int, code: int | None) -> IdentityQuery:
         """Return the same with the content of the rate's register for a rate that the profile has no code for.
@@ -97,21 +97,21 @@ class IdentityQuery:
         profile = self.profile.model_copy(update={"baudrate": known})
         return IdentityQuery(profile, self.codec, self._pending, self.clock, line_rate=self.line_rate)
 
-    def values(
-        self, spot: Endpoint, timeout: float | None = None, *, block: Block | None = None
+    def read_values(
+        self, endpoint: Endpoint, timeout: float | None = None, *, block: Block | None = None
     ) -> Generator[Step, Outcome, IdentityReply]:
         """Ask a place for its values, whatever they are (the first `block` of the profile, or this one).
 
         A late answer to an older such question counts.
         """
-        until = self._pending.left_alone_until(spot.slave, self.clock.now)
+        until = self._pending.left_alone_until(endpoint.slave, self.clock.now)
         if until is not None:
             yield Hold(until)
-        return self._reply((yield self._ask(self._values_of(spot, block), spot, timeout)), values=True)
+        return self._reply((yield self._ask(self._values_of(endpoint, block), endpoint, timeout)), values=True)
 
-    def answered_twice(self, spot: Endpoint) -> bool:
+    def answered_twice(self, endpoint: Endpoint) -> bool:
         """Whether a second answer came to requests to this slave id: see `lfs10d.modbus.duplicates`."""
-        return self._pending.duplicates.known(spot.slave)
+        return self._pending.duplicates.known(endpoint.slave)
 
     def listen(
         self, silent: Endpoint, timeout: float, before: int
@@ -127,50 +127,50 @@ class IdentityQuery:
         extra = before in strangers(outcome, self.codec) - late
         return self._reply(outcome, values=True), extra
 
-    def settle(self, spot: Endpoint) -> Generator[Step, Outcome, bool]:
+    def settle(self, endpoint: Endpoint) -> Generator[Step, Outcome, bool]:
         """Ask until no answer to an older question can come from a place; whether that could be reached."""
         for _ in range(8):
-            if not self._pending.earlier(spot.slave):
+            if not self._pending.earlier(endpoint.slave):
                 return True
-            until = self._pending.left_alone_until(spot.slave, self.clock.now)
+            until = self._pending.left_alone_until(endpoint.slave, self.clock.now)
             if until is None:
-                reply = yield from self.who(spot, PATIENT)
+                reply = yield from self.read_register(endpoint, PATIENT)
                 if not reply.answers:
-                    reply = yield from self.values(spot, PATIENT)
-                self._pending.lingering_until(self._values_of(spot), self.codec, self.clock.now)
-                if not self._pending.earlier(spot.slave):
+                    reply = yield from self.read_values(endpoint, PATIENT)
+                self._pending.lingering_until(self._values_of(endpoint), self.codec, self.clock.now)
+                if not self._pending.earlier(endpoint.slave):
                     return True
                 until = self.clock.now + 0.25
             yield Hold(until)
-        return not self._pending.earlier(spot.slave)
+        return not self._pending.earlier(endpoint.slave)
 
-    def _values_of(self, spot: Endpoint, block: Block | None = None) -> ReadRegisters:
+    def _values_of(self, endpoint: Endpoint, block: Block | None = None) -> ReadRegisters:
         block = block or self.profile.reads()[0]
-        return ReadRegisters(spot.slave, block.address, block.count, block.function)
+        return ReadRegisters(endpoint.slave, block.address, block.count, block.function)
 
-    def _ask(self, request: ReadRegisters, spot: Endpoint, timeout: float | None) -> Ask:
-        baudrate = None if spot.baudrate == self.line_rate else spot.baudrate
+    def _ask(self, request: ReadRegisters, endpoint: Endpoint, timeout: float | None) -> Ask:
+        baudrate = None if endpoint.baudrate == self.line_rate else endpoint.baudrate
         waits = self.timeout if timeout is None else timeout
-        if self._pending.tardy(spot.slave):
+        if self._pending.tardy(endpoint.slave):
             waits = max(waits, PATIENT)
         return Ask(request, self.codec, waits, None, baudrate, request_gap=self.profile.request_gap)
 
     def _allowed(
-        self, request: ReadRegisters, spot: Endpoint, timeout: float | None
+        self, request: ReadRegisters, endpoint: Endpoint, timeout: float | None
     ) -> Generator[Step, Outcome, IdentityReply | None]:
         """Wait and ask what must be asked before `request` may be; return what came instead of an answer, if so."""
-        pending, other = self._pending, self._values_of(spot)
+        pending, other = self._pending, self._values_of(endpoint)
         apart = self.codec.shapes(other)[0] != self.codec.shapes(request)[0]
         while True:
             now = self.clock.now
-            until = pending.left_alone_until(spot.slave, now)
+            until = pending.left_alone_until(endpoint.slave, now)
             if until is not None:
                 yield Hold(until)
             elif pending.confusable(request, self.codec):
                 if not apart:
-                    pending.leave_alone(spot.slave, self.timeout)
+                    pending.leave_alone(endpoint.slave, self.timeout)
                     continue
-                reply = self._reply((yield self._ask(other, spot, timeout)), values=True)
+                reply = self._reply((yield self._ask(other, endpoint, timeout)), values=True)
                 if not reply.answers or reply.exception in NOT_FINAL:
                     return reply
             elif (until := pending.lingering_until(request, self.codec, now)) is not None:

@@ -15,18 +15,16 @@ FIRST_PAUSE = 1.0
 """Between the first look and the first probes, in s; doubled after each."""
 
 
-def locate(
-    places: Sequence[Endpoint], asking: IdentityQuery, *, longest_pause: float
-) -> Generator[Step, Any, Endpoint]:
+def locate(places: Sequence[Endpoint], query: IdentityQuery, *, longest_pause: float) -> Generator[Step, Any, Endpoint]:
     """Return the first of `places` at which somebody answers; None goes aside once if nobody does at first."""
-    for spot in places:
-        if (yield from present(spot, asking)).answers:
-            return spot
+    for endpoint in places:
+        if (yield from present(endpoint, query)).answers:
+            return endpoint
     yield Await(None)
     pause = min(FIRST_PAUSE, longest_pause)
     while True:
-        yield Hold(asking.clock.now + pause)
+        yield Hold(query.clock.now + pause)
         pause = min(2 * pause, longest_pause)
-        for spot in places:
-            if (yield from asking.who(spot)).answers:
-                return spot
+        for endpoint in places:
+            if (yield from query.read_register(endpoint)).answers:
+                return endpoint

@@ -1,19 +1,19 @@
-"""Giving a sensor another slave id: looked before, one write, then only asking counts. Pure.
+"""Gives a sensor another slave id: checked before, one write, and verified by reading. Pure.
 
 Rules
 -----
-1. Before anything is written: the new id is silent in three questions at the line's rate and at each other rate of
-   the profile, not one byte is heard; the sensor answers at its old id, it is there alone
-   (see `recognition`: two of one id would both move), and nothing older can come from there; how the adapter
-   echoes is known.
+1. Before anything is written: the new id is silent in three reads at the line's rate and at each other rate of
+   the profile, not one byte is received; the sensor answers at its old id, it is alone there
+   (see `recognition`: two of one id would both move), no older request to it can still be answered; and it is known
+   how the adapter echoes.
 2. The intent is on the disk before the write. There is one write, to one slave, and no other register is written. Only
    where two had the old id and the one that stayed has stored the new one is its old id written back: it would come
    to the other's at its next power-up.
-3. An echo, an exception, silence: all of them are only hints. For up to `VERIFY` both places are asked, once more
-   right after that; what they say then is the truth.
+3. An echo, an exception, silence after the write: all of them are only hints. For up to `VERIFY` both places are
+   read, and once more right after that; what they answer then counts.
 
 ================= ================== ======================= ==========================
-new id            old id             its register            verdict
+new id            old id             its register            ending
 ================= ================== ======================= ==========================
 answers           silent                                     moved
 answers           answers                                    duplicate_id
@@ -31,6 +31,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from itertools import takewhile
 from typing import Any
 
 from lfs10d.line.jobs.job import Hold
@@ -41,24 +42,24 @@ from lfs10d.modbus.request import WriteRegister
 from lfs10d.reading import FaultCode
 from lfs10d.reconfiguration.journal import Endpoint
 from lfs10d.reconfiguration.procedures.identity_query import PATIENT, SILENCE, IdentityQuery, IdentityReply
-from lfs10d.reconfiguration.procedures.recognition import one_alone
+from lfs10d.reconfiguration.procedures.recognition import look_for_twins
 
 VERIFY = 5.0
-"""How long after the write both places are asked, in s."""
+"""How long after the write both places are read, in s."""
 PAUSE = 0.25
-"""Between two rounds of questions, in s."""
+"""Pause between two rounds of reads, in s."""
 TRIES = 3
-"""Questions before a place counts as silent."""
+"""Reads without an answer before a place counts as silent."""
 QUICK_LOOK = (None,) * TRIES
-"""How long the last questions at the new id wait, in s (None: as usual), where looking is dear."""
+"""Time-outs of the last reads at the new id, in s (None: the usual one), where a long look costs too much."""
 PATIENT_LOOK = (None, None, PATIENT)
-"""So right after a write: a slow sensor must not pass for silent."""
+"""The same right after a write: a slow sensor must not count as silent."""
 PROBE_TIMEOUTS = (0.2, 0.2, 0.6)
-"""How long the three questions at a new id wait, in s."""
+"""Time-outs of the three reads at a new id, in s."""
 WRITE_TIMEOUT = 1.0
-"""How long the write's echo is waited for, in s."""
+"""Time-out of the write's reply, in s."""
 ECHO_READS = 12
-"""Reads after which the adapter's echo must be known."""
+"""Reads after which it must be known how the adapter echoes."""
 
 
 class ReaddressEnding(StrEnum):
@@ -81,27 +82,16 @@ class ReaddressEnding(StrEnum):
     NOWHERE = "nowhere"
 
 
-NOTHING_WRITTEN = frozenset(
-    {
-        ReaddressEnding.TAKEN,
-        ReaddressEnding.ABSENT,
-        ReaddressEnding.DEAF,
-        ReaddressEnding.LOST_BEFORE,
-        ReaddressEnding.UNWRITTEN,
-        ReaddressEnding.TWINS,
-        ReaddressEnding.UNRECOGNISED,
-        ReaddressEnding.FREE,
-    }
-)
+NOTHING_WRITTEN = frozenset(takewhile(lambda ending: ending is not ReaddressEnding.MOVED, ReaddressEnding))
 STAYS_OPEN = frozenset({ReaddressEnding.GARBAGE, ReaddressEnding.PENDING, ReaddressEnding.NOWHERE})
 """With these the sensor may yet appear at either place; so it may where its register says the new id."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReaddressReport:
-    """How it ended; `register` and `exception` are what the sensor said, `at` the rate where somebody was heard.
+    """How it ended; `register` and `exception` are what the sensor answered, `at` the rate where bytes came.
 
-    `why` is what kept the intent from the disk, how two sensors show, or why it is not recognised. `stays_open`: the
+    `why` is what kept the intent from the disk, the sign of two sensors, or why it is not recognised. `stays_open`: the
     sensor may yet appear at either place.
     """
 
@@ -138,11 +128,11 @@ class ReaddressWish:
 
 
 def readdress(
-    wish: ReaddressWish, asking: IdentityQuery, echo_known: Callable[[], bool]
+    wish: ReaddressWish, query: IdentityQuery, echo_known: Callable[[], bool]
 ) -> Generator[Step, Any, ReaddressReport]:
     """Carry it out; see the rules."""
     try:
-        refusal, before = yield from looked_before(wish, asking, echo_known)
+        refusal, before = yield from check_before_write(wish, query, echo_known)
         if refusal is not None:
             return refusal
         if wish.dry_run:
@@ -153,36 +143,36 @@ def readdress(
     except LineLostError:
         return ReaddressReport(ReaddressEnding.LOST_BEFORE)
     try:
-        exception = yield from written(wish.old, asking.id_register, wish.to, asking)
-        found = yield from verified(wish.old, wish.new, asking)
-        verdict = judge(found, before.register, exception, wish.to)
-        return (yield from parted(verdict, wish.old, wish.to, asking))
+        exception = yield from write(wish.old, query.id_register, wish.to, query)
+        found = yield from verify(wish.old, wish.new, query)
+        report = judge(found, before.register, exception, wish.to)
+        return (yield from undo_stored_id(report, wish.old, wish.to, query))
     except LineLostError:
         return ReaddressReport(ReaddressEnding.NOWHERE, stays_open=True)
 
 
-def looked_before(
-    wish: ReaddressWish, asking: IdentityQuery, echo_known: Callable[[], bool]
+def check_before_write(
+    wish: ReaddressWish, query: IdentityQuery, echo_known: Callable[[], bool]
 ) -> Generator[Step, Any, tuple[ReaddressReport | None, IdentityReply]]:
-    """Find out whether it may be written at all (rule 1); return why not, and what the sensor said."""
-    before = yield from present(wish.old, asking)
+    """Check whether it may be written at all (rule 1); return why not, and what the sensor answered."""
+    before = yield from present(wish.old, query)
     if before.register is None:
         return absent(before), before
-    refusal = yield from alone(wish.old, wish.to, asking)
+    refusal = yield from alone(wish.old, wish.to, query)
     if refusal is not None:
         return refusal, before
     for rate in sorted(set(wish.rates) - {wish.old.baudrate}):
-        if not (yield from free(Endpoint(slave=wish.to, baudrate=rate), asking)):
+        if not (yield from free(Endpoint(slave=wish.to, baudrate=rate), query)):
             return ReaddressReport(ReaddressEnding.TAKEN, at=rate), before
     for _ in range(ECHO_READS):
         if echo_known():
             break
-        yield from asking.who(wish.old)
+        yield from query.read_register(wish.old)
     if not echo_known():
         return ReaddressReport(ReaddressEnding.DEAF), before
     # The long look at the new id over, it must answer now, and nothing from before may still be under way.
-    again = yield from present(wish.old, asking)
-    if not again.answers or not (yield from asking.settle(wish.old)):
+    again = yield from present(wish.old, query)
+    if not again.answers or not (yield from query.settle(wish.old)):
         return ReaddressReport(ReaddressEnding.ABSENT), before
     return None, before
 
@@ -194,9 +184,9 @@ def absent(reply: IdentityReply) -> ReaddressReport:
     return ReaddressReport(ReaddressEnding.ABSENT, exception=reply.exception)
 
 
-def alone(old: Endpoint, to: int, asking: IdentityQuery) -> Generator[Step, Any, ReaddressReport | None]:
+def alone(old: Endpoint, to: int, query: IdentityQuery) -> Generator[Step, Any, ReaddressReport | None]:
     """Find out whether one sensor is at a place and nothing at the slave id `to`; return what is wrong, if anything."""
-    look = yield from one_alone(old, Endpoint(slave=to, baudrate=old.baudrate), asking)
+    look = yield from look_for_twins(old, Endpoint(slave=to, baudrate=old.baudrate), query)
     if look.twins is not None:
         return ReaddressReport(ReaddressEnding.TWINS, why=look.twins)
     if not look.answers:
@@ -204,31 +194,31 @@ def alone(old: Endpoint, to: int, asking: IdentityQuery) -> Generator[Step, Any,
     return ReaddressReport(ReaddressEnding.TAKEN, at=old.baudrate) if look.taken else None
 
 
-def present(spot: Endpoint, asking: IdentityQuery) -> Generator[Step, Any, IdentityReply]:
-    """Ask a place up to three times, longer each time, until it answers."""
+def present(endpoint: Endpoint, query: IdentityQuery) -> Generator[Step, Any, IdentityReply]:
+    """Read the id at a place up to three times, waiting longer each time, until it answers."""
     reply = SILENCE
-    for timeout in (None, 2 * asking.timeout, PATIENT):
-        reply = yield from asking.who(spot, timeout)
+    for timeout in (None, 2 * query.timeout, PATIENT):
+        reply = yield from query.read_register(endpoint, timeout)
         if reply.answers:
             break
     return reply
 
 
-def free(spot: Endpoint, asking: IdentityQuery) -> Generator[Step, Any, bool]:
-    """Whether not one byte is heard when a place is asked three times."""
+def free(endpoint: Endpoint, query: IdentityQuery) -> Generator[Step, Any, bool]:
+    """Whether not one byte is received in three reads at a place."""
     for timeout in PROBE_TIMEOUTS:
-        reply = yield from asking.values(spot, timeout)
+        reply = yield from query.read_values(endpoint, timeout)
         if not reply.silent:
             return False
     return True
 
 
-def written(spot: Endpoint, register: int, value: int, asking: IdentityQuery) -> Generator[Step, Any, int | None]:
+def write(endpoint: Endpoint, register: int, value: int, query: IdentityQuery) -> Generator[Step, Any, int | None]:
     """Write once; return the code of an exception, if one came."""
-    request = WriteRegister(spot.slave, register, value)
-    baudrate = None if spot.baudrate == asking.line_rate else spot.baudrate
+    request = WriteRegister(endpoint.slave, register, value)
+    baudrate = None if endpoint.baudrate == query.line_rate else endpoint.baudrate
     outcome: Outcome = yield Ask(
-        request, asking.codec, WRITE_TIMEOUT, None, baudrate, request_gap=asking.profile.request_gap
+        request, query.codec, WRITE_TIMEOUT, None, baudrate, request_gap=query.profile.request_gap
     )
     fault = outcome.fault
     if fault is not None and fault.code is FaultCode.EXCEPTION:
@@ -238,66 +228,66 @@ def written(spot: Endpoint, register: int, value: int, asking: IdentityQuery) ->
 
 @dataclass(frozen=True, slots=True)
 class ReaddressFinding:
-    """What the two places said in the end; `spoilt`: again and again bytes at the new one that make no frame."""
+    """What the two places answered in the end; `spoilt`: repeatedly bytes at the new one that make no frame."""
 
     new: IdentityReply
     old: IdentityReply
     spoilt: bool = False
 
 
-def verified(
-    old: Endpoint, new: Endpoint, asking: IdentityQuery, look: Sequence[float | None] = PATIENT_LOOK
+def verify(
+    old: Endpoint, new: Endpoint, query: IdentityQuery, look: Sequence[float | None] = PATIENT_LOOK
 ) -> Generator[Step, Any, ReaddressFinding]:
-    """Ask both places until the new one answers and the old one is silent, for up to `VERIFY`, and once more."""
-    until = asking.clock.now + VERIFY
-    while asking.clock.now < until:
-        reply = yield from asking.who(new)
+    """Read both places until the new one answers and the old one is silent, for up to `VERIFY`, and once more."""
+    until = query.clock.now + VERIFY
+    while query.clock.now < until:
+        reply = yield from query.read_register(new)
         if reply.answers:
-            return (yield from told(old, new, asking, look))
-        yield from asking.who(old)
-        yield Hold(asking.clock.now + PAUSE)
-    return (yield from told(old, new, asking, look))
+            return (yield from read_both(old, new, query, look))
+        yield from query.read_register(old)
+        yield Hold(query.clock.now + PAUSE)
+    return (yield from read_both(old, new, query, look))
 
 
-def told(
-    old: Endpoint, new: Endpoint, asking: IdentityQuery, look: Sequence[float | None] = QUICK_LOOK
+def read_both(
+    old: Endpoint, new: Endpoint, query: IdentityQuery, look: Sequence[float | None] = QUICK_LOOK
 ) -> Generator[Step, Any, ReaddressFinding]:
-    """Ask each of two places until it answers or was silent `TRIES` times, at the new one as long as `look` says."""
+    """Read each of two places until it answers or was silent `TRIES` times; `look` has the time-outs at the new one."""
     spoilt = 0
     at_new = SILENCE
     for timeout in look:
-        reply = yield from asking.who(new, timeout)
+        reply = yield from query.read_register(new, timeout)
         spoilt += reply.noise
         at_new = _nearer(at_new, reply)
         if reply.answers and not reply.noise:
             break
     if at_new.answers:
-        # Two sensors that say the same id at the same time sound like one; their winds differ.
+        # Two sensors that answer the same id at the same time look like one; their values differ.
         for _ in range(TRIES):
-            reply = yield from asking.values(new)
+            reply = yield from query.read_values(new)
             spoilt += reply.noise
             if not reply.noise:
                 break
     at_old = SILENCE
     for _ in range(TRIES):
-        at_old = _nearer(at_old, (yield from asking.who(old)))
+        at_old = _nearer(at_old, (yield from query.read_register(old)))
         if at_old.answers:
             break
     return ReaddressFinding(at_new, at_old, spoilt >= TRIES)
 
 
-def parted(
-    verdict: ReaddressReport, old: Endpoint, to: int, asking: IdentityQuery
+def undo_stored_id(
+    report: ReaddressReport, old: Endpoint, to: int, query: IdentityQuery
 ) -> Generator[Step, Any, ReaddressReport]:
     """Have the one of two that stayed at `old` forget the new id, if it has stored that."""
-    if verdict.ending is not ReaddressEnding.BOTH or verdict.register != to:
-        return verdict
+    if report.ending is not ReaddressEnding.BOTH or report.register != to:
+        return report
     for _ in range(TRIES):
-        yield from written(old, asking.id_register, old.slave, asking)
-        reply = yield from asking.who(old, PATIENT)
+        yield from write(old, query.id_register, old.slave, query)
+        reply = yield from query.read_register(old, PATIENT)
         if reply.register == old.slave:
-            return replace(verdict, register=old.slave, stays_open=False)
-    return verdict
+            return replace(report, register=old.slave, stays_open=False)
+    return report
 
 
 def _nearer(one: IdentityReply, other: IdentityReply) -> IdentityReply:
@@ -305,7 +295,7 @@ def _nearer(one: IdentityReply, other: IdentityReply) -> IdentityReply:
 
 
 def judge(found: ReaddressFinding, register_before: int | None, exception: int | None, to: int) -> ReaddressReport:
-    """Return what follows from what the two places said, by the table."""
+    """Return what follows from the answers of the two places, by the table."""
     new, old = found.new, found.old
     if old.answers and (new.answers or found.spoilt):
         ending = ReaddressEnding.BOTH

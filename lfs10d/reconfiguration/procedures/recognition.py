@@ -72,44 +72,46 @@ class Look:
     exception: int | None = None
 
 
-def recognised(spot: Endpoint, identity: IdentityReply, asking: IdentityQuery) -> Generator[Step, Outcome, Recognition]:
+def recognise(
+    endpoint: Endpoint, identity: IdentityReply, query: IdentityQuery
+) -> Generator[Step, Outcome, Recognition]:
     """Find out whether a sensor of the profile is at a place where `identity` was the answer to who is there."""
-    profile = asking.profile
+    profile = query.profile
     if identity.exception is not None:
-        return Recognition(f"it refuses register 0x{asking.id_register:04X} (exception {identity.exception:02X})")
-    if identity.register != spot.slave:
-        return Recognition(f"its register 0x{asking.id_register:04X} says {identity.register}, not {spot.slave}")
+        return Recognition(f"it refuses register 0x{query.id_register:04X} (exception {identity.exception:02X})")
+    if identity.register != endpoint.slave:
+        return Recognition(f"its register 0x{query.id_register:04X} says {identity.register}, not {endpoint.slave}")
     for block in profile.reads():
-        found = yield from _values_fit(block, spot, asking)
+        found = yield from _values_fit(block, endpoint, query)
         if found.why is not None or found.spoilt:
             return found
     if profile.baudrate is None:
         return Recognition()
-    return (yield from _rate_fits(profile.baudrate.register, spot, asking))
+    return (yield from _rate_fits(profile.baudrate.register, endpoint, query))
 
 
-def _rate_fits(register: int, spot: Endpoint, asking: IdentityQuery) -> Generator[Step, Outcome, Recognition]:
+def _rate_fits(register: int, endpoint: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, Recognition]:
     reply = SILENCE
-    for timeout in _timeouts(asking):
-        reply = yield from asking.who(spot, timeout, register=register)
+    for timeout in _timeouts(query):
+        reply = yield from query.read_register(endpoint, timeout, register=register)
         if reply.answers:
             break
-    if rate_fits(asking.profile, reply.register, spot.baudrate):
+    if rate_fits(query.profile, reply.register, endpoint.baudrate):
         return Recognition(rate_code=reply.register)
     says = "does not answer" if reply.register is None else f"says {reply.register}, which is no rate"
     return Recognition(f"its register 0x{register:04X} {says}")
 
 
-def _timeouts(asking: IdentityQuery) -> tuple[float | None, ...]:
-    return (None, 2 * asking.timeout, PATIENT)
+def _timeouts(query: IdentityQuery) -> tuple[float | None, ...]:
+    return (None, 2 * query.timeout, PATIENT)
 
 
-def _values_fit(block: Block, spot: Endpoint, asking: IdentityQuery) -> Generator[Step, Outcome, Recognition]:
+def _values_fit(block: Block, endpoint: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, Recognition]:
     """Read a block of values `READS` times; the first answer that is none of such a device decides."""
     spoilt = answered = 0
     exception: int | None = None
-    for timeout in _timeouts(asking):
-        reply = yield from asking.values(spot, timeout, block=block)
+    for timeout in _timeouts(query):
+        reply = yield from query.read_values(endpoint, timeout, block=block)
         spoilt += reply.noise
         exception = reply.exception
         if reply.words is None:
@@ -126,48 +128,48 @@ def _values_fit(block: Block, spot: Endpoint, asking: IdentityQuery) -> Generato
     return Recognition(f"it {how} its values at 0x{block.address:04X}")
 
 
-def one_alone(spot: Endpoint, silent: Endpoint, asking: IdentityQuery) -> Generator[Step, Outcome, Look]:
+def look_for_twins(endpoint: Endpoint, silent: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, Look]:
     """Find out whether one sensor is at a place, not two (rules 2 to 4); `silent` is a slave id that nobody has."""
-    look = yield from _looked_at(spot, silent, asking)
-    if look.twins is None and asking.answered_twice(spot):
+    look = yield from _read_and_listen(endpoint, silent, query)
+    if look.twins is None and query.answered_twice(endpoint):
         return replace(look, twins="a second answer comes to each request")
     return look
 
 
-def _looked_at(spot: Endpoint, silent: Endpoint, asking: IdentityQuery) -> Generator[Step, Outcome, Look]:
-    value = asking.profile.values[0]
-    block = next(block for block in asking.profile.reads() if value in block.values)
+def _read_and_listen(endpoint: Endpoint, silent: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, Look]:
+    value = query.profile.values[0]
+    block = next(block for block in query.profile.reads() if value in block.values)
     numbers: list[float] = []
     for window in LISTENING:
-        look = yield from _measured(value, block, spot, asking)
+        look = yield from _measured(value, block, endpoint, query)
         if isinstance(look, Look):
             return look
         numbers.append(look)
-        received, extra = yield from asking.listen(silent, window, spot.slave)
+        received, extra = yield from query.listen(silent, window, endpoint.slave)
         if extra:
             return Look(twins="a second answer came behind the first")
         if not received.silent:
-            return (yield from _whose(silent, asking))
-    return (yield from _take_turns(value, block, numbers, spot, asking))
+            return (yield from _whose(silent, query))
+    return (yield from _take_turns(value, block, numbers, endpoint, query))
 
 
-def _whose(silent: Endpoint, asking: IdentityQuery) -> Generator[Step, Outcome, Look]:
+def _whose(silent: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, Look]:
     """Find out whether what was received behind a read came from the place that was to be silent."""
     for _ in range(READS - 1):
-        reply = yield from asking.values(silent, QUICK)
+        reply = yield from query.read_values(silent, QUICK)
         if not reply.silent:
             return Look(taken=True)
     return Look(twins="something is received behind its answer")
 
 
 def _take_turns(
-    value: Value, block: Block, numbers: list[float], spot: Endpoint, asking: IdentityQuery
+    value: Value, block: Block, numbers: list[float], endpoint: Endpoint, query: IdentityQuery
 ) -> Generator[Step, Outcome, Look]:
     """Read it more often where the `numbers` so far jump there and back; find out whether that goes on."""
     if jumps(value, numbers) < READS - 1:
         return Look()
     for _ in range(MORE_READS):
-        look = yield from _measured(value, block, spot, asking)
+        look = yield from _measured(value, block, endpoint, query)
         if isinstance(look, Look):
             return look
         numbers.append(look)
@@ -177,12 +179,12 @@ def _take_turns(
 
 
 def _measured(
-    value: Value, block: Block, spot: Endpoint, asking: IdentityQuery
+    value: Value, block: Block, endpoint: Endpoint, query: IdentityQuery
 ) -> Generator[Step, Outcome, Look | float]:
     """Return the value; a `Look` that ends it where there is none."""
     exception: int | None = None
-    for timeout in _timeouts(asking):
-        reply = yield from asking.values(spot, timeout, block=block)
+    for timeout in _timeouts(query):
+        reply = yield from query.read_values(endpoint, timeout, block=block)
         if reply.noise:
             return Look(twins="answers collide there")
         if reply.words is not None:

@@ -20,9 +20,9 @@ from lfs10d.reconfiguration.procedures.baudrate import (
     BaudrateEnding,
     BaudrateReport,
     RateSensor,
-    found_at,
-    restored,
-    written_back,
+    find_rate,
+    restore_rate,
+    write_back,
 )
 from lfs10d.reconfiguration.procedures.identity_query import PATIENT
 
@@ -58,10 +58,10 @@ def look_back(
     for one that is lost. `where` learns where each is, and is returned.
     """
     for sensor in sensors:
-        says, at = yield from found_at(sensor, _first(own, rate, other), tries=1)
+        says, at = yield from find_rate(sensor, _first(own, rate, other), tries=1)
         where[sensor.name] = at
         if at == rate and says != sensor.code(rate):
-            yield from written_back(sensor, rate)
+            yield from write_back(sensor, rate)
     return where
 
 
@@ -75,8 +75,8 @@ def put_back(
     for sensor in sensors:
         if where[sensor.name] is None:
             continue
-        where[sensor.name] = yield from restored(sensor, rate, other)
-        if where[sensor.name] == rate and (yield from sensor.asking.who(sensor.at(other))).answers:
+        where[sensor.name] = yield from restore_rate(sensor, rate, other)
+        if where[sensor.name] == rate and (yield from sensor.query.read_register(sensor.at(other))).answers:
             where[sensor.name] = other
             yield Await(Twins(sensor.name))
     names = tuple(name for name, at in where.items() if at != rate)
@@ -102,7 +102,7 @@ def await_lost(
     """
     rounds = 0
     while True:
-        now = sensors[0].asking.clock.now
+        now = sensors[0].query.clock.now
         if now >= tell_at:
             yield Await(StillLost())
             tell_at = inf
@@ -113,7 +113,7 @@ def await_lost(
         for sensor in sensors:
             for n, asked in enumerate(_first(where[sensor.name] or own, rate, other)):
                 timeout = PATIENT if rest == PATIENT_EVERY - 1 and turn % 2 == n else None
-                reply = yield from sensor.asking.who(sensor.at(asked), timeout, register=sensor.register)
+                reply = yield from sensor.query.read_register(sensor.at(asked), timeout, register=sensor.register)
                 if reply.answers and not (asked == other and reply.register == sensor.code(rate)):
                     found.append(sensor)
                 if reply.answers:
@@ -139,16 +139,16 @@ def await_power(
     pause = min(FIRST_PAUSE, longest_pause)
     while missing:
         for sensor in tuple(missing):
-            reply = yield from sensor.asking.who(sensor.at(to))
+            reply = yield from sensor.query.read_register(sensor.at(to))
             if not reply.answers:
                 continue
-            if not (yield from sensor.asking.who(sensor.at(old))).answers:
+            if not (yield from sensor.query.read_register(sensor.at(old))).answers:
                 missing.remove(sensor)
                 yield Await(CameUp(sensor.name))
             elif sensor.name not in twins:
                 twins.add(sensor.name)
                 yield Await(Twins(sensor.name))
         if missing:
-            yield Hold(missing[0].asking.clock.now + pause)
+            yield Hold(missing[0].query.clock.now + pause)
             pause = min(2 * pause, longest_pause)
     return BaudrateReport(BaudrateEnding.MOVED, {sensor.name: to for sensor in sensors})

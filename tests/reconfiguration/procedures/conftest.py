@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from lfs10d.modbus.outcome import Outcome
-from tests.support.sensors import Pretence, heard
+from tests.support.sensors import Pretence, outcome_of
 
 
 @pytest.fixture
@@ -15,7 +15,7 @@ def pretence() -> Pretence:
     return Pretence()
 
 
-@pytest.fixture(name="heard")
-def _heard() -> Callable[..., Outcome]:
+@pytest.fixture(name="outcome_of")
+def _outcome_of() -> Callable[..., Outcome]:
     """Give the function that makes outcomes."""
-    return heard
+    return outcome_of

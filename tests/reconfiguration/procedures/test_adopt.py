@@ -18,7 +18,7 @@ AT_9600, AT_19200 = Endpoint(slave=1, baudrate=9600), Endpoint(slave=1, baudrate
 
 
 def adopted(pretence: Pretence, wish: AdoptWish = WISH, *, echo_known: bool = True) -> AdoptReport:
-    return pretence.carry_out(adopt(wish, pretence.asking(), lambda: echo_known))
+    return pretence.carry_out(adopt(wish, pretence.query(), lambda: echo_known))
 
 
 def questions_before_the_first_write(pretence: Pretence) -> int:
@@ -35,14 +35,14 @@ def test_one_at_the_lines_rate_gets_the_first_free_id(pretence: Pretence) -> Non
     pretence.sensor(1)
     assert adopted(pretence) == AdoptReport(ReaddressReport(ReaddressEnding.MOVED, 2), AT_9600, 2)
     assert pretence.writes == [WriteRegister(1, 5, 2)]
-    assert pretence.aside == [IdWrite(AT_9600, Endpoint(slave=2, baudrate=9600), 1)]
+    assert pretence.awaited == [IdWrite(AT_9600, Endpoint(slave=2, baudrate=9600), 1)]
 
 
 def test_one_at_another_rate_is_brought_to_the_lines_first(pretence: Pretence) -> None:
     pretence.sensor(1, baudrate=19200)
     assert adopted(pretence) == AdoptReport(ReaddressReport(ReaddressEnding.MOVED, 2), AT_19200, 2)
     assert pretence.writes == [WriteRegister(1, 4, 1), WriteRegister(1, 5, 2)]
-    assert len(pretence.aside) == 1
+    assert len(pretence.awaited) == 1
 
 
 @pytest.mark.parametrize("rate", [9600, 19200])
@@ -92,8 +92,8 @@ def test_without_knowing_how_the_adapter_echoes_nothing_is_written(pretence: Pre
 def test_reads_that_teach_the_echo_are_enough(pretence: Pretence) -> None:
     pretence.sensor(1)
     before = questions_before_the_first_write(pretence)
-    steps = adopt(WISH, pretence.asking(), lambda: len(pretence.asked) >= before)
-    assert pretence.carry_out(steps).verdict.ending is ReaddressEnding.MOVED
+    steps = adopt(WISH, pretence.query(), lambda: len(pretence.asked) >= before)
+    assert pretence.carry_out(steps).readdress.ending is ReaddressEnding.MOVED
 
 
 def test_a_newcomer_that_is_gone_meanwhile_is_not_written_to(pretence: Pretence) -> None:
@@ -125,7 +125,7 @@ def test_a_port_lost_after_the_write_leaves_the_change_open(pretence: Pretence) 
 
 
 @pytest.mark.parametrize(
-    ("manner", "verdict"),
+    ("manner", "report"),
     [
         ("stores", ReaddressReport(ReaddressEnding.PENDING)),
         ("vanishes", ReaddressReport(ReaddressEnding.NOWHERE, stays_open=True)),
@@ -134,17 +134,17 @@ def test_a_port_lost_after_the_write_leaves_the_change_open(pretence: Pretence) 
     ],
 )
 def test_one_that_does_not_come_to_the_lines_rate_keeps_its_id(
-    pretence: Pretence, manner: str, verdict: ReaddressReport
+    pretence: Pretence, manner: str, report: ReaddressReport
 ) -> None:
     pretence.sensor(1, baudrate=19200, manner=manner)
-    assert adopted(pretence) == AdoptReport(verdict, AT_19200, 2, at_rate=False)
+    assert adopted(pretence) == AdoptReport(report, AT_19200, 2, at_rate=False)
     assert {write.address for write in pretence.writes} == {4}
 
 
 def test_two_newcomers_that_part_when_brought_to_the_lines_rate_are_told(pretence: Pretence) -> None:
     sensors = [pretence.sensor(1, baudrate=19200), pretence.sensor(1, baudrate=19200, manner="stores")]
     found = adopted(pretence)
-    assert (found.verdict.ending, found.verdict.stays_open, found.at_rate) == (ReaddressEnding.BOTH, False, False)
+    assert (found.readdress.ending, found.readdress.stays_open, found.at_rate) == (ReaddressEnding.BOTH, False, False)
     assert [sensor.baudrate for sensor in sensors] == [19200, 19200]
 
 
@@ -159,8 +159,12 @@ def test_two_newcomers_that_part_when_brought_to_the_lines_rate_are_told(pretenc
 def test_a_device_that_is_not_recognised_is_not_written_to(pretence: Pretence, facts: dict[str, Any], why: str) -> None:
     pretence.sensor(1, baudrate=19200, **facts)
     found = adopted(pretence)
-    assert (found.verdict.ending, found.verdict.why, found.verdict.at) == (ReaddressEnding.UNRECOGNISED, why, 19200)
-    assert pretence.writes == pretence.aside == []
+    assert (found.readdress.ending, found.readdress.why, found.readdress.at) == (
+        ReaddressEnding.UNRECOGNISED,
+        why,
+        19200,
+    )
+    assert pretence.writes == pretence.awaited == []
 
 
 class Changing(Mimic):
@@ -176,13 +180,13 @@ class Changing(Mimic):
 def test_two_that_show_only_after_one_was_recognised_are_not_written_to(pretence: Pretence) -> None:
     pretence.sensors.append(Changing(1))
     found = adopted(pretence)
-    assert (found.verdict.ending, found.to) == (ReaddressEnding.TWINS, 2)
+    assert (found.readdress.ending, found.to) == (ReaddressEnding.TWINS, 2)
     assert pretence.writes == []
 
 
 def test_a_newcomer_that_is_gone_before_the_write_is_not_written_to(pretence: Pretence) -> None:
     sensor = pretence.sensor(1)
-    assert pretence.carry_out(adopt(WISH, pretence.asking(), lambda: vanish(sensor))).verdict == ReaddressReport(
+    assert pretence.carry_out(adopt(WISH, pretence.query(), lambda: vanish(sensor))).readdress == ReaddressReport(
         ReaddressEnding.ABSENT
     )
     assert pretence.writes == []
@@ -198,6 +202,6 @@ def test_one_that_came_at_a_rate_without_a_code_is_brought_back_to_it(pretence: 
     for sensor in sensors:
         sensor.codes = {0: 4800, 1: 9600, 2: 19200}
     found = adopted(pretence, AdoptWish(1, (2,), 9600, (9600, 4800, 19200)))
-    assert (found.verdict.ending, found.verdict.stays_open) == (ReaddressEnding.BOTH, False)
+    assert (found.readdress.ending, found.readdress.stays_open) == (ReaddressEnding.BOTH, False)
     assert [sensor.baudrate for sensor in sensors] == [4800, 4800]
     assert WriteRegister(1, 4, 0) in pretence.writes

@@ -19,7 +19,7 @@ from lfs10d.reconfiguration.procedures.baudrate import (
     RateWish,
     WriteRates,
     change_rate,
-    restored,
+    restore_rate,
 )
 from lfs10d.reconfiguration.procedures.readdress import ECHO_READS
 from tests.support.sensors import Pretence
@@ -42,7 +42,7 @@ def line(pretence: Pretence, *manners: str) -> tuple[RateSensor, ...]:
     """Put sensors of these manners on the line, as `s1`, `s2` ..., and return how they are asked."""
     for slave, manner in enumerate(manners, 1):
         pretence.sensor(slave, manner=manner)
-    return tuple(RateSensor(f"s{slave}", slave, pretence.asking()) for slave in range(1, len(manners) + 1))
+    return tuple(RateSensor(f"s{slave}", slave, pretence.query()) for slave in range(1, len(manners) + 1))
 
 
 def changed(pretence: Pretence, *manners: str, echo_known: bool = True, **wish: Any) -> BaudrateReport:  # noqa: ANN401  # passed on
@@ -54,10 +54,10 @@ def changed(pretence: Pretence, *manners: str, echo_known: bool = True, **wish: 
 
 
 def test_sensors_that_obey_are_moved_one_after_the_other(pretence: Pretence) -> None:
-    verdict = changed(pretence, "obeys", "obeys")
-    assert verdict == BaudrateReport(BaudrateEnding.MOVED, {"s1": 19200, "s2": 19200})
+    report = changed(pretence, "obeys", "obeys")
+    assert report == BaudrateReport(BaudrateEnding.MOVED, {"s1": 19200, "s2": 19200})
     assert pretence.writes == [WriteRegister(1, 4, 2), WriteRegister(2, 4, 2)]
-    assert pretence.aside == [WriteRates()]
+    assert pretence.awaited == [WriteRates()]
 
 
 def test_a_line_without_sensors_is_moved_at_once(pretence: Pretence) -> None:
@@ -66,14 +66,14 @@ def test_a_line_without_sensors_is_moved_at_once(pretence: Pretence) -> None:
 
 def test_a_dry_run_looks_and_writes_nothing(pretence: Pretence) -> None:
     assert changed(pretence, "obeys", dry_run=True) == BaudrateReport(BaudrateEnding.FREE)
-    assert pretence.writes == pretence.aside == []
+    assert pretence.writes == pretence.awaited == []
 
 
 def test_nothing_is_written_unless_every_sensor_answers(pretence: Pretence) -> None:
     sensors = line(pretence, "obeys", "obeys", "obeys")
     pretence.sensors[1].silent = pretence.sensors[2].silent = True
-    verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True))
-    assert verdict == BaudrateReport(BaudrateEnding.ABSENT, names=("s2", "s3"))
+    report = pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True))
+    assert report == BaudrateReport(BaudrateEnding.ABSENT, names=("s2", "s3"))
     assert pretence.writes == []
 
 
@@ -90,9 +90,9 @@ def test_reads_that_teach_the_echo_are_enough(pretence: Pretence) -> None:
 
 def test_nor_where_the_intent_cannot_be_kept(pretence: Pretence) -> None:
     pretence.answer = "the disk is full"
-    verdict = changed(pretence, "obeys")
-    assert verdict == BaudrateReport(BaudrateEnding.UNWRITTEN, why="the disk is full")
-    assert verdict.ended in UNTOUCHED
+    report = changed(pretence, "obeys")
+    assert report == BaudrateReport(BaudrateEnding.UNWRITTEN, why="the disk is full")
+    assert report.ended in UNTOUCHED
     assert pretence.writes == []
 
 
@@ -121,8 +121,8 @@ def test_a_port_lost_after_it_leaves_every_place_unknown(pretence: Pretence) -> 
 def test_a_first_sensor_that_does_not_move_is_put_back_and_nobody_else_is_touched(
     pretence: Pretence, manner: str, ended: BaudrateEnding, exception: int | None, writes: list[int]
 ) -> None:
-    verdict = changed(pretence, manner, "obeys")
-    assert verdict == BaudrateReport(ended, {"s1": 9600, "s2": 9600}, ("s1",), exception)
+    report = changed(pretence, manner, "obeys")
+    assert report == BaudrateReport(ended, {"s1": 9600, "s2": 9600}, ("s1",), exception)
     assert pretence.writes == [WriteRegister(1, 4, code) for code in writes]
 
 
@@ -130,22 +130,22 @@ def test_a_first_sensor_that_cannot_be_put_back_is_told_as_unverified(pretence: 
     sensors = line(pretence, "stores")
     stubborn = pretence.sensors[0]
     pretence.later.append((4.0, lambda: setattr(stubborn, "manner", "ignores")))
-    verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True))
-    assert verdict == BaudrateReport(BaudrateEnding.UNVERIFIED, {"s1": None}, ("s1",))
+    report = pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True))
+    assert report == BaudrateReport(BaudrateEnding.UNVERIFIED, {"s1": None}, ("s1",))
 
 
 # -- back
 
 
 def test_if_a_later_one_stays_those_moved_are_moved_back(pretence: Pretence) -> None:
-    verdict = changed(pretence, "obeys", "ignores", "obeys")
-    assert verdict == BaudrateReport(BaudrateEnding.ROLLED_BACK, {"s1": 9600, "s2": 9600, "s3": 9600})
+    report = changed(pretence, "obeys", "ignores", "obeys")
+    assert report == BaudrateReport(BaudrateEnding.ROLLED_BACK, {"s1": 9600, "s2": 9600, "s3": 9600})
     assert [write.slave for write in pretence.writes] == [1, 2, 1]
 
 
 def test_if_the_first_is_found_nowhere_it_is_looked_for_for_a_minute(pretence: Pretence) -> None:
-    verdict = changed(pretence, "vanishes", "obeys")
-    assert verdict == BaudrateReport(BaudrateEnding.UNVERIFIED, {"s1": None, "s2": 9600}, ("s1",))
+    report = changed(pretence, "vanishes", "obeys")
+    assert report == BaudrateReport(BaudrateEnding.UNVERIFIED, {"s1": None, "s2": 9600}, ("s1",))
     assert ROLL_BACK < pretence.clock.now < ROLL_BACK + 20.0
 
 
@@ -157,16 +157,16 @@ def test_one_that_comes_back_within_that_minute_is_moved_back_too(pretence: Pret
         pretence.sensors[1].manner = "obeys"
 
     pretence.later.append((20.0, back))
-    verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True))
-    assert verdict == BaudrateReport(BaudrateEnding.ROLLED_BACK, {"s1": 9600, "s2": 9600})
+    report = pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True))
+    assert report == BaudrateReport(BaudrateEnding.ROLLED_BACK, {"s1": 9600, "s2": 9600})
 
 
 # -- with a power cycle
 
 
 def test_with_a_power_cycle_all_are_written_and_those_that_wait_are_told(pretence: Pretence) -> None:
-    verdict = changed(pretence, "stores", "obeys", "stores", power_cycle=True)
-    assert verdict == BaudrateReport(BaudrateEnding.PENDING, {"s1": 9600, "s2": 19200, "s3": 9600}, ("s1", "s3"))
+    report = changed(pretence, "stores", "obeys", "stores", power_cycle=True)
+    assert report == BaudrateReport(BaudrateEnding.PENDING, {"s1": 9600, "s2": 19200, "s3": 9600}, ("s1", "s3"))
     assert len(pretence.writes) == 3
 
 
@@ -176,8 +176,8 @@ def test_with_a_power_cycle_those_that_obey_at_once_are_moved(pretence: Pretence
 
 @pytest.mark.parametrize("manner", ["ignores", "refuses", "refuses_and_stores"])
 def test_with_a_power_cycle_one_that_does_not_take_the_rate_has_all_put_back(pretence: Pretence, manner: str) -> None:
-    verdict = changed(pretence, "stores", manner, "stores", power_cycle=True)
-    assert verdict == BaudrateReport(BaudrateEnding.ROLLED_BACK, {"s1": 9600, "s2": 9600, "s3": 9600})
+    report = changed(pretence, "stores", manner, "stores", power_cycle=True)
+    assert report == BaudrateReport(BaudrateEnding.ROLLED_BACK, {"s1": 9600, "s2": 9600, "s3": 9600})
     assert 3 not in {write.slave for write in pretence.writes}
 
 
@@ -199,16 +199,16 @@ def test_a_sensor_is_brought_to_a_rate_and_its_register_too(
     pretence: Pretence, facts: dict[str, Any], at: int | None, writes: list[int]
 ) -> None:
     pretence.sensor(1, **facts)
-    sensor = RateSensor("s1", 1, pretence.asking())
-    assert pretence.carry_out(restored(sensor, 9600, 19200)) == at
+    sensor = RateSensor("s1", 1, pretence.query())
+    assert pretence.carry_out(restore_rate(sensor, 9600, 19200)) == at
     assert [write.value for write in pretence.writes] == writes
 
 
 def test_a_sensor_whose_profile_has_no_register_of_the_rate_has_no_code(pretence: Pretence, tmp_path: Path) -> None:
     (tmp_path / "bare.yaml").write_text(BARE)
-    bare = RateSensor("x", 1, pretence.asking(load_profile("bare.yaml", relative_to=tmp_path)))
+    bare = RateSensor("x", 1, pretence.query(load_profile("bare.yaml", relative_to=tmp_path)))
     assert (bare.register, bare.code(9600)) == (-1, -1)
-    known = RateSensor("x", 1, pretence.asking())
+    known = RateSensor("x", 1, pretence.query())
     assert (known.register, known.code(9600), known.code(19200)) == (4, 1, 2)
 
 
@@ -218,24 +218,24 @@ def test_a_sensor_whose_profile_has_no_register_of_the_rate_has_no_code(pretence
 def test_one_that_answers_at_both_rates_since_the_write_is_two_and_all_are_moved_back(pretence: Pretence) -> None:
     sensors = line(pretence, "obeys", "obeys")
     pretence.sensor(2, manner="stores")
-    verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True))
-    assert verdict == BaudrateReport(BaudrateEnding.TWINS, {"s1": 9600, "s2": 9600}, ("s2",))
+    report = pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True))
+    assert report == BaudrateReport(BaudrateEnding.TWINS, {"s1": 9600, "s2": 9600}, ("s2",))
     assert [sensor.baudrate for sensor in pretence.sensors] == [9600] * 3
 
 
 def test_the_one_of_two_that_stayed_forgets_the_rate_it_stored(pretence: Pretence) -> None:
     sensors = line(pretence, "stores")
     pretence.sensor(1)
-    verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True))
-    assert verdict.ended is BaudrateEnding.TWINS
+    report = pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True))
+    assert report.ended is BaudrateEnding.TWINS
     assert [sensor.stored.get(4, 1) for sensor in pretence.sensors] == [1, 1]
 
 
 def test_so_with_a_power_cycle(pretence: Pretence) -> None:
     sensors = line(pretence, "stores")
     pretence.sensor(1)
-    verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP, power_cycle=True), lambda: True))
-    assert verdict == BaudrateReport(BaudrateEnding.TWINS, {"s1": 9600}, ("s1",))
+    report = pretence.carry_out(change_rate(RateWish(sensors, *UP, power_cycle=True), lambda: True))
+    assert report == BaudrateReport(BaudrateEnding.TWINS, {"s1": 9600}, ("s1",))
     assert [(sensor.baudrate, sensor.stored.get(4, 1)) for sensor in pretence.sensors] == [(9600, 1)] * 2
 
 
@@ -243,16 +243,16 @@ def test_one_that_was_deaf_while_its_twin_was_brought_back_is_looked_for_once_mo
     sensors = line(pretence, "obeys", "ignores")
     deaf = pretence.sensor(1, baudrate=19200, silent=True)
     pretence.later.append((12.0, partial(vars(deaf).update, silent=False)))
-    verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True))
-    assert verdict == BaudrateReport(BaudrateEnding.ROLLED_BACK, {"s1": 9600, "s2": 9600})
+    report = pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True))
+    assert report == BaudrateReport(BaudrateEnding.ROLLED_BACK, {"s1": 9600, "s2": 9600})
     assert [sensor.baudrate for sensor in pretence.sensors] == [9600] * 3
 
 
 def test_a_first_sensor_that_stays_has_the_others_forget_what_they_stored_before(pretence: Pretence) -> None:
     sensors = line(pretence, "stores", "stores", "obeys")
     pretence.sensors[1].stored[4] = 2
-    verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP, stored=frozenset({"s1", "s2"})), lambda: True))
-    assert verdict == BaudrateReport(BaudrateEnding.CANARY, dict.fromkeys(("s1", "s2", "s3"), 9600), ("s1",))
+    report = pretence.carry_out(change_rate(RateWish(sensors, *UP, stored=frozenset({"s1", "s2"})), lambda: True))
+    assert report == BaudrateReport(BaudrateEnding.CANARY, dict.fromkeys(("s1", "s2", "s3"), 9600), ("s1",))
     assert [sensor.stored.get(4, 1) for sensor in pretence.sensors] == [1, 1, 1]
     assert 3 not in {write.slave for write in pretence.writes}
 
@@ -260,5 +260,5 @@ def test_a_first_sensor_that_stays_has_the_others_forget_what_they_stored_before
 def test_one_of_them_that_cannot_be_made_to_forget_is_told(pretence: Pretence) -> None:
     sensors = line(pretence, "stores", "ignores")
     pretence.sensors[1].stored[4] = 2
-    verdict = pretence.carry_out(change_rate(RateWish(sensors, *UP, stored=frozenset({"s2"})), lambda: True))
-    assert (verdict.ended, verdict.names) == (BaudrateEnding.UNVERIFIED, ("s2",))
+    report = pretence.carry_out(change_rate(RateWish(sensors, *UP, stored=frozenset({"s2"})), lambda: True))
+    assert (report.ended, report.names) == (BaudrateEnding.UNVERIFIED, ("s2",))

@@ -13,7 +13,7 @@ from lfs10d.line.jobs.job import Hold
 from lfs10d.modbus.ask import Ask
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.profiles.library import load_profile
-from lfs10d.reconfiguration.procedures.find_baudrate import LOST_AFTER, in_words, seek
+from lfs10d.reconfiguration.procedures.find_baudrate import LOST_AFTER, find_other_rates, message
 from tests.support.sensors import Pretence
 
 RTU = Codec(Framing.RTU)
@@ -32,7 +32,7 @@ class Search:
         self.pretence = pretence
         self.devices = devices
         self.told: list[object] = []
-        self._steps: Generator[Any, Any, None] = seek(lambda: self.devices, pretence.clock, 9600)
+        self._steps: Generator[Any, Any, None] = find_other_rates(lambda: self.devices, pretence.clock, 9600)
 
     def go_on(self, seconds: float) -> None:
         """Let it search for so long."""
@@ -101,14 +101,14 @@ def test_a_device_whose_profile_knows_no_other_rate_is_not_asked(pretence: Prete
 
 
 def test_a_person_is_told_how_many_answer_at_which_rate_and_what_to_do() -> None:
-    assert in_words({"s4": 19200, "s3": 19200}, 9600, 8, filed=9600) == (
+    assert message({"s4": 19200, "s3": 19200}, 9600, 8, filed=9600) == (
         "no sensor answers at 9600 baud, but 2 of 8 at 19200 baud do (s3, s4); "
         "set line.baudrate to 19200; then line/baudrate can move them"
     )
 
 
 def test_sensors_at_two_rates_are_to_be_moved_one_rate_at_a_time() -> None:
-    assert in_words({"s4": 19200, "s3": 19200, "s5": 4800}, 9600, 8, filed=9600) == (
+    assert message({"s4": 19200, "s3": 19200, "s5": 4800}, 9600, 8, filed=9600) == (
         "no sensor answers at 9600 baud, but 1 of 8 at 4800 and 2 of 8 at 19200 baud do (s3, s4, s5); "
         "leave only those of one rate on the line; for 19200: set line.baudrate to 19200; "
         "then line/baudrate can move them"
@@ -117,7 +117,7 @@ def test_sensors_at_two_rates_are_to_be_moved_one_rate_at_a_time() -> None:
 
 def test_where_a_request_has_moved_the_line_away_from_the_file_s_rate_the_file_must_be_edited_twice() -> None:
     """The same value once more in the file is no edit; see `lfs10d.config.merge`."""
-    assert in_words({"s3": 9600}, 19200, 1, filed=9600) == (
+    assert message({"s3": 9600}, 19200, 1, filed=9600) == (
         "no sensor answers at 19200 baud, but 1 of 1 at 9600 baud do (s3); "
         "set line.baudrate to 19200 and reload, then to 9600 and reload; then line/baudrate can move them"
     )

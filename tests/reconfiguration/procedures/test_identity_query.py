@@ -37,198 +37,202 @@ WITHOUT_RATE = parse_profile(NARROW, "narrow.yaml")
 
 def test_a_profile_without_a_register_of_the_id_cannot_be_asked(pretence: Pretence) -> None:
     with pytest.raises(ValueError, match="profile ld-e knows no register of the slave id"):
-        pretence.asking(load_profile("ld-e", relative_to=Path()))
+        pretence.query(load_profile("ld-e", relative_to=Path()))
 
 
 def test_who_answers_says_its_id(pretence: Pretence) -> None:
     pretence.sensor(3)
-    assert pretence.carry_out(pretence.asking().who(HERE)) == IdentityReply(answers=True, register=3)
+    assert pretence.carry_out(pretence.query().read_register(HERE)) == IdentityReply(answers=True, register=3)
     assert pretence.asked == [Ask(WHO, RTU, QUICK)]
 
 
 def test_at_another_rate_than_the_lines_the_question_says_so(pretence: Pretence) -> None:
     pretence.sensor(3, baudrate=19200)
-    assert pretence.carry_out(pretence.asking().who(ELSEWHERE, 0.7)).answers
+    assert pretence.carry_out(pretence.query().read_register(ELSEWHERE, 0.7)).answers
     assert pretence.asked == [Ask(WHO, RTU, 0.7, None, 19200)]
 
 
 def test_another_register_can_be_asked(pretence: Pretence) -> None:
     pretence.sensor(3, baudrate=19200)
-    assert pretence.carry_out(pretence.asking().who(ELSEWHERE, register=4)).register == 2
+    assert pretence.carry_out(pretence.query().read_register(ELSEWHERE, register=4)).register == 2
     assert pretence.requests == [ReadRegisters(3, 4, 1)]
 
 
 def test_values_say_nothing_of_the_id(pretence: Pretence) -> None:
     pretence.sensor(3)
-    assert pretence.carry_out(pretence.asking().values(HERE)) == IdentityReply(answers=True)
+    assert pretence.carry_out(pretence.query().read_values(HERE)) == IdentityReply(answers=True)
     assert pretence.requests == [WIND]
 
 
 def test_silence_noise_and_a_refusal_are_told_apart(pretence: Pretence) -> None:
-    assert pretence.carry_out(pretence.asking().who(HERE)).silent
+    assert pretence.carry_out(pretence.query().read_register(HERE)).silent
     pretence.noise.add((4, 9600))
-    noise = pretence.carry_out(pretence.asking().who(Endpoint(slave=4, baudrate=9600)))
+    noise = pretence.carry_out(pretence.query().read_register(Endpoint(slave=4, baudrate=9600)))
     assert noise == IdentityReply(noise=True)
     assert not noise.silent
     pretence.sensor(5, exception=2)
-    refusal = pretence.carry_out(pretence.asking().who(Endpoint(slave=5, baudrate=9600)))
+    refusal = pretence.carry_out(pretence.query().read_register(Endpoint(slave=5, baudrate=9600)))
     assert refusal == IdentityReply(answers=True, exception=2)
     assert not refusal.silent
 
 
 def reply_to(pretence: Pretence, outcome: Outcome) -> tuple[IdentityReply, float]:
     """Return what is made of one outcome, and how long the next question waits."""
-    asking = pretence.asking()
-    steps = asking.who(HERE)
+    query = pretence.query()
+    steps = query.read_register(HERE)
     next(steps)
     with pytest.raises(StopIteration) as end:
         steps.send(outcome)
     reply = end.value.value
     assert isinstance(reply, IdentityReply)
-    return reply, asking.timeout
+    return reply, query.timeout
 
 
-def test_a_refusal_that_may_be_an_older_ones_is_no_answer(pretence: Pretence, heard: Callable[..., Outcome]) -> None:
-    reply, _ = reply_to(pretence, heard(WHO, exception=2, ambiguous=True))
+def test_a_refusal_that_may_be_an_older_ones_is_no_answer(
+    pretence: Pretence, outcome_of: Callable[..., Outcome]
+) -> None:
+    reply, _ = reply_to(pretence, outcome_of(WHO, exception=2, ambiguous=True))
     assert reply == IdentityReply(noise=True)
 
 
 def test_a_second_frame_behind_the_answer_is_noise_and_a_few_bytes_are_not(
-    pretence: Pretence, heard: Callable[..., Outcome]
+    pretence: Pretence, outcome_of: Callable[..., Outcome]
 ) -> None:
-    reply, _ = reply_to(pretence, heard(WHO, answer=(3,), unsolicited=5))
+    reply, _ = reply_to(pretence, outcome_of(WHO, answer=(3,), unsolicited=5))
     assert reply == IdentityReply(answers=True, noise=True, register=3)
-    reply, _ = reply_to(pretence, heard(WHO, answer=(3,), unsolicited=4))
+    reply, _ = reply_to(pretence, outcome_of(WHO, answer=(3,), unsolicited=4))
     assert reply == IdentityReply(answers=True, register=3)
 
 
 @pytest.mark.parametrize(("turnaround", "timeout"), [(0.1, QUICK), (0.101, PATIENT), (None, QUICK)])
 def test_a_slow_sensor_is_waited_for_longer_from_then_on(
-    pretence: Pretence, heard: Callable[..., Outcome], turnaround: float | None, timeout: float
+    pretence: Pretence, outcome_of: Callable[..., Outcome], turnaround: float | None, timeout: float
 ) -> None:
-    assert reply_to(pretence, heard(WHO, answer=(3,), turnaround=turnaround))[1] == timeout
+    assert reply_to(pretence, outcome_of(WHO, answer=(3,), turnaround=turnaround))[1] == timeout
 
 
 @pytest.mark.parametrize(("slave", "timeout"), [(3, PATIENT), (4, QUICK)])
 def test_so_is_one_whose_own_answer_came_late(
-    pretence: Pretence, heard: Callable[..., Outcome], slave: int, timeout: float
+    pretence: Pretence, outcome_of: Callable[..., Outcome], slave: int, timeout: float
 ) -> None:
     late = LateAnswer(ReadRegisters(slave, 1, 2), 0.3)
-    assert reply_to(pretence, heard(WHO, FaultCode.LATE, late=(late,)))[1] == timeout
+    assert reply_to(pretence, outcome_of(WHO, FaultCode.LATE, late=(late,)))[1] == timeout
 
 
 def test_after_silence_the_values_go_first_and_then_the_silence_is_waited_out(pretence: Pretence) -> None:
-    asking = pretence.asking()
-    assert pretence.carry_out(asking.who(HERE)).silent
+    query = pretence.query()
+    assert pretence.carry_out(query.read_register(HERE)).silent
     pretence.sensor(3)
-    assert pretence.carry_out(asking.who(HERE)) == IdentityReply(answers=True, register=3)
+    assert pretence.carry_out(query.read_register(HERE)) == IdentityReply(answers=True, register=3)
     assert pretence.requests == [WHO, WIND, WHO]
     assert pretence.clock.now >= 1.0
 
 
 def test_while_the_values_are_not_answered_the_id_is_not_asked_again(pretence: Pretence) -> None:
-    asking = pretence.asking()
-    pretence.carry_out(asking.who(HERE))
-    assert pretence.carry_out(asking.who(HERE)).silent
+    query = pretence.query()
+    pretence.carry_out(query.read_register(HERE))
+    assert pretence.carry_out(query.read_register(HERE)).silent
     assert pretence.requests == [WHO, WIND]
 
 
 def test_without_a_second_shape_the_slave_is_left_alone_first(pretence: Pretence) -> None:
-    asking = pretence.asking(parse_profile(NARROW, "narrow.yaml"))
-    assert pretence.carry_out(asking.who(HERE)).silent
+    query = pretence.query(parse_profile(NARROW, "narrow.yaml"))
+    assert pretence.carry_out(query.read_register(HERE)).silent
     pretence.sensor(3)
-    assert pretence.carry_out(asking.who(HERE)).register == 3
+    assert pretence.carry_out(query.read_register(HERE)).register == 3
     assert pretence.requests == [WHO, WHO]
     assert pretence.clock.now >= 1.0
 
 
 def test_values_wait_for_a_slave_that_is_left_alone(pretence: Pretence) -> None:
-    asking = pretence.asking()
-    pretence.carry_out(asking.who(HERE))
+    query = pretence.query()
+    pretence.carry_out(query.read_register(HERE))
     pretence.pending.leave_alone(3, 0.5)
     pretence.sensor(3)
-    assert pretence.carry_out(asking.values(HERE)).answers
+    assert pretence.carry_out(query.read_values(HERE)).answers
     assert pretence.clock.now >= 1.0
 
 
 def test_where_nothing_is_pending_nothing_is_asked_to_settle(pretence: Pretence) -> None:
-    assert pretence.carry_out(pretence.asking().settle(HERE))
+    assert pretence.carry_out(pretence.query().settle(HERE))
     assert pretence.requests == []
 
 
 def test_it_is_settled_once_the_sensor_answers_and_the_silence_is_over(pretence: Pretence) -> None:
-    asking = pretence.asking()
-    pretence.carry_out(asking.who(HERE))
+    query = pretence.query()
+    pretence.carry_out(query.read_register(HERE))
     pretence.sensor(3)
-    assert pretence.carry_out(asking.settle(HERE))
+    assert pretence.carry_out(query.settle(HERE))
     assert pretence.pending.earlier(3) == ()
 
 
 def test_a_slave_that_is_left_alone_is_settled_after_that(pretence: Pretence) -> None:
-    asking = pretence.asking()
-    pretence.carry_out(asking.who(HERE))
+    query = pretence.query()
+    pretence.carry_out(query.read_register(HERE))
     pretence.pending.leave_alone(3, 0.5)
     until = pretence.pending.left_alone_until(3, pretence.clock.now)
     pretence.sensor(3)
-    assert pretence.carry_out(asking.settle(HERE))
+    assert pretence.carry_out(query.settle(HERE))
     assert until is not None
     assert pretence.clock.now >= until
 
 
 def test_a_slave_that_stays_silent_is_never_settled(pretence: Pretence) -> None:
-    asking = pretence.asking()
-    pretence.carry_out(asking.who(HERE))
-    assert not pretence.carry_out(asking.settle(HERE))
+    query = pretence.query()
+    pretence.carry_out(query.read_register(HERE))
+    assert not pretence.carry_out(query.settle(HERE))
 
 
-def test_quiet_is_a_silence_in_which_only_others_answered_late(heard: Callable[..., Outcome]) -> None:
+def test_quiet_is_a_silence_in_which_only_others_answered_late(outcome_of: Callable[..., Outcome]) -> None:
     own, others = (LateAnswer(ReadRegisters(slave, 1, 2), 0.3) for slave in (3, 4))
-    assert quiet(heard(WHO))
-    assert quiet(heard(WHO, FaultCode.LATE, late=(others,)))
-    assert not quiet(heard(WHO, FaultCode.LATE, late=(others, own)))
-    assert not quiet(heard(WHO, FaultCode.MALFORMED))
-    assert not quiet(heard(WHO, unsolicited=1))
-    assert not quiet(heard(WHO, answer=(3,)))
+    assert quiet(outcome_of(WHO))
+    assert quiet(outcome_of(WHO, FaultCode.LATE, late=(others,)))
+    assert not quiet(outcome_of(WHO, FaultCode.LATE, late=(others, own)))
+    assert not quiet(outcome_of(WHO, FaultCode.MALFORMED))
+    assert not quiet(outcome_of(WHO, unsolicited=1))
+    assert not quiet(outcome_of(WHO, answer=(3,)))
 
 
-def test_so_is_one_whose_answer_came_while_another_was_asked(pretence: Pretence, heard: Callable[..., Outcome]) -> None:
+def test_so_is_one_whose_answer_came_while_another_was_asked(
+    pretence: Pretence, outcome_of: Callable[..., Outcome]
+) -> None:
     late = LateAnswer(WHO, 0.4)
-    pretence.pending.on_outcome(heard(ReadRegisters(9, 1, 2), late=(late,)), RTU, QUICK, 1.0)
-    pretence.carry_out(pretence.asking().who(HERE))
-    pretence.carry_out(pretence.asking().who(Endpoint(slave=9, baudrate=9600)))
+    pretence.pending.on_outcome(outcome_of(ReadRegisters(9, 1, 2), late=(late,)), RTU, QUICK, 1.0)
+    pretence.carry_out(pretence.query().read_register(HERE))
+    pretence.carry_out(pretence.query().read_register(Endpoint(slave=9, baudrate=9600)))
     assert [ask.timeout for ask in pretence.asked if ask.request == WHO] == [PATIENT]
     assert pretence.asked[-1].timeout == QUICK
 
 
 def test_listening_asks_a_silent_place_behind_the_exchange_before(pretence: Pretence) -> None:
     silent = Endpoint(slave=9, baudrate=9600)
-    assert pretence.carry_out(pretence.asking().listen(silent, 0.3, 3)) == (IdentityReply(), False)
+    assert pretence.carry_out(pretence.query().listen(silent, 0.3, 3)) == (IdentityReply(), False)
     assert pretence.asked == [Ask(ReadRegisters(9, 1, 2), RTU, 0.3, at_once=True)]
 
 
 def test_a_second_block_of_values_can_be_asked(pretence: Pretence) -> None:
     pretence.sensor(3)
     block = load_profile("fuling-dzb", relative_to=Path()).reads()[1]
-    pretence.carry_out(pretence.asking().values(Endpoint(slave=4, baudrate=9600), block=block))
+    pretence.carry_out(pretence.query().read_values(Endpoint(slave=4, baudrate=9600), block=block))
     assert pretence.requests == [ReadRegisters(4, 0x5000, 2)]
 
 
 def test_a_rate_without_a_code_is_known_by_what_the_register_held(pretence: Pretence) -> None:
-    asking = pretence.asking()
-    for same in (asking.knowing(4800, None), asking.knowing(9600, 7), pretence.asking(WITHOUT_RATE).knowing(4800, 7)):
-        assert same.profile in (asking.profile, WITHOUT_RATE)
-    knowing = asking.knowing(4800, 7)
+    query = pretence.query()
+    for same in (query.knowing(4800, None), query.knowing(9600, 7), pretence.query(WITHOUT_RATE).knowing(4800, 7)):
+        assert same.profile in (query.profile, WITHOUT_RATE)
+    knowing = query.knowing(4800, 7)
     assert knowing.profile.baudrate is not None
     assert knowing.profile.baudrate.codes == {9600: 1, 19200: 2, 4800: 7}
-    assert knowing.clock is asking.clock
-    assert pretence.carry_out(knowing.values(Endpoint(slave=3, baudrate=9600))).silent
+    assert knowing.clock is query.clock
+    assert pretence.carry_out(knowing.read_values(Endpoint(slave=3, baudrate=9600))).silent
 
 
 def test_a_place_is_answered_twice_after_two_second_answers() -> None:
     pretence = Pretence()
-    asking, here = pretence.asking(), Endpoint(slave=3, baudrate=9600)
+    query, here = pretence.query(), Endpoint(slave=3, baudrate=9600)
     pretence.pending.duplicates.answered(3, 1.0)
     pretence.pending.duplicates.second(3, 1.5)
-    assert not asking.answered_twice(here)
+    assert not query.answered_twice(here)
     pretence.pending.duplicates.second(3, 1.7)
-    assert asking.answered_twice(here)
+    assert query.answered_twice(here)

@@ -22,12 +22,12 @@ from lfs10d.reconfiguration.procedures.readdress import (
     ReaddressWish,
     free,
     judge,
-    parted,
     present,
+    read_both,
     readdress,
-    told,
-    verified,
-    written,
+    undo_stored_id,
+    verify,
+    write,
 )
 from tests.support.sensors import Pretence
 
@@ -36,7 +36,7 @@ WISH = ReaddressWish(OLD, 9, (9600, 19200))
 
 
 def carried_out(pretence: Pretence, wish: ReaddressWish = WISH, *, echo_known: bool = True) -> ReaddressReport:
-    return pretence.carry_out(readdress(wish, pretence.asking(), lambda: echo_known))
+    return pretence.carry_out(readdress(wish, pretence.query(), lambda: echo_known))
 
 
 # -- the whole
@@ -46,7 +46,7 @@ def test_a_sensor_that_obeys_is_written_once_and_found_at_its_new_id(pretence: P
     pretence.sensor(3)
     assert carried_out(pretence) == ReaddressReport(ReaddressEnding.MOVED, 9)
     assert pretence.writes == [WriteRegister(3, 5, 9)]
-    assert pretence.aside == [IdWrite(OLD, NEW, 3)]
+    assert pretence.awaited == [IdWrite(OLD, NEW, 3)]
 
 
 @pytest.mark.parametrize(
@@ -71,8 +71,8 @@ def test_however_a_sensor_takes_the_write_what_it_answers_then_is_the_verdict(
 def test_of_two_sensors_at_one_id_one_that_moves_alone_is_a_duplicate(pretence: Pretence) -> None:
     pretence.sensor(3)
     pretence.sensor(3, manner="ignores")
-    verdict = carried_out(pretence)
-    assert verdict.ending is ReaddressEnding.BOTH
+    report = carried_out(pretence)
+    assert report.ending is ReaddressEnding.BOTH
 
 
 def test_the_one_of_two_that_stays_and_stored_the_new_id_gets_its_old_one_back(pretence: Pretence) -> None:
@@ -86,7 +86,7 @@ def test_one_that_keeps_the_new_id_stored_leaves_the_change_open(pretence: Prete
     stays = pretence.sensor(3, manner="ignores")
     stays.stored[5] = 9
     before = ReaddressReport(ReaddressEnding.BOTH, 9, stays_open=True)
-    assert pretence.carry_out(parted(before, OLD, 9, pretence.asking())) == before
+    assert pretence.carry_out(undo_stored_id(before, OLD, 9, pretence.query())) == before
 
 
 @pytest.mark.parametrize("dry_run", [False, True])
@@ -95,7 +95,7 @@ def test_two_sensors_of_one_id_are_not_written_to(pretence: Pretence, *, dry_run
     pretence.sensor(3, wind=(0, 0))
     wish = ReaddressWish(OLD, 9, (9600, 19200), dry_run)
     assert carried_out(pretence, wish) == ReaddressReport(ReaddressEnding.TWINS, why="answers collide there")
-    assert pretence.writes == pretence.aside == []
+    assert pretence.writes == pretence.awaited == []
 
 
 def test_two_whose_ids_collide_already_are_two(pretence: Pretence) -> None:
@@ -115,7 +115,7 @@ def test_a_dry_run_looks_and_writes_nothing(pretence: Pretence) -> None:
     assert carried_out(pretence, ReaddressWish(OLD, 9, (9600, 19200), dry_run=True)) == ReaddressReport(
         ReaddressEnding.FREE, 3
     )
-    assert pretence.writes == pretence.aside == []
+    assert pretence.writes == pretence.awaited == []
 
 
 def test_nothing_is_written_where_the_intent_cannot_be_kept(pretence: Pretence) -> None:
@@ -146,9 +146,9 @@ def test_a_port_lost_after_the_write_leaves_the_change_open(pretence: Pretence) 
 
 
 def test_a_sensor_that_does_not_answer_is_not_written_to(pretence: Pretence) -> None:
-    verdict = carried_out(pretence)
-    assert verdict == ReaddressReport(ReaddressEnding.ABSENT)
-    assert verdict.ending in NOTHING_WRITTEN
+    report = carried_out(pretence)
+    assert report == ReaddressReport(ReaddressEnding.ABSENT)
+    assert report.ending in NOTHING_WRITTEN
     assert pretence.writes == []
 
 
@@ -178,7 +178,7 @@ def test_without_knowing_how_the_adapter_echoes_nothing_is_written(pretence: Pre
 
 def test_reads_that_teach_the_echo_are_enough(pretence: Pretence) -> None:
     pretence.sensor(3)
-    steps = readdress(WISH, pretence.asking(), lambda: len(pretence.asked) >= 10)
+    steps = readdress(WISH, pretence.query(), lambda: len(pretence.asked) >= 10)
     assert pretence.carry_out(steps).ending is ReaddressEnding.MOVED
 
 
@@ -193,14 +193,14 @@ def test_a_sensor_that_is_gone_after_the_look_at_the_new_id_is_not_written_to(pr
 
 
 def test_present_asks_three_times_and_longer_each_time(pretence: Pretence) -> None:
-    asking = pretence.asking()
-    asking.timeout = 0.3
-    assert pretence.carry_out(present(OLD, asking)) == SILENCE
+    query = pretence.query()
+    query.timeout = 0.3
+    assert pretence.carry_out(present(OLD, query)) == SILENCE
     assert [ask.timeout for ask in pretence.asked] == [0.3, 0.6, 1.0]
 
 
 def test_free_asks_for_values_three_times(pretence: Pretence) -> None:
-    assert pretence.carry_out(free(NEW, pretence.asking()))
+    assert pretence.carry_out(free(NEW, pretence.query()))
     assert [ask.timeout for ask in pretence.asked] == [0.2, 0.2, 0.6]
     assert set(pretence.requests) == {ReadRegisters(9, 1, 2)}
 
@@ -208,37 +208,37 @@ def test_free_asks_for_values_three_times(pretence: Pretence) -> None:
 @pytest.mark.parametrize(("rate", "asked"), [(9600, None), (19200, 19200)])
 def test_a_write_goes_out_at_the_rate_of_its_place(pretence: Pretence, rate: int, asked: int | None) -> None:
     pretence.sensor(3, baudrate=rate)
-    assert pretence.carry_out(written(Endpoint(slave=3, baudrate=rate), 5, 9, pretence.asking())) is None
+    assert pretence.carry_out(write(Endpoint(slave=3, baudrate=rate), 5, 9, pretence.query())) is None
     (ask,) = pretence.asked
     assert (ask.request, ask.baudrate, ask.timeout) == (WriteRegister(3, 5, 9), asked, 1.0)
 
 
 def test_both_places_are_asked_for_five_seconds(pretence: Pretence) -> None:
     pretence.sensor(3)
-    found = pretence.carry_out(verified(OLD, NEW, pretence.asking()))
+    found = pretence.carry_out(verify(OLD, NEW, pretence.query()))
     assert found == ReaddressFinding(SILENCE, IdentityReply(answers=True, register=3))
     assert VERIFY <= pretence.clock.now < VERIFY + 3.0
 
 
 def test_after_a_write_the_new_id_is_waited_for_long_in_the_end(pretence: Pretence) -> None:
     pretence.sensor(3)
-    pretence.carry_out(verified(OLD, NEW, pretence.asking()))
+    pretence.carry_out(verify(OLD, NEW, pretence.query()))
     assert max(ask.timeout for ask in pretence.asked if ask.request.slave == NEW.slave) == PATIENT
     pretence.asked.clear()
-    pretence.carry_out(verified(OLD, NEW, pretence.asking(), QUICK_LOOK))
+    pretence.carry_out(verify(OLD, NEW, pretence.query(), QUICK_LOOK))
     assert {ask.timeout for ask in pretence.asked} == {QUICK}
 
 
 def test_a_sensor_that_takes_its_time_is_found_within_them(pretence: Pretence) -> None:
     pretence.later.append((4.0, lambda: pretence.sensor(9)))
-    assert pretence.carry_out(verified(OLD, NEW, pretence.asking())).new == IdentityReply(answers=True, register=9)
+    assert pretence.carry_out(verify(OLD, NEW, pretence.query())).new == IdentityReply(answers=True, register=9)
     assert pretence.clock.now < VERIFY + 3.0
 
 
 def test_two_with_one_id_are_told_by_their_winds(pretence: Pretence) -> None:
     pretence.sensor(9)
     pretence.sensor(9, wind=(0, 0))
-    found = pretence.carry_out(told(OLD, NEW, pretence.asking()))
+    found = pretence.carry_out(read_both(OLD, NEW, pretence.query()))
     assert found.spoilt
     assert found.new.answers
     assert pretence.requests.count(ReadRegisters(9, 1, 2)) == TRIES
@@ -246,7 +246,7 @@ def test_two_with_one_id_are_told_by_their_winds(pretence: Pretence) -> None:
 
 def test_garbage_thrice_is_spoilt(pretence: Pretence) -> None:
     pretence.noise.add((9, 9600))
-    assert pretence.carry_out(told(OLD, NEW, pretence.asking())) == ReaddressFinding(
+    assert pretence.carry_out(read_both(OLD, NEW, pretence.query())) == ReaddressFinding(
         IdentityReply(noise=True), SILENCE, spoilt=True
     )
 
@@ -279,14 +279,14 @@ def test_the_table_of_verdicts(
     ending: ReaddressEnding,
     stays_open: bool,  # noqa: FBT001  # a case
 ) -> None:
-    verdict = judge(found, 3, exception, 9)
-    assert (verdict.ending, verdict.exception, verdict.stays_open) == (ending, exception, stays_open)
+    report = judge(found, 3, exception, 9)
+    assert (report.ending, report.exception, report.stays_open) == (ending, exception, stays_open)
 
 
 def test_a_register_that_said_the_new_id_before_shows_no_write(pretence: Pretence) -> None:
     del pretence
-    verdict = judge(ReaddressFinding(NO, STORED), 9, None, 9)
-    assert (verdict.ending, verdict.stays_open) == (ReaddressEnding.LOCKED, True)
+    report = judge(ReaddressFinding(NO, STORED), 9, None, 9)
+    assert (report.ending, report.stays_open) == (ReaddressEnding.LOCKED, True)
 
 
 REPLIES = st.builds(
@@ -298,10 +298,10 @@ REPLIES = st.builds(
 def test_it_is_moved_only_where_the_new_id_answers_and_the_old_is_silent(
     new: IdentityReply, old: IdentityReply, spoilt: bool, before: int | None, exception: int | None  # noqa: FBT001  # drawn
 ) -> None:  # fmt: skip
-    verdict = judge(ReaddressFinding(new, old, spoilt), before, exception, 9)
-    assert verdict.ending not in NOTHING_WRITTEN
-    assert (verdict.ending is ReaddressEnding.MOVED) == (new.answers and not old.answers and not spoilt)
-    assert verdict.stays_open or verdict.ending not in (
+    report = judge(ReaddressFinding(new, old, spoilt), before, exception, 9)
+    assert report.ending not in NOTHING_WRITTEN
+    assert (report.ending is ReaddressEnding.MOVED) == (new.answers and not old.answers and not spoilt)
+    assert report.stays_open or report.ending not in (
         ReaddressEnding.NOWHERE,
         ReaddressEnding.GARBAGE,
         ReaddressEnding.PENDING,

@@ -28,10 +28,10 @@ from lfs10d.reconfiguration.procedures.recognition import (
     Look,
     Recognition,
     jumps,
-    one_alone,
-    recognised,
+    look_for_twins,
+    recognise,
 )
-from tests.support.sensors import CODEC, LFS10, Mimic, Pretence, heard
+from tests.support.sensors import CODEC, LFS10, Mimic, Pretence, outcome_of
 
 HERE, SILENT = Endpoint(slave=3, baudrate=9600), Endpoint(slave=9, baudrate=9600)
 SAYS_3 = IdentityReply(answers=True, register=3)
@@ -67,7 +67,7 @@ class Blowing(Mimic):
 
 
 def look(pretence: Pretence) -> Look:
-    return pretence.carry_out(one_alone(HERE, SILENT, pretence.asking()))
+    return pretence.carry_out(look_for_twins(HERE, SILENT, pretence.query()))
 
 
 def blowing(pretence: Pretence, numbers: Iterable[float]) -> Look:
@@ -78,7 +78,7 @@ def blowing(pretence: Pretence, numbers: Iterable[float]) -> Look:
 
 
 def recognition(pretence: Pretence, identity: IdentityReply = SAYS_3) -> Recognition:
-    return pretence.carry_out(recognised(HERE, identity, pretence.asking()))
+    return pretence.carry_out(recognise(HERE, identity, pretence.query()))
 
 
 # -- recognised
@@ -127,7 +127,7 @@ def test_values_that_collide_each_time_are_two_sensors(pretence: Pretence) -> No
 
 def test_one_answer_spoilt_by_noise_hides_no_sensor(pretence: Pretence, monkeypatch: pytest.MonkeyPatch) -> None:
     pretence.sensor(3)
-    spoil(pretence, monkeypatch, {0: heard(ReadRegisters(3, 1, 2), FaultCode.CRC)})
+    spoil(pretence, monkeypatch, {0: outcome_of(ReadRegisters(3, 1, 2), FaultCode.CRC)})
     assert recognition(pretence) == Recognition(rate_code=1)
 
 
@@ -141,10 +141,10 @@ def test_a_rate_register_that_does_not_answer_is_another_devices(
     pretence: Pretence, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pretence.sensor(3)
-    refused = heard(ReadRegisters(3, 4, 1), exception=2)
+    refused = outcome_of(ReadRegisters(3, 4, 1), exception=2)
     spoil(pretence, monkeypatch, {3: refused})
     assert recognition(pretence) == Recognition("its register 0x0004 does not answer")
-    silent = heard(ReadRegisters(3, 4, 1), FaultCode.TIMEOUT)
+    silent = outcome_of(ReadRegisters(3, 4, 1), FaultCode.TIMEOUT)
     pretence.asked.clear()
     spoil(pretence, monkeypatch, dict.fromkeys(range(3, 9), silent))
     assert recognition(pretence) == Recognition("its register 0x0004 does not answer")
@@ -152,7 +152,7 @@ def test_a_rate_register_that_does_not_answer_is_another_devices(
 
 def test_without_a_register_of_the_rate_none_is_asked(pretence: Pretence) -> None:
     pretence.sensor(3, wind=(12, 40))
-    found = pretence.carry_out(recognised(HERE, SAYS_3, pretence.asking(VANE)))
+    found = pretence.carry_out(recognise(HERE, SAYS_3, pretence.query(VANE)))
     assert found == Recognition()
     assert rate_fits(VANE, None, 9600)
 
@@ -199,7 +199,7 @@ def test_one_collision_in_three_reads_is_enough(
     pretence: Pretence, monkeypatch: pytest.MonkeyPatch, number: int
 ) -> None:
     pretence.sensor(3)
-    spoil(pretence, monkeypatch, {number: heard(ReadRegisters(3, 1, 2), FaultCode.CRC)})
+    spoil(pretence, monkeypatch, {number: outcome_of(ReadRegisters(3, 1, 2), FaultCode.CRC)})
     assert look(pretence) == Look(twins="answers collide there")
 
 
@@ -209,7 +209,7 @@ def test_a_second_answer_behind_the_first_is_of_another(
 ) -> None:
     pretence.sensor(3)
     frame = CODEC.wrap(bytes((3, 3, 4, 0, 0, 0, 0)))
-    extra = heard(ReadRegisters(9, 1, 2), FaultCode.WRONG_SLAVE, heard=frame, unsolicited=len(frame))
+    extra = outcome_of(ReadRegisters(9, 1, 2), FaultCode.WRONG_SLAVE, heard=frame, unsolicited=len(frame))
     spoil(pretence, monkeypatch, {number: extra})
     assert look(pretence) == Look(twins="a second answer came behind the first")
 
@@ -217,7 +217,7 @@ def test_a_second_answer_behind_the_first_is_of_another(
 def test_a_late_answer_to_an_older_question_is_its_own(pretence: Pretence, monkeypatch: pytest.MonkeyPatch) -> None:
     pretence.sensor(3)
     frame = CODEC.wrap(bytes((3, 3, 4, 0, 0, 0, 0)))
-    late = heard(ReadRegisters(9, 1, 2), FaultCode.LATE, heard=frame, late=(late_answer(),))
+    late = outcome_of(ReadRegisters(9, 1, 2), FaultCode.LATE, heard=frame, late=(late_answer(),))
     spoil(pretence, monkeypatch, {1: late})
     assert look(pretence) == Look()
 
@@ -242,7 +242,7 @@ def test_anything_received_from_the_new_id_means_that_it_is_taken(
 
 def test_bytes_that_come_behind_a_read_only_are_of_another(pretence: Pretence, monkeypatch: pytest.MonkeyPatch) -> None:
     pretence.sensor(3)
-    spoil(pretence, monkeypatch, {1: heard(ReadRegisters(9, 1, 2), FaultCode.MALFORMED)})
+    spoil(pretence, monkeypatch, {1: outcome_of(ReadRegisters(9, 1, 2), FaultCode.MALFORMED)})
     assert look(pretence) == Look(twins="something is received behind its answer")
 
 
@@ -262,7 +262,7 @@ def test_one_that_gives_no_value_is_not_there(pretence: Pretence) -> None:
 
 def test_one_silence_is_asked_again(pretence: Pretence, monkeypatch: pytest.MonkeyPatch) -> None:
     pretence.sensor(3)
-    spoil(pretence, monkeypatch, {0: heard(ReadRegisters(3, 1, 2), FaultCode.TIMEOUT)})
+    spoil(pretence, monkeypatch, {0: outcome_of(ReadRegisters(3, 1, 2), FaultCode.TIMEOUT)})
     assert look(pretence) == Look()
 
 
@@ -290,7 +290,7 @@ def test_values_that_take_turns_are_of_two(pretence: Pretence) -> None:
 
 
 def test_a_collision_among_the_further_reads_is_of_two(pretence: Pretence, monkeypatch: pytest.MonkeyPatch) -> None:
-    spoil(pretence, monkeypatch, {7: heard(ReadRegisters(3, 1, 2), FaultCode.CRC)})
+    spoil(pretence, monkeypatch, {7: outcome_of(ReadRegisters(3, 1, 2), FaultCode.CRC)})
     assert blowing(pretence, chain([3.0, 12.5, 3.1], repeat(3.0))).twins == "answers collide there"
 
 

@@ -23,7 +23,7 @@ UP = (9600, 19200)
 
 
 def sensors_of(pretence: Pretence, *slaves: int) -> list[RateSensor]:
-    return [RateSensor(f"s{slave}", slave, pretence.asking()) for slave in slaves]
+    return [RateSensor(f"s{slave}", slave, pretence.query()) for slave in slaves]
 
 
 def put(
@@ -61,8 +61,8 @@ def test_one_that_has_stored_the_other_rate_is_written_back_before_anybody_is_wa
     pretence.sensor(1, silent=True)
     pretence.sensor(2, baudrate=19200)
     pretence.sensor(3, manner="stores", stored={4: 2})
-    verdict = put(pretence, 1, 2, 3)
-    assert verdict == BaudrateReport(BaudrateEnding.UNVERIFIED, {"s1": None, "s2": 9600, "s3": 9600}, ("s1",))
+    report = put(pretence, 1, 2, 3)
+    assert report == BaudrateReport(BaudrateEnding.UNVERIFIED, {"s1": None, "s2": 9600, "s3": 9600}, ("s1",))
     assert (pretence.writes[0].slave, pretence.writes[0].value) == (3, 1)
     asked = [(ask.request.slave, ask.baudrate) for ask in pretence.asked]
     assert asked[:2] == [(1, None), (1, 19200)], "once at each rate, the line's own first"
@@ -80,7 +80,7 @@ def test_a_lost_one_is_waited_for_however_long_it_takes_and_nothing_is_written(p
     pretence.later.append((300.0, lambda: setattr(sensor, "silent", False)))
     assert awaited(pretence, 1, 2, tell_at=60.0) == ["s2"]
     assert pretence.writes == []
-    assert pretence.aside == [StillLost()]
+    assert pretence.awaited == [StillLost()]
     assert 300.0 < pretence.clock.now < 320.0
 
 
@@ -107,9 +107,9 @@ def test_one_that_is_put_back_while_another_of_its_id_stays_is_two_and_counts_as
     pretence.sensor(1, baudrate=19200)
     stays = pretence.sensor(1, baudrate=19200, manner="stores")
     where: dict[str, int | None] = {"s1": 19200}
-    verdict = pretence.carry_out(put_back(sensors_of(pretence, 1), *UP, where))
-    assert verdict == BaudrateReport(BaudrateEnding.UNVERIFIED, {"s1": 19200}, ("s1",))
-    assert pretence.aside == [Twins("s1")]
+    report = pretence.carry_out(put_back(sensors_of(pretence, 1), *UP, where))
+    assert report == BaudrateReport(BaudrateEnding.UNVERIFIED, {"s1": 19200}, ("s1",))
+    assert pretence.awaited == [Twins("s1")]
 
     def power_up() -> None:
         stays.baudrate, stays.stored = 9600, {}
@@ -138,12 +138,12 @@ def test_one_that_waits_for_its_power_cycle_to_come_back_is_waited_for_and_not_w
 def test_each_sensor_that_comes_up_at_the_new_rate_is_told_and_the_end_is_when_all_have(pretence: Pretence) -> None:
     for slave in (1, 2):
         pretence.sensor(slave)
-    sensors = [RateSensor(f"s{slave}", slave, pretence.asking()) for slave in (1, 2)]
+    sensors = [RateSensor(f"s{slave}", slave, pretence.query()) for slave in (1, 2)]
     for at, sensor in zip((30.0, 100.0), pretence.sensors, strict=True):
         pretence.later.append((at, partial(setattr, sensor, "baudrate", 19200)))
-    verdict = pretence.carry_out(await_power(sensors, *UP, longest_pause=4.0))
-    assert verdict == BaudrateReport(BaudrateEnding.MOVED, {"s1": 19200, "s2": 19200})
-    assert pretence.aside == [CameUp("s1"), CameUp("s2")]
+    report = pretence.carry_out(await_power(sensors, *UP, longest_pause=4.0))
+    assert report == BaudrateReport(BaudrateEnding.MOVED, {"s1": 19200, "s2": 19200})
+    assert pretence.awaited == [CameUp("s1"), CameUp("s2")]
     assert pretence.clock.now < 100.0 + 6.0
     assert pretence.writes == []
 
@@ -152,8 +152,8 @@ def test_one_that_answers_at_both_rates_is_two_and_is_awaited_until_the_other_ha
     pretence.sensor(1, baudrate=19200)
     stays = pretence.sensor(1)
     pretence.later.append((30.0, partial(setattr, stays, "baudrate", 19200)))
-    sensors = [RateSensor("s1", 1, pretence.asking())]
-    verdict = pretence.carry_out(await_power(sensors, *UP, longest_pause=4.0))
-    assert verdict == BaudrateReport(BaudrateEnding.MOVED, {"s1": 19200})
-    assert pretence.aside == [Twins("s1"), CameUp("s1")]
+    sensors = [RateSensor("s1", 1, pretence.query())]
+    report = pretence.carry_out(await_power(sensors, *UP, longest_pause=4.0))
+    assert report == BaudrateReport(BaudrateEnding.MOVED, {"s1": 19200})
+    assert pretence.awaited == [Twins("s1"), CameUp("s1")]
     assert pretence.clock.now >= 30.0
