@@ -160,7 +160,7 @@ def sections(ts: int) -> Iterator[str]:
     """Yield the parts of one section for each type."""
     for payload, (name, each) in zip(payloads(ts), EVENTS.items(), strict=True):
         yield f"### Event `{name}`"
-        yield f"Published: {each.when}"
+        yield each.when
         yield table(("key", "type", "meaning"), ((f"`{key}`", *map(plain, words)) for key, words in each.keys.items()))
         yield example(payload)
 
