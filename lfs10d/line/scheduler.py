@@ -23,7 +23,7 @@ from typing import TypeAlias
 from lfs10d.line.device import LEARNED_MOST, Device, DeviceSpec, Health, PollRules
 from lfs10d.line.job_queue import JobQueue
 from lfs10d.line.jobs.job import Continue, Hold, Job, Requeue
-from lfs10d.line.jobs.poll import Poll, tell, tell_lost
+from lfs10d.line.jobs.poll import Poll, lost_reading
 from lfs10d.line.poll_queue import PollQueue, back_on_grid, spread
 from lfs10d.line.probing import Probing
 from lfs10d.line.slave_rests import SlaveRests
@@ -139,7 +139,7 @@ class Scheduler:
         job.cut_off(now)
         if not wanted or lost is None or not isinstance(job, Poll):
             return []
-        return [tell_lost(job.device, lost, now, [job])]
+        return [lost_reading(job.device, lost, now, [job])]
 
     def wake(self, job: Job, now: float) -> None:
         """End the `Hold` of `job`."""
@@ -174,7 +174,7 @@ class Scheduler:
         polls = [job for job in jobs if isinstance(job, Poll) and self._wanted(job)]
         wanted = {poll.device.name for poll in polls if poll.purpose is Purpose.REQUEST}
         told = [device for device in self.devices.values() if device.spec.enabled or device.name in wanted]
-        return [tell_lost(device, fault, now, polls) for device in told]
+        return [lost_reading(device, fault, now, polls) for device in told]
 
     def retime(self, timing: LineTiming) -> None:
         """Take the times of the line's new rate; what was learned at another rate is forgotten."""
@@ -370,7 +370,7 @@ class Scheduler:
             self._probing.review(self.devices.values(), now)
         elif device.doubtful:
             self._probing.plan(now)
-        return tell(poll)
+        return poll.reading()
 
     def _hurry(self) -> None:
         """Wait for none of the devices long that are silent at the start, where they are many."""

@@ -31,7 +31,7 @@ from dataclasses import dataclass
 from lfs10d.modbus.duplicates import Duplicates
 from lfs10d.modbus.frames import Codec
 from lfs10d.modbus.outcome import LateAnswer, Outcome
-from lfs10d.modbus.request import Request
+from lfs10d.modbus.request import ReadRegisters, Request
 from lfs10d.reading import FaultCode
 
 QUIET_LEAST = 1.0
@@ -79,6 +79,36 @@ class PendingRequests:
     def tardy(self, slave: int) -> bool:
         """Whether an answer of `slave` has ever come after its time, whoever was asked meanwhile."""
         return slave in self._tardy
+
+    def next_request(
+        self,
+        request: Request,
+        codec: Codec,
+        now: float,
+        *,
+        barrier: ReadRegisters | None,
+        timeout: float,
+        barrier_first: bool = False,
+    ) -> Request | float:
+        """Return what to ask so that the answer to `request` is not mistaken: it, the barrier, or until when to wait.
+
+        `barrier` is a read of another shape, if the slave has one. `timeout` is the slave's, in s. A write is always
+        read back afterwards, so its own answer may be mistaken.
+        """
+        slave = request.slave
+        until = self.left_alone_until(slave, now)
+        if until is not None:
+            return until
+        confusable = isinstance(request, ReadRegisters) and self.confusable(request, codec)
+        if barrier is not None and (barrier_first or confusable):
+            return barrier
+        if confusable:
+            self.leave_alone(slave, timeout)
+            until = self.left_alone_until(slave, now)
+            if until is not None:
+                return until
+        until = self.lingering_until(request, codec, now)
+        return request if until is None else until
 
     def confusable(self, request: Request, codec: Codec) -> bool:
         """Whether an answer to an older request could pass for that to `request`, unless a barrier goes first."""

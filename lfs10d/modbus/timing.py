@@ -1,4 +1,4 @@
-"""How long things take on a serial line at one rate. Nobody else multiplies by a baud rate.
+"""Durations on a serial line at one rate. No other module multiplies by a baud rate.
 
 A timing belongs to an exchange; where the rate changes between two exchanges the slower gap holds.
 All times are seconds.
@@ -11,14 +11,11 @@ from dataclasses import dataclass
 SILENT_INTERVAL_CHARACTERS = 3.5
 """t3.5: least silence between two frames, in characters (Modbus over Serial Line V1.02, section 2.5.1.1)."""
 
-INTER_CHARACTER = 1.5
-"""t1.5: most silence inside a frame, in characters (Modbus over Serial Line V1.02, section 2.5.1.1)."""
-
 FIXED_ABOVE_BAUDRATE = 19200
-"""Above this rate both intervals are fixed (Modbus over Serial Line V1.02, section 2.5.1.1)."""
+"""Above this rate the interval is fixed (Modbus over Serial Line V1.02, section 2.5.1.1)."""
 
 FIXED_SILENT_INTERVAL = 1750e-6
-FIXED_INTER_CHARACTER = 750e-6
+"""t3.5 above that rate, in s."""
 
 _PARITIES = ("none", "even", "odd")
 
@@ -27,13 +24,12 @@ _PARITIES = ("none", "even", "odd")
 class LineTiming:
     """The times of one rate and character format; `gap` is the silence that precedes every request.
 
-    `bits` per character include start, parity and stop bits; `character`, `t15`, `t35` and `gap` are seconds.
+    `bits` per character include start, parity and stop bits; `character`, `t35` and `gap` are seconds.
     """
 
     baudrate: int
     bits: int
     character: float
-    t15: float
     t35: float
     gap: float
 
@@ -62,7 +58,6 @@ class LineTiming:
             baudrate=baudrate,
             bits=bits,
             character=character,
-            t15=FIXED_INTER_CHARACTER if fixed else INTER_CHARACTER * character,
             t35=t35,
             gap=t35 + extra_gap,
         )

@@ -34,7 +34,7 @@ WAKES = 3
 _NOTHING: frozenset[int] = frozenset()
 
 
-def told_busy(fault: Fault, exceptions: tuple[int, ...]) -> Fault:
+def marked_busy(fault: Fault, exceptions: tuple[int, ...]) -> Fault:
     """Return the fault, marked as busy where its exception is one of those that mean so."""
     return replace(fault, busy=True) if fault.exception_code in exceptions else fault
 
@@ -89,25 +89,23 @@ class Poll:
     def ask(self, now: float) -> Ask | Hold:
         """Decide what to put on the line now."""
         device = self.device
-        spec = device.spec
+        codec, profile = device.spec.codec, device.spec.profile
         self._waking = self._wakes < WAKES and device.gap.may_sleep(now)
-        block = self._blocks[self._block]
-        request = _read(device.slave, block.address, block.count, block.function)
-        barrier = spec.profile.barrier
-        if barrier is None and self._pending.confusable(request, spec.codec):
-            self._pending.leave_alone(device.slave, device.timeout)
-        until = self._pending.left_alone_until(device.slave, now)
-        if until is not None:
-            return Hold(until)
-        self._barrier_asked = False
-        first = self._barrier_due or (self._waking and device.gap.sleeps)
-        if barrier is not None and (first or self._pending.confusable(request, spec.codec)):
-            request = _read(device.slave, barrier.register, barrier.count, barrier.function)
-            self._barrier_asked = True
-        elif (until := self._pending.lingering_until(request, spec.codec, now)) is not None:
-            return Hold(until)
-        timeout = device.probe_timeout if self.purpose is Purpose.PROBE else device.timeout
-        return Ask(request, spec.codec, timeout, device.patience)
+        block, barrier, usual = self._blocks[self._block], profile.barrier, device.timeout
+        value = _read(device.slave, block.address, block.count, block.function)
+        request = self._pending.next_request(
+            value,
+            codec,
+            now,
+            barrier=None if barrier is None else _read(device.slave, barrier.register, barrier.count, barrier.function),
+            timeout=usual,
+            barrier_first=self._barrier_due or (self._waking and device.gap.sleeps),
+        )
+        if isinstance(request, float):
+            return Hold(request)
+        self._barrier_asked = request is not value
+        timeout = device.probe_timeout if self.purpose is Purpose.PROBE else usual
+        return Ask(request, codec, timeout, device.patience)
 
     def on_outcome(self, outcome: Outcome, now: float) -> Next:
         """Take the outcome of what was asked."""
@@ -143,7 +141,7 @@ class Poll:
             self.failed_attempts.append(fault.code)
             self.due = now
             return Requeue(now)
-        self.fault = None if fault is None else told_busy(fault, device.spec.profile.busy_exceptions)
+        self.fault = None if fault is None else marked_busy(fault, device.spec.profile.busy_exceptions)
         self.values = {}
         return Done()
 
@@ -159,18 +157,18 @@ class Poll:
         """Learn that the port is lost."""
         self.at = now
 
+    def reading(self) -> Reading:
+        """Return the reading of the poll that is over; its device knows of it already."""
+        return _reading(self.device, self.at, self.fault, () if self.request is None else (self.request,), self)
 
-def tell(poll: Poll) -> Reading:
-    """Return the reading of a poll that is over; its device knows of it already."""
-    return _reading(poll.device, poll.at, poll.fault, poll, [poll])
 
-
-def tell_lost(device: Device, fault: Fault, now: float, polls: Iterable[Poll]) -> Reading:
+def lost_reading(device: Device, fault: Fault, now: float, polls: Iterable[Poll]) -> Reading:
     """Return the reading of a device whose port is lost, in answer to the requested among `polls` of it too."""
-    return _reading(device, now, fault, None, (poll for poll in polls if poll.device is device))
+    requests = tuple(each.request for each in polls if each.device is device and each.request is not None)
+    return _reading(device, now, fault, requests, None)
 
 
-def _reading(device: Device, at: float, fault: Fault | None, poll: Poll | None, polls: Iterable[Poll]) -> Reading:
+def _reading(device: Device, at: float, fault: Fault | None, requests: tuple[int, ...], poll: Poll | None) -> Reading:
     overruns, device.overruns = device.overruns, 0
     return Reading(
         device=device.name,
@@ -183,7 +181,7 @@ def _reading(device: Device, at: float, fault: Fault | None, poll: Poll | None, 
         probe=poll is not None and poll.purpose is Purpose.PROBE,
         failed_attempts=tuple(poll.failed_attempts) if poll else (),
         overruns=overruns,
-        requests=tuple(each.request for each in polls if each.request is not None),
+        requests=requests,
         request_gap=device.gap.seconds,
         gap_learned=device.gap.learned > device.gap.configured,
     )

@@ -20,7 +20,7 @@ from typing import TypeAlias
 
 from lfs10d.line.device import FIRST_TIMEOUTS
 from lfs10d.line.jobs.job import Done, Hold, Next, Requeue
-from lfs10d.line.jobs.poll import told_busy
+from lfs10d.line.jobs.poll import marked_busy
 from lfs10d.modbus.ask import Ask
 from lfs10d.modbus.frames import Codec
 from lfs10d.modbus.outcome import Outcome
@@ -122,23 +122,14 @@ class Access:
     def ask(self, now: float) -> Ask | Hold:
         """Decide what to put on the line now."""
         self._shaping = False
-        slave, codec, request = self._target.slave, self._target.codec, self._following
+        codec, wanted = self._target.codec, self._following
         if now < self._rest_until:
             return Hold(self._rest_until)
-        until = self._pending.left_alone_until(slave, now)
-        reads = isinstance(request, ReadRegisters)
-        if until is None and reads and self._pending.confusable(request, codec):
-            other = self._other_shape()
-            if other is not None:
-                self._shaping = True
-                return Ask(other, codec, self._timeout)
-            self._pending.leave_alone(slave, self._timeout)
-            until = self._pending.left_alone_until(slave, now)
-        if until is None:
-            until = self._pending.lingering_until(request, codec, now)
-        if until is not None:
-            return Hold(until)
-        self.sent = self.sent or not reads
+        request = self._pending.next_request(wanted, codec, now, barrier=self._other_shape(), timeout=self._timeout)
+        if isinstance(request, float):
+            return Hold(request)
+        self._shaping = request is not wanted
+        self.sent = self.sent or isinstance(request, WriteRegister)
         return Ask(request, codec, self._timeout)
 
     def on_outcome(self, outcome: Outcome, now: float) -> Next:
@@ -228,7 +219,7 @@ class Access:
         self._timeout = timeout
         outcome = yield what
         fault = outcome.fault
-        self.fault = None if fault is None else told_busy(fault, self._target.busy_exceptions)
+        self.fault = None if fault is None else marked_busy(fault, self._target.busy_exceptions)
         if isinstance(what, ReadRegisters):
             self.registers = outcome.answer
         if _refused(outcome) and not self._refuses(outcome):

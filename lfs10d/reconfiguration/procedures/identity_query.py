@@ -159,24 +159,20 @@ class IdentityQuery:
         self, request: ReadRegisters, endpoint: Endpoint, timeout: float | None
     ) -> Generator[Step, Outcome, IdentityReply | None]:
         """Wait and ask what must be asked before `request` may be; return what came instead of an answer, if so."""
-        pending, other = self._pending, self._values_of(endpoint)
-        apart = self.codec.shapes(other)[0] != self.codec.shapes(request)[0]
+        other = self._values_of(endpoint)
+        barrier = other if self.codec.shapes(other)[0] != self.codec.shapes(request)[0] else None
         while True:
-            now = self.clock.now
-            until = pending.left_alone_until(endpoint.slave, now)
-            if until is not None:
-                yield Hold(until)
-            elif pending.confusable(request, self.codec):
-                if not apart:
-                    pending.leave_alone(endpoint.slave, self.timeout)
-                    continue
-                reply = self._reply((yield self._ask(other, endpoint, timeout)), values=True)
-                if not reply.answers or reply.exception in NOT_FINAL:
-                    return reply
-            elif (until := pending.lingering_until(request, self.codec, now)) is not None:
-                yield Hold(until)
-            else:
+            allowed = self._pending.next_request(
+                request, self.codec, self.clock.now, barrier=barrier, timeout=self.timeout
+            )
+            if allowed is request:
                 return None
+            if isinstance(allowed, float):
+                yield Hold(allowed)
+                continue
+            reply = self._reply((yield self._ask(other, endpoint, timeout)), values=True)
+            if not reply.answers or reply.exception in NOT_FINAL:
+                return reply
 
     def _reply(self, outcome: Outcome, *, values: bool = False) -> IdentityReply:
         if outcome.turnaround is not None and outcome.turnaround > SLOW_FROM:

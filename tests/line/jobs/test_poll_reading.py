@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from lfs10d.line.device import Device, DeviceSpec, PollRules
-from lfs10d.line.jobs.poll import Poll, tell, tell_lost
+from lfs10d.line.jobs.poll import Poll, lost_reading
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.pending import PendingRequests
 from lfs10d.profiles.library import load_profile
@@ -32,22 +32,22 @@ def test_a_good_poll(device: Device) -> None:
     poll = a_poll(device, Purpose.REQUEST, 7)
     poll.values, poll.rtt, poll.at = {"wind_speed": 12.99}, 0.02, 5.0
     poll.failed_attempts.append(FaultCode.CRC)
-    reading = tell(poll)
+    reading = poll.reading()
     assert (reading.device, reading.at, reading.values, reading.rtt) == ("mast", 5.0, {"wind_speed": 12.99}, 0.02)
     assert (reading.fault, reading.online, reading.probe, reading.requests) == (None, True, False, (7,))
     assert (reading.failed_attempts, reading.overruns, reading.response_timeout) == ((FaultCode.CRC,), 2, 0.3)
-    assert tell(poll).overruns == 0
+    assert poll.reading().overruns == 0
 
 
 def test_a_failed_probe(device: Device) -> None:
     poll = a_poll(device, Purpose.PROBE)
     poll.fault = Fault(FaultCode.TIMEOUT, "no answer")
-    reading = tell(poll)
+    reading = poll.reading()
     assert (reading.values, reading.fault, reading.probe, reading.requests) == (None, poll.fault, True, ())
 
 
 def test_the_loss_of_the_port_answers_the_requests_for_this_device(device: Device) -> None:
     other = Device(device.spec, PollRules(), 2)
     polls = [a_poll(device, Purpose.REQUEST, 7), a_poll(other, Purpose.REQUEST, 8), a_poll(device, Purpose.POLL)]
-    reading = tell_lost(device, GONE, 9.0, polls)
+    reading = lost_reading(device, GONE, 9.0, polls)
     assert (reading.at, reading.values, reading.fault, reading.requests) == (9.0, None, GONE, (7,))
