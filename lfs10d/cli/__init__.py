@@ -14,10 +14,12 @@ from lfs10d import __version__
 from lfs10d.system import startup
 
 EXIT_FAILED = 1
-EXIT_USAGE = 2
 EXIT_UNAVAILABLE = 69
 EXIT_CONFIG = 78
 """sysexits.h: EX_UNAVAILABLE, EX_CONFIG."""
+
+SERVICE_FILE = Path("/etc/lfs10d/lfs10d.yaml")
+"""The configuration that the service reads, and every verb that is given no other."""
 
 VERBS = {
     "run": "Run the daemon.",
@@ -86,7 +88,7 @@ def config_option(function: Callable[..., Any]) -> Callable[..., Any]:
         "--config",
         envvar="LFS10D_CONFIG",
         show_envvar=True,
-        default=Path("/etc/lfs10d/lfs10d.yaml"),
+        default=SERVICE_FILE,
         show_default=True,
         metavar="FILE",
         type=click.Path(path_type=Path, readable=False),  # whether it can be read is told in our words

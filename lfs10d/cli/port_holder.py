@@ -7,14 +7,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from lfs10d.cli import SERVICE_FILE
 from lfs10d.config.loader import load
 from lfs10d.errors import ConfigError
 from lfs10d.modbus.port_lock import PROC, Holder, holder
 from lfs10d.system.logs import escape
 
 DAEMON = "lfs10d"
-SERVICE_FILE = "/etc/lfs10d/lfs10d.yaml"
-"""Where the daemon reads when nothing else is said; then no -c is needed either."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +51,7 @@ def config_of(argv: list[str]) -> str:
             config = word.removeprefix("--config=")
         elif word.startswith("-c") and not word.startswith("--"):
             config = word.removeprefix("-c")
-    return "" if config == SERVICE_FILE else escape(config)
+    return "" if config == str(SERVICE_FILE) else escape(config)
 
 
 def device_name(daemon: HoldingDaemon, slave: int) -> str:

@@ -21,7 +21,7 @@ from lfs10d.config.credentials import (
     unreadable,
 )
 from lfs10d.config.defaults import resolved, unfit
-from lfs10d.config.models import Config, MqttConfig, SlaveConfig
+from lfs10d.config.models import Config, MqttConfig
 from lfs10d.config.validation import contradictions
 from lfs10d.errors import ConfigError, Problem
 from lfs10d.profiles.library import builtin_names, load_profile
@@ -31,8 +31,6 @@ from lfs10d.schema.fields import quoted, shown
 from lfs10d.schema.messages import KeyPath
 from lfs10d.system.regular_file import read_regular
 from lfs10d.system.secret import Secret
-
-DEFAULT_FILE = Path("/etc/lfs10d/lfs10d.yaml")
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,10 +57,6 @@ class LoadedConfig:
     profiles: Mapping[str, Profile]
     origins: Mapping[str, Origin]
     credential: Path | None
-
-    def profile_of(self, slave: SlaveConfig) -> Profile:
-        """Return the profile of a slave of this configuration."""
-        return self.profiles[slave.profile]
 
     def password(self) -> Secret | None:
         """Read the broker's password anew; None if there is none. Raises ConfigError if it cannot be read."""

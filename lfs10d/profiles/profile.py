@@ -268,11 +268,6 @@ class Profile(Facts):
         return {value.name: value.unit for value in self.values}
 
     @property
-    def id_and_rate_registers(self) -> frozenset[int]:
-        """Registers that only a verified change of id or rate may write."""
-        return frozenset(fact.register for fact in (self.slave_id, self.baudrate) if fact is not None)
-
-    @property
     def most_words(self) -> int:
         """Registers that one read may ask for in every framing that the device speaks."""
         return _words_per_read(self.__dict__)

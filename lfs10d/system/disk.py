@@ -1,7 +1,7 @@
 """Files that survive a power cut: write, fsync, rename, fsync of the folder.
 
-`Disk` holds the order of the steps, `Files` are the steps. The tests have other `Files`, which
-forget at a cut what was not synced.
+`Disk` holds the order of the steps, `Files` are the steps; the tests have `Files` that forget at a power cut what was
+not synced.
 """
 
 from __future__ import annotations
@@ -23,12 +23,6 @@ class Files(Protocol):
     def write(self, path: Path, data: bytes, *, mode: int) -> None:
         """Write a new file, in the place of one that is there; nothing is safe yet."""
 
-    def append(self, path: Path, data: bytes, *, mode: int) -> None:
-        """Write at the end, creating the file if need be; nothing is safe yet."""
-
-    def truncate(self, path: Path, length: int) -> None:
-        """Cut the file; nothing is safe yet."""
-
     def sync(self, path: Path) -> None:
         """Return when the content is on the disk."""
 
@@ -36,13 +30,13 @@ class Files(Protocol):
         """Put one file in place of another, in one step."""
 
     def remove(self, path: Path) -> None:
-        """Take the name away."""
+        """Remove the name."""
 
     def sync_folder(self, folder: Path) -> None:
         """Return when the folder's names are on the disk."""
 
     def exists(self, path: Path) -> bool:
-        """Tell whether there is such a file."""
+        """Return whether there is such a file."""
 
 
 class SystemFiles:
@@ -56,20 +50,6 @@ class SystemFiles:
         """Write a new file, in the place of one that is there."""
         write_new(path, data, mode=mode)
 
-    def append(self, path: Path, data: bytes, *, mode: int) -> None:
-        """Write at the end, creating the file if need be."""
-        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW | os.O_CLOEXEC, mode)
-        try:
-            rest = memoryview(data)
-            while rest:
-                rest = rest[os.write(descriptor, rest) :]
-        finally:
-            os.close(descriptor)
-
-    def truncate(self, path: Path, length: int) -> None:
-        """Cut the file."""
-        os.truncate(path, length)
-
     def sync(self, path: Path) -> None:
         """Return when the content is on the disk."""
         self._synced(path, os.O_RDONLY)
@@ -79,7 +59,7 @@ class SystemFiles:
         source.replace(target)
 
     def remove(self, path: Path) -> None:
-        """Take the name away."""
+        """Remove the name."""
         path.unlink()
 
     def sync_folder(self, folder: Path) -> None:
@@ -94,12 +74,12 @@ class SystemFiles:
             os.close(descriptor)
 
     def exists(self, path: Path) -> bool:
-        """Tell whether there is such a file."""
+        """Return whether there is such a file."""
         return path.exists()
 
 
 class Disk:
-    """Writes that have happened when the call returns, and else have not happened or (append) only in part.
+    """Changes that are on the disk when the call returns, and else have not happened.
 
     All raise OSError. New files are readable by their owner only, unless `mode` says otherwise.
     """
@@ -124,24 +104,8 @@ class Disk:
             raise
         self.files.sync_folder(path.parent)
 
-    def append(self, path: Path, data: bytes, *, mode: int = 0o600) -> None:
-        """Write at the end; after a cut any part of `data` may be there: the reader judges each record.
-
-        If it fails (a full disk), what was written of it is taken back as far as that is possible.
-        """
-        length = len(self.files.read(path)) if self.files.exists(path) else None
-        try:
-            self.files.append(path, data, mode=mode)
-            self.files.sync(path)
-        except OSError:
-            with contextlib.suppress(OSError):
-                self.files.truncate(path, length or 0)
-            raise
-        if length is None:
-            self.files.sync_folder(path.parent)
-
     def remove(self, path: Path) -> None:
-        """Take a file away; one that is not there is none."""
+        """Remove a file, if it is there."""
         if self.files.exists(path):
             self.files.remove(path)
             self.files.sync_folder(path.parent)

@@ -1,12 +1,11 @@
 """Logging: one line per record, for the journal, a terminal or a pipe, and nothing foreign unescaped.
 
-Standard error may be closed, full, or nobody may read it: no record is worth an exception or a standstill. What could
-not be written is counted, and the count is the first thing written afterwards.
+Standard error may be closed, full or unread: a record that cannot be written raises nothing and waits for nothing. Lost
+records are counted, and the count is the first thing written afterwards.
 """
 
 from __future__ import annotations
 
-import json
 import logging
 import os
 import select
@@ -39,9 +38,6 @@ _DIM, _RESET = "\x1b[2m", "\x1b[0m"
 
 _CUT = b" ... "
 
-_JSON_FRAME = 128
-"""Bytes of a JSON line beside its message, and some more."""
-
 
 class Style(StrEnum):
     """How a line looks."""
@@ -54,8 +50,6 @@ class Style(StrEnum):
     """`2026-11-21T21:53:42.003Z warning message`: for a file or another program."""
     BARE = "bare"
     """`warning message`: where the reader adds the time."""
-    JSON = "json"
-    """`{"time": "2026-11-21T21:53:42.003Z", "level": "warning", "logger": "lfs10d.line.poller", "message": "..."}`."""
 
 
 def escape(text: str) -> str:
@@ -78,15 +72,13 @@ def shortened(line: str, limit: int = LIMIT - 1) -> str:
 
 
 def style_of(wanted: str, *, journal: bool, terminal: bool, coloured: bool = True) -> Style:
-    """Choose the style for log.format `auto`, `journal`, `text`, `plain` or `json`.
+    """Return the style for log.format `auto`, `journal` or `text`.
 
-    `journal` and `terminal` say what standard error is, `coloured` whether its reader likes colour.
+    `journal` and `terminal` say what standard error is, `coloured` whether colour is wanted there.
     """
-    if wanted == "json":
-        return Style.JSON
     if wanted == "journal" or (wanted == "auto" and journal):
         return Style.JOURNAL
-    if wanted != "plain" and terminal and coloured:
+    if terminal and coloured:
         return Style.COLOUR
     return Style.BARE if journal else Style.PLAIN
 
@@ -128,11 +120,6 @@ class LineFormatter(logging.Formatter):
             return f"{_DIM}{stamp}{_RESET} {colour}{level:<7} {words}{_RESET}"
         if self._look is Style.BARE:
             return f"{level} {words}"
-        if self._look is Style.JSON:
-            # Cut before quoting, which may double its length: half an object is no JSON.
-            message = shortened(words, LIMIT // 2 - _JSON_FRAME)
-            entry = {"time": _utc(record.created), "level": level, "logger": record.name, "message": message}
-            return json.dumps(entry, ensure_ascii=False)
         return f"{_utc(record.created)} {level} {words}"
 
     def _said(self, record: logging.LogRecord) -> str:
@@ -174,7 +161,7 @@ class DescriptorHandler(logging.Handler):
             level=logging.WARNING,
             pathname="",
             lineno=0,
-            msg="%d log records were lost: nobody took them from standard error",
+            msg="%d log records were lost: standard error was not read",
             args=(self.dropped,),
             exc_info=None,
         )

@@ -112,7 +112,7 @@ def test_a_device_is_found_by_its_name(file: Callable[[str], LoadedConfig]) -> N
 
 def test_the_profile_of_what_was_added_is_loaded(file: Callable[[str], LoadedConfig]) -> None:
     now = effective(file(TEXT), Changes().adding("roof", {"id": 9, "profile": "own.yaml"}))
-    assert now.loaded.profile_of(now.config.slaves[-1]).name == "own"
+    assert now.loaded.profiles[now.config.slaves[-1].profile].name == "own"
 
 
 @pytest.mark.parametrize(

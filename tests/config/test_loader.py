@@ -42,7 +42,7 @@ def test_a_file_gives_a_configuration_its_profiles_and_origins() -> None:
     assert found.config.line.port == str(Path("tty").absolute())
     assert found.config.mqtt.client_id == "lfs10d-gateway-north"
     assert set(found.profiles) == {"lfs10"}
-    assert found.profile_of(found.config.slaves[0]).name == "lfs10"
+    assert found.profiles[found.config.slaves[0].profile].name == "lfs10"
     assert {path: str(found.origins[path]) for path in ("line.name", "line.port", "slaves[0].id", "slaves[1].id")} == {
         "line.name": "default",
         "line.port": "north.yaml:1",

@@ -144,7 +144,9 @@ def test_lfs10_is_what_its_protocol_document_says() -> None:
 
 def test_nothing_of_an_lfs10_is_ever_written_but_id_and_rate() -> None:
     profile = builtin("lfs10")
-    assert profile.id_and_rate_registers == {0x0004, 0x0005}
+    assert profile.slave_id is not None
+    assert profile.baudrate is not None
+    assert {profile.slave_id.register, profile.baudrate.register} == {0x0004, 0x0005}
     assert profile.settings == ()
     assert profile.setting_at(0x0003) is None
 
@@ -194,7 +196,7 @@ def test_nothing_of_an_inverter_may_be_written(name: str) -> None:
     profile = builtin(name)
     assert profile.settings
     assert all(setting.refusal(0) is not None for setting in profile.settings)
-    assert profile.id_and_rate_registers == frozenset()
+    assert (profile.slave_id, profile.baudrate) == (None, None)
 
 
 @pytest.mark.parametrize("name", ["ld-e", "fuling-dzb", "eh600"])

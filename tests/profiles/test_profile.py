@@ -86,7 +86,9 @@ def test_id_and_rate_have_registers_of_their_own_that_are_no_settings(profile_of
         baudrate={"register": 4, "codes": {9600: 1}},
         settings=[{"name": "average", "register": 6}],
     )
-    assert profile.id_and_rate_registers == {4, 5}
+    assert profile.slave_id is not None
+    assert profile.baudrate is not None
+    assert (profile.slave_id.register, profile.baudrate.register) == (5, 4)
     assert profile.setting_at(5) is None
     setting = profile.setting_at(6)
     assert setting is not None
@@ -94,7 +96,7 @@ def test_id_and_rate_have_registers_of_their_own_that_are_no_settings(profile_of
 
 
 def test_a_profile_without_id_and_rate_registers_sets_neither(profile_of: Build) -> None:
-    assert profile_of().id_and_rate_registers == frozenset()
+    assert (profile_of().slave_id, profile_of().baudrate) == (None, None)
 
 
 TOO_SHORT = {"max_words": 1, "values": TWO_VALUES}

@@ -75,12 +75,6 @@ class ForgetfulFiles:
         content.seen = b""
         self._put(content, data)
 
-    def append(self, path: Path, data: bytes, *, mode: int) -> None:
-        """Write at the end, creating the file if need be."""
-        del mode
-        self._step()
-        self._put(self.seen.setdefault(path, _Content()), data)
-
     def _put(self, content: _Content, data: bytes) -> None:
         room = len(data) if self.full is None else min(self.full, len(data))
         content.seen += data[:room]
@@ -88,12 +82,6 @@ class ForgetfulFiles:
             self.full -= room
         if room < len(data):
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    def truncate(self, path: Path, length: int) -> None:
-        """Cut the file."""
-        self._step()
-        content = self._content(path)
-        content.seen = content.seen[:length]
 
     def sync(self, path: Path) -> None:
         """Keep the content."""

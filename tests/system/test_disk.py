@@ -39,26 +39,6 @@ def test_a_replaced_file_is_old_or_new_whenever_the_power_fails(cut: int, surviv
     assert disk.read(FILE) in ({b"new"} if returned else {b"old", b"new"})
 
 
-@given(st.integers(0, 2), st.booleans())
-def test_what_was_appended_is_there_once_the_call_returned(cut: int, survives: bool) -> None:  # noqa: FBT001 - the test's parameter
-    files, disk = begun()
-    files.steps_left = files.steps + cut
-    try:
-        disk.append(FILE, b" and more")
-        returned = True
-    except PowerCutError:
-        returned = False
-    files.power_cut({FILE} if survives else ())
-    assert disk.read(FILE) == b"old and more" if returned else disk.read(FILE).startswith(b"old")
-
-
-def test_a_file_begun_by_an_append_has_its_name_on_the_disk() -> None:
-    files = ForgetfulFiles()
-    Disk(files).append(FILE, b"first")
-    files.power_cut()
-    assert Disk(files).read(FILE) == b"first"
-
-
 def test_a_removed_file_stays_removed() -> None:
     files, disk = begun()
     disk.remove(FILE)
@@ -77,26 +57,13 @@ def test_a_full_disk_leaves_the_old_content_and_no_draft() -> None:
     assert set(files.seen) == {FILE}
 
 
-def test_an_append_that_failed_is_taken_back() -> None:
-    files, disk = begun()
-    files.full = 2
-    with pytest.raises(OSError, match="No space left"):
-        disk.append(FILE, b"more")
-    assert disk.read(FILE) == b"old"
-    with pytest.raises(OSError, match="No space left"):
-        disk.append(Path("/state/other"), b"more")
-    assert disk.read(Path("/state/other")) == b""
-
-
 def test_on_the_real_file_system_the_same_steps_do_the_same(tmp_path: Path) -> None:
     disk, file = Disk(), tmp_path / "file"
     disk.replace(file, b"one")
-    disk.append(file, b" two")
-    assert disk.read(file) == b"one two"
+    disk.replace(file, b"two")
+    assert disk.read(file) == b"two"
     assert file.stat().st_mode & 0o777 == 0o600
-    disk.append(tmp_path / "new", b"x")
-    disk.files.truncate(file, 3)
-    assert file.read_bytes() == b"one"
+    disk.replace(tmp_path / "new", b"x")
     disk.remove(file)
     assert [path.name for path in tmp_path.iterdir()] == ["new"]
 
@@ -104,8 +71,6 @@ def test_on_the_real_file_system_the_same_steps_do_the_same(tmp_path: Path) -> N
 def test_a_folder_that_is_not_there_is_an_error_of_the_system(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         Disk().replace(tmp_path / "none" / "file", b"x")
-    with pytest.raises(FileNotFoundError):
-        Disk().append(tmp_path / "none" / "file", b"x")
 
 
 @pytest.mark.parametrize("cut", range(3))

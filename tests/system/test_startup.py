@@ -22,7 +22,7 @@ def in_a_fresh_interpreter(code: str) -> str:
 
 def test_the_daemon_is_imported_without_what_it_does_not_need() -> None:
     code = (
-        "import sys, lfs10d.cli.exit_status; from lfs10d import startup; startup.begin()\n"
+        "import sys, lfs10d.cli.exit_status; from lfs10d.system import startup; startup.begin()\n"
         f"import lfs10d.cli.run; print([name for name in {NEVER!r} if name in sys.modules])"
     )
     assert in_a_fresh_interpreter(code) == "[]"
@@ -56,7 +56,7 @@ def test_no_plugins_are_found_and_the_rest_of_the_loader_is_the_true_one() -> No
 
 def test_what_stands_in_for_a_client_of_the_web_gives_way_to_it() -> None:
     code = (
-        "import sys; from lfs10d import startup; startup.begin()\n"
+        "import sys; from lfs10d.system import startup; startup.begin()\n"
         "import urllib.request as web; print(type(web).__name__, 'http.client' in sys.modules)\n"
         "print(web.getproxies.__module__, web.Request.__name__, 'http.client' in sys.modules)\n"
         "import urllib.request; print(type(urllib.request).__name__)"
@@ -66,7 +66,7 @@ def test_what_stands_in_for_a_client_of_the_web_gives_way_to_it() -> None:
 
 def test_a_client_of_the_web_that_is_there_stays() -> None:
     code = (
-        "import urllib.request; there = urllib.request; from lfs10d import startup; startup.begin()\n"
+        "import urllib.request; there = urllib.request; from lfs10d.system import startup; startup.begin()\n"
         "import urllib.request; print(urllib.request is there)"
     )
     assert in_a_fresh_interpreter(code) == "True"

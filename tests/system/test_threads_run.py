@@ -69,9 +69,9 @@ def test_a_loop_that_is_closed_is_told_nothing() -> None:
 def test_a_call_that_never_returns_does_not_hold_the_end_of_the_process_up() -> None:
     code = """
 import asyncio, time
-from lfs10d.aside import aside
+from lfs10d.system.threads import run_in_thread
 async def run():
-    task = asyncio.create_task(aside(lambda: time.sleep(3600), "for ever"))
+    task = asyncio.create_task(run_in_thread(lambda: time.sleep(3600), "for ever"))
     await asyncio.sleep(0.01)
     task.cancel()
 asyncio.run(run())
