@@ -136,7 +136,7 @@ class Poller:
         step = self.bus.step(now, readable=readable)
         if self.bus.strays:
             strays, self.bus.strays = self.bus.strays, []
-            self._events += self.scheduler.on_strays(strays)
+            self._events += self.scheduler.second_answers.on_strays(strays)
         if isinstance(step, PortChanged):
             self._port_changed(step)
             return None
@@ -179,9 +179,9 @@ class Poller:
             )
         )
         self._events += readings
-        self._events += self.scheduler.on_answer(outcome)
+        self._events += self.scheduler.second_answers.on_answer(outcome)
         if outcome.strays:
-            self._events += self.scheduler.on_strays(outcome.strays, outcome)
+            self._events += self.scheduler.second_answers.on_strays(outcome.strays, outcome)
 
     def _port_changed(self, changed: PortChanged) -> None:
         self._events.append(changed)

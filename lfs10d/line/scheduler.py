@@ -1,4 +1,4 @@
-"""Who speaks next on the line. Pure: it decides, the bus obeys, one `Ask` at a time; so no lock guards anything.
+"""Decides what is asked next on the line. Pure: the bus carries out one `Ask` at a time, so no lock is needed.
 
 Rules
 -----
@@ -20,23 +20,22 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from lfs10d.line.device import LEARNED_MOST, Device, DeviceSpec, Health, PollRules
+from lfs10d.line.device import Device, DeviceSpec, Health, PollRules
+from lfs10d.line.devices import Devices
 from lfs10d.line.job_queue import JobQueue
 from lfs10d.line.jobs.job import Continue, Hold, Job, Requeue
 from lfs10d.line.jobs.poll import Poll, lost_reading
 from lfs10d.line.poll_queue import PollQueue, back_on_grid, spread
 from lfs10d.line.probing import Probing
+from lfs10d.line.second_answers import SecondAnswers
 from lfs10d.line.slave_rests import SlaveRests
 from lfs10d.line.surcharge import Surcharge
-from lfs10d.modbus import diagnosis
 from lfs10d.modbus.ask import Ask
-from lfs10d.modbus.frames import EXCEPTION_FLAG
 from lfs10d.modbus.outcome import Outcome
-from lfs10d.modbus.overhearing import Overhearing
 from lfs10d.modbus.pending import PendingRequests
 from lfs10d.modbus.request import ReadRegisters
 from lfs10d.modbus.timing import LineTiming
-from lfs10d.reading import AnsweredTwice, Fault, FaultCode, Purpose, Reading
+from lfs10d.reading import Fault, FaultCode, Purpose, Reading
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,9 +44,6 @@ class Rest:
 
     until: float
 
-
-START_PATIENT = 8
-"""With more silent devices than this at the start none of them is waited for longer than 200 ms."""
 
 Decision: TypeAlias = Ask | Rest
 
@@ -61,9 +57,8 @@ class Scheduler:
     def __init__(self, timing: LineTiming, now: float) -> None:
         self.timing = timing
         self.pending = PendingRequests()
-        self.devices: dict[str, Device] = {}
-        self._by_slave: dict[int, Device] = {}
-        self._overhearing = Overhearing()
+        self.devices = Devices()
+        self.second_answers = SecondAnswers(self.pending)
         self._polls = PollQueue(self.pending)
         self._probing = Probing(now)
         self._jobs = JobQueue()
@@ -80,24 +75,8 @@ class Scheduler:
 
         One that is enabled again, or whose slave id, profile or codec changed, is a new one on the line.
         """
-        before, self.devices = self.devices, {}
-        fresh: list[Device] = []
-        for spec in specs:
-            device = before.get(spec.name)
-            if device is None or spec.begins_anew(device.spec):
-                device = Device(spec, rules, spec.slave)
-                if self._lost:
-                    device.cut_off()
-                fresh.append(device)
-                if (known := before.get(spec.name)) is not None and known.spec.profile == spec.profile:
-                    device.gap = known.gap
-            elif device.spec.interval != spec.interval:
-                fresh.append(device)
-            device.spec, device.rules = spec, rules
-            device.gap.configured = spec.request_gap
-            self.devices[spec.name] = device
-        self._by_slave = {device.slave: device for device in self.devices.values()}
-        self._overhearing.listen_to({device.slave: device.spec.codec for device in self.devices.values()})
+        fresh = self.devices.replace(specs, rules, port_lost=self._lost is not None)
+        self.second_answers.watch(self.devices.by_slave)
         for device in fresh:
             self.pending.duplicates.forget(device.slave)
         for job in self._jobs.drop(lambda job: isinstance(job, Poll) and not self._wanted(job)):
@@ -179,8 +158,7 @@ class Scheduler:
     def retime(self, timing: LineTiming) -> None:
         """Take the times of the line's new rate; what was learned at another rate is forgotten."""
         if timing.baudrate != self.timing.baudrate:
-            for device in self.devices.values():
-                device.response_times.forget()
+            self.devices.forget_response_times()
         self.timing = timing
 
     def on_port_opened(self, now: float) -> None:
@@ -191,16 +169,16 @@ class Scheduler:
             device.reconnected()
         self._requeue(list(self.devices.values()), now)
 
-    # -- who speaks next
+    # -- what is asked next
 
     def next(self, now: float) -> Decision:
-        """Decide who speaks next; the outcome of an `Ask` must come back through `on_outcome`."""
+        """Decide what is asked next; the outcome of an `Ask` must come back through `on_outcome`."""
         for job in self._jobs.released(now):
             self._resume(job, now)
         while (chosen := self._choose(now)) is not None:
             decision = chosen.ask(now)
             if isinstance(decision, Ask):
-                until = self._rests.until(chosen, decision, self._by_slave)
+                until = self._rests.until(chosen, decision, self.devices.by_slave)
                 if until <= now:
                     self._begin(chosen, decision, now)
                     return decision
@@ -252,8 +230,8 @@ class Scheduler:
             raise RuntimeError("an outcome without an Ask")
         (job, ask), self._current = self._current, None
         self.pending.on_outcome(outcome, ask.codec, ask.timeout, now)
-        self._learn(outcome)
-        widened = self._rests.learn(outcome, ask, self._by_slave, line_rate=self.timing.baudrate)
+        self.devices.learn(outcome)
+        widened = self._rests.learn(outcome, ask, self.devices.by_slave, line_rate=self.timing.baudrate)
         self._spend(job, outcome, now)
         ignored = self._ignored(outcome)
         if isinstance(job, Poll) and self._wanted(job) and (widened or (ignored and self._benefits(job.device))):
@@ -274,40 +252,6 @@ class Scheduler:
         self._jobs.over(job)
         return [self._finish(job, now)] if isinstance(job, Poll) else []
 
-    def on_answer(self, outcome: Outcome) -> list[AnsweredTwice]:
-        """Take an outcome that is settled: a second answer may follow it, or none does any more."""
-        device = self._by_slave.get(outcome.request.slave)
-        if device is None or outcome.answer is None:
-            return []
-        barrier, request = device.spec.profile.barrier, outcome.request
-        asked = (
-            None if barrier is None else ReadRegisters(device.slave, barrier.register, barrier.count, barrier.function)
-        )
-        ended = self.pending.duplicates.answered(device.slave, outcome.ended, barrier=request == asked)
-        return [AnsweredTwice(outcome.ended, device.name, device.slave, None)] if ended else []
-
-    def on_strays(self, strays: Iterable[tuple[bytes, float]], outcome: Outcome | None = None) -> list[AnsweredTwice]:
-        """Take what was heard and belongs to no exchange, or is left over by `outcome`, with the times of its pieces.
-
-        A right frame of a slave that owes nothing is one answer too many.
-        """
-        events: list[AnsweredTwice] = []
-        owing = outcome.request.slave if outcome is not None and outcome.answer is None else None
-        for frame in self._overhearing.hear(strays):
-            codec = self._by_slave[frame.slave].spec.codec
-            if frame.request is not None:
-                self.pending.asked_by_another(frame.request, codec, frame.at)
-                continue
-            size, exception = codec.size(len(frame.body)), bool(frame.body[1] & EXCEPTION_FLAG)
-            owed = self.pending.overheard(frame.slave, size, exception=exception, now=frame.at)
-            if owed or frame.slave == owing:
-                continue
-            twice = self.pending.duplicates.second(frame.slave, frame.at)
-            if twice is not None:
-                fault = Fault(FaultCode.DUPLICATE_ID, diagnosis.twice(twice), heard=codec.wrap(frame.body))
-                events.append(AnsweredTwice(frame.at, self._by_slave[frame.slave].name, frame.slave, fault))
-        return events
-
     def _ignored(self, outcome: Outcome) -> bool:
         """Whether the request may have been ignored only for the one before it (rule 4)."""
         before, self._silent = self._silent, None
@@ -321,18 +265,6 @@ class Scheduler:
         if device.starting:
             return False
         return device.health is Health.UNHEARD or device.probe_exempt or not self._probing.anyone_online
-
-    def _learn(self, outcome: Outcome) -> None:
-        """Learn how long answers take, late ones included, whoever asked."""
-        for late in outcome.late:
-            device = self._by_slave.get(late.request.slave)
-            # What is later than any time-out says nothing of the usual time, and may be an older answer's.
-            if device is not None and late.ours and late.latency <= LEARNED_MOST:
-                device.response_times.learn(late.latency)
-        if outcome.turnaround is not None and outcome.answer is not None:
-            device = self._by_slave.get(outcome.request.slave)
-            if device is not None:
-                device.response_times.learn(outcome.turnaround)
 
     def _spend(self, job: Job, outcome: Outcome, now: float) -> None:
         taken = outcome.ended - outcome.asked + self.timing.gap
@@ -363,7 +295,7 @@ class Scheduler:
         if (before is not Health.ONLINE and device.online) or (doubtful and not device.doubtful):
             back_on_grid(device, now)
         if device.starting:
-            self._hurry()
+            self.devices.hurry()
         if not device.polling:
             self._polls.enqueue(device)
         if (device.health, device.doubtful) != (before, doubtful):
@@ -371,12 +303,6 @@ class Scheduler:
         elif device.doubtful:
             self._probing.plan(now)
         return poll.reading()
-
-    def _hurry(self) -> None:
-        """Wait for none of the devices long that are silent at the start, where they are many."""
-        starting = [device for device in self.devices.values() if device.starting]
-        for device in starting if len(starting) > START_PATIENT else ():
-            device.hurried = True
 
 
 def _wire_time(device: Device, timing: LineTiming) -> float:

@@ -9,8 +9,9 @@ from math import inf
 import pytest
 
 from lfs10d.line.device import LEARNED_MOST, Health, PollRules
+from lfs10d.line.devices import START_PATIENT
 from lfs10d.line.jobs.job import Continue, Hold, Requeue
-from lfs10d.line.scheduler import START_PATIENT, Rest, Scheduler
+from lfs10d.line.scheduler import Rest, Scheduler
 from lfs10d.modbus.outcome import LateAnswer
 from lfs10d.modbus.request import ReadRegisters
 from lfs10d.modbus.timing import LineTiming

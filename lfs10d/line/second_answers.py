@@ -1,0 +1,63 @@
+"""Right frames that answer no request of ours: another master's traffic, and second answers to one request. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from lfs10d.line.device import Device
+from lfs10d.modbus import diagnosis
+from lfs10d.modbus.frames import EXCEPTION_FLAG
+from lfs10d.modbus.outcome import Outcome
+from lfs10d.modbus.overhearing import Overhearing
+from lfs10d.modbus.pending import PendingRequests
+from lfs10d.reading import AnsweredTwice, Fault, FaultCode
+
+
+class SecondAnswers:
+    """Watches the configured devices of one line; what other masters ask goes to `pending`."""
+
+    def __init__(self, pending: PendingRequests) -> None:
+        self._pending = pending
+        self._overhearing = Overhearing()
+        self._devices: Mapping[int, Device] = {}
+
+    def watch(self, devices: Mapping[int, Device]) -> None:
+        """Watch these devices, by slave id, from now on."""
+        self._devices = devices
+        self._overhearing.listen_to({slave: device.spec.codec for slave, device in devices.items()})
+
+    def on_answer(self, outcome: Outcome) -> list[AnsweredTwice]:
+        """Take an outcome that the scheduler knows of: a second answer may follow it, or none does any more."""
+        device = self._devices.get(outcome.request.slave)
+        if device is None or outcome.answer is None:
+            return []
+        request, barrier = outcome.request, device.spec.profile.barrier
+        is_barrier = barrier is not None and (
+            (request.address, request.function) == (barrier.register, barrier.function)
+            and len(outcome.answer) == barrier.count
+        )
+        ended = self._pending.duplicates.answered(device.slave, outcome.ended, barrier=is_barrier)
+        return [AnsweredTwice(outcome.ended, device.name, device.slave, None)] if ended else []
+
+    def on_strays(self, strays: Iterable[tuple[bytes, float]], outcome: Outcome | None = None) -> list[AnsweredTwice]:
+        """Take what was heard and belongs to no exchange, or is left over by `outcome`, with the times of its pieces.
+
+        A right frame of a slave that owes nothing is one answer too many.
+        """
+        events: list[AnsweredTwice] = []
+        owing = outcome.request.slave if outcome is not None and outcome.answer is None else None
+        for frame in self._overhearing.hear(strays):
+            device = self._devices[frame.slave]
+            codec = device.spec.codec
+            if frame.request is not None:
+                self._pending.asked_by_another(frame.request, codec, frame.at)
+                continue
+            size, exception = codec.size(len(frame.body)), bool(frame.body[1] & EXCEPTION_FLAG)
+            owed = self._pending.overheard(frame.slave, size, exception=exception, now=frame.at)
+            if owed or frame.slave == owing:
+                continue
+            twice = self._pending.duplicates.second(frame.slave, frame.at)
+            if twice is not None:
+                fault = Fault(FaultCode.DUPLICATE_ID, diagnosis.twice(twice), heard=codec.wrap(frame.body))
+                events.append(AnsweredTwice(frame.at, device.name, frame.slave, fault))
+        return events
