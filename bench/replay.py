@@ -20,7 +20,6 @@ from paho.mqtt.enums import CallbackAPIVersion, MQTTProtocolVersion
 
 from bench.broker import Broker
 from lfs10d.mqtt.settings import BrokerSettings
-from lfs10d.mqtt.topics import InboundRequest
 from lfs10d.mqtt.uplink import Uplink
 from lfs10d.outbox.store.database import Limits
 from lfs10d.outbox.store.sample_file import SampleFile, StoreEntry
@@ -114,18 +113,11 @@ class NothingElse:
         """Return that nothing is retained."""
         return frozenset()
 
-    def on_request(self, request: InboundRequest) -> None:
-        """Take nothing."""
-
     def on_uplink_change(self) -> None:
         """Take nothing."""
 
     def on_announced(self) -> None:
         """Take nothing."""
-
-    def on_spool_trouble(self, trouble: str | None) -> None:
-        """Print it."""
-        print(trouble)
 
 
 async def live(uplink: Uplink, rate: float, seconds: float) -> None:
@@ -152,7 +144,7 @@ async def replay(folder: Path, options: argparse.Namespace) -> bool:
             epoch_ms=lambda: int(time.time() * 1000),
             store=Store(folder, boot="k0000002", limits=LIMITS),
         )
-        await uplink.start(NothingElse())
+        await uplink.start(NothingElse(), on_request=lambda _: None, on_spool_trouble=print)
         publishing = asyncio.create_task(live(uplink, options.rate, options.seconds))
         worst = 0.0
         while not publishing.done():

@@ -96,8 +96,8 @@ class Command:
 
 
 class RefusedError(Exception):
-    """A request is refused where it is being carried out; `answer` says why."""
+    """A request is refused where it is being carried out; `result` says why."""
 
-    def __init__(self, answer: Result) -> None:
-        super().__init__(answer.message)
-        self.answer = answer
+    def __init__(self, result: Result) -> None:
+        super().__init__(result.message)
+        self.result = result

@@ -13,14 +13,13 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 
 from lfs10d.config.models import Config
-from lfs10d.daemon.settings import config_hash, device_facts, line_facts
+from lfs10d.daemon.settings import config_hash, device_infos, line_info
 from lfs10d.line.budget import timing_of
 from lfs10d.line.poller import Poller
 from lfs10d.line.scheduler import Scheduler
 from lfs10d.line.settings import device_specs, line_rules, poll_rules, port_settings
 from lfs10d.modbus.bus import Bus
 from lfs10d.mqtt.settings import BrokerSettings
-from lfs10d.mqtt.topics import InboundRequest
 from lfs10d.mqtt.uplink import Uplink
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Event, Reading
@@ -122,8 +121,8 @@ class DaemonInMemory:
             Bus(self.port, line_rules(config.line), self.clock), scheduler, self._take_over, self.clock
         )
         facts = DaemonInfo("0", "soak", boot, None, config_hash(config))
-        devices = device_facts(config, profiles)
-        self._station = Station(facts, line_facts(config.line), devices, self.now())
+        devices = device_infos(config, profiles)
+        self._station = Station(facts, line_info(config.line), devices, self.now())
         settings = BrokerSettings.of(config.mqtt, client_id="soak", password=lambda: None)
         self._uplink = Uplink(
             settings,
@@ -181,7 +180,7 @@ class DaemonInMemory:
     # -- the loop, as in `lfs10d.daemon.daemon`
 
     async def _begin(self) -> None:
-        await self._uplink.start(self)
+        await self._uplink.start(self, on_request=lambda _: None, on_spool_trouble=lambda _: None)
         self._tick()
 
     def _heard(self, events: list[Event]) -> None:
@@ -216,13 +215,7 @@ class DaemonInMemory:
         """Return the retained topics."""
         return self._station.topics()
 
-    def on_request(self, request: InboundRequest) -> None:
-        """Take nothing."""
-
     def on_uplink_change(self) -> None:
-        """Take nothing."""
-
-    def on_spool_trouble(self, trouble: str | None) -> None:
         """Take nothing."""
 
     def on_announced(self) -> None:

@@ -16,7 +16,7 @@ from typing import Any, Final, get_args
 from docs.generate.markdown import example, table
 from docs.generate.meanings import ADVICE, ERROR_CODES
 from lfs10d.command import ErrorCode
-from lfs10d.commands.handlers.registry import REQUESTS
+from lfs10d.commands.handlers.registry import HANDLERS
 
 RECORDED: Final = Path(__file__).with_name("recorded.json")
 
@@ -137,11 +137,11 @@ def _requests() -> Iterator[str]:
     """Yield a section for each request, in the order of the walk; ValueError where one is not walked."""
     answers = list(zip(WALK, recorded(), strict=True))
     names = dict.fromkeys(step.name for step in WALK)
-    if set(names) != set(REQUESTS):
-        raise ValueError(f"not walked, or unknown: {', '.join(sorted(set(names) ^ set(REQUESTS)))}")
+    if set(names) != set(HANDLERS):
+        raise ValueError(f"not walked, or unknown: {', '.join(sorted(set(names) ^ set(HANDLERS)))}")
     for name in names:
         yield f"### `{name}`"
-        yield f"Class `{REQUESTS[name].form.klass}`. Its parameters: [mqtt.md](mqtt.md#{name.replace('/', '')})."
+        yield f"Class `{HANDLERS[name].spec.klass}`. Its parameters: [mqtt.md](mqtt.md#{name.replace('/', '')})."
         for step, response in answers:
             if step.name == name:
                 yield step.words

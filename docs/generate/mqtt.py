@@ -18,7 +18,7 @@ from docs.generate.meanings import ERROR_CODES, FAULT_CODES
 from docs.generate.uplink import bytes_table
 from lfs10d.command import ErrorCode
 from lfs10d.commands.context import Handler
-from lfs10d.commands.handlers.registry import REQUESTS
+from lfs10d.commands.handlers.registry import HANDLERS
 from lfs10d.reading import FaultCode
 from lfs10d.telemetry.contract import OUTBOUND, Outbound
 from lfs10d.telemetry.payloads import Availability
@@ -193,10 +193,10 @@ def _json_word(value: object) -> str:
 
 
 def _requests() -> Iterator[str]:
-    for name, request in sorted(REQUESTS.items(), key=lambda item: (CLASSES.index(item[1].form.klass), item[0])):
+    for name, request in sorted(HANDLERS.items(), key=lambda item: (CLASSES.index(item[1].spec.klass), item[0])):
         yield f"### `{name}`"
-        yield f"Class `{request.form.klass}`. {_does(request)}"
-        fields = request.form.parameters.model_fields
+        yield f"Class `{request.spec.klass}`. {_does(request)}"
+        fields = request.spec.parameters.model_fields
         if fields:
             rows = (
                 (f"`{field.alias or key}`", _parameter(field), field.description or "") for key, field in fields.items()

@@ -24,7 +24,7 @@ from lfs10d.cli.render.live_lines import health
 from lfs10d.cli.render.response import told, verdict
 from lfs10d.cli.render.spinner import spinning
 from lfs10d.cli.requested_scan import SCAN, scan
-from lfs10d.commands.handlers.registry import REQUESTS
+from lfs10d.commands.handlers.registry import HANDLERS
 from lfs10d.commands.message import LARGEST, Parameters
 from lfs10d.config.loader import load
 from lfs10d.errors import ConfigError, FailedError
@@ -62,14 +62,14 @@ def _timeout(context: click.Context, parameter: click.Parameter, value: str | No
 def _name(context: click.Context, parameter: click.Parameter, value: str) -> str:
     levels = value.split("/")
     if not value.isprintable() or "+" in value or "#" in value or "" in levels:
-        known = ", ".join(sorted(REQUESTS))
+        known = ", ".join(sorted(HANDLERS))
         raise click.BadParameter(f"{value!r} is no name of a request; known are: {known}", context, parameter)
     return value
 
 
 def _complete(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
     del context, parameter
-    return [name for name in sorted(REQUESTS) if name.startswith(incomplete)]
+    return [name for name in sorted(HANDLERS) if name.startswith(incomplete)]
 
 
 def _complete_parameter(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[str]:
@@ -92,7 +92,7 @@ class _Command(click.Command):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse what was typed."""
-        ctx.meta[__name__] = next((word for word in args if word in REQUESTS), None)
+        ctx.meta[__name__] = next((word for word in args if word in HANDLERS), None)
         return super().parse_args(ctx, args)
 
     def format_help(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -223,9 +223,9 @@ class _RequestOptions:
         return content
 
     def _parsed(self, parameters: Sequence[str]) -> dict[str, Any]:
-        known = REQUESTS.get(self.name)
+        known = HANDLERS.get(self.name)
         try:
-            return content_of(parameters, None if known is None else known.form.parameters)
+            return content_of(parameters, None if known is None else known.spec.parameters)
         except KeyValueError as error:
             raise click.UsageError(str(error)) from None
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Final, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from lfs10d.commands.handlers.registry import REQUESTS
+from lfs10d.commands.handlers.registry import HANDLERS
 from lfs10d.schema.fields import Choice, Duration, FieldKind, Flag
 from lfs10d.schema.quantities import duration_text
 
@@ -38,10 +38,10 @@ class Parameter:
 
 def parameters(name: str) -> tuple[Parameter, ...]:
     """Return the parameters of a request in order; none for one that is not known."""
-    known = REQUESTS.get(name)
+    known = HANDLERS.get(name)
     if known is None:
         return ()
-    fields = known.form.parameters.model_fields.items()
+    fields = known.spec.parameters.model_fields.items()
     return tuple(_parameter(field.alias or key, field, keeping=name in KEEPING) for key, field in fields)
 
 
@@ -76,14 +76,14 @@ def _usual(value: object, kinds: Sequence[FieldKind]) -> str:
 
 def does(name: str) -> str:
     """Return in a sentence what a request does."""
-    return " ".join((inspect.getdoc(REQUESTS[name].perform) or "").partition("\n\n")[0].split()).replace("`", "")
+    return " ".join((inspect.getdoc(HANDLERS[name].perform) or "").partition("\n\n")[0].split()).replace("`", "")
 
 
 def listing() -> Iterator[str]:
     """Yield every request with its parameters, those in brackets that may be left out."""
-    for name in sorted(REQUESTS, key=lambda name: (CLASSES.index(REQUESTS[name].form.klass), name)):
+    for name in sorted(HANDLERS, key=lambda name: (CLASSES.index(HANDLERS[name].spec.klass), name)):
         keys = [each.key if each.usual is None else f"[{each.key}]" for each in parameters(name)]
-        yield f"{name}  ({REQUESTS[name].form.klass})"
+        yield f"{name}  ({HANDLERS[name].spec.klass})"
         yield from _block(does(name))
         if keys:
             yield from _block(f"parameters: {', '.join(keys)}")
@@ -96,7 +96,7 @@ def help_of(name: str) -> Iterator[str]:
     """Yield what a request does and what each of its parameters may be."""
     yield f"Usage: lfs10d request {name} [KEY=VALUE]..."
     yield ""
-    yield from _block(f"{does(name)} Class {REQUESTS[name].form.klass}.", "  ")
+    yield from _block(f"{does(name)} Class {HANDLERS[name].spec.klass}.", "  ")
     yield ""
     known = parameters(name)
     yield "Parameters:" if known else "It takes no parameters."

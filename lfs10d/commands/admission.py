@@ -1,12 +1,12 @@
-"""Whether a request is obeyed. Pure: time is an argument.
+"""Admits or rejects a request. Pure: time is an argument.
 
 Rules
 -----
 1. Checked in this order: empty (ignored), retained, too_large, rate_limited, invalid_json, unknown_request,
-   not_allowed, repeated id, parameters. Whoever performs the request checks the rest, `busy` among it.
+   not_allowed, repeated id, parameters. Its handler checks the rest, `busy` among it.
    All but empty ones count towards the rate.
-2. The id of a request that passed `not_allowed` is remembered with its answer, whatever the answer is. Repeated
-   with the same parameters it gets that answer again and is not executed twice; while the first still runs the
+2. The id of a request that passed `not_allowed` is remembered with its result, whatever the result is. Repeated
+   with the same parameters it gets that result again and is not executed twice; while the first still runs the
    repeat waits for its end, up to `WAITING` of them; more are `busy`. With other parameters it is a
    `duplicate_conflict`.
 3. What was rejected before that is not remembered: sent again later, it is judged again.
@@ -29,7 +29,7 @@ BURST = 64
 REMEMBERED = 256
 """Ids that are remembered, those of requests that still run besides."""
 REMEMBERED_FOR = 60.0
-"""How long an answer is kept for its repeats, in s."""
+"""Seconds for which a result is kept for its repeats."""
 
 WAITING = 16
 """Repeats that wait for the end of one request."""
@@ -39,7 +39,7 @@ W = TypeVar("W")
 
 @dataclass(frozen=True, slots=True)
 class CommandSpec:
-    """What is known of a request before it is performed: its class, its parameters, how long repeats are told."""
+    """A request before it is carried out: its class, its parameters, seconds for which its result is remembered."""
 
     klass: RequestClass
     parameters: type[Parameters] = NoParameters
@@ -48,18 +48,18 @@ class CommandSpec:
 
 @dataclass(frozen=True, slots=True)
 class Ignored:
-    """Nothing is done and nothing answered."""
+    """Nothing is done and no response sent."""
 
 
 @dataclass(frozen=True, slots=True)
 class Answered:
-    """The answer is known already, after `took` s; `clear`: the request was retained and must be cleared.
+    """The result is known already, after `took` s; `clear`: the request was retained and must be cleared.
 
     `flood`: it came beyond the rate.
     """
 
-    call: Command
-    answer: Result
+    command: Command
+    result: Result
     took: float = 0.0
     clear: bool = False
     flood: bool = False
@@ -67,10 +67,10 @@ class Answered:
 
 @dataclass(slots=True)
 class _Memory(Generic[W]):
-    """What is remembered of a request by its id; `repeats` wait for its end."""
+    """A request remembered by its id; `repeats` wait for its end."""
 
     fingerprint: str
-    answer: Result | None = None
+    result: Result | None = None
     took: float = 0.0
     forget_at: float = inf
     repeats: list[tuple[Command, W]] = field(default_factory=list)
@@ -78,10 +78,10 @@ class _Memory(Generic[W]):
 
 @dataclass(frozen=True, slots=True)
 class Admitted(Generic[W]):
-    """An admitted request, since monotonic `since`: perform it and tell `Admission.done`, once."""
+    """A request admitted at monotonic `since`: carry it out, then call `Admission.done`, once."""
 
     name: str
-    call: Command
+    command: Command
     parameters: Parameters
     since: float
     memory: _Memory[W]
@@ -93,19 +93,19 @@ class Waiting:
 
 
 class Admission(Generic[W]):
-    """`forms` are the requests known, by name; `allowed` the classes obeyed besides `always`."""
+    """`specs` are the requests by name; `allowed` the classes admitted besides `always`."""
 
-    def __init__(self, forms: Mapping[str, CommandSpec], allowed: frozenset[str]) -> None:
+    def __init__(self, specs: Mapping[str, CommandSpec], allowed: frozenset[str]) -> None:
         self.allowed = allowed
-        self._forms = forms
+        self.specs = specs
         self._tokens = float(BURST)
         self._filled_at = 0.0
         self._seen: dict[tuple[str, Identifier], _Memory[W]] = {}
 
     def admit(
-        self, name: str, payload: bytes, *, retained: bool, whence: W, now: float, correlation: int = 0
+        self, name: str, payload: bytes, *, retained: bool, reply_to: W, now: float, correlation: int = 0
     ) -> Ignored | Answered | Admitted[W] | Waiting:
-        """Judge a request; `whence` is kept for `done` if it repeats one that still runs.
+        """Judge a request; `reply_to` is kept for `done` if it repeats one that still runs.
 
         `correlation` is how many bytes its Correlation Data has.
         """
@@ -113,29 +113,29 @@ class Admission(Generic[W]):
             return Ignored()
         flood = not self._within_rate(now)
         if retained:
-            call = read(payload)[0] if len(payload) <= LARGEST else Command()
+            command = read(payload)[0] if len(payload) <= LARGEST else Command()
             message = "a retained request is never executed; publish it without the retain flag"
-            return Answered(call, rejected("retained", message), clear=True, flood=flood)
-        call, problem = read(payload) if len(payload) <= LARGEST else (Command(), None)
+            return Answered(command, rejected("retained", message), clear=True, flood=flood)
+        command, problem = read(payload) if len(payload) <= LARGEST else (Command(), None)
         if (excess := _too_large(len(payload), correlation)) is not None:
-            return Answered(call, rejected("too_large", excess), flood=flood)
+            return Answered(command, rejected("too_large", excess), flood=flood)
         if flood:
             message = f"more than {RATE:g} requests a second; send it again later"
-            return Answered(call, rejected("rate_limited", message), flood=True)
+            return Answered(command, rejected("rate_limited", message), flood=True)
         refusal = self._refusal(name, problem)
         if refusal is not None:
-            return Answered(call, refusal)
-        return self._repeated(name, call, whence, now) or self._new(name, call, problem, now)
+            return Answered(command, refusal)
+        return self._repeated(name, command, reply_to, now) or self._new(name, command, problem, now)
 
     def _refusal(self, name: str, problem: Result | None) -> Result | None:
-        """Return why the request is not obeyed, whoever asks it with whatever parameters."""
+        """Return the rejection that holds whatever the parameters are, None if there is none."""
         if problem is not None and problem.code == "invalid_json":
             return problem
-        form = self._forms.get(name)
-        if form is None:
-            return rejected("unknown_request", f"no such request; known are: {', '.join(sorted(self._forms))}")
-        if form.klass != "always" and form.klass not in self.allowed:
-            message = f"requests of class {form.klass} are not obeyed; add it to `commands` in the configuration"
+        spec = self.specs.get(name)
+        if spec is None:
+            return rejected("unknown_request", f"no such request; known are: {', '.join(sorted(self.specs))}")
+        if spec.klass != "always" and spec.klass not in self.allowed:
+            message = f"requests of class {spec.klass} are not obeyed; add it to `commands` in the configuration"
             return rejected("not_allowed", message)
         return None
 
@@ -147,70 +147,70 @@ class Admission(Generic[W]):
         self._tokens -= 1
         return True
 
-    def _repeated(self, name: str, call: Command, whence: W, now: float) -> Answered | Waiting | None:
-        if call.key is None:
+    def _repeated(self, name: str, command: Command, reply_to: W, now: float) -> Answered | Waiting | None:
+        if command.key is None:
             return None
-        first = self._seen.get((name, call.key))
+        first = self._seen.get((name, command.key))
         if first is None or now >= first.forget_at:
             return None
-        if first.fingerprint != call.fingerprint:
+        if first.fingerprint != command.fingerprint:
             message = "this id was used for another request; give every request an id of its own"
-            return Answered(call, rejected("duplicate_conflict", message))
-        if first.answer is None and len(first.repeats) >= WAITING:
+            return Answered(command, rejected("duplicate_conflict", message))
+        if first.result is None and len(first.repeats) >= WAITING:
             message = f"{WAITING} repeats of this request wait for its end already; its response comes once it is over"
-            return Answered(call, rejected("busy", message))
-        if first.answer is None:
-            first.repeats.append((call, whence))
+            return Answered(command, rejected("busy", message))
+        if first.result is None:
+            first.repeats.append((command, reply_to))
             return Waiting()
-        return Answered(call, first.answer, first.took)
+        return Answered(command, first.result, first.took)
 
-    def _new(self, name: str, call: Command, problem: Result | None, now: float) -> Answered | Admitted[W]:
-        form = self._forms[name]
-        memory = _Memory[W](call.fingerprint)
-        self._remember(name, call, memory)
-        parameters = problem or parameters_of(form.parameters, call)
+    def _new(self, name: str, command: Command, problem: Result | None, now: float) -> Answered | Admitted[W]:
+        spec = self.specs[name]
+        memory = _Memory[W](command.fingerprint)
+        self._remember(name, command, memory)
+        parameters = problem or parameters_of(spec.parameters, command)
         if isinstance(parameters, Result):
-            memory.answer, memory.forget_at = parameters, now + form.remembered_for
-            return Answered(call, parameters)
-        return Admitted(name, call, parameters, now, memory)
+            memory.result, memory.forget_at = parameters, now + spec.remembered_for
+            return Answered(command, parameters)
+        return Admitted(name, command, parameters, now, memory)
 
-    def _remember(self, name: str, call: Command, memory: _Memory[W]) -> None:
-        """Keep the ids that are to be kept longest; one whose request still runs is never forgotten."""
-        if call.key is None:
+    def _remember(self, name: str, command: Command, memory: _Memory[W]) -> None:
+        """Remember an id; of those over, the ones to be forgotten last are kept, and all whose request still runs."""
+        if command.key is None:
             return
-        self._seen.pop((name, call.key), None)
-        over = [key for key, known in self._seen.items() if known.answer is not None]
+        self._seen.pop((name, command.key), None)
+        over = [key for key, known in self._seen.items() if known.result is not None]
         over.sort(key=lambda key: self._seen[key].forget_at)
         for key in over[: max(len(over) - REMEMBERED + 1, 0)]:
             del self._seen[key]
-        self._seen[name, call.key] = memory
+        self._seen[name, command.key] = memory
 
-    def recall(self, name: str, call: Command, answer: Result | None, forget_at: float) -> list[tuple[Command, W]]:
-        """Remember a request of an earlier life of the daemon, None while its answer is still to come.
+    def recall(self, name: str, command: Command, result: Result | None, forget_at: float) -> list[tuple[Command, W]]:
+        """Remember a request of an earlier life of the daemon, None while its result is still to come.
 
-        Returns the repeats that waited for the answer, with their `whence`.
+        Returns the repeats that waited for the result, with their `reply_to`.
         """
-        key = call.key
+        key = command.key
         if key is None:
             return []
-        memory = self._seen.setdefault((name, key), _Memory[W](call.fingerprint))
-        memory.answer, memory.forget_at = answer, forget_at
-        if answer is None:
+        memory = self._seen.setdefault((name, key), _Memory[W](command.fingerprint))
+        memory.result, memory.forget_at = result, forget_at
+        if result is None:
             return []
         repeats, memory.repeats = memory.repeats, []
         return repeats
 
-    def done(self, ticket: Admitted[W], answer: Result, now: float) -> list[tuple[Command, W]]:
-        """Note how it ended; return the repeats that wait for it, with their `whence`."""
-        memory = ticket.memory
-        memory.answer, memory.took = answer, now - ticket.since
-        memory.forget_at = now + self._forms[ticket.name].remembered_for
+    def done(self, admitted: Admitted[W], result: Result, now: float) -> list[tuple[Command, W]]:
+        """Note how it ended; return the repeats that wait for it, with their `reply_to`."""
+        memory = admitted.memory
+        memory.result, memory.took = result, now - admitted.since
+        memory.forget_at = now + self.specs[admitted.name].remembered_for
         repeats, memory.repeats = memory.repeats, []
         return repeats
 
 
 def _too_large(payload: int, correlation: int) -> str | None:
-    """Return what of a request has more bytes than are allowed, in words; None if nothing has."""
+    """Return the words for what is too large in a request; None if nothing is."""
     if payload > LARGEST:
         return f"the payload has more than the {LARGEST} bytes that are allowed"
     if correlation > LARGEST_CORRELATION:

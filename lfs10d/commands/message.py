@@ -85,10 +85,10 @@ def _is_identifier(value: object) -> bool:
     return isinstance(value, int) and not isinstance(value, bool)
 
 
-def parameters_of(form: type[Parameters], call: Command) -> Parameters | Result:
+def parameters_of(form: type[Parameters], command: Command) -> Parameters | Result:
     """Return the parameters in their form, or the rejection that names the first wrong one."""
     try:
-        return form.model_validate(call.parameters)
+        return form.model_validate(command.parameters)
     except ValidationError as error:
         details = error.errors(include_url=False)
         unknown = (detail for detail in details if detail["type"] == "extra_forbidden")

@@ -1,4 +1,4 @@
-"""Polls that requests wait for: a number goes to the line thread and comes back with the reading."""
+"""Polls on request: a number goes to the line thread and comes back with the reading."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from lfs10d.telemetry.publication import Payload, Publication, PublicationKind
 
 @dataclass(frozen=True, slots=True)
 class ReadResult:
-    """What came of one: the sample as it was published, and why there is no value."""
+    """The sample of one poll as it was published, and why there is no value."""
 
     sample: Payload
     fault: Fault | None
 
 
 class PendingReads:
-    """Those under way. Used in the thread of the asyncio loop; `submit(device, number)` begins one on the line."""
+    """The polls under way. Used in the thread of the asyncio loop; `submit(device, number)` begins one on the line."""
 
     def __init__(self, submit: Callable[[str, int], None]) -> None:
         self._submit = submit
@@ -38,25 +38,25 @@ class PendingReads:
         finally:
             del self._waiting[number]
 
-    def heard(self, reading: Reading, published: Iterable[Publication]) -> None:
-        """Tell those who wait for this reading; `published` is what the station made of it."""
+    def on_reading(self, reading: Reading, published: Iterable[Publication]) -> None:
+        """Resolve the reads that wait for this reading; `published` is what the station made of it."""
         if not reading.requests:
             return
         sample = next((each.payload for each in published if each.kind is PublicationKind.SAMPLE), None)
         for number in reading.requests:
-            self._tell(number, ReadResult(sample, reading.fault))
+            self._resolve(number, ReadResult(sample, reading.fault))
 
     def abandon(self, devices: Collection[str]) -> None:
-        """Tell those who wait for one of these devices that no reading will come."""
+        """Resolve the reads of these devices: no reading will come."""
         for number, (device, _) in self._waiting.items():
             if device in devices:
-                self._tell(number, None)
+                self._resolve(number, None)
 
-    def _tell(self, number: int, inquiry: ReadResult | None) -> None:
+    def _resolve(self, number: int, result: ReadResult | None) -> None:
         if number in self._waiting:
             _, future = self._waiting[number]
             if not future.done():
-                future.set_result(inquiry)
+                future.set_result(result)
 
 
 def altered(before: Mapping[str, object], after: Mapping[str, object]) -> frozenset[str]:

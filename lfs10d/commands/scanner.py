@@ -1,4 +1,4 @@
-"""A scan on request: it holds the one place of scans and changes, tells how far it is, and can be cancelled.
+"""A scan on request: publishes its progress, and can be cancelled.
 
 Used in the thread of the asyncio loop; the scan itself runs in the line's.
 """
@@ -15,47 +15,51 @@ from lfs10d.line.jobs.scan import Scan
 from lfs10d.line.jobs.scan_plan import ScanPlan
 
 SCANNING: Final = "scanning"
-"""The activity of the line while it lasts."""
+"""The activity of the line meanwhile."""
 LOOK_EVERY = 0.5
-"""How often it is looked at, in s."""
+"""Seconds between two checks of its progress."""
 STEP = 10.0
-"""Its progress is told whenever so many percent more are done, and at its beginning and end."""
+"""Progress is published at each step of so many percent, and at the beginning and end."""
 LAST_STEP = 99.0
-"""Percent that are told at most before the end: at the end of each round some ids are asked again."""
+"""Percent published at most before the end: at the end of each round some ids are asked again."""
 
 
 class Scanner:
-    """`submit` has a job done on the line, `act` tells what the line is busy with (None: as usual), `tell` an event."""
+    """One scan at a time.
+
+    `submit` has a job done on the line, `act` publishes what the line is busy with (None: polling), `announce` an
+    event.
+    """
 
     def __init__(
         self,
         *,
         submit: Callable[[Job], None],
         act: Callable[[str | None], None],
-        tell: Callable[[str, Mapping[str, object]], None],
+        announce: Callable[[str, Mapping[str, object]], None],
     ) -> None:
         self._submit = submit
         self._act = act
-        self._tell = tell
+        self._announce = announce
         self._scan: Scan | None = None
         self._over: asyncio.Future[None] | None = None
 
-    async def scan(self, search: ScanPlan) -> Scan:
+    async def scan(self, plan: ScanPlan) -> Scan:
         """Scan, one at a time; return the scan when it is over, however it ended. Cancelling it ends it early."""
         loop = asyncio.get_running_loop()
         over: asyncio.Future[None] = loop.create_future()
 
         def ended(_: Scan) -> None:
-            with contextlib.suppress(RuntimeError):  # the loop is closed: nobody waits any more
+            with contextlib.suppress(RuntimeError):  # the loop is closed: nothing waits any more
                 loop.call_soon_threadsafe(_settle, over)
 
-        scan = Scan(search, ended)
+        scan = Scan(plan, ended)
         self._scan, self._over = scan, over
         self._act(SCANNING)
         try:
             self._submit(scan)
             await self._follow(scan, over)
-        except asyncio.CancelledError:  # the daemon is ending: what was found is told all the same
+        except asyncio.CancelledError:  # the daemon is ending: what was found is returned all the same
             scan.cancel()
         finally:
             self._scan = self._over = None
@@ -71,19 +75,19 @@ class Scanner:
         return True
 
     async def _follow(self, scan: Scan, over: asyncio.Future[None]) -> None:
-        """Tell how far it is until it is over, and of every id that seems to have two devices."""
+        """Publish its progress until it is over, and each id that seems to have two devices."""
         duplicates: set[tuple[int, int]] = set()
-        self._tell_progress(scan, told := 0.0)
+        self._publish_progress(scan, last := 0.0)
         while not over.done():
             await asyncio.wait([over], timeout=LOOK_EVERY)
-            self._tell_duplicates(scan, duplicates)
+            self._publish_duplicates(scan, duplicates)
             done = min(scan.progress.percent, LAST_STEP)
-            if not over.done() and done >= told + STEP:
-                self._tell_progress(scan, told := done)
+            if not over.done() and done >= last + STEP:
+                self._publish_progress(scan, last := done)
         if scan.complete:
-            self._tell_progress(scan, 100.0)
+            self._publish_progress(scan, 100.0)
 
-    def _tell_progress(self, scan: Scan, percent: float) -> None:
+    def _publish_progress(self, scan: Scan, percent: float) -> None:
         progress = scan.progress
         facts = {
             "percent": round(percent, 1),
@@ -94,14 +98,14 @@ class Scanner:
             "baudrate": progress.baudrate,
             "found": len(scan.found),
         }
-        self._tell("scan_progress", facts)
+        self._announce("scan_progress", facts)
 
-    def _tell_duplicates(self, scan: Scan, told: set[tuple[int, int]]) -> None:
+    def _publish_duplicates(self, scan: Scan, published: set[tuple[int, int]]) -> None:
         for finding in scan.found:
             place = finding.slave, finding.baudrate
-            if finding.duplicate and place not in told:
-                told.add(place)
-                self._tell("duplicate_id", {"slave": finding.slave, "baudrate": finding.baudrate})
+            if finding.duplicate and place not in published:
+                published.add(place)
+                self._announce("duplicate_id", {"slave": finding.slave, "baudrate": finding.baudrate})
 
 
 def _settle(over: asyncio.Future[None]) -> None:

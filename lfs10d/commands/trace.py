@@ -1,4 +1,4 @@
-"""Frames of the line as they are told on `trace`, with the device's name and its values. Pure: time is an argument."""
+"""Frames of the line as published on `trace`, with the device's name and its values. Pure: time is an argument."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from lfs10d.system.clock import Instant
 from lfs10d.telemetry.publication import TRACE, VERSION, Publication, PublicationKind
 
 LONGEST = 600
-"""Bytes of one piece that are told; the longest frame, in ASCII, has 513 (Modbus over Serial Line V1.02, 2.5.2)."""
+"""Bytes of a frame that are published; the longest frame, in ASCII, has 513 (Modbus over Serial Line V1.02, 2.5.2)."""
 
 
 _READ_BODY = 6
@@ -22,7 +22,7 @@ _READ_BODY = 6
 
 @dataclass(frozen=True, slots=True)
 class TracedDevice:
-    """What is known of a slave: its device's name, its frames, and what its registers mean."""
+    """The device at a slave id: its name, its frames, and the meaning of its registers."""
 
     name: str
     codec: Codec
@@ -30,38 +30,38 @@ class TracedDevice:
 
 
 class FrameTrace:
-    """Tells exchanges until `until` (monotonic s). `devices` by slave id; other slaves are read by `usual`."""
+    """Publishes exchanges until `until` (monotonic s). `devices` by slave id; other slaves are decoded by `usual`."""
 
     def __init__(self, until: float, devices: Mapping[int, TracedDevice], usual: Codec) -> None:
         self.until = until
         self._devices = devices
         self._usual = usual
 
-    def told(self, exchange: Exchanged, now: Instant) -> list[Publication]:
-        """Return what one exchange put on the line and what came back, in order.
+    def publications(self, exchange: Exchanged, now: Instant) -> list[Publication]:
+        """Return the frames of one exchange, sent and received, in order.
 
-        `ts` is when our first byte was sent, and when the last byte of what came back was heard. The silence is
-        known before what we sent.
+        `ts` is when our first byte was sent, and when the last byte of the reply was received. The gap is
+        known before the frame we sent.
         """
         device = self._devices.get(exchange.slave)
         codec = self._usual if device is None else device.codec
         whose = "" if device is None else f"{device.name}: "
-        told = []
+        published = []
         if exchange.began is not None:
             gap_us = None if exchange.gap is None else round(exchange.gap * 1e6, 1)
             text = whose + _described(exchange.sent, codec)
-            told.append(_frame("tx", now.ts(exchange.began), exchange.sent, text, gap_us))
+            published.append(_frame("tx", now.ts(exchange.began), exchange.sent, text, gap_us))
         if exchange.heard:
             meaning = None if device is None or exchange.fault is not None else _meaning(exchange, device)
             text = whose + _described(exchange.heard, codec) + ("" if meaning is None else f": {meaning}")
-            told.append(_frame("rx", now.ts(exchange.at), exchange.heard, text))
-        return told
+            published.append(_frame("rx", now.ts(exchange.at), exchange.heard, text))
+        return published
 
 
 def _meaning(exchange: Exchanged, device: TracedDevice) -> str | None:
-    """Return the values that a good answer brought, or what is wrong with them; None where it is not a value's.
+    """Return the values of a good reply, or what is wrong with them; None for a reply that has no value.
 
-    Of several frames that could be the answer none is chosen: a trace shows no value that may be another's.
+    Where several frames could be the reply none is chosen: a trace shows no value that may be another device's.
     """
     asked = [body for _, _, body in device.codec.frames(exchange.sent, exchange.slave, len(exchange.sent))]
     if (

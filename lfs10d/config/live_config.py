@@ -6,10 +6,11 @@ A request's change is on the disk before anything of it takes effect, and a pers
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Mapping
+import contextlib
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TypeAlias
+from typing import Protocol, TypeAlias
 
 from lfs10d.config.changes import Changes
 from lfs10d.config.changes_file import FILE_NAME, ChangesFile
@@ -19,45 +20,45 @@ from lfs10d.config.merge import DroppedChange
 from lfs10d.config.reload import ConfigFiles, ReloadPlan, imprint, plan, read
 from lfs10d.errors import StateError
 from lfs10d.system.threads import run_in_thread
-from lfs10d.telemetry.publication import Publication, event
 
 Edit: TypeAlias = "Callable[[Effective], Changes]"
-"""What a request makes of the changes, given what holds; raises what refuses the request. Called in any thread."""
+"""Returns the changes for a configuration in force; raises what refuses the request. Called in any thread."""
 
 
 @dataclass(slots=True)
 class News:
-    """What a person should know: changes that were `dropped`, other `warnings`, and why the disk fails, if it does."""
+    """For a person: changes by request that were `dropped`, other `warnings`, and why the disk fails, if it does."""
 
     dropped: list[DroppedChange] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     storage: str | None = None
 
     @property
-    def sayings(self) -> list[str]:
+    def messages(self) -> list[str]:
         """All of it in words, but for the disk."""
-        lost = (f"{each.key}: {each.message}: what a request changed there is dropped" for each in self.dropped)
+        lost = (f"{each.key}: {each.message}: the change made by request is dropped" for each in self.dropped)
         return [*lost, *self.warnings]
 
-    def events(self, ts: int) -> list[Publication]:
-        """Return what the broker is told of it at `ts`, epoch ms."""
-        return [
-            event("change_dropped", ts, key=lost.key, device=lost.device, lost=lost.lost, message=lost.message)
-            for lost in self.dropped
-        ]
+
+class ConfigEvents(Protocol):
+    """What another configuration takes effect by, and what is reported of it. Called in the loop's thread."""
+
+    async def apply(self, plan: ReloadPlan, before: Effective) -> None:
+        """Put into force what `LiveConfig.now` holds already."""
+        ...
+
+    def report(self, news: News) -> None:
+        """Report to people what became of changes."""
+        ...
 
 
 class LiveConfig:
-    """`take(plan, before)` puts another configuration into force; `now` holds it already then.
+    """Built before the loop runs: the file of changes is read at once, and a damaged one put aside."""
 
-    Built before the loop runs: the file of changes is read at once, and one that cannot be understood put aside.
-    """
-
-    def __init__(
-        self, file: LoadedConfig, changes: ChangesFile, take: Callable[[ReloadPlan, Effective], Awaitable[None]]
-    ) -> None:
+    def __init__(self, file: LoadedConfig, changes: ChangesFile) -> None:
         self._file = changes
-        self._take = take
+        self._events: ConfigEvents
+        """Given at the start."""
         self._lock = asyncio.Lock()
         self._news = News()
         self._login: Mapping[str, bytes] = imprint(file)
@@ -70,17 +71,17 @@ class LiveConfig:
         self._news.dropped += self.now.dropped
         self._note(self.now, {})
         if self.now.changes != found.changes:
-            self._save(self.now.changes)
+            self._try_save(self.now.changes)
 
     @property
     def loaded(self) -> LoadedConfig:
         """What holds, as one configuration."""
         return self.now.loaded
 
-    def news(self) -> News:
-        """Return what a person was not told yet."""
-        news, self._news = self._news, News()
-        return news
+    def start(self, events: ConfigEvents) -> None:
+        """Take what is called from now on; what was found when this was built is reported."""
+        self._events = events
+        self._report()
 
     async def reload(self) -> ReloadPlan:
         """Read the file again and apply what changed; raises ConfigError and changes nothing if it is wrong."""
@@ -89,22 +90,30 @@ class LiveConfig:
             found = await run_in_thread(partial(read, self.now.file.path), "reload")
             now = await run_in_thread(partial(effective, found.loaded, before), "reload")
             if now.changes != before:
-                await run_in_thread(partial(self._save, now.changes), "changes")
+                await run_in_thread(partial(self._try_save, now.changes), "changes")
             self._news.dropped += now.dropped
-            return await self._hold(now, found.login)
+            plan = await self._apply(now, found.login)
+        self._report()
+        return plan
 
     async def change(self, edit: Edit) -> tuple[Effective, Effective]:
         """Change what holds, on the disk first; return what held before and what holds now.
 
         Raises StateError if it cannot be put on the disk, and what `edit` raises; nothing is changed then.
         """
-        return await self._change(edit, self._file.save)
-
-    async def learn(self, edit: Edit) -> tuple[Effective, Effective]:
-        """Take up what was learnt of the line. It is so whether or not the disk keeps it: that is told as news."""
         return await self._change(edit, self._save)
 
+    async def learn(self, edit: Edit) -> tuple[Effective, Effective]:
+        """Take a fact found on the line. It holds whether or not the disk keeps it; that is reported."""
+        return await self._change(edit, self._try_save)
+
     async def _change(self, edit: Edit, save: Callable[[Changes], None]) -> tuple[Effective, Effective]:
+        try:
+            return await self._changed(edit, save)
+        finally:
+            self._report()
+
+    async def _changed(self, edit: Edit, save: Callable[[Changes], None]) -> tuple[Effective, Effective]:
         async with self._lock:
             before = self.now
             changes = await run_in_thread(partial(edit, before), "changes")
@@ -112,26 +121,38 @@ class LiveConfig:
                 return before, before
             now = await run_in_thread(partial(effective, before.file, changes), "changes")
             await run_in_thread(partial(save, now.changes), "changes")
-            await self._hold(now, self._login)
+            await self._apply(now, self._login)
             return before, self.now
 
     def _save(self, changes: Changes) -> None:
-        """Keep what a person's edit left of the changes; if that fails the next start finds the same."""
+        """Put the changes on the disk; raises StateError, which is reported too."""
         try:
             self._file.save(changes)
         except StateError as error:
             self._news.storage = str(error)
+            raise
 
-    def _note(self, now: Effective, told: Mapping[str, str]) -> None:
-        """Note what cannot hold, unless it was `told` already."""
+    def _try_save(self, changes: Changes) -> None:
+        """Put the changes on the disk; if that fails the next start finds the same facts or edits again."""
+        with contextlib.suppress(StateError):
+            self._save(changes)
+
+    def _note(self, now: Effective, reported: Mapping[str, str]) -> None:
+        """Note what cannot hold, unless it was `reported` already."""
         self._news.warnings += (
-            f"{name}: {why}" for name, why in {**now.suspended, **now.conflicts}.items() if told.get(name) != why
+            f"{name}: {why}" for name, why in {**now.suspended, **now.conflicts}.items() if reported.get(name) != why
         )
 
-    async def _hold(self, now: Effective, login: Mapping[str, bytes]) -> ReloadPlan:
+    def _report(self) -> None:
+        """Report the news, once."""
+        news, self._news = self._news, News()
+        if news != News():
+            self._events.report(news)
+
+    async def _apply(self, now: Effective, login: Mapping[str, bytes]) -> ReloadPlan:
         before = self.now
         self._note(now, {**before.suspended, **before.conflicts})
         found = plan(ConfigFiles(before.loaded, self._login), ConfigFiles(now.loaded, login))
         self.now, self._login = replace(now, loaded=found.loaded), login
-        await self._take(found, before)
+        await self._events.apply(found, before)
         return found

@@ -1,22 +1,59 @@
-"""From the configuration to what each part is built from: the one place where their words meet."""
+"""From the configuration to what telemetry, outbox and mqtt are built from."""
 
 from __future__ import annotations
 
 import hashlib
 import json
+import socket
 from collections.abc import Mapping
 
+from lfs10d import __version__
+from lfs10d.config.effective import Effective
+from lfs10d.config.live_config import LiveConfig
 from lfs10d.config.models import Config, LineConfig, StoreConfig
+from lfs10d.daemon.boot import Boot
 from lfs10d.line.budget import request_gap, timing_of
 from lfs10d.line.device import FIRST_TIMEOUTS
+from lfs10d.mqtt.settings import BrokerSettings
 from lfs10d.outbox.store.database import Limits
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Fault, FaultCode, Reading
-from lfs10d.telemetry.info import DeviceInfo, LineInfo
+from lfs10d.system.secret import Secret
+from lfs10d.telemetry.info import DaemonInfo, DeviceInfo, LineInfo
 
 
-def line_facts(line: LineConfig) -> LineInfo:
-    """Return what the broker is told about the line."""
+def daemon_info(now: Effective, boot: Boot) -> DaemonInfo:
+    """Return what is published about the daemon itself."""
+    config = now.config
+    return DaemonInfo(
+        version=__version__,
+        host=socket.gethostname(),
+        boot=boot.id,
+        previous_boot=boot.previous,
+        config_hash=config_hash(config),
+        changes=now.changes.count,
+        mqtt={"version": config.mqtt.version},
+        features=features(config),
+    )
+
+
+def features(config: Config) -> tuple[str, ...]:
+    """Return the features that a consumer can rely on."""
+    return ("history",) if config.mqtt.telemetry else ()
+
+
+def broker_settings(config: LiveConfig) -> BrokerSettings:
+    """Return the connection to the broker; its password is read at each connect."""
+    mqtt = config.now.config.mqtt
+
+    def password() -> Secret | None:
+        return config.loaded.password()
+
+    return BrokerSettings.of(mqtt, client_id=mqtt.client_id or "", password=password)
+
+
+def line_info(line: LineConfig) -> LineInfo:
+    """Return what is published about the line."""
     return LineInfo(
         name=line.name,
         port=line.port,
@@ -29,8 +66,8 @@ def line_facts(line: LineConfig) -> LineInfo:
     )
 
 
-def device_facts(config: Config, profiles: Mapping[str, Profile]) -> tuple[DeviceInfo, ...]:
-    """Return what the broker is told about each device."""
+def device_infos(config: Config, profiles: Mapping[str, Profile]) -> tuple[DeviceInfo, ...]:
+    """Return what is published about each device."""
     return tuple(
         DeviceInfo(
             name=slave.name,
@@ -51,7 +88,7 @@ def device_facts(config: Config, profiles: Mapping[str, Profile]) -> tuple[Devic
 
 
 def conflict_readings(conflicts: Mapping[str, str], at: float) -> list[Reading]:
-    """Return what there is to say of devices that must not be polled: that they are offline, and why."""
+    """Return a failed reading of each device that must not be polled: it is offline, and why."""
     return [
         Reading(
             device=name,
@@ -67,7 +104,7 @@ def conflict_readings(conflicts: Mapping[str, str], at: float) -> list[Reading]:
 
 
 def store_limits(store: StoreConfig) -> Limits:
-    """Return how much of the backlog is kept on disk, and for how long."""
+    """Return the limits of the backlog on disk: bytes, and age in ms."""
     return Limits(size=store.max_size, age=round(store.max_age * 1000))
 
 

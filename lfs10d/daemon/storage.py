@@ -1,4 +1,4 @@
-"""Whether what must be kept can be kept: the state directory, the backlog in it, what requests changed."""
+"""Whether files can be written: the state directory, the backlog in it, the changes by request."""
 
 from __future__ import annotations
 
@@ -7,8 +7,11 @@ import logging
 from collections.abc import Callable
 from pathlib import Path
 
+from lfs10d.daemon.boot import Boot, keep
 from lfs10d.daemon.state_directory import prepare
 from lfs10d.errors import StateError
+from lfs10d.reading import FaultCode, LineFaultCode
+from lfs10d.system.disk import Disk
 
 log = logging.getLogger(__name__)
 
@@ -18,14 +21,20 @@ LOOK_EVERY = 5.0
 
 
 class Storage:
-    """`tell(trouble)` is called when it begins, is another, or (None) is over; it is logged here."""
+    """Logs trouble, and raises it as an error of the line by `set_line_error`; None clears that.
 
-    def __init__(self, directory: Path, tell: Callable[[str | None], None]) -> None:
+    When the trouble is over, the id of this life (`boot`) is put on the disk if it is not there yet.
+    """
+
+    def __init__(
+        self, directory: Path, boot: Boot, set_line_error: Callable[[LineFaultCode, str | None], None]
+    ) -> None:
         self._directory = directory
-        self._tell = tell
+        self._boot = boot
+        self._set_line_error = set_line_error
         self._backlog: str | None = None
         """Why the backlog cannot be kept."""
-        self._told: str | None = None
+        self._reported: str | None = None
 
     def look(self) -> None:
         """See whether files can be written."""
@@ -34,25 +43,27 @@ class Storage:
             prepare(self._directory)
         except StateError as error:
             trouble = str(error)
-        before, self._told = self._told, trouble
+        before, self._reported = self._reported, trouble
         if trouble is None:
-            self._tell(None)
+            if not self._boot.kept:
+                self._boot = keep(self._boot, self._directory, Disk())
+            self._set_line_error(FaultCode.STORAGE_FULL, None)
         elif trouble != before:
-            self.failed(trouble)
+            self.on_failure(trouble)
 
     async def watch(self) -> None:
-        """Look again while there is trouble, until cancelled: where nothing is stored nobody else finds its end."""
+        """Look again while there is trouble, until cancelled: where nothing is stored its end shows nowhere else."""
         while True:
             await asyncio.sleep(LOOK_EVERY)
-            if self._told is not None:
+            if self._reported is not None:
                 self.look()
 
-    def backlog_failed(self, trouble: str | None) -> None:
+    def on_backlog_trouble(self, trouble: str | None) -> None:
         """Take that the backlog cannot be kept, or (None) can again."""
         self._backlog = trouble
         self.look()
 
-    def failed(self, trouble: str) -> None:
+    def on_failure(self, trouble: str) -> None:
         """Take that something could not be written."""
         log.warning("%s", trouble)
-        self._tell(trouble)
+        self._set_line_error(FaultCode.STORAGE_FULL, trouble)

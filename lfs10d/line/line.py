@@ -15,6 +15,7 @@ from typing import Protocol
 
 from lfs10d.config.models import Config, LineConfig
 from lfs10d.line.budget import timing_of
+from lfs10d.line.device import Device
 from lfs10d.line.jobs.job import Job
 from lfs10d.line.jobs.procedure import Procedure
 from lfs10d.line.poller import Poller
@@ -77,6 +78,10 @@ class Line:
     def declared(self) -> float:
         """The monotonic time by which the thread promised its next turn."""
         return self._thread.declared
+
+    def devices(self) -> tuple[Device, ...]:
+        """Return the devices as the line's thread has them."""
+        return tuple(self.poller.scheduler.devices.values())
 
     def read(self, device: str, request: int) -> None:
         """Have a device polled now for a request, whose number comes back with the reading."""

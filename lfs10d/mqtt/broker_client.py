@@ -70,6 +70,12 @@ class BrokerClient:
         return None if self._accepted is None else self._accepted.version
 
     @property
+    def summary(self) -> str:
+        """Whether the broker is connected, in words, with the node where there are several."""
+        broker = self.settings.place if len(self._nodes) > 1 else "broker"
+        return f"{broker} {'away' if self.standing is None else 'connected'}"
+
+    @property
     def duplicate(self) -> bool:
         """Another client uses our id; False again once a connection has held for longer than we would have waited."""
         self._reconnect.held(self._now())

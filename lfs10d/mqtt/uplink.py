@@ -24,7 +24,7 @@ from lfs10d.mqtt.retained_requests import RetainedRequests
 from lfs10d.mqtt.sender import Sender
 from lfs10d.mqtt.settings import BrokerSettings, Version
 from lfs10d.mqtt.topics import OFFLINE, ONLINE, Topics
-from lfs10d.mqtt.uplink_events import UplinkEvents
+from lfs10d.mqtt.uplink_events import OnRequest, OnSpoolTrouble, UplinkEvents
 from lfs10d.outbox.outbox import Outbox
 from lfs10d.outbox.spooler import Spooler
 from lfs10d.outbox.store.database import Limits
@@ -60,6 +60,7 @@ class Uplink:
     ) -> None:
         self._topics = Topics(base)
         self._events: UplinkEvents  # given at the start
+        self._on_request: OnRequest  # given at the start
         self._cleanup: Cleanup  # built at the start
         self._retained_requests = RetainedRequests(self._ask_for_retained_requests)
         self._announcing = False
@@ -101,9 +102,9 @@ class Uplink:
         return self._client.version
 
     @property
-    def place(self) -> str:
-        """The node that is connected or tried next, as messages name it: `broker localhost:1883`."""
-        return self._client.settings.place
+    def summary(self) -> str:
+        """Whether the broker is connected, in words, with the node where there are several."""
+        return self._client.summary
 
     @property
     def duplicate(self) -> bool:
@@ -115,9 +116,9 @@ class Uplink:
         """What waits, for `line/stats`."""
         return self._outbox.stats
 
-    async def start(self, events: UplinkEvents) -> None:
+    async def start(self, events: UplinkEvents, *, on_request: OnRequest, on_spool_trouble: OnSpoolTrouble) -> None:
         """Begin to connect; what is published before waits."""
-        self._events = events
+        self._events, self._on_request = events, on_request
         self._cleanup = Cleanup(self._topics, owned=events.topics, clear=self._clear_orphans)
         if self._store is not None:
             self._spooler = Spooler(
@@ -125,7 +126,7 @@ class Uplink:
                 self._store,
                 epoch_ms=self._epoch_ms,
                 wake=self._sender.wake,
-                on_trouble=events.on_spool_trouble,
+                on_trouble=on_spool_trouble,
                 publish=lambda event: self.publish([event]),
             )
             self._spooler.start()
@@ -294,7 +295,7 @@ class Uplink:
         request = self._topics.command(message)
         if request is not None:
             self._retained_requests.received(request, self.version)
-            self._events.on_request(request)
+            self._on_request(request)
 
     def _ask_for_retained_requests(self) -> None:
         if (standing := self._client.standing) is not None:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from collections.abc import Set as AbstractSet
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
 from lfs10d.mqtt.topics import InboundRequest
 from lfs10d.telemetry.publication import Publication
+
+OnRequest: TypeAlias = Callable[[InboundRequest], None]
+"""Takes a request."""
+OnSpoolTrouble: TypeAlias = Callable[[str | None], None]
+"""Takes why the disk does not keep what waits; None when it does again."""
 
 
 class UplinkEvents(Protocol):
@@ -21,18 +26,10 @@ class UplinkEvents(Protocol):
         """Return the retained topics under `B` that are ours, but for `availability`."""
         ...
 
-    def on_request(self, request: InboundRequest) -> None:
-        """Take a request."""
-        ...
-
     def on_uplink_change(self) -> None:
         """Take that a connect, loss, takeover or subscription changed the properties of the uplink."""
         ...
 
     def on_announced(self) -> None:
         """Take that the broker has the whole burst after a connect."""
-        ...
-
-    def on_spool_trouble(self, trouble: str | None) -> None:
-        """Take why the disk does not keep what waits; None when it does again."""
         ...

@@ -33,7 +33,7 @@ log = logging.getLogger(__name__)
 class Reconfiguration:
     """Changes of the sensors of one line. Used in the thread of the asyncio loop.
 
-    `act` publishes what the line is busy with (None: polling), `repoll` puts into force what is `polled` now; the
+    `act` publishes what the line is busy with (None: polling), `repoll` has the line polled by a configuration; the
     others are those of `ChangeRunner`.
     """
 
@@ -49,7 +49,7 @@ class Reconfiguration:
         recall: Recall,
         now: Callable[[], Instant],
         act: Callable[[str | None], None],
-        repoll: Callable[[], None],
+        repoll: Callable[[Config], None],
     ) -> None:
         runner = self._runner = ChangeRunner(
             journal, running=running, change=change, learn=learn, wire=wire, announce=tell, recall=recall, now=now
@@ -60,7 +60,7 @@ class Reconfiguration:
         self._baudrate = BaudrateChange(runner)
         self._adopt = Adopt(runner)
         self._recovery = Recovery(runner, BaudrateRecovery(runner, self._baudrate))
-        self._locator = Locator(runner, repoll)
+        self._locator = Locator(runner, lambda: repoll(self.polled()))
         trouble = journal.take()
         if trouble is not None:
             log.error("%s", trouble)

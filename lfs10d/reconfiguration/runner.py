@@ -49,12 +49,12 @@ OVERTAKEN = "the daemon ended before this change was finished; a later request h
 
 
 class Recall(Protocol):
-    """Remembers a command of an earlier life; see `lfs10d.commands.dispatcher.Dispatcher.recall`."""
+    """Remembers a command of an earlier life; see `lfs10d.commands.responder.Responder.recall`."""
 
     def __call__(
-        self, name: str, call: Command, answer: Result | None, *, forget_in: float, tell: bool = False
+        self, name: str, command: Command, result: Result | None, *, forget_in: float, respond: bool = False
     ) -> None:
-        """Remember it for `forget_in` s; with `tell` answer it too."""
+        """Remember it for `forget_in` s; with `respond` answer it too."""
 
 
 class ChangeRunner:
@@ -295,7 +295,7 @@ class ChangeRunner:
         """Answer a command of an earlier life, and its repeats."""
         forget_in = REMEMBERED_FOR_MS / 1000
         command, result = command_of(record.asked), result_of(record)
-        self._recall(record.asked.name, command, result, forget_in=forget_in, tell=True)
+        self._recall(record.asked.name, command, result, forget_in=forget_in, respond=True)
 
     async def stop(self) -> None:
         """Begin nothing any more; put on the disk what was only noted."""

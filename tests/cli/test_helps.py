@@ -8,7 +8,7 @@ import click
 import pytest
 
 from lfs10d.cli import VERBS, lfs10d
-from lfs10d.commands.handlers.registry import REQUESTS
+from lfs10d.commands.handlers.registry import HANDLERS
 
 COLUMNS = 80
 
@@ -22,7 +22,7 @@ def helps() -> Iterator[str]:
         command = lfs10d.get_command(context, verb)
         if isinstance(command, click.Group):
             yield from (f"{verb} {inner}" for inner in command.list_commands(context))
-    yield from (f"request {name}" for name in REQUESTS)
+    yield from (f"request {name}" for name in HANDLERS)
 
 
 @pytest.mark.parametrize("typed", list(helps()))

@@ -17,24 +17,24 @@ from lfs10d.cli.request_words import (
     named_device,
     parameters,
 )
-from lfs10d.commands.handlers.registry import REQUESTS
+from lfs10d.commands.handlers.registry import HANDLERS
 
 DEVICES = [{"name": "mast-top", "id": 3}, {"name": "7", "id": 5}, {"name": "crane", "id": 7}, {"id": 9}, "noise"]
 
 
 def test_the_list_has_every_request_with_every_parameter() -> None:
     lines = list(listing())
-    for name in REQUESTS:
+    for name in HANDLERS:
         assert any(line.startswith(f"{name}  (") for line in lines)
     assert "      parameters: slave, [name], [label], [profile], [interval], [probe]" in lines
 
 
-@pytest.mark.parametrize("name", REQUESTS)
+@pytest.mark.parametrize("name", HANDLERS)
 def test_the_help_of_a_request_says_what_each_parameter_may_be(name: str) -> None:
     lines = list(help_of(name))
     assert lines[0] == f"Usage: lfs10d request {name} [KEY=VALUE]..."
     assert does(name).split()[0] in lines[2]
-    keys = [field.alias or key for key, field in REQUESTS[name].form.parameters.model_fields.items()]
+    keys = [field.alias or key for key, field in HANDLERS[name].spec.parameters.model_fields.items()]
     after = lines[lines.index("Parameters:") :] if keys else []
     assert [line.strip() for line in after if line.startswith("  ") and line[2] != " "] == keys
     assert all(len(line) <= WIDTH and line.isprintable() for line in lines)

@@ -52,10 +52,10 @@ class Door:
         self.now = NOW
 
     def tell(
-        self, name: str, content: object = None, *, retained: bool = False, whence: str = "here"
+        self, name: str, content: object = None, *, retained: bool = False, reply_to: str = "here"
     ) -> Ignored | Answered | Admitted[str] | Waiting:
         payload = content if isinstance(content, bytes) else json.dumps({} if content is None else content).encode()
-        return self.admission.admit(name, payload, retained=retained, whence=whence, now=self.now)
+        return self.admission.admit(name, payload, retained=retained, reply_to=reply_to, now=self.now)
 
     def ticket(self, name: str, content: object = None) -> Admitted[str]:
         verdict = self.tell(name, content)
@@ -69,11 +69,11 @@ class Door:
 
     def code(self, name: str, content: object = None, *, retained: bool = False) -> str | None:
         verdict = self.answered(name, content, retained=retained)
-        assert verdict.answer.status == "rejected"
-        return verdict.answer.code
+        assert verdict.result.status == "rejected"
+        return verdict.result.code
 
     def done(self, ticket: Admitted[str], answer: Result | None = None) -> list[tuple[object, str]]:
-        return [(call.id, whence) for call, whence in self.admission.done(ticket, answer or ok(), self.now)]
+        return [(call.id, reply_to) for call, reply_to in self.admission.done(ticket, answer or ok(), self.now)]
 
     def flood(self) -> None:
         """Use up the burst."""
@@ -83,7 +83,7 @@ class Door:
 
 def test_a_request_of_an_allowed_class_gets_a_ticket_with_its_parameters() -> None:
     ticket = Door().ticket("device/read", {"id": "a", "to": 9})
-    assert (ticket.name, ticket.call.id, ticket.parameters, ticket.since) == ("device/read", "a", To(to=9), NOW)
+    assert (ticket.name, ticket.command.id, ticket.parameters, ticket.since) == ("device/read", "a", To(to=9), NOW)
 
 
 # Each check before the next: a request that is wrong in every way from here on is told the first.
@@ -110,7 +110,7 @@ def test_the_checks_come_in_the_order_of_the_contract(
     if flooded:
         door.flood()
     verdict = door.answered(name, payload, retained=retained)
-    assert (verdict.answer.code, verdict.clear) == (code, code == "retained")
+    assert (verdict.result.code, verdict.clear) == (code, code == "retained")
 
 
 @pytest.mark.parametrize("retained", [True, False])
@@ -123,9 +123,9 @@ def test_an_empty_payload_is_ignored_and_costs_nothing(retained: bool) -> None: 
 
 def test_a_retained_request_is_told_by_its_id_if_it_can_be_read() -> None:
     door = Door()
-    assert door.answered("health", {"id": "a"}, retained=True).call.id == "a"
-    assert door.answered("health", b"{", retained=True).call.id is None
-    assert door.answered("health", b'{"id":"a",' + b" " * LARGEST + b"}", retained=True).call.id is None
+    assert door.answered("health", {"id": "a"}, retained=True).command.id == "a"
+    assert door.answered("health", b"{", retained=True).command.id is None
+    assert door.answered("health", b'{"id":"a",' + b" " * LARGEST + b"}", retained=True).command.id is None
 
 
 @pytest.mark.parametrize(("content", "retained"), [({}, True), (b" " * (LARGEST + 1), False)])
@@ -134,7 +134,7 @@ def test_retained_and_oversize_requests_count_towards_the_rate_and_keep_their_co
 ) -> None:  # fmt: skip
     door = Door()
     told = [door.answered("health", content, retained=retained) for _ in range(BURST + 2)]
-    assert {each.answer.code for each in told} == {"retained" if retained else "too_large"}
+    assert {each.result.code for each in told} == {"retained" if retained else "too_large"}
     assert [each.flood for each in told] == [*[False] * BURST, True, True]
     assert door.code("health", {}) == "rate_limited"
 
@@ -179,7 +179,7 @@ def test_a_burst_of_64_is_obeyed_and_the_65th_is_not() -> None:
     door = Door()
     door.flood()
     assert door.code("health", {"id": "late"}) == "rate_limited"
-    assert door.answered("health", {"id": "late"}).call.id == "late"
+    assert door.answered("health", {"id": "late"}).command.id == "late"
 
 
 def test_a_rate_limited_id_is_obeyed_when_it_is_sent_again() -> None:
@@ -221,14 +221,14 @@ def test_a_repeat_gets_the_first_answer_and_its_time_again() -> None:
     assert door.done(ticket, answer) == []
     door.now += 10
     again = door.answered("device/read", {"to": 1, "id": "a"})
-    assert (again.answer, again.took, again.call.id, again.clear) == (answer, 0.25, "a", False)
+    assert (again.result, again.took, again.command.id, again.clear) == (answer, 0.25, "a", False)
 
 
 def test_repeats_wait_while_the_first_runs_and_are_all_given_back_once() -> None:
     door = Door()
     ticket = door.ticket("device/read", {"id": "a", "to": 1})
-    assert door.tell("device/read", {"id": "a", "to": 1}, whence="one") == Waiting()
-    assert door.tell("device/read", {"transaction": "a", "to": 1}, whence="two") == Waiting()
+    assert door.tell("device/read", {"id": "a", "to": 1}, reply_to="one") == Waiting()
+    assert door.tell("device/read", {"transaction": "a", "to": 1}, reply_to="two") == Waiting()
     assert door.done(ticket) == [("a", "one"), (None, "two")]
     assert isinstance(door.tell("device/read", {"id": "a", "to": 1}), Answered)
 
@@ -237,13 +237,13 @@ def test_of_the_repeats_of_one_request_16_wait_and_more_are_busy() -> None:
     door = Door()
     ticket = door.ticket("device/read", {"id": "a", "to": 1})
     for number in range(WAITING):
-        assert door.tell("device/read", {"id": "a", "to": 1}, whence=str(number)) == Waiting()
+        assert door.tell("device/read", {"id": "a", "to": 1}, reply_to=str(number)) == Waiting()
     assert door.code("device/read", {"id": "a", "to": 1}) == "busy"
     other = door.ticket("device/read", {"id": "b", "to": 1})
     assert door.tell("device/read", {"id": "b", "to": 1}) == Waiting(), "those of another request are its own"
-    assert [whence for _, whence in door.done(ticket)] == [str(number) for number in range(WAITING)]
+    assert [reply_to for _, reply_to in door.done(ticket)] == [str(number) for number in range(WAITING)]
     assert len(door.done(other)) == 1
-    assert door.answered("device/read", {"id": "a", "to": 1}).answer == ok()
+    assert door.answered("device/read", {"id": "a", "to": 1}).result == ok()
 
 
 def test_correlation_data_may_have_1024_bytes_and_no_more_whatever_the_payload() -> None:
@@ -253,14 +253,19 @@ def test_correlation_data_may_have_1024_bytes_and_no_more_whatever_the_payload()
             name,
             b'{"id": "a", "to": 1}',
             retained=False,
-            whence="here",
+            reply_to="here",
             now=NOW,
             correlation=LARGEST_CORRELATION + 1,
         )
         assert isinstance(verdict, Answered)
-        assert (verdict.call.id, verdict.answer.status, verdict.answer.code) == ("a", "rejected", "too_large")
+        assert (verdict.command.id, verdict.result.status, verdict.result.code) == ("a", "rejected", "too_large")
     allowed = door.admission.admit(
-        "device/read", b'{"id": "a", "to": 1}', retained=False, whence="here", now=NOW, correlation=LARGEST_CORRELATION
+        "device/read",
+        b'{"id": "a", "to": 1}',
+        retained=False,
+        reply_to="here",
+        now=NOW,
+        correlation=LARGEST_CORRELATION,
     )
     assert isinstance(allowed, Admitted), "and what was too large was not remembered"
 
@@ -292,8 +297,8 @@ def test_requests_without_an_id_are_never_repeats() -> None:
 def test_a_rejected_parameter_is_remembered_with_its_id() -> None:
     door = Door()
     first = door.answered("device/read", {"id": "a", "to": 0})
-    assert first.answer.code == "invalid_param"
-    assert door.answered("device/read", {"id": "a", "to": 0}).answer is first.answer
+    assert first.result.code == "invalid_param"
+    assert door.answered("device/read", {"id": "a", "to": 0}).result is first.result
     assert door.code("device/read", {"id": "a", "to": 1}) == "duplicate_conflict"
 
 
@@ -371,13 +376,13 @@ def test_every_request_is_given_back_exactly_once_and_no_id_is_performed_twice_w
             given += 1
         elif isinstance(verdict, Admitted):
             assert key not in performed or door.now >= performed[key] + REMEMBERED_FOR
-            assert all(ticket.call.id != key for ticket in running)
+            assert all(ticket.command.id != key for ticket in running)
             running.append(verdict)
         if finish and running:
             ticket = running.pop(0)
             given += 1 + len(door.done(ticket))
-            assert isinstance(ticket.call.id, int)
-            performed[ticket.call.id] = door.now
+            assert isinstance(ticket.command.id, int)
+            performed[ticket.command.id] = door.now
     given += sum(1 + len(door.done(ticket)) for ticket in running)
     assert given == owed
 
@@ -386,13 +391,13 @@ def test_a_request_of_an_earlier_life_is_not_carried_out_again_and_its_repeats_w
     door = Door()
     call = Command("a1", fingerprint=json.dumps({"to": 9}))
     assert door.admission.recall("device/readdress", call, None, NOW + DAY) == []
-    waiting = door.tell("device/readdress", {"id": "a1", "to": 9}, whence="again")
+    waiting = door.tell("device/readdress", {"id": "a1", "to": 9}, reply_to="again")
     assert isinstance(waiting, Waiting)
-    ((repeat, whence),) = door.admission.recall("device/readdress", call, ok({"to": 9}), NOW + DAY)
-    assert (repeat.id, whence) == ("a1", "again")
+    ((repeat, reply_to),) = door.admission.recall("device/readdress", call, ok({"to": 9}), NOW + DAY)
+    assert (repeat.id, reply_to) == ("a1", "again")
     answered = door.tell("device/readdress", {"id": "a1", "to": 9})
     assert isinstance(answered, Answered)
-    assert answered.answer == ok({"to": 9})
+    assert answered.result == ok({"to": 9})
 
 
 def test_a_request_of_an_earlier_life_without_an_id_cannot_be_repeated() -> None:

@@ -12,10 +12,11 @@ from typing import Any, cast
 import pytest
 
 from lfs10d.command import Command, Result, ok
-from lfs10d.commands.admission import BURST, CommandSpec
+from lfs10d.commands.admission import BURST, Admission, CommandSpec
 from lfs10d.commands.context import Context, Handler
 from lfs10d.commands.dispatcher import Dispatcher
 from lfs10d.commands.message import LARGEST, LARGEST_CORRELATION, NoParameters, Parameters
+from lfs10d.commands.responder import Responder
 from lfs10d.mqtt.topics import InboundRequest
 
 
@@ -25,7 +26,7 @@ class Text(Parameters):
     text: str = ""
 
 
-POWERS = cast("Context", object())
+CONTEXT = cast("Context", object())
 
 
 @dataclass
@@ -38,22 +39,25 @@ class Bench:
     gate: asyncio.Event = field(default_factory=asyncio.Event)
 
     def __post_init__(self) -> None:
-        self.service = Dispatcher(
-            {
-                "echo": Handler(CommandSpec("always", Text), self._echo),
-                "device/wait": Handler(CommandSpec("polling", Text), self._wait),
-                "device/break": Handler(CommandSpec("polling"), self._break),
-                "register/read": Handler(CommandSpec("registers"), self._break),
-            },
-            POWERS,
-            allowed=frozenset({"polling"}),
-            respond=lambda topic, payload, correlation: self.answered.append((topic, payload, correlation)),
-            clear=self.cleared.append,
-        )
+        handlers = {
+            "echo": Handler(CommandSpec("always", Text), self._echo),
+            "device/wait": Handler(CommandSpec("polling", Text), self._wait),
+            "device/break": Handler(CommandSpec("polling"), self._break),
+            "register/read": Handler(CommandSpec("registers"), self._break),
+        }
+        specs = {name: handler.spec for name, handler in handlers.items()}
+        self.responder = Responder(Admission(specs, frozenset({"polling"})), self)
+        self.service = Dispatcher(handlers, CONTEXT, self.responder)
 
-    async def _echo(self, parameters: Text, powers: Context, call: Command) -> Result:
-        assert powers is POWERS
-        assert call.parameters.get("text", "") == parameters.text
+    def respond(self, topic: str, payload: dict[str, object], correlation: bytes | None = None) -> None:
+        self.answered.append((topic, payload, correlation))
+
+    def clear_retained(self, topic: str) -> None:
+        self.cleared.append(topic)
+
+    async def _echo(self, parameters: Text, context: Context, command: Command) -> Result:
+        assert context is CONTEXT
+        assert command.parameters.get("text", "") == parameters.text
         self.performed.append("echo")
         return ok({"text": parameters.text})
 
@@ -62,8 +66,8 @@ class Bench:
         await self.gate.wait()
         return ok({"text": parameters.text})
 
-    async def _break(self, _: NoParameters, powers: Context, __: Command) -> Result:
-        raise RuntimeError(f"a mistake with {powers}")
+    async def _break(self, _: NoParameters, context: Context, __: Command) -> Result:
+        raise RuntimeError(f"a mistake with {context}")
 
     def ask(
         self,
@@ -76,7 +80,7 @@ class Bench:
     ) -> None:
         payload = content if isinstance(content, bytes) else json.dumps({} if content is None else content).encode()
         levels = tuple(name.split("/")) if name else ()
-        self.service.requested(
+        self.service.on_request(
             InboundRequest(f"request/{name}", levels, payload, retained, response_topic, correlation)
         )  # fmt: skip
 

@@ -13,13 +13,16 @@ class Bench:
     def __init__(self) -> None:
         self.done: list[str | None] = []
         self.opened = asyncio.Event()
-        self.pausing = LinePause(pause=self._pause, resume=self._open, act=self.done.append)
+        self.pausing = LinePause(self, self._set_paused)
 
-    def _open(self) -> None:
+    def _set_paused(self, *, paused: bool) -> None:
+        self.done.append("paused" if paused else None)
+
+    def resume(self) -> None:
         self.done.append("open")
         self.opened.set()
 
-    async def _pause(self) -> None:
+    async def pause(self) -> None:
         self.done.append("free")
 
 

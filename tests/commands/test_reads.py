@@ -44,8 +44,8 @@ def test_a_reading_tells_the_request_whose_number_it_has_and_no_other() -> None:
         one, two = await line.begin("a", "a")
         (_, first), (_, second) = line.submitted
         assert first != second
-        line.inquiries.heard(reading(), PUBLISHED)
-        line.inquiries.heard(reading(second), PUBLISHED)
+        line.inquiries.on_reading(reading(), PUBLISHED)
+        line.inquiries.on_reading(reading(second), PUBLISHED)
         assert await two == ReadResult(SAMPLE, None)
         assert not one.done()
         one.cancel()
@@ -58,7 +58,7 @@ def test_one_reading_may_answer_several_and_carries_its_fault() -> None:
         line = Line()
         tasks = await line.begin("a", "a")
         fault = Fault(FaultCode.PORT_LOST, "absent")
-        line.inquiries.heard(reading(*(number for _, number in line.submitted), fault=fault), PUBLISHED)
+        line.inquiries.on_reading(reading(*(number for _, number in line.submitted), fault=fault), PUBLISHED)
         assert await asyncio.gather(*tasks) == [ReadResult(SAMPLE, fault)] * 2
 
     run(scene())
@@ -70,7 +70,7 @@ def test_a_reading_nobody_waits_for_any_more_is_passed_over() -> None:
         (task,) = await line.begin("a")
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
-        line.inquiries.heard(reading(line.submitted[0][1], 99), PUBLISHED)
+        line.inquiries.on_reading(reading(line.submitted[0][1], 99), PUBLISHED)
         assert task.cancelled()
 
     run(scene())
@@ -80,7 +80,7 @@ def test_what_is_told_twice_counts_once() -> None:
     async def scene() -> None:
         line = Line()
         (task,) = await line.begin("a")
-        line.inquiries.heard(reading(line.submitted[0][1]), PUBLISHED)
+        line.inquiries.on_reading(reading(line.submitted[0][1]), PUBLISHED)
         line.inquiries.abandon({"a"})
         assert await task == ReadResult(SAMPLE, None)
 
@@ -94,7 +94,7 @@ def test_those_who_wait_for_a_device_that_is_gone_are_told_and_the_others_wait_o
         line.inquiries.abandon({"a", "nobody"})
         assert await gone is None
         assert not stays.done()
-        line.inquiries.heard(reading(line.submitted[1][1], device="b"), [])
+        line.inquiries.on_reading(reading(line.submitted[1][1], device="b"), [])
         assert await stays == ReadResult(None, None)
 
     run(scene())

@@ -41,12 +41,12 @@ class Bench:
         bus = Bus(self.port, LineRules(), self.clock)
         events: list[Event] = []
         self.poller = Poller(bus, Scheduler(bus.line_timing, 0.0), events.extend, self.clock)
-        self.scanning = Scanner(submit=self.poller.submit, act=self.acts.append, tell=self._tell)
+        self.scanning = Scanner(submit=self.poller.submit, act=self.acts.append, announce=self._announce)
         file = folder / "lfs10d.yaml"
         file.write_text("line: {port: tty}\nslaves: []\nmqtt: {host: localhost}\n")
         self.search = search(load(file), IDS, (9600,), share=0.9)
 
-    def _tell(self, kind: str, facts: Mapping[str, object]) -> None:
+    def _announce(self, kind: str, facts: Mapping[str, object]) -> None:
         self.told.append({"type": kind, **facts})
 
     def of(self, kind: str) -> list[dict[str, Any]]:

@@ -34,7 +34,7 @@ def exchange(
 def told(what: Exchanged, device: TracedDevice | None = None) -> list[dict[str, Any]]:
     """Return the payloads; each is as the documentation promises. `device` is that of slave 1."""
     trace = FrameTrace(200.0, {} if device is None else {1: device}, RTU)
-    published = trace.told(what, NOW)
+    published = trace.publications(what, NOW)
     for each in published:
         assert (each.topic, each.retain, each.qos) == ("trace", False, 0)
         check(each.topic, json.dumps(each.payload))

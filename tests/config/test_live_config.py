@@ -36,9 +36,21 @@ class Site:
         self.start()
 
     def start(self) -> None:
-        self.running = LiveConfig(load(self.path), ChangesFile(STATE, Disk(self.disk)), self._take)
+        self._news: list[News] = []
+        self.running = LiveConfig(load(self.path), ChangesFile(STATE, Disk(self.disk)))
+        self.running.start(self)
 
-    async def _take(self, plan: ReloadPlan, before: Effective) -> None:
+    def report(self, news: News) -> None:
+        assert news != News()
+        self._news.append(news)
+
+    def news(self) -> News:
+        """Return what was reported since this was asked last, at most one report."""
+        reports, self._news = self._news, []
+        (news,) = reports or (News(),)
+        return news
+
+    async def apply(self, plan: ReloadPlan, before: Effective) -> None:
         self.taken.append(plan.applied)
         assert plan.loaded == self.running.loaded
         assert before is not self.running.now
@@ -87,7 +99,7 @@ def test_a_change_takes_effect_and_is_there_after_a_power_cut(site: Site) -> Non
     site.disk.power_cut()
     site.start()
     assert site.interval() == 5.0
-    assert site.running.news() == News()
+    assert site.news() == News()
 
 
 def test_what_changes_nothing_is_neither_kept_nor_taken(site: Site) -> None:
@@ -118,7 +130,7 @@ def test_what_was_learnt_of_the_line_is_so_though_the_disk_does_not_keep_it(site
     site.disk.full = 0
     run(site.running.learn(lambda now: now.changes.moving("slave-2", Place(9), now.said)))
     assert site.taken == [("slaves.slave-2.id",)]
-    news = site.running.news()
+    news = site.news()
     assert news.storage is not None
     assert "changes.yaml cannot be written" in news.storage
     site.disk.full = None
@@ -162,16 +174,16 @@ def test_a_reload_keeps_what_was_changed_and_applies_the_rest(site: Site) -> Non
     plan = site.reload(TEXT.replace("3]", "3, 4]"))
     assert plan.applied == ("slaves.slave-4",)
     assert site.interval() == 5.0
-    assert site.running.news() == News()
+    assert site.news() == News()
 
 
 def test_an_edit_wins_at_a_reload_is_told_once_and_forgotten_on_the_disk(site: Site) -> None:
     site.change(slower)
     site.reload(TEXT.replace("1s", "3s"))
     assert (site.interval(), site.kept) == (3.0, Changes())
-    (lost,) = site.running.news().dropped
+    (lost,) = site.news().dropped
     assert (lost.key, lost.lost) == ("slaves.slave-2.interval", 5.0)
-    assert site.running.news() == News()
+    assert site.news() == News()
     site.reload(TEXT)
     assert site.interval() == 1.0
 
@@ -181,9 +193,9 @@ def test_an_edit_wins_at_the_start_too(site: Site) -> None:
     site.path.write_text(TEXT.replace("1s", "3s"))
     site.start()
     assert (site.interval(), site.kept) == (3.0, Changes())
-    assert [lost.key for lost in site.running.news().dropped] == ["slaves.slave-2.interval"]
+    assert [lost.key for lost in site.news().dropped] == ["slaves.slave-2.interval"]
     site.start()
-    assert site.running.news() == News()
+    assert site.news() == News()
 
 
 @pytest.mark.parametrize("beginning", [True, False])
@@ -196,7 +208,7 @@ def test_where_the_disk_fails_the_edit_wins_all_the_same(site: Site, *, beginnin
     else:
         site.reload(TEXT.replace("1s", "3s"))
     assert site.interval() == 3.0
-    news = site.running.news()
+    news = site.news()
     assert news.storage is not None
     assert len(news.dropped) == 1
     assert site.kept.count == 1
@@ -212,24 +224,24 @@ def test_a_broken_file_changes_nothing(site: Site) -> None:
 def test_a_file_of_changes_that_nobody_understands_is_told_once(site: Site) -> None:
     Disk(site.disk).replace(STATE / FILE_NAME, b"nonsense")
     site.start()
-    (lost,) = site.running.news().dropped
+    (lost,) = site.news().dropped
     assert (lost.key, lost.device) == ("changes.yaml", None)
     assert site.running.now.changes == Changes()
     site.start()
-    assert site.running.news() == News()
+    assert site.news() == News()
 
 
 def test_what_cannot_hold_is_told_when_it_begins_and_not_again(site: Site) -> None:
     site.change(lambda now: now.changes.adding("roof", {"id": 9}))
-    assert site.running.news() == News()
+    assert site.news() == News()
     clash = TEXT.replace("3]", "3, 9]")
     site.reload(clash)
-    (warning,) = site.running.news().warnings
+    (warning,) = site.news().warnings
     assert warning == "roof: slave id 9 is taken by slave-9; change the id of one, or remove one"
     site.reload(clash.replace("1s", "3s"))
-    assert site.running.news() == News()
+    assert site.news() == News()
     site.start()
-    assert site.running.news().warnings == [warning]
+    assert site.news().warnings == [warning]
 
 
 def test_what_needs_a_restart_waits_for_it_whatever_requests_change(site: Site) -> None:
@@ -240,21 +252,18 @@ def test_what_needs_a_restart_waits_for_it_whatever_requests_change(site: Site) 
     assert site.taken[-1] == ("slaves.slave-2.interval",)
 
 
-def test_news_is_said_to_people_and_what_was_dropped_to_the_broker() -> None:
+def test_news_is_words_for_people() -> None:
     news = News(
         [DroppedChange("slaves.a.label", "a", "Top", "the file says something else now")], ["roof: cannot hold"]
     )
-    assert news.sayings == [
-        "slaves.a.label: the file says something else now: what a request changed there is dropped",
+    assert news.messages == [
+        "slaves.a.label: the file says something else now: the change made by request is dropped",
         "roof: cannot hold",
     ]
-    (event,) = news.events(17)
-    assert event.payload == {
-        "v": 1,
-        "type": "change_dropped",
-        "ts": 17,
-        "key": "slaves.a.label",
-        "device": "a",
-        "lost": "Top",
-        "message": "the file says something else now",
-    }
+
+
+def test_a_change_that_the_disk_refuses_is_reported(site: Site) -> None:
+    site.disk.full = 0
+    with pytest.raises(StateError) as refused:
+        site.change(slower)
+    assert site.news().storage == str(refused.value)

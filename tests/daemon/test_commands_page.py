@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from docs.generate.commands import BAUDRATE, CONFIG, SLAVES, WALK, Step, recorded
-from lfs10d.commands.handlers.registry import REQUESTS
+from lfs10d.commands.handlers.registry import HANDLERS
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from lfs10d.telemetry.contract import check
@@ -69,7 +69,7 @@ def publish(mosquitto: Mosquitto, step: Step, content: dict[str, Any], *options:
 
 
 def test_the_page_walks_through_every_request() -> None:
-    assert {step.name for step in WALK} == set(REQUESTS)
+    assert {step.name for step in WALK} == set(HANDLERS)
     assert [response["request"] for response in recorded()] == [step.name for step in WALK]
 
 

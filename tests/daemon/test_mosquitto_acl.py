@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from lfs10d.commands.handlers.registry import REQUESTS
+from lfs10d.commands.handlers.registry import HANDLERS
 from lfs10d.telemetry.contract import OUTBOUND
 from tests.support.brokers import Listener, Mosquitto
 
@@ -45,7 +45,7 @@ CLASSES = {
     "line/cancel": "sensors",
     "register/read": "registers",
     "register/write": "registers",
-} | {name: request.form.klass for name, request in REQUESTS.items()}
+} | {name: request.spec.klass for name, request in HANDLERS.items()}
 """Every request of the contract, and every one that the daemon knows, with its class."""
 
 PUBLISHED = ["availability", *(row.topic.replace("+", "mast-top") for row in OUTBOUND if row.topic != "response/+/+")]

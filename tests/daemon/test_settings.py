@@ -8,7 +8,7 @@ import pytest
 
 from lfs10d import profiles
 from lfs10d.config.loader import LoadedConfig, load
-from lfs10d.daemon.settings import config_hash, device_facts, line_facts
+from lfs10d.daemon.settings import config_hash, device_infos, line_info
 from lfs10d.line.budget import timing_of
 from lfs10d.line.settings import access_target, device_specs, line_rules, poll_rules, port_settings, search, usual_codec
 from lfs10d.modbus.frames import Checksum, Framing
@@ -48,7 +48,7 @@ def test_the_line_is_spoken_on_as_configured(loaded: LoadedConfig) -> None:
     assert (rules.extra_gap, rules.turnaround_delay, rules.echo) == (0.005, 0.05, "on")
     assert timing.bits == 12
     assert timing.gap == pytest.approx(3.5 * 12 / 19200 + 0.005)
-    assert line_facts(loaded.config.line).gap_required == timing.gap
+    assert line_info(loaded.config.line).gap_required == timing.gap
 
 
 def test_devices_are_polled_and_described_as_configured(loaded: LoadedConfig) -> None:
@@ -62,7 +62,7 @@ def test_devices_are_polled_and_described_as_configured(loaded: LoadedConfig) ->
     )  # fmt: skip
     assert other.codec.checksum is Checksum.SUM
     assert (rules.retries, rules.offline_after, rules.probe_interval_max) == (2, 5, 30.0)
-    facts = device_facts(loaded.config, loaded.profiles)
+    facts = device_infos(loaded.config, loaded.profiles)
     assert [(one.name, one.slave, one.label, one.profile) for one in facts] == [
         ("mast", 3, "Mast, 10 m", "lfs10"),
         ("slave-4", 4, None, "eh600"),
@@ -96,7 +96,7 @@ def test_as_fast_as_the_line_allows_is_no_faster_than_the_device_does(
     config = load(file)
     (spec,) = device_specs(config.config, config.profiles)
     assert spec.interval == polled
-    assert spec.request_gap == device_facts(config.config, config.profiles)[0].request_gap == 0.3
+    assert spec.request_gap == device_infos(config.config, config.profiles)[0].request_gap == 0.3
 
 
 def test_registers_are_accessed_as_the_device_is_polled_or_as_the_line_usually_speaks(loaded: LoadedConfig) -> None:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from lfs10d.daemon import storage as module
+from lfs10d.daemon.boot import Boot
 from lfs10d.daemon.storage import Storage
+from lfs10d.reading import FaultCode, LineFaultCode
 
 
 @pytest.fixture
@@ -18,12 +21,22 @@ def told() -> list[str | None]:
     return []
 
 
+def storage_at(directory: Path, tell: Callable[[str | None], None]) -> Storage:
+    """Return the storage of a life whose id is on the disk; `tell` takes each error of the line."""
+
+    def set_line_error(code: LineFaultCode, message: str | None) -> None:
+        assert code is FaultCode.STORAGE_FULL
+        tell(message)
+
+    return Storage(directory, Boot("k0000001", None, kept=True), set_line_error)
+
+
 def test_a_directory_that_cannot_be_written_is_told_once_and_when_it_can_be(
     tmp_path: Path, told: list[str | None], caplog: pytest.LogCaptureFixture
 ) -> None:
     place = tmp_path / "place"
     place.write_text("a file")
-    storage = Storage(place / "state", told.append)
+    storage = storage_at(place / "state", told.append)
 
     storage.look()
     storage.look()
@@ -40,21 +53,21 @@ def test_a_directory_that_cannot_be_written_is_told_once_and_when_it_can_be(
 def test_a_backlog_that_cannot_be_kept_is_trouble_though_the_directory_is_well(
     tmp_path: Path, told: list[str | None]
 ) -> None:
-    storage = Storage(tmp_path, told.append)
+    storage = storage_at(tmp_path, told.append)
 
-    storage.backlog_failed("the disk is full")
+    storage.on_backlog_trouble("the disk is full")
     storage.look()
-    storage.backlog_failed("the disk is read-only")
-    storage.backlog_failed(None)
+    storage.on_backlog_trouble("the disk is read-only")
+    storage.on_backlog_trouble(None)
 
     assert told == ["the disk is full", "the disk is read-only", None]
 
 
 def test_what_could_not_be_written_is_told_each_time(tmp_path: Path, told: list[str | None]) -> None:
-    storage = Storage(tmp_path, told.append)
+    storage = storage_at(tmp_path, told.append)
 
-    storage.failed("changes.yaml cannot be written")
-    storage.failed("changes.yaml cannot be written")
+    storage.on_failure("changes.yaml cannot be written")
+    storage.on_failure("changes.yaml cannot be written")
 
     assert told == ["changes.yaml cannot be written"] * 2
 
@@ -74,7 +87,7 @@ def test_the_end_of_trouble_is_found_though_nobody_asks(
             if trouble is None:
                 over.set()
 
-        storage = Storage(place / "state", tell)
+        storage = storage_at(place / "state", tell)
         storage.look()
         place.unlink()
         async with asyncio.timeout(10), asyncio.TaskGroup() as group:

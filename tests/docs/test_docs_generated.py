@@ -18,7 +18,7 @@ from docs.generate.markdown import WIDTH, example, plain
 from docs.generate.mqtt import _meanings, examples
 from docs.generate.pages import PAGES, filled, stale
 from lfs10d.command import Command, Result
-from lfs10d.commands.handlers.registry import REQUESTS
+from lfs10d.commands.handlers.registry import HANDLERS
 from lfs10d.commands.message import parameters_of
 from lfs10d.config.diff import RESTART_KEYS
 from lfs10d.config.models import Config
@@ -128,10 +128,10 @@ def test_the_frames_of_the_examples_are_frames() -> None:
     assert [body for _, _, body in codec.frames(HEARD, 2, codec.answer_size(asked))] == [HEARD[:-2]]
 
 
-@pytest.mark.parametrize("name", sorted(REQUESTS))
+@pytest.mark.parametrize("name", sorted(HANDLERS))
 def test_every_request_has_its_class_and_parameters(name: str) -> None:
     told = section(MQTT, name)
-    form = REQUESTS[name].form
+    form = HANDLERS[name].spec
     assert f"Class `{form.klass}`." in told
     for key, field in form.parameters.model_fields.items():
         assert f"| `{field.alias or key}` |" in told
@@ -142,13 +142,13 @@ def test_every_request_has_its_class_and_parameters(name: str) -> None:
 def test_every_request_of_the_page_of_examples_is_one_and_its_answer_is_as_promised() -> None:
     for step, response in zip(WALK, recorded(), strict=True):
         assert not isinstance(
-            parameters_of(REQUESTS[step.name].form.parameters, Command(parameters=step.parameters)), Result
+            parameters_of(HANDLERS[step.name].spec.parameters, Command(parameters=step.parameters)), Result
         )
         assert check(f"response/{step.name}", json.dumps(response)) is not None
 
 
 def test_a_request_that_is_not_walked_and_a_code_without_advice_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(commands, "REQUESTS", {**REQUESTS, "line/dance": REQUESTS["health"]})
+    monkeypatch.setattr(commands, "HANDLERS", {**HANDLERS, "line/dance": HANDLERS["health"]})
     with pytest.raises(ValueError, match="line/dance"):
         commands.parts()
     monkeypatch.undo()

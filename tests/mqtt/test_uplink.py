@@ -87,7 +87,7 @@ async def until(claim: Callable[[], bool], what: str, *, within: float = PATIENC
 @contextlib.asynccontextmanager
 async def running(site: Site) -> AsyncIterator[Uplink]:
     """Start and stop an uplink."""
-    await site.uplink.start(site)
+    await site.uplink.start(site, on_request=site.on_request, on_spool_trouble=site.on_spool_trouble)
     try:
         yield site.uplink
     finally:
@@ -199,7 +199,7 @@ def test_a_broker_that_hangs_does_not_hold_up_the_end(mosquitto: Mosquitto) -> N
     async def scenario() -> float:
         listener = mosquitto.subscribe(f"{B}/#")
         site = Site(mosquitto.port)
-        await site.uplink.start(site)
+        await site.uplink.start(site, on_request=site.on_request, on_spool_trouble=site.on_spool_trouble)
         await online(listener)
         assert mosquitto.process is not None
         mosquitto.process.send_signal(signal.SIGSTOP)

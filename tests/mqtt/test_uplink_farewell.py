@@ -56,7 +56,7 @@ async def announced(broker: Capricious) -> Uplink:
     site = Site()
     settings = BrokerSettings(host="127.0.0.1", port=broker.port, client_id="gateway")
     uplink = Uplink(settings, base=BASE.rstrip("/"), epoch_ms=lambda: 0)
-    await uplink.start(site)
+    await uplink.start(site, on_request=site.on_request, on_spool_trouble=site.on_spool_trouble)
     await asyncio.wait_for(site.announced.wait(), 10.0)
     return uplink
 

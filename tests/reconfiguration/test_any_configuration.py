@@ -5,7 +5,7 @@ The whole daemon but its thread, its port and its broker, in virtual time: `Line
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from typing import Any, cast
 
@@ -13,20 +13,21 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from lfs10d.commands.dispatcher import Dispatcher
-from lfs10d.commands.handlers.registry import REQUESTS
+from lfs10d.commands.context import Context, Handler
+from lfs10d.commands.handlers.registry import HANDLERS
 from lfs10d.commands.line_access import LineAccess
 from lfs10d.config.effective import Effective
 from lfs10d.config.reload import ReloadPlan
-from lfs10d.daemon.settings import device_facts, line_facts
+from lfs10d.daemon.settings import device_infos, line_info
 from lfs10d.line.line import Line
+from lfs10d.mqtt.publisher import Publisher
 from lfs10d.mqtt.uplink import Uplink
 from lfs10d.profiles.library import load_profile
 from lfs10d.reading import Event
 from lfs10d.simulator.registers import blueprint_of
 from lfs10d.simulator.sensor import Sensor
-from lfs10d.system.clock import Instant
-from lfs10d.telemetry.publication import BacklogStats
+from lfs10d.system.clock import Clock, Instant
+from lfs10d.telemetry.publication import BacklogStats, Publication
 from lfs10d.telemetry.station import Station
 from tests.support.lives import EPOCH, Bench, Life, Wire
 from tests.support.stations import DAEMON
@@ -71,7 +72,7 @@ CALLS: list[tuple[str, dict[str, Any]]] = [
 
 
 class VirtualLine(Wire):
-    """The line as the daemon's powers see it."""
+    """The line as `LineAccess` sees it."""
 
     def read(self, device: str, request: int) -> None:
         self.poller.read(device, request)
@@ -89,53 +90,55 @@ class NoBroker:
     backlog = BacklogStats()
     connected = False
 
+    def publish(self, publications: Iterable[Publication]) -> None:
+        """Send nothing."""
+
     def republish(self) -> None:
         """Send nothing."""
+
+
+class BenchClock:
+    """Both clocks, in virtual time."""
+
+    def __init__(self, bench: Bench) -> None:
+        self._bench = bench
+
+    def now(self) -> Instant:
+        now = self._bench.clock.now
+        return Instant(now, EPOCH + now, "synced")
+
+    def epoch_ms(self) -> int:
+        return self.now().ts()
 
 
 class Whole(Life):
     """One life of the daemon with all its requests."""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        config, profiles = self.running.now.config, self.running.loaded.profiles
-        facts = device_facts(config, profiles)
-        self.station = Station(DAEMON, line_facts(config.line), facts, self._instant())
-        self.powers = LineAccess(
-            self.station,
-            cast("Uplink", NoBroker()),
-            now=self._instant,
-            running=self.running,
-            reload=self.running.reload,
-            change=self.running.change,
-            line=lambda: cast("Line", VirtualLine(self.poller)),
-            publish=lambda _: None,
-        )
-        self.powers.physical = self.physical
-        self.service = Dispatcher(
-            REQUESTS,
-            self.powers,
-            allowed=frozenset({"polling", "sensors", "registers"}),
-            respond=self.bench.respond,
-            clear=self.bench.cleared.append,
-        )
+    @property
+    def handlers(self) -> Mapping[str, Handler]:
+        return HANDLERS
 
-    def _instant(self) -> Instant:
-        now = self.bench.clock.now
-        return Instant(now, EPOCH + now, "synced")
+    def context(self) -> Context:
+        config, profiles = self.running.now.config, self.running.loaded.profiles
+        self.clock = cast("Clock", BenchClock(self.bench))
+        infos = device_infos(config, profiles)
+        station = Station(DAEMON, line_info(config.line), infos, self.clock.now())
+        self.publisher = Publisher(station, DAEMON, cast("Uplink", NoBroker()), self.clock)
+        line = cast("Line", VirtualLine(self.poller))
+        self.access = LineAccess(line, self.running, self.publisher, self.physical)
+        return Context(self.running, self.access, self.physical, self.publisher)
 
     def _heard(self, events: list[Event]) -> None:
         super()._heard(events)
         for event in events:
-            now = self._instant()
-            self.powers.heard(event, self.station.on_event(event, now), now)
+            now = self.clock.now()
+            self.access.on_event(event, self.publisher.on_event(event, now), now)
 
-    async def _take(self, plan: ReloadPlan, before: Effective) -> None:
+    async def apply(self, plan: ReloadPlan, before: Effective) -> None:
         now = self.running.now
-        facts = device_facts(now.config, now.loaded.profiles)
-        self.station.configure(line_facts(now.config.line), facts, self._instant())
-        self.powers.reconfigured(before.config, now.config)
-        await super()._take(plan, before)
+        self.publisher.configure(line_info(now.config.line), device_infos(now.config, now.loaded.profiles))
+        self.access.on_config(before.config, now.config)
+        await super().apply(plan, before)
 
 
 @pytest.fixture
@@ -184,7 +187,7 @@ def _mine(bench: Bench, name: str, number: int) -> list[dict[str, Any]]:
 
 
 def test_every_request_is_asked_here() -> None:
-    assert {name for name, _ in CALLS} == set(REQUESTS)
+    assert {name for name, _ in CALLS} == set(HANDLERS)
 
 
 @pytest.mark.parametrize("configuration", CONFIGURATIONS)

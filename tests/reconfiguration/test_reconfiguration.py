@@ -21,7 +21,7 @@ def test_while_a_scan_has_the_place_nothing_is_changed_and_no_other_scan_begun(b
         answer = bench.readdress(life, "s3", 9)
         with pytest.raises(RefusedError, match="line/scan is being carried out") as refused:
             held.enter_context(life.physical.place("line/scan"))
-        assert refused.value.answer == answer
+        assert refused.value.result == answer
     assert (answer.status, answer.code) == ("rejected", "busy")
     assert life.physical.busy is None
     assert bench.readdress(life, "s3", 9).status == "ok"

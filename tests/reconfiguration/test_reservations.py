@@ -22,7 +22,7 @@ def test_whoever_comes_while_the_place_is_held_is_told_busy() -> None:
         assert reserving.underway == "line/scan"
         with pytest.raises(RefusedError) as refused, reserving.held("line/adopt"):
             pytest.fail("two have the place")
-        assert refused.value.answer.code == "busy"
+        assert refused.value.result.code == "busy"
     assert reserving.busy is None
 
 

@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from lfs10d.command import Command, RefusedError, Result, ok, rejected
+from lfs10d.commands.context import Context
 from lfs10d.commands.reads import ReadResult
 from lfs10d.config.changes_file import ChangesFile
-from lfs10d.config.effective import Edit, Effective
-from lfs10d.config.live_config import LiveConfig
+from lfs10d.config.effective import Effective
+from lfs10d.config.live_config import LiveConfig, News
 from lfs10d.config.loader import load
 from lfs10d.config.models import SlaveConfig
 from lfs10d.config.reload import ReloadPlan
@@ -25,6 +26,7 @@ from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Fault
+from lfs10d.reconfiguration.adopt import AdoptRequest
 from lfs10d.system.disk import Disk
 from tests.support.volatile_disk import ForgetfulFiles
 
@@ -40,18 +42,18 @@ slaves:
 STATE = Path("/state")
 
 
-class FakePowers:
-    """Answers as told beforehand and notes what was done. `at` are the slave ids that answer to a knock."""
+class FakeContext:
+    """Answers as set beforehand and notes what was done. `at` are the slave ids that answer a ping."""
 
     def __init__(self, file: Path) -> None:
         self.done: list[object] = []
-        self.inquiry: ReadResult | None = None
+        self.read_result: ReadResult | None = None
+        self.paused = False
         self.running: tuple[str, ...] = ()
         self.busy = False
         self.findings: tuple[FoundDevice, ...] = ()
         self.scanned = True, False
         """Whether a scan is complete, and whether its port was lost."""
-        self.broken: Exception | None = None
         self.at: set[int] = set()
         self.silence: Fault | None = None
         self.came: dict[str, object] = {}
@@ -72,17 +74,20 @@ class FakePowers:
         self.done.append(("baudrate", to, power_cycle, dry_run, call.id))
         return ok({"to": to})
 
-    async def adopt(
-        self, *, name: str | None, label: str | None, profile: str, factory: int | None, to: int | None, call: Command
-    ) -> Result:
-        self.done.append(("adopt", name, label, profile, factory, to, call.id))
-        return ok({"device": name})
+    async def adopt(self, request: AdoptRequest, call: Command) -> Result:
+        self.done.append(("adopt", request, call.id))
+        return ok({"device": request.name})
 
     def start(self) -> None:
         """Begin anew, as a daemon does."""
-        self.holding = LiveConfig(load(self.file), ChangesFile(STATE, Disk(self.disk)), self._take)
+        self.holding = LiveConfig(load(self.file), ChangesFile(STATE, Disk(self.disk)))
+        self.holding.start(self)
+        self.context = Context(self.holding, self, self, self)
 
-    async def _take(self, plan: ReloadPlan, before: Effective) -> None:
+    def report(self, news: News) -> None:
+        """Take what became of changes."""
+
+    async def apply(self, plan: ReloadPlan, before: Effective) -> None:
         assert before is not self.holding.now
         self.done.append(plan.applied)
 
@@ -93,45 +98,27 @@ class FakePowers:
         self.done.append("republish")
         return 17
 
-    def configuration(self) -> dict[str, object]:
-        return {"config": {}, "origins": {}}
+    def applied(self, request: str, command: Command, **facts: object) -> None:
+        self.told.append({"request": request, "id": command.key, **facts})
 
-    async def reload(self) -> dict[str, list[str]]:
-        self.done.append("reload")
-        if self.broken is not None:
-            raise self.broken
-        return {"applied": ["poll.interval"], "restart_required": []}
+    async def ping(self, slave: int, profile: Profile) -> Ping:
+        self.done.append(f"ping {slave}")
+        ping = Ping(slave, profile, Codec(Framing.RTU), lambda _: None)
+        ping.answered = slave in self.at
+        ping.fault = None if ping.answered else self.silence
+        return ping
 
-    def devices(self) -> tuple[str, ...]:
-        return tuple(slave.name for slave in self.holding.now.config.slaves)
-
-    def effective(self) -> Effective:
-        return self.holding.now
-
-    async def change(self, edit: Edit) -> tuple[Effective, Effective]:
-        return await self.holding.change(edit)
-
-    def applied(self, request: str, call: Command, **facts: object) -> None:
-        self.told.append({"request": request, "id": call.key, **facts})
-
-    async def knock(self, slave: int, profile: Profile) -> Ping:
-        self.done.append(f"knock {slave}")
-        knock = Ping(slave, profile, Codec(Framing.RTU), lambda _: None)
-        knock.answered = slave in self.at
-        knock.fault = None if knock.answered else self.silence
-        return knock
-
-    async def access(self, what: RegisterRequest, device: SlaveConfig | None) -> Access:
-        self.done.append((device and device.name, what))
+    async def access(self, request: RegisterRequest, device: SlaveConfig | None) -> Access:
+        self.done.append((device and device.name, request))
         never = PendingRequests()
-        access = Access(Target(1, Codec(Framing.RTU)), what, pending=never, echo_known=bool, over=lambda _: None)
+        access = Access(Target(1, Codec(Framing.RTU)), request, pending=never, echo_known=bool, over=lambda _: None)
         for name, what_came in self.came.items():
             setattr(access, name, what_came)
         return access
 
     async def read(self, device: str) -> ReadResult | None:
         self.done.append(f"read {device}")
-        return self.inquiry
+        return self.read_result
 
     def trace(self, duration: float) -> None:
         self.done.append(duration)

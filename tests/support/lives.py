@@ -10,13 +10,16 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from lfs10d.command import Command, Result
-from lfs10d.commands.context import Context
+from lfs10d.commands.admission import Admission
+from lfs10d.commands.context import Announcements, Context, Handler, LineCommands
 from lfs10d.commands.dispatcher import Dispatcher
-from lfs10d.commands.handlers.registry import REQUESTS
+from lfs10d.commands.handlers.registry import HANDLERS
+from lfs10d.commands.responder import Responder
 from lfs10d.config.changes_file import ChangesFile
 from lfs10d.config.effective import Effective
-from lfs10d.config.live_config import Edit, LiveConfig
+from lfs10d.config.live_config import Edit, LiveConfig, News
 from lfs10d.config.loader import load
+from lfs10d.config.models import Config
 from lfs10d.config.reload import ReloadPlan
 from lfs10d.line.budget import timing_of
 from lfs10d.line.jobs.job import Job
@@ -30,7 +33,6 @@ from lfs10d.modbus.pending import PendingRequests
 from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.mqtt.topics import InboundRequest
 from lfs10d.reading import Event, PortChanged, Reading
-from lfs10d.reconfiguration.adopt import AdoptRequest
 from lfs10d.reconfiguration.journal import Journal
 from lfs10d.reconfiguration.reconfiguration import Reconfiguration
 from lfs10d.simulator.line import SimulatedLine
@@ -75,6 +77,12 @@ class Wire:
         self.poller.post(tell)
 
 
+class Unpaused:
+    """A line that is never freed for another program."""
+
+    paused = False
+
+
 @dataclass
 class Life:
     """One life of the daemon."""
@@ -85,19 +93,16 @@ class Life:
     physical: Reconfiguration = field(init=False)
     events: list[tuple[str, Mapping[str, object]]] = field(default_factory=list)
     readings: list[Reading] = field(default_factory=list)
+    news: list[News] = field(default_factory=list)
     service: Dispatcher = field(init=False)
 
     def __post_init__(self) -> None:
         bench = self.bench
         disk = Disk(bench.files)
-        self.running = LiveConfig(load(bench.file), ChangesFile(STATE, disk), self._take)
-        self.service = Dispatcher(
-            {name: REQUESTS[name] for name in CHANGING},
-            cast("Context", self),
-            allowed=frozenset({"sensors"}),
-            respond=bench.respond,
-            clear=bench.cleared.append,
-        )
+        self.running = LiveConfig(load(bench.file), ChangesFile(STATE, disk))
+        handlers = self.handlers
+        specs = {name: handler.spec for name, handler in handlers.items()}
+        responder = Responder(Admission(specs, frozenset({"polling", "sensors", "registers"})), bench)
         self.physical = Reconfiguration(
             Journal(STATE, disk),
             running=lambda: self.running.now,
@@ -105,7 +110,7 @@ class Life:
             learn=self.running.learn,
             wire=lambda: Wire(self.poller),
             tell=lambda kind, facts: self.events.append((kind, facts)),
-            recall=self.service.recall,
+            recall=responder.recall,
             act=lambda activity: self.events.append(("acting", {"activity": activity})),
             repoll=self._repoll,
             now=lambda: Instant(bench.clock.now, EPOCH + bench.clock.now, "synced"),
@@ -118,22 +123,22 @@ class Life:
             device_specs(config, profiles), poll_rules(config.poll), bench.clock.now
         )  # fmt: skip
         self.poller = Poller(bus, scheduler, self._heard, bench.clock)
+        self.running.start(self)
+        self.service = Dispatcher(handlers, self.context(), responder)
         self.physical.recall()
 
-    def effective(self) -> Effective:
-        return self.running.now
+    @property
+    def handlers(self) -> Mapping[str, Handler]:
+        """The handlers of the requests that this life knows."""
+        return {name: HANDLERS[name] for name in CHANGING}
 
-    async def readdress(self, device: str, to: int, *, dry_run: bool, call: Command) -> Result:
-        """Perform a request, as the daemon's powers do; so do the next two."""
-        return await self.physical.readdress(device, to, dry_run=dry_run, call=call)
+    def context(self) -> Context:
+        """Return what the handlers may use."""
+        return Context(self.running, cast("LineCommands", Unpaused()), self.physical, cast("Announcements", None))
 
-    async def baudrate(self, to: int, *, power_cycle: bool, dry_run: bool, call: Command) -> Result:
-        return await self.physical.baudrate(to, power_cycle=power_cycle, dry_run=dry_run, call=call)
-
-    async def adopt(
-        self, *, name: str | None, label: str | None, profile: str, factory: int | None, to: int | None, call: Command
-    ) -> Result:
-        return await self.physical.adopt(AdoptRequest(name, label, factory, to, profile), call)
+    def report(self, news: News) -> None:
+        """Take what became of changes."""
+        self.news.append(news)
 
     def request(self, name: str, **parameters: Any) -> None:  # noqa: ANN401 - any JSON
         """Let a request come in by MQTT; its response comes to `bench.responses`."""
@@ -141,7 +146,7 @@ class Life:
         async def come() -> None:
             payload = json.dumps(parameters).encode()
             topic = f"lfs10d/line0/request/{name}"
-            self.service.requested(InboundRequest(topic, tuple(name.split("/")), payload, retained=False))
+            self.service.on_request(InboundRequest(topic, tuple(name.split("/")), payload, retained=False))
 
         self.bench.loop.run_until_complete(come())
 
@@ -154,7 +159,7 @@ class Life:
 
         self.bench.loop.run_until_complete(ended())
 
-    async def _take(self, plan: ReloadPlan, before: Effective) -> None:
+    async def apply(self, plan: ReloadPlan, before: Effective) -> None:
         now = self.running.now
         if plan.line:
             self.poller.reconfigure(port_settings(now.config.line), line_rules(now.config.line))
@@ -163,10 +168,9 @@ class Life:
         )  # fmt: skip
         await self.physical.reconfigured(before.config, now.config)
 
-    def _repoll(self) -> None:
+    def _repoll(self, polled: Config) -> None:
         now = self.running.now
-        specs = device_specs(self.physical.polled(), now.loaded.profiles)
-        self.poller.replace(specs, poll_rules(now.config.poll))
+        self.poller.replace(device_specs(polled, now.loaded.profiles), poll_rules(now.config.poll))
 
     async def _change(self, edit: Edit) -> object:
         return await self.running.change(edit)
@@ -248,7 +252,11 @@ class Bench:
         """Let the loop do what can be done now."""
         self.loop.drain()
 
-    def respond(self, topic: str, response: dict[str, object], correlation: bytes | None) -> None:
+    def clear_retained(self, topic: str) -> None:
+        """Take that a retained request is cleared."""
+        self.cleared.append(topic)
+
+    def respond(self, topic: str, response: dict[str, object], correlation: bytes | None = None) -> None:
         """Take a response."""
         del topic, correlation
         if self.dark:

@@ -8,7 +8,7 @@ from typing import Annotated
 from lfs10d.command import Command, RefusedError, Result, ok, rejected
 from lfs10d.commands.admission import CommandSpec
 from lfs10d.commands.context import Context, Handler
-from lfs10d.commands.handlers.config_edit import altered, amend, known_device, refuse
+from lfs10d.commands.handlers.config_edit import altered, apply_edit, known_device, refuse
 from lfs10d.commands.message import NoParameters, Parameters
 from lfs10d.config import changes
 from lfs10d.config.changes import Changes
@@ -44,32 +44,35 @@ class WhichChange(Parameters):
         raise refuse("invalid_param", f"key: no request changed {quoted(self.key)}", param="key")
 
 
-async def get(_: NoParameters, powers: Context, __: Command) -> Result:
-    """Tell the effective configuration."""
-    return ok(powers.configuration())
+async def get(_: NoParameters, context: Context, __: Command) -> Result:
+    """Return the effective configuration, secrets left out, and where its values come from but for defaults."""
+    loaded = context.config.loaded
+    origins = {key: str(origin) for key, origin in loaded.origins.items() if origin.kind != "default"}
+    return ok({"config": loaded.config.model_dump(mode="json"), "origins": origins})
 
 
-async def reload(_: NoParameters, powers: Context, __: Command) -> Result:
+async def reload(_: NoParameters, context: Context, __: Command) -> Result:
     """Read the files again; a broken one changes nothing."""
     try:
-        return ok(await powers.reload())
+        plan = await context.config.reload()
     except ConfigError as error:
         return rejected("invalid_param", str(error.problems[0]))
+    return ok({"applied": list(plan.applied), "restart_required": list(plan.restart_required)})
 
 
-async def reset(parameters: WhichChange, powers: Context, call: Command) -> Result:
-    """Take back what requests changed."""
+async def reset(parameters: WhichChange, context: Context, command: Command) -> Result:
+    """Undo changes made by request."""
     try:
         device, key = parameters.place
-        before, now = await amend(lambda now: _without(device, key, now), powers)
+        before, now = await apply_edit(lambda now: _without(device, key, now), context)
     except RefusedError as error:
-        return error.answer
+        return error.result
     left = set(changes.keys(now.changes))
     data = {
         "dropped": [name for name in changes.keys(before.changes) if name not in left],
         "changed": altered(before, now),
     }
-    powers.applied("config/reset", call, device=device, **data)
+    context.publisher.applied("config/reset", command, device=device, **data)
     return ok(data)
 
 
@@ -104,7 +107,7 @@ def _fact(device: str) -> str:
     return f"the slave id of {device} was verified on the line; device/readdress changes it"
 
 
-REQUESTS: Mapping[str, Handler] = {
+HANDLERS: Mapping[str, Handler] = {
     "config/get": Handler(CommandSpec("always"), get),
     "config/reload": Handler(CommandSpec("polling"), reload),
     "config/reset": Handler(CommandSpec("polling", WhichChange), reset),

@@ -12,10 +12,10 @@ from lfs10d.config.models import SlaveConfig
 from lfs10d.errors import StateError
 
 
-async def amend(edit: Edit, powers: Context) -> tuple[Effective, Effective]:
+async def apply_edit(edit: Edit, context: Context) -> tuple[Effective, Effective]:
     """Change what holds; raises RefusedError, also where the change cannot be kept."""
     try:
-        return await powers.change(edit)
+        return await context.config.change(edit)
     except StateError as error:
         raise RefusedError(rejected("storage_full", f"{error}; nothing was changed")) from None
 
@@ -39,7 +39,7 @@ def known_device(device: str, now: Effective) -> SlaveConfig:
     return slave
 
 
-def plainly(slave: SlaveConfig, keys: tuple[str, ...]) -> dict[str, Any]:
+def as_json(slave: SlaveConfig, keys: tuple[str, ...]) -> dict[str, Any]:
     """Return what holds of a device as JSON has it: durations in s, a learned time-out is auto."""
     values = {key: getattr(slave, key) for key in keys}
     if "response_timeout" in values and values["response_timeout"] is None:

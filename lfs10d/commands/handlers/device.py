@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from lfs10d.command import Command, ErrorCode, RefusedError, Result, failed, ok
 from lfs10d.commands.admission import CommandSpec
 from lfs10d.commands.context import Context, Handler
-from lfs10d.commands.handlers.config_edit import amend, known_device, plainly, refuse, unknown_device
+from lfs10d.commands.handlers.config_edit import apply_edit, as_json, known_device, refuse, unknown_device
 from lfs10d.commands.message import Parameters
 from lfs10d.config.changes import OPTIONS, Changes, Place
 from lfs10d.config.defaults import inherited
@@ -73,25 +73,25 @@ class Options(Parameters):
         return {key: getattr(self, key) for key in OPTIONS if key in self.model_fields_set}
 
 
-async def add(parameters: NewDevice, powers: Context, call: Command) -> Result:
+async def add(parameters: NewDevice, context: Context, command: Command) -> Result:
     """Poll one more slave; with `probe` only if it answers."""
     try:
-        profile = await profile_of(parameters.profile, powers.effective())
-        _check_new(parameters, profile, powers.effective(), powers.reserved())
+        profile = await profile_of(parameters.profile, context.config.now)
+        _check_new(parameters, profile, context.config.now, context.reconfiguration.reserved())
         if parameters.probe:
-            await _knock(parameters.slave, profile, powers)
+            await _ping(parameters.slave, profile, context)
 
         def edit(now: Effective) -> Changes:
-            _check_new(parameters, profile, now, powers.reserved())
+            _check_new(parameters, profile, now, context.reconfiguration.reserved())
             place = Place(parameters.slave) if parameters.probe else None
             return now.changes.adding(parameters.device, parameters.entry, place)
 
-        _, now = await amend(edit, powers)
+        _, now = await apply_edit(edit, context)
         slave = known_device(parameters.device, now)
     except RefusedError as error:
-        return error.answer
-    data = {"slave": slave.id, **plainly(slave, SHOWN)}
-    powers.applied("device/add", call, device=slave.name, **{"from": None, "to": data})
+        return error.result
+    data = {"slave": slave.id, **as_json(slave, SHOWN)}
+    context.publisher.applied("device/add", command, device=slave.name, **{"from": None, "to": data})
     return ok({"device": slave.name, **data})
 
 
@@ -136,19 +136,19 @@ def _check_new(wanted: NewDevice, profile: Profile, now: Effective, reserved: Ma
         raise refuse("invalid_param", message, param="name")
 
 
-async def _knock(slave: int, profile: Profile, powers: Context) -> None:
+async def _ping(slave: int, profile: Profile, context: Context) -> None:
     """Raise RefusedError unless there is an answer."""
-    knock = await powers.knock(slave, profile)
-    if knock.answered:
+    ping = await context.line.ping(slave, profile)
+    if ping.answered:
         return
-    if knock.fault is None:
+    if ping.fault is None:
         raise refuse("line_error", f"slave {slave} could not be asked: the port is lost")
-    heard = f" (heard {knock.fault.heard.hex(' ').upper()})" if knock.fault.heard else ""
-    message = f"slave {slave} does not answer: {knock.fault.message}{heard}; with probe false it is added all the same"
+    heard = f" (heard {ping.fault.heard.hex(' ').upper()})" if ping.fault.heard else ""
+    message = f"slave {slave} does not answer: {ping.fault.message}{heard}; with probe false it is added all the same"
     raise refuse("timeout", message)
 
 
-async def remove(parameters: OneDevice, powers: Context, call: Command) -> Result:
+async def remove(parameters: OneDevice, context: Context, command: Command) -> Result:
     """Poll a device no more."""
     device = parameters.device
 
@@ -158,16 +158,16 @@ async def remove(parameters: OneDevice, powers: Context, call: Command) -> Resul
         return now.changes.removing(device, now.said)
 
     try:
-        before, _ = await amend(edit, powers)
+        before, _ = await apply_edit(edit, context)
     except RefusedError as error:
-        return error.answer
+        return error.result
     gone = before.slave(device)
-    data = None if gone is None else {"slave": gone.id, **plainly(gone, SHOWN)}
-    powers.applied("device/remove", call, device=device, **{"from": data, "to": None})
+    data = None if gone is None else {"slave": gone.id, **as_json(gone, SHOWN)}
+    context.publisher.applied("device/remove", command, device=device, **{"from": data, "to": None})
     return ok({"device": device, "slave": None if gone is None else gone.id})
 
 
-async def options(parameters: Options, powers: Context, call: Command) -> Result:
+async def options(parameters: Options, context: Context, command: Command) -> Result:
     """Change how a device is polled and called."""
     device, wanted = parameters.device, parameters.wanted
 
@@ -184,36 +184,36 @@ async def options(parameters: Options, powers: Context, call: Command) -> Result
         if not wanted:
             message = f"nothing to change: give {', '.join(OPTIONS[:-1])} or {OPTIONS[-1]}"
             raise refuse("invalid_param", message)
-        before, now = await amend(edit, powers)
+        before, now = await apply_edit(edit, context)
         keys = tuple(wanted)
-        old, new = plainly(known_device(device, before), keys), plainly(known_device(device, now), keys)
+        old, new = as_json(known_device(device, before), keys), as_json(known_device(device, now), keys)
     except RefusedError as error:
-        return error.answer
+        return error.result
     if old != new:
-        powers.applied("device/options", call, device=device, **{"from": old, "to": new})
+        context.publisher.applied("device/options", command, device=device, **{"from": old, "to": new})
     return ok({"from": old, "to": new})
 
 
-async def read(parameters: OneDevice, powers: Context, _: Command) -> Result:
+async def read(parameters: OneDevice, context: Context, _: Command) -> Result:
     """Poll a device now, in turn with everybody else."""
     device = parameters.device
-    if device not in powers.devices():
-        return unknown_device(device, powers.devices())
-    conflict = powers.effective().conflicts.get(device)
+    if device not in context.devices:
+        return unknown_device(device, context.devices)
+    conflict = context.config.now.conflicts.get(device)
     if conflict is not None:
         return failed("line_error", f"{device} cannot be asked: {conflict}")
-    inquiry = await powers.read(device)
-    if inquiry is None:
+    result = await context.line.read(device)
+    if result is None:
         return failed("line_error", f"{device} was removed or changed before it could be asked")
-    fault = inquiry.fault
+    fault = result.fault
     if fault is None:
-        return ok(inquiry.sample)
+        return ok(result.sample)
     facts = {} if fault.exception_code is None else {"exception_code": fault.exception_code}
     code: ErrorCode = "timeout" if fault.code is FaultCode.TIMEOUT else "line_error"
-    return failed(code, f"{device}: {fault.message}", data=inquiry.sample, **facts)
+    return failed(code, f"{device}: {fault.message}", data=result.sample, **facts)
 
 
-REQUESTS: Mapping[str, Handler] = {
+HANDLERS: Mapping[str, Handler] = {
     "device/add": Handler(CommandSpec("polling", NewDevice), add),
     "device/remove": Handler(CommandSpec("polling", OneDevice), remove),
     "device/options": Handler(CommandSpec("polling", Options), options),

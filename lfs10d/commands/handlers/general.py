@@ -10,17 +10,17 @@ from lfs10d.commands.context import Context, Handler
 from lfs10d.commands.message import NoParameters
 
 
-async def health(_: NoParameters, powers: Context, __: Command) -> Result:
+async def health(_: NoParameters, context: Context, __: Command) -> Result:
     """Tell how everything is."""
-    return ok(powers.health())
+    return ok(context.publisher.health())
 
 
-async def republish(_: NoParameters, powers: Context, __: Command) -> Result:
+async def republish(_: NoParameters, context: Context, __: Command) -> Result:
     """Send every retained topic once more."""
-    return ok({"topics": powers.republish()})
+    return ok({"topics": context.publisher.republish()})
 
 
-REQUESTS: Mapping[str, Handler] = {
+HANDLERS: Mapping[str, Handler] = {
     "health": Handler(CommandSpec("always"), health),
     "republish": Handler(CommandSpec("always"), republish),
 }

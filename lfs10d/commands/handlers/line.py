@@ -25,27 +25,27 @@ class HowLong(Parameters):
     duration: Annotated[float, Duration(0.1, LONGEST)] = Field(default=USUAL, alias="for")
 
 
-async def trace(parameters: HowLong, powers: Context, _: Command) -> Result:
+async def trace(parameters: HowLong, context: Context, _: Command) -> Result:
     """Tell every frame on `trace` for a while."""
-    powers.trace(parameters.duration)
+    context.line.trace(parameters.duration)
     return ok({"for": parameters.duration})
 
 
-async def pause(parameters: HowLong, powers: Context, _: Command) -> Result:
+async def pause(parameters: HowLong, context: Context, _: Command) -> Result:
     """Free the port for another program for a while."""
     try:
-        await powers.pause(parameters.duration)
+        await context.line.pause(parameters.duration)
     except RefusedError as error:
-        return error.answer
+        return error.result
     return ok({"for": parameters.duration})
 
 
-async def cancel(_: NoParameters, powers: Context, __: Command) -> Result:
+async def cancel(_: NoParameters, context: Context, __: Command) -> Result:
     """End a scan, a trace, a pause."""
-    return ok({"cancelled": list(powers.cancel())})
+    return ok({"cancelled": list(context.line.cancel())})
 
 
-REQUESTS: Mapping[str, Handler] = {
+HANDLERS: Mapping[str, Handler] = {
     "line/trace": Handler(CommandSpec("sensors", HowLong), trace),
     "line/pause": Handler(CommandSpec("sensors", HowLong), pause),
     "line/cancel": Handler(CommandSpec("sensors"), cancel),

@@ -12,6 +12,8 @@ from lfs10d.commands.admission import CommandSpec
 from lfs10d.commands.context import Context, Handler
 from lfs10d.commands.handlers import device
 from lfs10d.commands.message import Parameters
+from lfs10d.commands.pause import FREED
+from lfs10d.reconfiguration.adopt import AdoptRequest
 from lfs10d.schema.fields import Choice, FilePath, Flag, Name, Text, Whole
 
 REMEMBERED_FOR = 86_400.0
@@ -26,9 +28,11 @@ class ReaddressParameters(Parameters):
     dry_run: Annotated[bool, Flag()] = False
 
 
-async def readdress(parameters: ReaddressParameters, powers: Context, call: Command) -> Result:
+async def readdress(parameters: ReaddressParameters, context: Context, command: Command) -> Result:
     """Give a sensor another slave id."""
-    return await powers.readdress(parameters.device, parameters.to, dry_run=parameters.dry_run, call=call)
+    return await context.reconfiguration.readdress(
+        parameters.device, parameters.to, dry_run=parameters.dry_run, call=command
+    )
 
 
 class BaudrateParameters(Parameters):
@@ -39,10 +43,12 @@ class BaudrateParameters(Parameters):
     dry_run: Annotated[bool, Flag()] = False
 
 
-async def baudrate(parameters: BaudrateParameters, powers: Context, call: Command) -> Result:
+async def baudrate(parameters: BaudrateParameters, context: Context, command: Command) -> Result:
     """Move every sensor and the port to another rate."""
-    return await powers.baudrate(
-        parameters.to, power_cycle=parameters.power_cycle, dry_run=parameters.dry_run, call=call
+    if context.line.paused:
+        return FREED
+    return await context.reconfiguration.baudrate(
+        parameters.to, power_cycle=parameters.power_cycle, dry_run=parameters.dry_run, call=command
     )
 
 
@@ -58,24 +64,18 @@ class AdoptParameters(Parameters):
     to: Annotated[int, Whole(1, 255)] | None = Field(default=None, description="Without: the next free id from 2.")
 
 
-async def adopt(parameters: AdoptParameters, powers: Context, call: Command) -> Result:
+async def adopt(parameters: AdoptParameters, context: Context, command: Command) -> Result:
     """Take in a factory-new sensor."""
     wanted = parameters
     try:
-        await device.profile_of(wanted.profile, powers.effective())
+        await device.profile_of(wanted.profile, context.config.now)
     except RefusedError as error:
-        return error.answer
-    return await powers.adopt(
-        name=wanted.name,
-        label=wanted.label,
-        profile=wanted.profile,
-        factory=wanted.factory,
-        to=wanted.to,
-        call=call,
-    )
+        return error.result
+    request = AdoptRequest(wanted.name, wanted.label, wanted.factory, wanted.to, wanted.profile)
+    return await context.reconfiguration.adopt(request, command)
 
 
-REQUESTS: Mapping[str, Handler] = {
+HANDLERS: Mapping[str, Handler] = {
     "device/readdress": Handler(CommandSpec("sensors", ReaddressParameters, REMEMBERED_FOR), readdress),
     "line/adopt": Handler(CommandSpec("sensors", AdoptParameters, REMEMBERED_FOR), adopt),
     "line/baudrate": Handler(CommandSpec("sensors", BaudrateParameters, REMEMBERED_FOR), baudrate),

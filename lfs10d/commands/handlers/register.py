@@ -57,12 +57,12 @@ class OneRegister(OnePlace):
     value: Annotated[int, Whole(0, REGISTERS - 1)] = Field(description="What the register is to hold, unscaled.")
 
 
-async def read(parameters: SomeRegisters, powers: Context, _: Command) -> Result:
+async def read(parameters: SomeRegisters, context: Context, _: Command) -> Result:
     """Read registers as they are, with function 03."""
-    now = powers.effective()
+    now = context.config.now
     address, count = parameters.address, parameters.count
     try:
-        device, slave = _whose(parameters, now)
+        device, slave = _target(parameters, now)
         if address + count > REGISTERS:
             raise refuse("invalid_param", f"count: there are {REGISTERS - address} registers from there", param="count")
         most = READ_COUNT_MAX if device is None else now.loaded.profiles[device.profile].most_words
@@ -70,39 +70,39 @@ async def read(parameters: SomeRegisters, powers: Context, _: Command) -> Result
             message = f"count: one read of a {_kind(device, now)} brings at most {most} registers"
             raise refuse("invalid_param", message, param="count")
     except RefusedError as error:
-        return error.answer
-    access = await powers.access(ReadRegisters(slave, address, count), device)
+        return error.result
+    access = await context.line.access(ReadRegisters(slave, address, count), device)
     place = {"device": device and device.name, "slave": slave, "address": address}
     if access.end is End.DONE:
         return ok({**place, "registers": list(access.registers or ())})
     return _ended(access, f"slave {slave}")
 
 
-async def write(parameters: OneRegister, powers: Context, call: Command) -> Result:
+async def write(parameters: OneRegister, context: Context, command: Command) -> Result:
     """Write one register with function 06 and read it back; only settings that the device's profile marks."""
-    now = powers.effective()
+    now = context.config.now
     address, value = parameters.address, parameters.value
     try:
-        device, slave = _whose(parameters, now)
+        device, slave = _target(parameters, now)
         if device is None:
             _check_unknown(address, now)
         else:
             _check_setting(address, value, now.loaded.profiles[device.profile])
-        reserved = powers.reserved().get(slave)
+        reserved = context.reconfiguration.reserved().get(slave)
         if reserved is not None:
             raise refuse("busy", f"slave id {slave} {reserved}; write when that is over")
     except RefusedError as error:
-        return error.answer
-    access = await powers.access(WriteRegister(slave, address, value), device)
+        return error.result
+    access = await context.line.access(WriteRegister(slave, address, value), device)
     place = {"device": device and device.name, "slave": slave, "address": address}
     if access.end is End.DONE:
-        powers.applied("register/write", call, **place, **{"from": access.before, "to": value})
+        context.publisher.applied("register/write", command, **place, **{"from": access.before, "to": value})
         return ok({**place, "value": value, "before": access.before})
     data = None if access.registers is None else {**place, "value": access.registers[0], "before": access.before}
     return _ended(access, f"slave {slave}", data=data, writes=True)
 
 
-def _whose(parameters: OnePlace, now: Effective) -> tuple[SlaveConfig | None, int]:
+def _target(parameters: OnePlace, now: Effective) -> tuple[SlaveConfig | None, int]:
     """Return the device, None if none is configured there, and its slave id; raises RefusedError."""
     match parameters.device, parameters.slave:
         case (str(name), None):
@@ -190,7 +190,7 @@ def _why(access: Access) -> tuple[ErrorCode, str]:
     return "timeout" if silent else "line_error", said
 
 
-REQUESTS: Mapping[str, Handler] = {
+HANDLERS: Mapping[str, Handler] = {
     "register/read": Handler(CommandSpec("registers", SomeRegisters), read),
     "register/write": Handler(CommandSpec("registers", OneRegister), write),
 }

@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from lfs10d.commands.context import Handler
 from lfs10d.commands.handlers import config, device, general, line, reconfigure, register, scan
 
-REQUESTS: Mapping[str, Handler] = {
-    **general.REQUESTS,
-    **config.REQUESTS,
-    **device.REQUESTS,
-    **line.REQUESTS,
-    **register.REQUESTS,
-    **scan.REQUESTS,
-    **reconfigure.REQUESTS,
+HANDLERS: Mapping[str, Handler] = {
+    **general.HANDLERS,
+    **config.HANDLERS,
+    **device.HANDLERS,
+    **line.HANDLERS,
+    **register.HANDLERS,
+    **scan.HANDLERS,
+    **reconfigure.HANDLERS,
 }

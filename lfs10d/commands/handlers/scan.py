@@ -78,33 +78,33 @@ class WhomToFind(Parameters):
     )
 
 
-async def scan(parameters: WhomToFind, powers: Context, call: Command) -> Result:
+async def scan(parameters: WhomToFind, context: Context, command: Command) -> Result:
     """Find out who is on the line."""
     try:
-        done = await powers.scan(parameters.ids, parameters.baudrates or (), parameters.share / 100)
+        done = await context.line.scan(parameters.ids, parameters.baudrates or (), parameters.share / 100)
     except RefusedError as error:
-        return error.answer
-    data: dict[str, Any] = {"found": [_told(finding, powers) for finding in done.found]}
+        return error.result
+    data: dict[str, Any] = {"found": [_told(finding, context) for finding in done.found]}
     asked = f"after {done.progress.asked} of {done.progress.total} ids"
     if done.lost:
         return failed("line_error", f"the port was lost {asked}", data=data)
     if not done.complete:
         return failed("cancelled", f"the scan was ended {asked}", data=data)
     if parameters.add:
-        data |= await _add(done, powers, call)
+        data |= await _add(done, context, command)
     return ok(data)
 
 
-def _known(finding: FoundDevice, powers: Context) -> str | None:
+def _known(finding: FoundDevice, context: Context) -> str | None:
     """Return the name of the device that is configured where this was found."""
-    config = powers.effective().config
+    config = context.config.now.config
     if finding.baudrate != config.line.baudrate:
         return None
     return next((slave.name for slave in config.slaves if slave.id == finding.slave), None)
 
 
-def _told(finding: FoundDevice, powers: Context) -> dict[str, Any]:
-    name = _known(finding, powers)
+def _told(finding: FoundDevice, context: Context) -> dict[str, Any]:
+    name = _known(finding, context)
     return {
         "id": finding.slave,
         "baudrate": finding.baudrate,
@@ -117,22 +117,22 @@ def _told(finding: FoundDevice, powers: Context) -> dict[str, Any]:
     }
 
 
-async def _add(done: Scan, powers: Context, call: Command) -> dict[str, list[dict[str, Any]]]:
+async def _add(done: Scan, context: Context, command: Command) -> dict[str, list[dict[str, Any]]]:
     """Have polled who is new and beyond doubt, each as `device/add` does; return who was added and who was not."""
     added: list[dict[str, Any]] = []
     refused: list[dict[str, Any]] = []
     for finding in done.found:
-        now = powers.effective()
+        now = context.config.now
         profile = finding.profile
         doubtful = finding.suspect or finding.duplicate or finding.baudrate != now.config.line.baudrate
-        if profile is None or doubtful or _known(finding, powers) is not None:
+        if profile is None or doubtful or _known(finding, context) is not None:
             continue
         own = now.loaded.profiles
         word = next((word for word, known in own.items() if known.name == profile.name), profile.name)
-        answer = await device.add(device.NewDevice(slave=finding.slave, profile=word), powers, call)
+        answer = await device.add(device.NewDevice(slave=finding.slave, profile=word), context, command)
         entry = {"id": finding.slave, "error": answer.error()} if answer.code else answer.data
         (refused if answer.code else added).append(entry)  # type: ignore[arg-type]  # device/add answers with an object
     return {"added": added, "not_added": refused}
 
 
-REQUESTS: Mapping[str, Handler] = {"line/scan": Handler(CommandSpec("sensors", WhomToFind), scan)}
+HANDLERS: Mapping[str, Handler] = {"line/scan": Handler(CommandSpec("sensors", WhomToFind), scan)}

@@ -1,4 +1,4 @@
-"""The powers of a daemon that is not there: the configuration is real, on a disk in memory, the line is not."""
+"""The fake of a daemon that is not there: the configuration is real, on a disk in memory, the line is not."""
 
 from __future__ import annotations
 
@@ -11,29 +11,29 @@ import pytest
 
 from lfs10d.command import Result
 from lfs10d.commands.admission import Admission, Admitted, Answered
-from lfs10d.commands.handlers.registry import REQUESTS
-from tests.support.context import FILE, Ask, Asked, FakePowers
+from lfs10d.commands.handlers.registry import HANDLERS
+from tests.support.context import FILE, Ask, Asked, FakeContext
 
 
 @pytest.fixture
-def powers(tmp_path: Path) -> FakePowers:
+def fake(tmp_path: Path) -> FakeContext:
     file = tmp_path / "lfs10d.yaml"
     file.write_text(FILE)
-    return FakePowers(file)
+    return FakeContext(file)
 
 
 @pytest.fixture
-def ask(powers: FakePowers) -> Ask:
+def ask(fake: FakeContext) -> Ask:
     """Return the door with every class allowed."""
 
     def ask(name: str, payload: str = "{}") -> Result:
-        forms = {name: request.form for name, request in REQUESTS.items()}
+        forms = {name: request.spec for name, request in HANDLERS.items()}
         door = Admission[None](forms, frozenset({"polling", "sensors", "registers"}))
-        verdict = door.admit(name, payload.encode(), retained=False, whence=None, now=0.0)
+        verdict = door.admit(name, payload.encode(), retained=False, reply_to=None, now=0.0)
         if isinstance(verdict, Answered):
-            return verdict.answer
+            return verdict.result
         assert isinstance(verdict, Admitted)
-        return asyncio.run(REQUESTS[name].perform(verdict.parameters, powers, verdict.call))
+        return asyncio.run(HANDLERS[name].perform(verdict.parameters, fake.context, verdict.command))
 
     return ask
 

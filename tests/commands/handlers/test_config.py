@@ -8,41 +8,43 @@ import pytest
 
 from lfs10d.config.changes import Changes, DeviceChange, Place, Verified
 from lfs10d.config.effective import effective
-from lfs10d.errors import ConfigError, Problem
-from tests.support.context import Ask, Asked, FakePowers
+from tests.support.context import FILE, Ask, Asked, FakeContext
 
 
 def test_the_configuration_is_told(ask: Ask) -> None:
-    assert ask("config/get").data == {"config": {}, "origins": {}}
+    data = ask("config/get").data
+    assert isinstance(data, dict)
+    assert [slave["name"] for slave in data["config"]["slaves"]] == ["mast-top", "slave-3"]
+    assert data["origins"]["poll.interval"].endswith("lfs10d.yaml:2")
+    assert "poll.offline_after" not in data["origins"]
 
 
-def test_a_reload_tells_what_was_applied_and_what_needs_a_restart(ask: Ask) -> None:
-    assert ask("config/reload").data == {"applied": ["poll.interval"], "restart_required": []}
+def test_a_reload_tells_what_was_applied_and_what_needs_a_restart(ask: Ask, fake: FakeContext) -> None:
+    fake.file.write_text(FILE.replace("2s", "3s").replace("port: tty", "port: tty, name: north"))
+    assert ask("config/reload").data == {
+        "applied": ["poll.interval", "slaves.slave-3.interval"],
+        "restart_required": ["line.name"],
+    }
 
 
-def test_a_broken_file_is_rejected_with_its_first_line(ask: Ask, powers: FakePowers) -> None:
-    powers.broken = ConfigError(
-        (
-            Problem("lfs10d.yaml", 3, 9, "poll.interval", "must be more"),
-            Problem("lfs10d.yaml", 5, 1, "slaves", "no list"),
-        )
-    )
+def test_a_broken_file_is_rejected_with_its_first_line(ask: Ask, fake: FakeContext) -> None:
+    fake.file.write_text(FILE.replace("name: mast-top", "name: 7").replace("id: 2", "id: 0"))
     answer = ask("config/reload")
     assert (answer.status, answer.code) == ("rejected", "invalid_param")
-    assert answer.message == "lfs10d.yaml:3:9: poll.interval: must be more"
+    assert answer.message.endswith("lfs10d.yaml:4:10: slaves[0].id: must be a whole number from 1 to 255, not 0")
 
 
 # -- config/reset
 
 
 @pytest.fixture
-def changed(asked: Asked, powers: FakePowers) -> None:
+def changed(asked: Asked, fake: FakeContext) -> None:
     """Change two options of one device, remove the other, add a third."""
     asked("device/options", device="mast-top", interval="250ms", label="Top")
     asked("device/remove", device="slave-3")
     asked("device/add", slave=9, name="roof", probe=False)
-    powers.done.clear()
-    powers.told.clear()
+    fake.done.clear()
+    fake.told.clear()
 
 
 INTERVAL = {"key": "slaves.mast-top.interval", "from": 0.25, "to": 1.0}
@@ -65,7 +67,7 @@ GONE = {"key": "slaves.roof", "from": "polled", "to": None}
 )
 def test_what_was_changed_is_taken_back_and_told(
     asked: Asked,
-    powers: FakePowers,
+    fake: FakeContext,
     parameters: dict[str, Any],
     device: str,
     dropped: list[str],
@@ -73,11 +75,11 @@ def test_what_was_changed_is_taken_back_and_told(
 ) -> None:
     data = {"dropped": dropped, "changed": altered}
     assert asked("config/reset", id="r", **parameters) == ("ok", data)
-    assert powers.told == [{"request": "config/reset", "id": "r", "device": device, **data}]
-    before = powers.holding.now
-    powers.disk.power_cut()
-    powers.start()
-    assert powers.holding.now == before
+    assert fake.told == [{"request": "config/reset", "id": "r", "device": device, **data}]
+    before = fake.holding.now
+    fake.disk.power_cut()
+    fake.start()
+    assert fake.holding.now == before
 
 
 @pytest.mark.usefixtures("changed")
@@ -100,10 +102,10 @@ def test_what_was_changed_is_taken_back_and_told(
     ],
 )
 def test_what_was_not_changed_cannot_be_taken_back(
-    asked: Asked, powers: FakePowers, parameters: dict[str, Any], code: str, param: str
+    asked: Asked, fake: FakeContext, parameters: dict[str, Any], code: str, param: str
 ) -> None:
     assert asked("config/reset", **parameters) == ("rejected", (code, param))
-    assert (powers.done, powers.told) == ([], [])
+    assert (fake.done, fake.told) == ([], [])
 
 
 def test_a_device_without_changes_has_none_to_take_back(ask: Ask) -> None:
@@ -114,10 +116,10 @@ def test_a_device_without_changes_has_none_to_take_back(ask: Ask) -> None:
 
 @pytest.mark.parametrize("parameters", [{"device": "mast-top"}, {"key": "slaves.mast-top.id"}])
 def test_a_slave_id_is_a_fact_that_nobody_takes_back(
-    ask: Ask, asked: Asked, powers: FakePowers, parameters: dict[str, Any]
+    ask: Ask, asked: Asked, fake: FakeContext, parameters: dict[str, Any]
 ) -> None:
-    powers.holding.now = effective(
-        powers.holding.now.file, Changes({"mast-top": DeviceChange(verified=Verified(Place(7), 2))})
+    fake.holding.now = effective(
+        fake.holding.now.file, Changes({"mast-top": DeviceChange(verified=Verified(Place(7), 2))})
     )
     status, (code, _) = asked("config/reset", **parameters)
     assert (status, code) == ("rejected", "invalid_param")
@@ -125,16 +127,16 @@ def test_a_slave_id_is_a_fact_that_nobody_takes_back(
     assert message.endswith("the slave id of mast-top was verified on the line; device/readdress changes it")
 
 
-def test_a_device_does_not_come_back_to_an_id_that_is_another_s_now(asked: Asked, powers: FakePowers) -> None:
+def test_a_device_does_not_come_back_to_an_id_that_is_another_s_now(asked: Asked, fake: FakeContext) -> None:
     asked("device/remove", device="slave-3")
     asked("device/add", slave=3, name="other", probe=False)
-    before = powers.holding.now
+    before = fake.holding.now
     assert asked("config/reset", device="slave-3") == ("rejected", ("address_in_use", None))
-    assert powers.holding.now is before
+    assert fake.holding.now is before
 
 
-def test_what_cannot_be_kept_is_not_taken_back(asked: Asked, powers: FakePowers) -> None:
+def test_what_cannot_be_kept_is_not_taken_back(asked: Asked, fake: FakeContext) -> None:
     asked("device/options", device="mast-top", enabled=False)
-    powers.disk.full = 0
+    fake.disk.full = 0
     assert asked("config/reset", device="mast-top") == ("rejected", ("storage_full", None))
-    assert powers.holding.now.changes.count == 1
+    assert fake.holding.now.changes.count == 1

@@ -11,7 +11,7 @@ import pytest
 from lfs10d import profiles
 from lfs10d.command import Command
 from lfs10d.commands.handlers.device import NewDevice
-from lfs10d.commands.handlers.registry import REQUESTS
+from lfs10d.commands.handlers.registry import HANDLERS
 from lfs10d.commands.reads import ReadResult
 from lfs10d.config.changes import Place
 from lfs10d.config.changes_file import FILE_NAME
@@ -19,17 +19,17 @@ from lfs10d.config.models import SlaveConfig
 from lfs10d.line.jobs.ping import Ping
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Fault, FaultCode
-from tests.support.context import Ask, Asked, FakePowers
+from tests.support.context import Ask, Asked, FakeContext
 
 GOOD = {"device": "mast-top", "wind_speed": 12.5, "error": None}
 BAD = {"device": "mast-top", "wind_speed": None, "error": "timeout"}
 
 
-def test_a_reading_is_answered_with_its_sample(ask: Ask, powers: FakePowers) -> None:
-    powers.inquiry = ReadResult(GOOD, None)
+def test_a_reading_is_answered_with_its_sample(ask: Ask, fake: FakeContext) -> None:
+    fake.read_result = ReadResult(GOOD, None)
     answer = ask("device/read", '{"device":"mast-top"}')
     assert (answer.status, answer.data, answer.error()) == ("ok", GOOD, None)
-    assert powers.done == ["read mast-top"]
+    assert fake.done == ["read mast-top"]
 
 
 @pytest.mark.parametrize(
@@ -40,22 +40,22 @@ def test_a_reading_is_answered_with_its_sample(ask: Ask, powers: FakePowers) -> 
     ],
 )
 def test_silence_is_a_timeout_and_everything_else_a_line_error(
-    ask: Ask, powers: FakePowers, fault: Fault, code: str
+    ask: Ask, fake: FakeContext, fault: Fault, code: str
 ) -> None:
-    powers.inquiry = ReadResult(BAD, fault)
+    fake.read_result = ReadResult(BAD, fault)
     answer = ask("device/read", '{"device":"mast-top"}')
     assert (answer.status, answer.data) == ("failed", BAD)
     assert answer.error() == {"code": code, "message": f"mast-top: {fault.message}", "param": None}
 
 
-def test_an_exception_is_told_with_its_code(ask: Ask, powers: FakePowers) -> None:
-    powers.inquiry = ReadResult(BAD, Fault(FaultCode.EXCEPTION, "refused", exception_code=2))
+def test_an_exception_is_told_with_its_code(ask: Ask, fake: FakeContext) -> None:
+    fake.read_result = ReadResult(BAD, Fault(FaultCode.EXCEPTION, "refused", exception_code=2))
     error = ask("device/read", '{"device":"mast-top"}').error()
     assert error is not None
     assert (error["code"], error["exception_code"]) == ("line_error", 2)
 
 
-def test_an_unknown_device_is_rejected_without_a_look_at_the_line(ask: Ask, powers: FakePowers) -> None:
+def test_an_unknown_device_is_rejected_without_a_look_at_the_line(ask: Ask, fake: FakeContext) -> None:
     answer = ask("device/read", '{"device":"nobody"}')
     assert answer.status == "rejected"
     assert answer.error() == {
@@ -63,7 +63,7 @@ def test_an_unknown_device_is_rejected_without_a_look_at_the_line(ask: Ask, powe
         "message": "there is no device nobody; configured are: mast-top, slave-3",
         "param": "device",
     }
-    assert powers.done == []
+    assert fake.done == []
 
 
 @pytest.mark.parametrize("payload", ["{}", '{"device":3}', '{"device":null}', '{"device":"Mast Top"}', '{"slave":3}'])
@@ -76,21 +76,21 @@ def test_a_device_that_went_before_it_was_asked_is_a_line_error(ask: Ask) -> Non
     assert (answer.status, answer.code, answer.data) == ("failed", "line_error", None)
 
 
-def test_a_device_whose_id_is_another_s_cannot_be_asked(ask: Ask, powers: FakePowers) -> None:
-    powers.at = {9}
+def test_a_device_whose_id_is_another_s_cannot_be_asked(ask: Ask, fake: FakeContext) -> None:
+    fake.at = {9}
     assert ask("device/add", '{"slave":9,"name":"roof"}').status == "ok"
-    powers.file.write_text(powers.file.read_text() + "  - {id: 9, name: tower}\n")
-    powers.start()
+    fake.file.write_text(fake.file.read_text() + "  - {id: 9, name: tower}\n")
+    fake.start()
     answer = ask("device/read", '{"device":"tower"}')
     assert (answer.status, answer.code) == ("failed", "line_error")
     assert answer.message.startswith("tower cannot be asked: slave id 9 is taken by roof")
 
 
-def slave(powers: FakePowers, name: str) -> SlaveConfig:
+def slave(fake: FakeContext, name: str) -> SlaveConfig:
     """Return a device as it holds after a restart."""
-    powers.disk.power_cut()
-    powers.start()
-    found = powers.holding.now.slave(name)
+    fake.disk.power_cut()
+    fake.start()
+    found = fake.holding.now.slave(name)
     assert found is not None
     return found
 
@@ -100,22 +100,22 @@ def slave(powers: FakePowers, name: str) -> SlaveConfig:
 WHOLE = {"label": "Roof", "profile": "ld-e", "interval": 0.25}
 
 
-def test_what_answers_is_added_with_what_was_said_of_it(asked: Asked, powers: FakePowers) -> None:
-    powers.at = {9}
+def test_what_answers_is_added_with_what_was_said_of_it(asked: Asked, fake: FakeContext) -> None:
+    fake.at = {9}
     data = {"slave": 9, **WHOLE, "enabled": True, "response_timeout": "auto"}
     assert asked("device/add", slave=9, name="roof", id="a1", **WHOLE) == ("ok", {"device": "roof", **data})
-    assert powers.done == ["knock 9", ("slaves.roof",)]
-    assert powers.told == [{"request": "device/add", "id": "a1", "device": "roof", "from": None, "to": data}]
-    roof = slave(powers, "roof")
+    assert fake.done == ["ping 9", ("slaves.roof",)]
+    assert fake.told == [{"request": "device/add", "id": "a1", "device": "roof", "from": None, "to": data}]
+    roof = slave(fake, "roof")
     assert (roof.id, roof.label, roof.profile, roof.interval) == (9, "Roof", "ld-e", 0.25)
-    assert powers.holding.now.changes.of("roof").added_at == Place(9)
+    assert fake.holding.now.changes.of("roof").added_at == Place(9)
 
 
-def test_what_is_not_said_is_as_for_everybody(asked: Asked, powers: FakePowers) -> None:
-    powers.at = {9}
+def test_what_is_not_said_is_as_for_everybody(asked: Asked, fake: FakeContext) -> None:
+    fake.at = {9}
     _, data = asked("device/add", slave=9)
     assert (data["device"], data["profile"], data["interval"], data["label"]) == ("slave-9", "lfs10", 2.0, None)
-    assert powers.holding.now.changes.of("slave-9").added == {"id": 9}
+    assert fake.holding.now.changes.of("slave-9").added == {"id": 9}
 
 
 SILENCE = Fault(FaultCode.TIMEOUT, "no answer in 1000 ms")
@@ -131,20 +131,20 @@ NOISE = Fault(FaultCode.CRC, "the check is wrong", heard=b"\x09\x03")
     ],
 )
 def test_where_nobody_answers_nothing_is_added_and_what_was_heard_is_told(
-    ask: Ask, powers: FakePowers, fault: Fault | None, code: str, message: str
+    ask: Ask, fake: FakeContext, fault: Fault | None, code: str, message: str
 ) -> None:
-    powers.silence = fault
+    fake.silence = fault
     answer = ask("device/add", '{"slave":9}')
     assert (answer.status, answer.code, answer.facts) == ("rejected", code, {"param": None})
     assert answer.message.startswith(message)
-    assert powers.done == ["knock 9"]
-    assert (powers.told, powers.disk.exists(Path("/state") / FILE_NAME)) == ([], False)
+    assert fake.done == ["ping 9"]
+    assert (fake.told, fake.disk.exists(Path("/state") / FILE_NAME)) == ([], False)
 
 
-def test_unprobed_it_is_added_though_nobody_answers(asked: Asked, powers: FakePowers) -> None:
+def test_unprobed_it_is_added_though_nobody_answers(asked: Asked, fake: FakeContext) -> None:
     assert asked("device/add", slave=9, probe=False)[0] == "ok"
-    assert "knock 9" not in powers.done
-    assert powers.holding.now.changes.of("slave-9").added_at is None
+    assert "ping 9" not in fake.done
+    assert fake.holding.now.changes.of("slave-9").added_at is None
 
 
 @pytest.mark.parametrize(
@@ -175,77 +175,77 @@ def test_unprobed_it_is_added_though_nobody_answers(asked: Asked, powers: FakePo
     ],
 )
 def test_what_cannot_be_added_is_rejected_before_anybody_is_asked(
-    asked: Asked, powers: FakePowers, parameters: dict[str, Any], code: str, param: str
+    asked: Asked, fake: FakeContext, parameters: dict[str, Any], code: str, param: str
 ) -> None:
-    own_profile(powers)
+    own_profile(fake)
     assert asked("device/add", **parameters) == ("rejected", (code, param))
-    assert (powers.done, powers.told) == ([], [])
+    assert (fake.done, fake.told) == ([], [])
 
 
-def own_profile(powers: FakePowers) -> None:
+def own_profile(fake: FakeContext) -> None:
     """Put a profile beside the configuration that wants to be polled slowly."""
     text = (Path(profiles.__file__).parent / "ld-e.yaml").read_text()
-    powers.file.with_name("own.yaml").write_text(text.replace("name: ld-e", "name: own") + "\nmin_interval: 500ms\n")
+    fake.file.with_name("own.yaml").write_text(text.replace("name: ld-e", "name: own") + "\nmin_interval: 500ms\n")
 
 
 def test_a_profile_beside_the_configuration_can_be_used_and_nothing_of_another_file_is_told(
-    ask: Ask, powers: FakePowers
+    ask: Ask, fake: FakeContext
 ) -> None:
-    own_profile(powers)
-    powers.file.with_name("login.yaml").write_text("hunter2: hunter2")
-    powers.at = {9}
+    own_profile(fake)
+    fake.file.with_name("login.yaml").write_text("hunter2: hunter2")
+    fake.at = {9}
     assert ask("device/add", '{"slave":9,"profile":"own.yaml"}').status == "ok"
     answer = ask("device/add", '{"slave":10,"profile":"login.yaml"}')
     assert "hunter2" not in answer.message
-    powers.at = {10}
+    fake.at = {10}
     assert ask("device/add", '{"slave":10,"profile":"own.yaml"}').status == "ok"
 
 
-def test_a_default_name_that_is_taken_is_rejected_with_the_name(ask: Ask, powers: FakePowers) -> None:
-    powers.at = {9, 10}
+def test_a_default_name_that_is_taken_is_rejected_with_the_name(ask: Ask, fake: FakeContext) -> None:
+    fake.at = {9, 10}
     ask("device/add", '{"slave":9,"name":"slave-10"}')
     answer = ask("device/add", '{"slave":10}')
     assert (answer.code, answer.facts["param"]) == ("invalid_param", "name")
     assert answer.message == "name: the default slave-10 is taken; give it another name"
-    assert powers.done.count("knock 10") == 0
+    assert fake.done.count("ping 10") == 0
 
 
-def test_of_two_that_are_added_at_once_one_is(powers: FakePowers, asked: Asked) -> None:
-    powers.at = {9}
-    knock = powers.knock
+def test_of_two_that_are_added_at_once_one_is(fake: FakeContext, asked: Asked) -> None:
+    fake.at = {9}
+    ping = fake.ping
 
     async def slow(slave: int, profile: Profile) -> Ping:
-        powers.knock = knock  # type: ignore[method-assign]  # the other request is not asked again
-        answer = await REQUESTS["device/add"].perform(NewDevice(slave=9, name="first"), powers, Command())
+        fake.ping = ping  # type: ignore[method-assign]  # the other request is not asked again
+        answer = await HANDLERS["device/add"].perform(NewDevice(slave=9, name="first"), fake.context, Command())
         assert answer.status == "ok"
-        return await knock(slave, profile)
+        return await ping(slave, profile)
 
-    powers.knock = slow  # type: ignore[method-assign]  # asked while this one waits
+    fake.ping = slow  # type: ignore[method-assign]  # asked while this one waits
     assert asked("device/add", slave=9, name="second") == ("rejected", ("address_in_use", "slave"))
 
 
 # -- device/remove
 
 
-def test_what_is_removed_is_gone_after_a_restart(asked: Asked, powers: FakePowers) -> None:
+def test_what_is_removed_is_gone_after_a_restart(asked: Asked, fake: FakeContext) -> None:
     assert asked("device/remove", device="mast-top") == ("ok", {"device": "mast-top", "slave": 2})
-    (told,) = powers.told
+    (told,) = fake.told
     assert (told["request"], told["device"], told["to"]) == ("device/remove", "mast-top", None)
-    powers.disk.power_cut()
-    powers.start()
-    assert powers.devices() == ("slave-3",)
+    fake.disk.power_cut()
+    fake.start()
+    assert fake.context.devices == ("slave-3",)
     assert asked("device/remove", device="mast-top") == ("rejected", ("unknown_device", "device"))
 
 
-def test_what_was_added_and_cannot_be_polled_now_can_be_removed(asked: Asked, powers: FakePowers) -> None:
-    own_profile(powers)
+def test_what_was_added_and_cannot_be_polled_now_can_be_removed(asked: Asked, fake: FakeContext) -> None:
+    own_profile(fake)
     asked("device/add", slave=9, profile="own.yaml", probe=False)
-    powers.file.with_name("own.yaml").unlink()
-    powers.start()
-    assert "slave-9" not in powers.devices()
+    fake.file.with_name("own.yaml").unlink()
+    fake.start()
+    assert "slave-9" not in fake.context.devices
     assert asked("device/add", slave=9, probe=False) == ("rejected", ("invalid_param", "name"))
     assert asked("device/remove", device="slave-9") == ("ok", {"device": "slave-9", "slave": None})
-    assert powers.holding.now.changes.count == 0
+    assert fake.holding.now.changes.count == 0
 
 
 # -- device/options
@@ -267,25 +267,25 @@ def test_what_was_added_and_cannot_be_polled_now_can_be_removed(asked: Asked, po
     ],
 )
 def test_options_are_changed_and_told_from_and_to(
-    asked: Asked, powers: FakePowers, wanted: dict[str, Any], old: dict[str, Any], new: dict[str, Any]
+    asked: Asked, fake: FakeContext, wanted: dict[str, Any], old: dict[str, Any], new: dict[str, Any]
 ) -> None:
     assert asked("device/options", device="mast-top", id=7, **wanted) == ("ok", {"from": old, "to": new})
-    assert powers.told == [{"request": "device/options", "id": 7, "device": "mast-top", "from": old, "to": new}]
-    held = slave(powers, "mast-top").model_dump()
+    assert fake.told == [{"request": "device/options", "id": 7, "device": "mast-top", "from": old, "to": new}]
+    held = slave(fake, "mast-top").model_dump()
     assert {key: "auto" if held[key] is None and key == "response_timeout" else held[key] for key in new} == new
 
 
-def test_options_that_hold_already_are_no_change(asked: Asked, powers: FakePowers) -> None:
+def test_options_that_hold_already_are_no_change(asked: Asked, fake: FakeContext) -> None:
     data = {"interval": 1.0, "label": None, "response_timeout": "auto"}
     wanted = {"interval": "1s", "label": None, "response_timeout": "auto"}
     assert asked("device/options", device="mast-top", **wanted) == ("ok", {"from": data, "to": data})
-    assert (powers.done, powers.told) == ([], [])
+    assert (fake.done, fake.told) == ([], [])
 
 
-def test_options_of_what_was_added_can_be_changed(asked: Asked, powers: FakePowers) -> None:
+def test_options_of_what_was_added_can_be_changed(asked: Asked, fake: FakeContext) -> None:
     asked("device/add", slave=9, probe=False)
     assert asked("device/options", device="slave-9", interval=5)[0] == "ok"
-    assert slave(powers, "slave-9").interval == 5.0
+    assert slave(fake, "slave-9").interval == 5.0
 
 
 @pytest.mark.parametrize(
@@ -304,13 +304,13 @@ def test_options_of_what_was_added_can_be_changed(asked: Asked, powers: FakePowe
     ],
 )
 def test_options_that_cannot_be_are_rejected(
-    asked: Asked, powers: FakePowers, parameters: dict[str, Any], code: str, param: str | None
+    asked: Asked, fake: FakeContext, parameters: dict[str, Any], code: str, param: str | None
 ) -> None:
-    own_profile(powers)
-    powers.file.write_text(powers.file.read_text() + "  - {id: 4, name: slow, profile: own.yaml}\n")
-    powers.start()
+    own_profile(fake)
+    fake.file.write_text(fake.file.read_text() + "  - {id: 4, name: slow, profile: own.yaml}\n")
+    fake.start()
     assert asked("device/options", **parameters) == ("rejected", (code, param))
-    assert (powers.done, powers.told) == ([], [])
+    assert (fake.done, fake.told) == ([], [])
 
 
 @pytest.mark.parametrize(
@@ -322,12 +322,12 @@ def test_options_that_cannot_be_are_rejected(
     ],
 )
 def test_what_cannot_be_kept_is_rejected_and_not_done(
-    ask: Ask, powers: FakePowers, name: str, parameters: dict[str, Any]
+    ask: Ask, fake: FakeContext, name: str, parameters: dict[str, Any]
 ) -> None:
-    powers.disk.full = 0
-    before = powers.holding.now
+    fake.disk.full = 0
+    before = fake.holding.now
     answer = ask(name, json.dumps(parameters))
     assert (answer.status, answer.code) == ("rejected", "storage_full")
     assert answer.message == ("/state/changes.yaml cannot be written: no space left on device; nothing was changed")
-    assert powers.holding.now is before
-    assert (powers.done, powers.told) == ([], [])
+    assert fake.holding.now is before
+    assert (fake.done, fake.told) == ([], [])

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from lfs10d.commands.handlers.registry import REQUESTS
-from tests.support.context import Ask, FakePowers
+from lfs10d.commands.handlers.registry import HANDLERS
+from tests.support.context import Ask, FakeContext
 
 WORDS = st.sampled_from(
     [
@@ -48,18 +48,18 @@ VALUES = st.recursive(
 )
 
 
-@pytest.mark.parametrize("name", sorted(REQUESTS))
+@pytest.mark.parametrize("name", sorted(HANDLERS))
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_whatever_the_parameters_are_one_answer_comes(
-    ask: Ask, powers: FakePowers, name: str, data: st.DataObject
+    ask: Ask, fake: FakeContext, name: str, data: st.DataObject
 ) -> None:
-    del powers.done[:]
-    keys = st.sampled_from([*REQUESTS[name].form.parameters.model_fields, "id", "transaction"])
+    del fake.done[:]
+    keys = st.sampled_from([*HANDLERS[name].spec.parameters.model_fields, "id", "transaction"])
     parameters: dict[str, Any] = data.draw(st.dictionaries(keys, VALUES))
     answer = ask(name, json.dumps(parameters))
     assert answer.status in {"ok", "rejected", "failed"}
     json.dumps([answer.data, answer.error()], allow_nan=False)
-    assert answer.status != "rejected" or "change" not in powers.done
+    assert answer.status != "rejected" or "change" not in fake.done
     error = answer.error()
     assert error is None or str(error["message"]).isprintable()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.support.context import Ask, FakePowers
+from tests.support.context import Ask, FakeContext
 
 
 @pytest.mark.parametrize(
@@ -12,28 +12,28 @@ from tests.support.context import Ask, FakePowers
 )
 @pytest.mark.parametrize("name", ["line/trace", "line/pause"])
 def test_a_trace_or_a_pause_begins_for_the_time_asked_or_half_a_minute(
-    ask: Ask, powers: FakePowers, name: str, payload: str, seconds: float
+    ask: Ask, fake: FakeContext, name: str, payload: str, seconds: float
 ) -> None:
     answer = ask(name, payload)
-    assert (answer.status, answer.data, powers.done) == ("ok", {"for": seconds}, [seconds])
+    assert (answer.status, answer.data, fake.done) == ("ok", {"for": seconds}, [seconds])
 
 
 @pytest.mark.parametrize("payload", ['{"for":"10m1s"}', '{"for":601}', '{"for":0}', '{"for":-1}', '{"for":"5"}'])
 @pytest.mark.parametrize("name", ["line/trace", "line/pause"])
 def test_one_longer_than_ten_minutes_or_of_no_duration_is_refused(
-    ask: Ask, powers: FakePowers, name: str, payload: str
+    ask: Ask, fake: FakeContext, name: str, payload: str
 ) -> None:
     answer = ask(name, payload)
-    assert (answer.code, answer.facts["param"], powers.done) == ("invalid_param", "for", [])
+    assert (answer.code, answer.facts["param"], fake.done) == ("invalid_param", "for", [])
 
 
-def test_a_pause_waits_for_what_must_not_be_cut_off(ask: Ask, powers: FakePowers) -> None:
-    powers.busy = True
+def test_a_pause_waits_for_what_must_not_be_cut_off(ask: Ask, fake: FakeContext) -> None:
+    fake.busy = True
     answer = ask("line/pause")
-    assert (answer.status, answer.code, powers.done) == ("rejected", "busy", [])
+    assert (answer.status, answer.code, fake.done) == ("rejected", "busy", [])
 
 
-def test_what_is_cancelled_is_told(ask: Ask, powers: FakePowers) -> None:
-    powers.running = ("trace",)
+def test_what_is_cancelled_is_told(ask: Ask, fake: FakeContext) -> None:
+    fake.running = ("trace",)
     assert ask("line/cancel").data == {"cancelled": ["trace"]}
     assert ask("line/cancel").data == {"cancelled": []}

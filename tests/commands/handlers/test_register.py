@@ -15,7 +15,7 @@ from lfs10d.line.jobs.register_access import End
 from lfs10d.modbus.request import ReadRegisters, WriteRegister
 from lfs10d.profiles.library import builtin_names
 from lfs10d.reading import Fault, FaultCode
-from tests.support.context import Ask, FakePowers
+from tests.support.context import Ask, FakeContext
 
 VANE = """\
 name: vane
@@ -43,11 +43,11 @@ BUSY = Fault(FaultCode.EXCEPTION, "exception 06 busy", 6, busy=True)
 
 
 @pytest.fixture(autouse=True)
-def _devices(powers: FakePowers) -> None:
-    powers.file.with_name("vane.yaml").write_text(VANE)
-    powers.file.write_text(FILE)
-    powers.start()
-    powers.came = {"end": End.DONE, "registers": (7,), "before": 1, "sent": True}
+def _devices(fake: FakeContext) -> None:
+    fake.file.with_name("vane.yaml").write_text(VANE)
+    fake.file.write_text(FILE)
+    fake.start()
+    fake.came = {"end": End.DONE, "registers": (7,), "before": 1, "sent": True}
 
 
 def told(ask: Ask, name: str, **parameters: Any) -> Result:  # noqa: ANN401  # as JSON has it
@@ -67,34 +67,34 @@ def told(ask: Ask, name: str, **parameters: Any) -> Result:  # noqa: ANN401  # a
     ],
 )
 def test_registers_are_read_of_a_device_or_of_any_slave(
-    ask: Ask, powers: FakePowers, whom: dict[str, Any], device: str | None, slave: int
+    ask: Ask, fake: FakeContext, whom: dict[str, Any], device: str | None, slave: int
 ) -> None:
-    powers.came["registers"] = (1, 2)
+    fake.came["registers"] = (1, 2)
     answer = told(ask, "read", **whom, address=16, count=2)
-    assert powers.done == [(device, ReadRegisters(slave, 16, 2))]
+    assert fake.done == [(device, ReadRegisters(slave, 16, 2))]
     assert answer.status == "ok"
     assert answer.data == {"device": device, "slave": slave, "address": 16, "registers": [1, 2]}
 
 
-def test_one_register_is_read_where_no_count_is_given(ask: Ask, powers: FakePowers) -> None:
+def test_one_register_is_read_where_no_count_is_given(ask: Ask, fake: FakeContext) -> None:
     told(ask, "read", slave=88, address=0)
-    assert powers.done == [(None, ReadRegisters(88, 0, 1))]
+    assert fake.done == [(None, ReadRegisters(88, 0, 1))]
 
 
-def test_a_setting_is_written_and_everybody_told_from_what_to_what(ask: Ask, powers: FakePowers) -> None:
+def test_a_setting_is_written_and_everybody_told_from_what_to_what(ask: Ask, fake: FakeContext) -> None:
     answer = ask("register/write", '{"id":"w1","device":"vane","address":16,"value":600}')
     place = {"device": "vane", "slave": 5, "address": 16}
-    assert powers.done == [("vane", WriteRegister(5, 16, 600))]
+    assert fake.done == [("vane", WriteRegister(5, 16, 600))]
     assert (answer.status, answer.data) == ("ok", {**place, "value": 600, "before": 1})
-    assert powers.told == [{"request": "register/write", "id": "w1", **place, "from": 1, "to": 600}]
+    assert fake.told == [{"request": "register/write", "id": "w1", **place, "from": 1, "to": 600}]
 
 
 @pytest.mark.parametrize(("slave", "address"), [(88, 0x0010), (88, 0), (200, 0xFFFF)])
 def test_a_slave_that_is_not_configured_is_written_as_asked(
-    ask: Ask, powers: FakePowers, slave: int, address: int
+    ask: Ask, fake: FakeContext, slave: int, address: int
 ) -> None:
     assert told(ask, "write", slave=slave, address=address, value=65535).status == "ok"
-    assert powers.done == [(None, WriteRegister(slave, address, 65535))]
+    assert fake.done == [(None, WriteRegister(slave, address, 65535))]
 
 
 # -- what is not permitted
@@ -120,24 +120,24 @@ def test_a_slave_that_is_not_configured_is_written_as_asked(
     ],
 )
 def test_what_must_not_be_written_is_not_allowed(
-    ask: Ask, powers: FakePowers, whom: dict[str, Any], address: int, words: str
+    ask: Ask, fake: FakeContext, whom: dict[str, Any], address: int, words: str
 ) -> None:
     answer = told(ask, "write", **whom, address=address, value=1)
     assert (answer.status, answer.code, answer.facts["param"]) == ("rejected", "not_allowed", "address")
     assert words in answer.message
-    assert powers.done == []
+    assert fake.done == []
 
 
 @pytest.mark.parametrize(("name", "more"), [("read", {}), ("write", {"value": 1})])
-def test_nothing_is_sent_to_everybody(ask: Ask, powers: FakePowers, name: str, more: dict[str, int]) -> None:
+def test_nothing_is_sent_to_everybody(ask: Ask, fake: FakeContext, name: str, more: dict[str, int]) -> None:
     answer = told(ask, name, slave=0, address=16, **more)
     assert (answer.status, answer.code, answer.facts["param"]) == ("rejected", "not_allowed", "slave")
-    assert powers.done == []
+    assert fake.done == []
 
 
-def test_where_a_physical_change_is_open_registers_are_read_but_not_written(ask: Ask, powers: FakePowers) -> None:
+def test_where_a_physical_change_is_open_registers_are_read_but_not_written(ask: Ask, fake: FakeContext) -> None:
     answer = told(ask, "write", slave=77, address=16, value=1)
-    assert (answer.status, answer.code, powers.done) == ("rejected", "busy", [])
+    assert (answer.status, answer.code, fake.done) == ("rejected", "busy", [])
     assert answer.message == "slave id 77 is reserved by the open change of slave-3; write when that is over"
     assert told(ask, "read", slave=77, address=16).status == "ok"
 
@@ -150,11 +150,11 @@ def test_where_a_physical_change_is_open_registers_are_read_but_not_written(ask:
     ],
 )
 def test_a_value_outside_the_settings_range_is_an_invalid_parameter(
-    ask: Ask, powers: FakePowers, value: int, words: str
+    ask: Ask, fake: FakeContext, value: int, words: str
 ) -> None:
     answer = told(ask, "write", device="vane", address=16, value=value)
     assert (answer.status, answer.code, answer.facts["param"]) == ("rejected", "invalid_param", "value")
-    assert (answer.message, powers.done) == (words, [])
+    assert (answer.message, fake.done) == (words, [])
 
 
 @pytest.mark.parametrize(
@@ -182,11 +182,11 @@ def test_a_value_outside_the_settings_range_is_an_invalid_parameter(
     ],
 )
 def test_what_cannot_be_asked_is_an_invalid_parameter(
-    ask: Ask, powers: FakePowers, name: str, parameters: dict[str, Any], param: str
+    ask: Ask, fake: FakeContext, name: str, parameters: dict[str, Any], param: str
 ) -> None:
     answer = told(ask, name, **parameters)
     assert (answer.status, answer.code, answer.facts["param"]) == ("rejected", "invalid_param", param)
-    assert powers.done == []
+    assert fake.done == []
 
 
 def test_a_read_longer_than_the_device_gives_is_told_with_its_limit(ask: Ask) -> None:
@@ -195,23 +195,23 @@ def test_a_read_longer_than_the_device_gives_is_told_with_its_limit(ask: Ask) ->
     )
 
 
-def test_an_unknown_device_is_told_which_there_are(ask: Ask, powers: FakePowers) -> None:
+def test_an_unknown_device_is_told_which_there_are(ask: Ask, fake: FakeContext) -> None:
     answer = told(ask, "write", device="nobody", address=1, value=1)
-    assert (answer.status, answer.code, powers.done) == ("rejected", "unknown_device", [])
+    assert (answer.status, answer.code, fake.done) == ("rejected", "unknown_device", [])
 
 
 @pytest.mark.parametrize(("name", "more"), [("read", {}), ("write", {"value": 60})])
 def test_a_device_whose_id_is_another_ones_now_is_not_asked(
-    ask: Ask, powers: FakePowers, name: str, more: dict[str, int]
+    ask: Ask, fake: FakeContext, name: str, more: dict[str, int]
 ) -> None:
-    powers.holding.now = replace(powers.holding.now, conflicts={"vane": "its id is that of motor"})
+    fake.holding.now = replace(fake.holding.now, conflicts={"vane": "its id is that of motor"})
     answer = told(ask, name, device="vane", address=16, **more)
     assert (answer.status, answer.code, answer.message) == (
         "rejected",
         "line_error",
         "vane cannot be asked: its id is that of motor",
     )
-    assert powers.done == []
+    assert fake.done == []
 
 
 @pytest.mark.parametrize("name", builtin_names())
@@ -221,14 +221,14 @@ def test_a_device_whose_id_is_another_ones_now_is_not_asked(
     value=st.integers(0, 0xFFFF),
 )
 def test_nothing_but_documented_settings_is_ever_written(
-    ask: Ask, powers: FakePowers, name: str, address: int, value: int
+    ask: Ask, fake: FakeContext, name: str, address: int, value: int
 ) -> None:
     """LD-E's 0x1000 is the only writable register of all that come with lfs10d, and 1 its only content."""
     device = {"lfs10": "mast-top", "eh600": "motor", "fuling-dzb": "pump", "ld-e": "laser"}[name]
-    powers.done.clear()
+    fake.done.clear()
     answer = told(ask, "write", device=device, address=address, value=value)
     permitted = (name, address, value) == ("ld-e", 0x1000, 1)
-    assert bool(powers.done) is permitted
+    assert bool(fake.done) is permitted
     assert (answer.status == "ok") is permitted
 
 
@@ -246,9 +246,9 @@ def test_nothing_but_documented_settings_is_ever_written(
     ],
 )
 def test_a_read_that_brought_nothing_failed(
-    ask: Ask, powers: FakePowers, end: End, fault: Fault | None, code: str, words: str
+    ask: Ask, fake: FakeContext, end: End, fault: Fault | None, code: str, words: str
 ) -> None:
-    powers.came = {"end": end, "fault": fault}
+    fake.came = {"end": end, "fault": fault}
     answer = told(ask, "read", device="vane", address=16)
     assert (answer.status, answer.code, answer.message) == ("failed", code, words)
     assert answer.facts.get("exception_code") == (fault and fault.exception_code)
@@ -266,27 +266,27 @@ def test_a_read_that_brought_nothing_failed(
     ],
 )
 def test_a_write_that_was_not_even_sent_is_rejected_and_any_other_failed(
-    ask: Ask, powers: FakePowers, end: End, fault: Fault | None, code: str, *, sent: bool
+    ask: Ask, fake: FakeContext, end: End, fault: Fault | None, code: str, *, sent: bool
 ) -> None:
-    powers.came = {"end": end, "fault": fault, "sent": sent}
+    fake.came = {"end": end, "fault": fault, "sent": sent}
     answer = told(ask, "write", device="vane", address=16, value=2)
     assert (answer.status, answer.code) == ("failed" if sent else "rejected", code)
     assert answer.message.endswith("; nothing was written") is not sent
     assert answer.facts.get("exception_code") == (fault and fault.exception_code)
-    assert powers.told == []
+    assert fake.told == []
 
 
-def test_a_write_that_did_not_take_tells_what_the_register_holds(ask: Ask, powers: FakePowers) -> None:
-    powers.came = {"end": End.NOT_VERIFIED, "registers": (1,), "before": 1, "sent": True}
+def test_a_write_that_did_not_take_tells_what_the_register_holds(ask: Ask, fake: FakeContext) -> None:
+    fake.came = {"end": End.NOT_VERIFIED, "registers": (1,), "before": 1, "sent": True}
     answer = told(ask, "write", device="vane", address=16, value=2)
     assert (answer.status, answer.code) == ("failed", "not_verified")
     assert answer.message == "slave 5: the register holds 1 and not what was written"
     assert answer.data == {"device": "vane", "slave": 5, "address": 16, "value": 1, "before": 1}
-    assert powers.told == []
+    assert fake.told == []
 
 
-def test_a_write_that_cannot_be_read_back_is_not_verified(ask: Ask, powers: FakePowers) -> None:
-    powers.came = {"end": End.NOT_VERIFIED, "fault": REFUSED, "sent": True}
+def test_a_write_that_cannot_be_read_back_is_not_verified(ask: Ask, fake: FakeContext) -> None:
+    fake.came = {"end": End.NOT_VERIFIED, "fault": REFUSED, "sent": True}
     answer = told(ask, "write", slave=88, address=16, value=2)
     assert (answer.status, answer.code, answer.data) == ("failed", "not_verified", None)
     assert answer.message == ("slave 88: what was written cannot be read back: exception 02 illegal register address")

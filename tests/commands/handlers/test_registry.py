@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from lfs10d.commands.handlers.registry import REQUESTS
-from tests.support.context import Ask, FakePowers
+from lfs10d.commands.handlers.registry import HANDLERS
+from tests.support.context import Ask, FakeContext
 
 CLASSES = {
     "config/get": "always",
@@ -29,11 +29,11 @@ CLASSES = {
 
 @pytest.mark.parametrize(("name", "klass"), CLASSES.items())
 def test_every_request_is_of_the_class_the_contract_says(name: str, klass: str) -> None:
-    assert REQUESTS[name].form.klass == klass
+    assert HANDLERS[name].spec.klass == klass
 
 
-@pytest.mark.parametrize("name", sorted(REQUESTS))
-def test_no_request_takes_a_parameter_it_does_not_know(ask: Ask, powers: FakePowers, name: str) -> None:
+@pytest.mark.parametrize("name", sorted(HANDLERS))
+def test_no_request_takes_a_parameter_it_does_not_know(ask: Ask, fake: FakeContext, name: str) -> None:
     answer = ask(name, '{"nonsense":1}')
     assert (answer.status, answer.code, answer.facts["param"]) == ("rejected", "invalid_param", "nonsense")
-    assert powers.done == []
+    assert fake.done == []

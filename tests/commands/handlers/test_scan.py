@@ -10,7 +10,7 @@ import pytest
 from lfs10d.config.changes import Place
 from lfs10d.line.jobs.identification import FoundDevice
 from lfs10d.profiles.library import load_profile
-from tests.support.context import Ask, Asked, FakePowers
+from tests.support.context import Ask, Asked, FakeContext
 
 LFS10 = load_profile("lfs10", relative_to=Path())
 LD_E = load_profile("ld-e", relative_to=Path())
@@ -30,10 +30,10 @@ ALL = tuple(range(1, 256))
     ],
 )
 def test_it_is_looked_where_it_is_said(
-    asked: Asked, powers: FakePowers, parameters: dict[str, Any], wanted: tuple[object, ...]
+    asked: Asked, fake: FakeContext, parameters: dict[str, Any], wanted: tuple[object, ...]
 ) -> None:
     assert asked("line/scan", **parameters) == ("ok", {"found": []})
-    assert powers.done == [wanted]
+    assert fake.done == [wanted]
 
 
 @pytest.mark.parametrize(
@@ -45,13 +45,13 @@ def test_it_is_looked_where_it_is_said(
         *(("add", value) for value in (1, "true", None)),
     ],
 )
-def test_what_is_no_place_to_look_at_is_refused(asked: Asked, powers: FakePowers, param: str, value: object) -> None:
+def test_what_is_no_place_to_look_at_is_refused(asked: Asked, fake: FakeContext, param: str, value: object) -> None:
     assert asked("line/scan", **{param: value}) == ("rejected", ("invalid_param", param))
-    assert powers.done == []
+    assert fake.done == []
 
 
-def test_a_second_scan_waits(asked: Asked, powers: FakePowers) -> None:
-    powers.busy = True
+def test_a_second_scan_waits(asked: Asked, fake: FakeContext) -> None:
+    fake.busy = True
     assert asked("line/scan") == ("rejected", ("busy", None))
 
 
@@ -59,8 +59,8 @@ def found(slave: int, baudrate: int = 9600, **facts: Any) -> FoundDevice:  # noq
     return FoundDevice(slave, baudrate, answers=True, **{"profile": LFS10, "rtt": 0.0213, **facts})
 
 
-def test_each_who_was_found_is_told_with_what_is_known_of_it(asked: Asked, powers: FakePowers) -> None:
-    powers.findings = (found(2), found(3, 19200), found(4, profile=None, duplicate=True), found(255))
+def test_each_who_was_found_is_told_with_what_is_known_of_it(asked: Asked, fake: FakeContext) -> None:
+    fake.findings = (found(2), found(3, 19200), found(4, profile=None, duplicate=True), found(255))
     status, data = asked("line/scan")
     assert status == "ok"
     first, strange, last, other = data["found"]
@@ -75,19 +75,19 @@ def test_each_who_was_found_is_told_with_what_is_known_of_it(asked: Asked, power
 
 @pytest.mark.parametrize(("scanned", "code"), [((False, False), "cancelled"), ((False, True), "line_error")])
 def test_a_scan_that_did_not_come_to_its_end_tells_what_it_found_and_adds_nobody(
-    ask: Ask, powers: FakePowers, scanned: tuple[bool, bool], code: str
+    ask: Ask, fake: FakeContext, scanned: tuple[bool, bool], code: str
 ) -> None:
-    powers.findings, powers.scanned, powers.at = (found(9),), scanned, {9}
+    fake.findings, fake.scanned, fake.at = (found(9),), scanned, {9}
     answer = ask("line/scan", '{"add":true,"ids":"1-20"}')
     assert (answer.status, answer.code) == ("failed", code)
     assert answer.message.endswith("after 0 of 40 ids")
     assert isinstance(answer.data, dict)
     assert [each["id"] for each in answer.data["found"]] == [9]
-    assert len(powers.done) == 1
+    assert len(fake.done) == 1
 
 
-def test_who_is_new_recognised_and_beyond_doubt_is_added_as_by_device_add(asked: Asked, powers: FakePowers) -> None:
-    powers.findings = (
+def test_who_is_new_recognised_and_beyond_doubt_is_added_as_by_device_add(asked: Asked, fake: FakeContext) -> None:
+    fake.findings = (
         found(2),
         found(5),
         found(6, profile=LD_E),
@@ -96,7 +96,7 @@ def test_who_is_new_recognised_and_beyond_doubt_is_added_as_by_device_add(asked:
         found(9, 19200),
         found(250),
     )
-    powers.at = {5, 6}
+    fake.at = {5, 6}
     status, data = asked("line/scan", add=True, id="s")
     assert status == "ok"
     assert [(each["device"], each["slave"], each["profile"]) for each in data["added"]] == [
@@ -104,12 +104,12 @@ def test_who_is_new_recognised_and_beyond_doubt_is_added_as_by_device_add(asked:
         ("slave-6", 6, "ld-e"),
     ]
     assert data["not_added"] == []
-    assert [each["id"] for each in powers.told] == ["s", "s"]
-    assert powers.holding.now.changes.of("slave-6").added_at == Place(6)
+    assert [each["id"] for each in fake.told] == ["s", "s"]
+    assert fake.holding.now.changes.of("slave-6").added_at == Place(6)
 
 
-def test_who_could_not_be_added_is_told_with_the_reason(asked: Asked, powers: FakePowers) -> None:
-    powers.findings = (found(5), found(77))
+def test_who_could_not_be_added_is_told_with_the_reason(asked: Asked, fake: FakeContext) -> None:
+    fake.findings = (found(5), found(77))
     status, data = asked("line/scan", add=True)
     assert (status, data["added"]) == ("ok", [])
     assert [(each["id"], each["error"]["code"]) for each in data["not_added"]] == [

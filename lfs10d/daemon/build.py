@@ -1,0 +1,118 @@
+"""The composition root: builds the parts of a daemon in the order of the floors. No part is given a later one.
+
+What a part reports to later ones, it is given at its start: see `lfs10d.daemon.daemon`.
+"""
+
+from __future__ import annotations
+
+import os
+from functools import partial
+from pathlib import Path
+
+from lfs10d.commands.admission import Admission
+from lfs10d.commands.context import Context
+from lfs10d.commands.dispatcher import Dispatcher
+from lfs10d.commands.handlers.registry import HANDLERS
+from lfs10d.commands.line_access import LineAccess
+from lfs10d.commands.responder import Responder
+from lfs10d.config.changes_file import ChangesFile
+from lfs10d.config.live_config import LiveConfig
+from lfs10d.config.loader import LoadedConfig
+from lfs10d.daemon.boot import Boot
+from lfs10d.daemon.parts import Parts
+from lfs10d.daemon.settings import broker_settings, daemon_info, device_infos, line_info, store_limits
+from lfs10d.daemon.shutdown import Shutdown
+from lfs10d.daemon.signals import Signals
+from lfs10d.daemon.state_directory import status_file
+from lfs10d.daemon.status_file import StatusFile
+from lfs10d.daemon.storage import Storage
+from lfs10d.daemon.supervision import Supervision
+from lfs10d.line.line import Line
+from lfs10d.mqtt.publisher import Publisher
+from lfs10d.mqtt.uplink import Uplink
+from lfs10d.outbox.store.store import Store
+from lfs10d.reading import FaultCode
+from lfs10d.reconfiguration.baudrate_watch import BaudrateWatch
+from lfs10d.reconfiguration.journal import Journal
+from lfs10d.reconfiguration.reconfiguration import Reconfiguration
+from lfs10d.reconfiguration.restore import Restore
+from lfs10d.system.clock import Clock
+from lfs10d.system.disk import Disk
+from lfs10d.system.systemd import Notifier
+from lfs10d.telemetry.station import Station
+
+
+def build(file: LoadedConfig, boot: Boot, state_directory: Path, notifier: Notifier) -> Parts:
+    """Return the parts of a daemon, none of them started. Called in the asyncio loop, while it runs."""
+    shutdown = Shutdown()
+    clock = Clock()
+    config = LiveConfig(file, ChangesFile(state_directory, Disk()))
+    loaded, now = config.loaded, config.now.config
+
+    info = daemon_info(config.now, boot)
+    station = Station(info, line_info(now.line), device_infos(now, loaded.profiles), clock.now())
+    uplink = Uplink(
+        broker_settings(config),
+        base=f"{now.mqtt.base_topic}/{now.line.name}",
+        epoch_ms=clock.epoch_ms,
+        store=Store(state_directory, boot=boot.id, limits=store_limits(now.store)),
+    )
+    uplink.send_samples(telemetry=now.mqtt.telemetry)
+    publisher = Publisher(station, info, uplink, clock)
+    storage = Storage(state_directory, boot, publisher.set_line_error)
+
+    line = Line(now.line)
+    responder = Responder(
+        Admission({name: each.spec for name, each in HANDLERS.items()}, frozenset(now.commands)), uplink
+    )
+    reconfiguration = Reconfiguration(
+        Journal(state_directory, Disk()),
+        running=lambda: config.now,
+        change=config.change,
+        learn=config.learn,
+        wire=lambda: line,
+        tell=publisher.announce,
+        recall=responder.recall,
+        act=publisher.act,
+        repoll=lambda polled: line.take(polled, config.loaded.profiles),
+        now=clock.now,
+    )
+    line.take(reconfiguration.polled(), loaded.profiles)
+    watch = BaudrateWatch(
+        running=lambda: config.now,
+        new_run=reconfiguration.new_run,
+        devices=line.devices,
+        tell=partial(publisher.set_line_error, FaultCode.WRONG_RATE),
+    )
+    if config.missing:
+        restore = Restore(
+            running=lambda: config.now, learn=config.learn, devices=line.devices, announce=publisher.announce
+        )
+        uplink.read_back(restore.topics, restore.on_retained)
+
+    access = LineAccess(line, config, publisher, reconfiguration)
+    dispatcher = Dispatcher(HANDLERS, Context(config, access, reconfiguration, publisher), responder)
+
+    path = status_file(loaded.path, now.line.name, os.environ, root=os.geteuid() == 0)
+    return Parts(
+        notifier=notifier,
+        shutdown=shutdown,
+        clock=clock,
+        config=config,
+        uplink=uplink,
+        publisher=publisher,
+        storage=storage,
+        line=line,
+        reconfiguration=reconfiguration,
+        baudrate_watch=watch,
+        access=access,
+        dispatcher=dispatcher,
+        signals=Signals(notifier, end=shutdown.request, reload=config.reload, summary=publisher.summary),
+        supervision=Supervision(
+            notifier,
+            None if path is None else StatusFile(path),
+            declared=lambda: line.declared,
+            snapshot=publisher.health,
+            summary=publisher.summary,
+        ),
+    )
