@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from lfs10d.outbox.history import QueuedSample
 from lfs10d.outbox.items import HistoryBatch, LiveSample, LossNotice, Message, OutboxItem, Retained, samples_of
 from lfs10d.outbox.losses import Loss
 from lfs10d.telemetry.publication import Publication, PublicationKind, event, retained
+from tests.support.outbox_items import live
 from tests.support.samples import SAMPLE
 
 KEPT = QueuedSample(SAMPLE, since=0.0)
@@ -34,3 +37,19 @@ def test_each_item_has_its_topic_and_its_samples(
 def test_two_items_that_say_the_same_are_two_messages() -> None:
     items: list[OutboxItem] = [LiveSample(LIVE, KEPT), LiveSample(LIVE, KEPT)]
     assert items.index(items[1]) == 1
+
+
+def test_a_live_sample_is_given_the_time_that_the_clock_tells_now_in_its_payload_too() -> None:
+    item = live("a", 1)
+    measured = replace(item.queued.sample, clock="unsynced")
+    early = replace(
+        item,
+        queued=replace(item.queued, sample=measured, shift=0),
+        publication=replace(item.publication, payload={"ts": 1000, "clock": "unsynced", "seq": 1}),
+    )
+    right = early.at(60_000)
+    assert right.publication.payload == {
+        "ts": 61_000, "time": "1970-01-01T00:01:01.000Z", "clock": "synced", "seq": 1,
+    }  # fmt: skip
+    assert right.publication.sample == right.queued.sample
+    assert right.at(90_000) is right, "its clock was synchronised"

@@ -146,3 +146,11 @@ def test_a_loss_notice_that_ends_the_connection_waits(waiting: Waiting) -> None:
     notice = LossNotice(Loss("a", "k", 1, 2, 2))
     waiting.queues.condemn(Culprit("event", 90), [notice, event("x")], 0.0, denied=False)
     assert waiting.backlog.losses.waiting() == [notice.loss]
+
+
+def test_where_the_last_of_a_burst_is_refused_the_rest_goes_on(waiting: Waiting) -> None:
+    sample = live("a", 1)
+    waiting.refusals.refused("availability", NOT_AUTHORIZED, 0.0)
+    waiting.queues.retained.burst([], publication.retained("availability", "online"))
+    waiting.queues.live.add(sample)
+    assert waiting.queues.next(0.0, batch=True) is sample

@@ -83,3 +83,11 @@ def test_one_that_is_refused_twice_at_once_is_passed_over_for_the_longer_time() 
     refusals.refused("t", LATER, 0.0)
     assert refusals.due() is None
     assert refusal_of(DENIED) is Refusal.DENIED
+
+
+def test_a_message_that_is_wrong_in_itself_is_reported_once_for_its_topic_until_a_reload() -> None:
+    refusals = Refusals()
+    assert [refusals.unfit("event"), refusals.unfit("event"), refusals.unfit("state")] == [True, False, True]
+    assert refusals.topics == set()
+    refusals.reload(0.0)
+    assert refusals.unfit("event")

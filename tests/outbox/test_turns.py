@@ -4,10 +4,24 @@ from __future__ import annotations
 
 from collections import Counter
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.outbox.turns import Turns
+from lfs10d.outbox.turns import (
+    CHANGES,
+    CLEARINGS,
+    HISTORY,
+    LEAST_WEIGHT,
+    LIVE,
+    MESSAGES,
+    REFRESH_WEIGHT,
+    REFRESHES,
+    TRACES,
+    WEIGHT,
+    Turns,
+    weight,
+)
 
 
 def test_equals_go_in_their_order_and_then_in_turn() -> None:
@@ -58,3 +72,21 @@ def test_the_first_classes_go_before_the_others() -> None:
         turns.went(0, 1)
     assert turns.order(first=2) == [1, 0, 2, 3]
     assert turns.order() == [1, 2, 3, 0]
+
+
+@pytest.mark.parametrize(
+    ("number", "bursting", "expected"),
+    [
+        (CHANGES, False, WEIGHT),
+        (CHANGES, True, 2 * WEIGHT),
+        (MESSAGES, False, WEIGHT),
+        (LIVE, True, WEIGHT),
+        (HISTORY, False, 4 * WEIGHT),
+        (HISTORY, True, WEIGHT),
+        (REFRESHES, False, REFRESH_WEIGHT),
+        (TRACES, False, LEAST_WEIGHT),
+        (CLEARINGS, True, LEAST_WEIGHT),
+    ],
+)
+def test_the_weight_of_a_class(number: int, *, bursting: bool, expected: int) -> None:
+    assert weight(number, bursting=bursting, level=4) == expected
