@@ -1,8 +1,9 @@
-"""A start that costs little: what no daemon needs is not imported, and nobody looks for garbage among what was.
+"""A start that costs little: no search for plugins, no web client, no garbage collection of what was imported.
 
-pydantic asks every installed distribution for plugins by `importlib.metadata`, which brings a reader of zip files and
-more with it: 0.9 MB for good, and time of the start, for plugins that a daemon has none of. paho imports a client of
-the web, 2 MB, to look for a proxy, which it does only where PySocks is installed.
+Pydantic searches every installed distribution for plugins by `importlib.metadata`, which imports `email` and `zipfile`.
+paho imports `urllib.request` for a proxy that it looks for only where PySocks is installed. Together they cost 2.7 MB
+for good. Pydantic's documented switch (PYDANTIC_DISABLE_PLUGINS) skips the search but not the import, and paho has
+none: docs/decisions/0006-at-the-wires-limit.md has the figures.
 """
 
 from __future__ import annotations
@@ -14,13 +15,13 @@ import urllib
 from types import ModuleType
 
 _LOADER = "pydantic.plugin._loader"
-"""Where pydantic looks for plugins, as of 2.14."""
+"""Where pydantic searches for plugins, as of 2.14."""
 
 _WEB = "urllib.request"
 
 
-class Later(ModuleType):
-    """Stands in for a module until something is wanted of it; then it gives way to the true one."""
+class LazyModule(ModuleType):
+    """Stands in for a module until one of its attributes is wanted; then the true module takes its place."""
 
     def __getattr__(self, name: str) -> object:
         """Return what the true module has, unless it is Python's import that asks."""
@@ -31,12 +32,12 @@ class Later(ModuleType):
         return getattr(importlib.import_module(self.__name__), name)
 
 
-class NoPlugins(Later):
-    """Stands in for the module that looks for plugins; whatever else is wanted of it is the true one's."""
+class NoPlugins(LazyModule):
+    """Stands in for the module that searches for plugins; its other attributes are the true module's."""
 
     @staticmethod
     def get_plugins() -> tuple[()]:
-        """Return that there are none."""
+        """Return no plugins."""
         return ()
 
 
@@ -44,10 +45,10 @@ def begin() -> None:
     """Prepare for importing; to be called before pydantic and paho are imported, and `done` after all is."""
     sys.modules.setdefault(_LOADER, NoPlugins(_LOADER))
     if _WEB not in sys.modules:
-        sys.modules[_WEB] = later = Later(_WEB)
+        sys.modules[_WEB] = later = LazyModule(_WEB)
         setattr(urllib, "request", later)  # noqa: B010  # as an import of it would do; no type checker knows of it
 
 
 def done() -> None:
-    """Never look for garbage among what was imported: the line would have to wait meanwhile."""
+    """Leave what was imported out of garbage collection: the line would have to wait meanwhile."""
     gc.freeze()

@@ -61,7 +61,7 @@ def test_what_stands_in_for_a_client_of_the_web_gives_way_to_it() -> None:
         "print(web.getproxies.__module__, web.Request.__name__, 'http.client' in sys.modules)\n"
         "import urllib.request; print(type(urllib.request).__name__)"
     )
-    assert in_a_fresh_interpreter(code).splitlines() == ["Later False", "urllib.request Request True", "module"]
+    assert in_a_fresh_interpreter(code).splitlines() == ["LazyModule False", "urllib.request Request True", "module"]
 
 
 def test_a_client_of_the_web_that_is_there_stays() -> None:
