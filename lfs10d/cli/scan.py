@@ -151,7 +151,7 @@ class _Result:
 def _scan(result: _Result, *, as_json: bool) -> int:
     """Scan to the end, or until it is ended; return the exit code."""
     scan, port = result.scan, result.line.port
-    first_rate = scan.search.timings[0].baudrate
+    first_rate = scan.plan.timings[0].baudrate
     try:
         with DirectLine(result.line.settings(first_rate)) as line:
             while not line.events(LOOK_EVERY):

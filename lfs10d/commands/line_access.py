@@ -83,7 +83,7 @@ class LineAccess:
             raise RefusedError(FREED)
         with self._reservation.place("line/scan"):
             loaded = self._config.loaded
-            plan = await run_in_thread(partial(settings.search, loaded, ids, rates, share=share), "profiles")
+            plan = await run_in_thread(partial(settings.scan_plan, loaded, ids, rates, share=share), "profiles")
             return await self._scanner.scan(plan)
 
     async def pause(self, duration: float) -> None:

@@ -1,4 +1,4 @@
-"""Runtime truth per device: where it answers, how it is, how long it may take.
+"""One device at run time: its health, its learned time-outs, when it is polled again.
 
 Rules
 -----

@@ -1,6 +1,6 @@
 """The line as the daemon holds it: port, bus, scheduler and poller, and the thread that owns them.
 
-What the thread hears is taken over to the asyncio loop by one `call_soon_threadsafe` per exchange.
+What happens in the thread is handed over to the asyncio loop by one `call_soon_threadsafe` per exchange.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ class Line:
         self.wake()
 
     def resume_procedure(self, procedure: Procedure, result: object) -> None:
-        """Tell a course what came of what it had done aside."""
+        """Give a procedure the result of what it awaited."""
 
         def tell(now: float) -> None:
             procedure.resume(result)

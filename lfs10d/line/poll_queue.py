@@ -1,4 +1,4 @@
-"""Which poll is next: fixed grids, the earliest due first; then devices with interval 0 in turn.
+"""The queue of polls: fixed grids, the earliest due first; then devices with interval 0 in turn.
 
 Polls lie on a fixed grid per device: no drift. A point of the grid that is missed is skipped and counted. A retry
 goes behind what was due before the attempt failed. So overload degrades evenly, and no device is asked twice before

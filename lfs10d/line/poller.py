@@ -1,4 +1,4 @@
-"""The body of the line thread: the scheduler decides, the bus obeys, what was heard goes out as events.
+"""The body of the line thread: the scheduler decides, the bus carries out, what happened goes out as events.
 
 `Poller.turn` is called with a time and says when to come back: by `LineThread` with the real clock, by tests with a
 virtual one. Other threads only `post`.

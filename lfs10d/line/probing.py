@@ -2,7 +2,7 @@
 
 An offline device is probed after 1 s, 2 s, 4 s ... up to `probe_interval_max`. All probes together take at most 5 % of
 the line while any device answers. While none does they have the line in turn, each at most once a second; the first
-answer then makes all of them due at once, share or no share: after a power cut everybody is found in seconds.
+answer then makes all of them due at once, share or no share: after a power cut every device is found in seconds.
 """
 
 from __future__ import annotations
@@ -25,29 +25,29 @@ PROBE_SPACING = 1.0
 class ProbeAccount:
     """The share that all probes have together; it binds only while any device answers."""
 
-    def __init__(self, probing: Probing, share: Quota) -> None:
+    def __init__(self, probing: Probing, quota: Quota) -> None:
         self._probing = probing
-        self._share = share
+        self._quota = quota
 
     def allows(self, now: float) -> bool:
         """Whether the line may be used now."""
-        return not self._probing.anyone_online or self._share.allows(now)
+        return not self._probing.anyone_online or self._quota.allows(now)
 
     def ready_at(self, now: float) -> float:
         """When the line may be used next; not before `now`."""
-        return self._share.ready_at(now) if self._probing.anyone_online else now
+        return self._quota.ready_at(now) if self._probing.anyone_online else now
 
     def spend(self, taken: float, now: float) -> None:
         """Note that `taken` s of the line were used."""
         if self._probing.anyone_online:
-            self._share.spend(taken, now)
+            self._quota.spend(taken, now)
 
 
 class Probing:
     """The offline devices of one line; `now` is the line's clock at the beginning."""
 
     def __init__(self, now: float) -> None:
-        self._share = Quota(PROBE_SHARE, credit=PROBE_CREDIT, now=now)
+        self._quota = Quota(PROBE_SHARE, credit=PROBE_CREDIT, now=now)
         self._offline: list[Device] = []
         self.anyone_online = False
         self.next_at = inf
@@ -66,7 +66,7 @@ class Probing:
 
     def plan(self, now: float) -> None:
         """Find out when a probe may be next: `next_at`."""
-        ready = self._share.ready_at(now)
+        ready = self._quota.ready_at(now)
         self.next_at = min((self._allowed_at(device, ready) for device in self._offline), default=inf)
 
     def stop(self) -> None:
@@ -79,7 +79,7 @@ class Probing:
         """Return the device to probe now, if any."""
         if now < self.next_at:
             return None
-        ready = self._share.ready_at(now)
+        ready = self._quota.ready_at(now)
         waiting = [d for d in self._offline if not d.polling and d.slave not in excluded]
         device = min(waiting, key=lambda d: (not d.probe_exempt, self._wished_at(d)), default=None)
         if device is None:
@@ -91,12 +91,12 @@ class Probing:
     @property
     def account(self) -> ProbeAccount:
         """The share of probes, for jobs that probe too."""
-        return ProbeAccount(self, self._share)
+        return ProbeAccount(self, self._quota)
 
     def spend(self, device: Device, taken: float, now: float) -> None:
         """Note that a probe of `device` took `taken` s of the line."""
         if self.anyone_online and not device.probe_exempt:
-            self._share.spend(taken, now)
+            self._quota.spend(taken, now)
 
     def _wished_at(self, device: Device) -> float:
         return device.next_probe if self.anyone_online else device.last_asked + PROBE_SPACING

@@ -73,10 +73,10 @@ def _device_spec(slave: SlaveConfig, line: LineConfig, profile: Profile) -> Devi
     )
 
 
-def search(loaded: LoadedConfig, ids: tuple[int, ...], rates: tuple[int, ...], *, share: float) -> ScanPlan:
-    """Return what to look for on the line; without `rates` its own, and those an LFS10 can have.
+def scan_plan(loaded: LoadedConfig, ids: tuple[int, ...], rates: tuple[int, ...], *, share: float) -> ScanPlan:
+    """Return the plan of a scan; without `rates` its own, and those an LFS10 can have.
 
-    Everybody is asked with the check that all configured devices share, or CRC. May read the built-in profiles.
+    Every id is asked with the check that all configured devices share, or CRC. May read the built-in profiles.
     """
     line, builtin = loaded.config.line, builtin_names()
     checksums = {spec.codec.checksum for spec in device_specs(loaded.config, loaded.profiles)}

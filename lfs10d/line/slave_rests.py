@@ -1,4 +1,4 @@
-"""Until when each slave of a line must be left in peace, whoever wants to ask it. Pure.
+"""The rest of each slave between two exchanges, whatever they are for. Pure.
 
 Rules
 -----

@@ -1,4 +1,4 @@
-"""What a change costs the others, so that they keep 90 % of their rate on a line that is 70 % full. Pure.
+"""What a change is charged beyond its own time: the polls keep 90 % of their rate on a 70 % full line. Pure.
 
 Rules
 -----

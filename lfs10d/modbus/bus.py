@@ -1,8 +1,8 @@
-"""The bus: owns the port and obeys one order at a time.
+"""The bus: owns the port and carries out one request at a time.
 
 A thin shell around `Exchange`; it decides nothing but when to reopen the port. Every byte on the line passes here,
 in one thread. `step` does what can be done now and says when to come back; the thread waits in between, in virtual
-time nobody does.
+time there is no wait.
 """
 
 from __future__ import annotations

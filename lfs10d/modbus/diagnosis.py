@@ -1,4 +1,4 @@
-"""What went wrong in an exchange without an answer: the fault's code and words for the person on the roof."""
+"""What went wrong in an exchange without an answer: the fault's code and a message for the installer."""
 
 from __future__ import annotations
 

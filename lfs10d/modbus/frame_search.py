@@ -1,6 +1,6 @@
-"""Finding frames in what the line gave, through noise, at every offset.
+"""Finds frames in what was received, through noise, at every offset.
 
-A `ExpectedFrame` is one right answer looked for. Its head (slave id, function, count) is found by a plain search, its
+An `ExpectedFrame` is one right answer looked for. Its head (slave id, function, count) is found by a plain search, its
 length is known from its shape, so each byte is looked at a fixed number of times however long the garbage is.
 Positions count characters from the beginning of the exchange.
 """

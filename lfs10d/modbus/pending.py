@@ -1,4 +1,4 @@
-"""Which requests may still be answered: the memory that keeps a late answer from passing for the next one.
+"""The requests that may still be answered, kept so that a late answer is not taken for the next one.
 
 Modbus RTU has no transaction id, and no waiting time proves that a late answer will not come. So a request that got
 no answer stays here until its slave has answered something that can only be newer, for a slave answers in order.

@@ -1,4 +1,4 @@
-"""Why a port cannot be used, in words for the person who must act.
+"""Errors of a port, with a message that says what to do.
 
 `look` gathers what the words need, `refusal` chooses them. ENOENT, ENODEV, ENXIO, EIO, EACCES and EBUSY all mean
 "not yet": an adapter that comes back passes through several of them before udev is done with it.

@@ -1,4 +1,4 @@
-"""One owner of a port: the locks that say so, and who holds it instead.
+"""Locks a port for one owner, and finds the process that holds it instead.
 
 flock keeps out every program that asks by flock, root's too. TIOCEXCL keeps out those that ask nothing, but lets
 root pass; so root looks whether the flag was there already. On a pty TIOCEXCL is not set: there the flag lives as

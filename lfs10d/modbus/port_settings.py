@@ -1,4 +1,4 @@
-"""How a port is to be set: plain values, checked once, known to whoever opens one."""
+"""The settings of a port: plain values, checked once."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from lfs10d.config.loader import load
 from lfs10d.line.jobs.scan import Scan
 from lfs10d.line.poller import Poller
 from lfs10d.line.scheduler import Scheduler
-from lfs10d.line.settings import search
+from lfs10d.line.settings import scan_plan
 from lfs10d.modbus.bus import Bus, LineRules
 from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.reading import Event
@@ -44,7 +44,7 @@ class Bench:
         self.scanning = Scanner(submit=self.poller.submit, act=self.acts.append, announce=self._announce)
         file = folder / "lfs10d.yaml"
         file.write_text("line: {port: tty}\nslaves: []\nmqtt: {host: localhost}\n")
-        self.search = search(load(file), IDS, (9600,), share=0.9)
+        self.search = scan_plan(load(file), IDS, (9600,), share=0.9)
 
     def _announce(self, kind: str, facts: Mapping[str, object]) -> None:
         self.told.append({"type": kind, **facts})

@@ -10,7 +10,15 @@ from lfs10d import profiles
 from lfs10d.config.loader import LoadedConfig, load
 from lfs10d.daemon.settings import config_hash, device_infos, line_info
 from lfs10d.line.budget import timing_of
-from lfs10d.line.settings import access_target, device_specs, line_rules, poll_rules, port_settings, search, usual_codec
+from lfs10d.line.settings import (
+    access_target,
+    device_specs,
+    line_rules,
+    poll_rules,
+    port_settings,
+    scan_plan,
+    usual_codec,
+)
 from lfs10d.modbus.frames import Checksum, Framing
 from lfs10d.modbus.port_settings import PortSettings, Rs485
 
@@ -109,13 +117,13 @@ def test_registers_are_accessed_as_the_device_is_polled_or_as_the_line_usually_s
 
 
 def test_a_scan_looks_at_the_lines_own_rate_first_and_at_both_of_an_lfs10(loaded: LoadedConfig) -> None:
-    found = search(loaded, (1, 2), (), share=0.3)
+    found = scan_plan(loaded, (1, 2), (), share=0.3)
     assert [timing.baudrate for timing in found.timings] == [19200, 9600]
     assert all(timing.bits == timing_of(loaded.config.line).bits for timing in found.timings)
     assert (found.ids, found.line_rate, found.share) == ((1, 2), 19200, 0.3)
     assert found.codec.checksum is Checksum.CRC, "not all devices have the same one"
     assert found.profiles[0].name == "lfs10"
-    chosen = search(loaded, (1,), (4800, 9600), share=1.0)
+    chosen = scan_plan(loaded, (1,), (4800, 9600), share=1.0)
     assert [timing.baudrate for timing in chosen.timings] == [4800, 9600]
     assert chosen.share < 1, "polling goes on"
 
@@ -124,7 +132,7 @@ def test_a_scan_asks_with_the_check_that_all_devices_share(tmp_path: Path) -> No
     file = tmp_path / "lfs10d.yaml"
     slave = "{id: 4, profile: eh600, checksum: sum}"
     file.write_text(f"line: {{port: tty}}\nslaves: [{slave}]\nmqtt: {{host: localhost}}\n")
-    found = search(load(file), (1,), (), share=0.3)
+    found = scan_plan(load(file), (1,), (), share=0.3)
     assert found.codec.checksum is Checksum.SUM
     assert {"sum"} <= {checksum for profile in found.profiles for checksum in profile.checksums}
 
@@ -137,7 +145,7 @@ def test_on_an_ascii_line_those_are_looked_for_that_speak_it_own_profiles_first(
         "line: {port: tty, framing: ascii, baudrate: 4800}\nslaves: [{id: 4, profile: mine.yaml}]\n"
         "mqtt: {host: localhost}\n"
     )
-    found = search(load(file), (1,), (), share=0.3)
+    found = scan_plan(load(file), (1,), (), share=0.3)
     assert found.codec.framing is Framing.ASCII
     assert [timing.baudrate for timing in found.timings] == [4800]
     assert found.profiles[0].name == "mine"

@@ -1,4 +1,4 @@
-"""Who speaks next: classes of jobs, probes and polls, the port's loss, and one reading per poll."""
+"""What is asked next: classes of jobs, probes and polls, the port's loss, and one reading per poll."""
 
 from __future__ import annotations
 

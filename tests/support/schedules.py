@@ -1,4 +1,4 @@
-"""A scheduler on a line whose `dead` slaves are silent, in virtual time: for the tests of who speaks next."""
+"""A scheduler on a line whose `dead` slaves are silent, in virtual time: for the tests of what is asked next."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ def view(scan: Scan, port: str, *, quiet: bool) -> Iterator[ScanView]:
 
 def announcement(scan: Scan, port: str) -> str:
     """Return what is about to happen and how long it takes."""
-    search = scan.search
+    search = scan.plan
     rates = " and ".join(str(timing.baudrate) for timing in search.timings)
     ids = f"id {search.ids[0]}" if len(search.ids) == 1 else f"{len(search.ids)} ids"
     return f"Scanning {port}: {ids} at {rates} baud, about {span(search.expected)}. Nothing is written. Ctrl-C ends it."
@@ -102,7 +102,7 @@ class _Drawn:
         self._scan = scan
         self._bar = bar
         self._news = _News(scan)
-        self._task = bar.add_task("", total=100.0, remaining=span(scan.search.expected))
+        self._task = bar.add_task("", total=100.0, remaining=span(scan.plan.expected))
 
     def update(self) -> None:
         """Move the bar; put each finding above it."""

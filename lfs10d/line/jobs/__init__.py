@@ -1,1 +1,1 @@
-"""What is done on the line, each as a pure job: poll, probe, and later scan and changes."""
+"""Jobs of the line, all pure: polls and probes, pings, register access, scans and procedures."""

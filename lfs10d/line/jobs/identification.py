@@ -1,4 +1,4 @@
-"""Who is it? A few reads of one slave id at which something was heard: is it one device, which one, how fast. Pure.
+"""Identification of a slave id that answered: whether it is one device, of which profile, how fast. Pure.
 
 Rules
 -----
@@ -37,7 +37,7 @@ SILENCES = 3
 _EXCEPTION_BODY = 3
 """Slave, function, code: the body of the shortest answer (Modbus Application Protocol V1.1b3, section 7)."""
 
-Conversation: TypeAlias = "Generator[ReadRegisters, Outcome, FoundDevice | None]"
+IdentificationSteps: TypeAlias = "Generator[ReadRegisters, Outcome, FoundDevice | None]"
 """Yields what to read, is sent the outcome, returns what was found; None: nobody is there."""
 
 
@@ -118,19 +118,19 @@ def _read_of(block: Block, slave: int) -> ReadRegisters:
 
 
 class Identification:
-    """One slave id at one rate; `first` is an outcome that is known already. `converse` does it."""
+    """One slave id at one rate; `first` is an outcome that is known already. `steps` does it."""
 
-    def __init__(self, finding: FoundDevice, profiles: Sequence[Profile], codec: Codec, first: Outcome | None) -> None:
-        self._finding = finding
-        self._slave = finding.slave
-        self._profiles = [profile for profile in profiles if profile.ids[0] <= finding.slave <= profile.ids[1]]
+    def __init__(self, found: FoundDevice, profiles: Sequence[Profile], codec: Codec, first: Outcome | None) -> None:
+        self._found = found
+        self._slave = found.slave
+        self._profiles = [profile for profile in profiles if profile.ids[0] <= found.slave <= profile.ids[1]]
         self._codec = codec
         self._told: dict[object, Outcome | None] = {}
         self._rtts: list[float] = []
         if first is not None and self._listen(first):
             self._told[first.request] = first
 
-    def converse(self) -> Conversation:
+    def steps(self) -> IdentificationSteps:
         """Ask until it is clear who is there."""
         for profile in self._profiles:
             if (yield from self._fits(profile)):
@@ -140,11 +140,11 @@ class Identification:
             yield from self._hear(ReadRegisters(self._slave, 0, 1))
         rtts = sorted(self._rtts)
         self._note(rtt=rtts[len(rtts) // 2] if rtts else None)
-        finding = self._finding
-        return finding if finding.answers or finding.duplicate else None
+        found = self._found
+        return found if found.answers or found.duplicate else None
 
     def _note(self, **changes: object) -> None:
-        self._finding = replace(self._finding, **changes)  # type: ignore[arg-type]  # replace checks the names
+        self._found = replace(self._found, **changes)  # type: ignore[arg-type]  # replace checks the names
 
     def _fits(self, profile: Profile) -> Generator[ReadRegisters, Outcome, bool]:
         sure, number = False, None
@@ -161,7 +161,7 @@ class Identification:
         values: Mapping[str, Number] | Fault = {}
         if outcome is not None and outcome.answer is not None:
             values = profile.decode(block, outcome.answer)
-        elif outcome is not None or not (sure and self._finding.duplicate):
+        elif outcome is not None or not (sure and self._found.duplicate):
             return False
         if isinstance(values, Fault) or not (yield from self._rate_agrees(profile)):
             return False
@@ -173,7 +173,7 @@ class Identification:
             return True
         said = yield from self._hear(ReadRegisters(self._slave, profile.baudrate.register, 1, READ_HOLDING_REGISTERS))
         code = None if said is None or said.answer is None else said.answer[0]
-        return rate_fits(profile, code, self._finding.baudrate)
+        return rate_fits(profile, code, self._found.baudrate)
 
     def _hear(self, request: ReadRegisters) -> Generator[ReadRegisters, Outcome, Outcome | None]:
         """Ask one read, again where rules 3 and 4 say so; return the outcome that is to be believed."""
@@ -189,8 +189,8 @@ class Identification:
                 believed = believed or outcome
             elif not spoilt(outcome, self._codec):
                 silences += 1
-        if broken > self._finding.spoilt:
-            duplicate = self._finding.duplicate or broken >= (SPOILT if self._finding.answers else ALL_SPOILT)
+        if broken > self._found.spoilt:
+            duplicate = self._found.duplicate or broken >= (SPOILT if self._found.answers else ALL_SPOILT)
             self._note(spoilt=broken, tries=tries, duplicate=duplicate)
         self._told[request] = believed
         return believed

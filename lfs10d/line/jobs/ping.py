@@ -1,4 +1,4 @@
-"""Is anybody there? One slave id that nobody polls is asked a few times, until it answers. Pure; it only reads."""
+"""A ping: one slave id that is not polled is asked a few times, until it answers. Pure; it only reads."""
 
 from __future__ import annotations
 

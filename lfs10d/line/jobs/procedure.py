@@ -1,8 +1,8 @@
-"""A course: a job whose questions follow from the answers, told as one generator. Pure.
+"""A procedure: a job whose requests follow from the answers, written as one generator. Pure.
 
 Its generator yields `Ask` and is sent the outcome; yields `Hold(until)` to rest; yields `Await(...)` to have something
 done off the line (an intent put on the disk) and is sent what `resume` brings, while others have the line. What it
-returns goes aside too: the job is over only when that has been taken care of, so that its slave ids stay its own
+returns goes there too: the job is over only when that has been taken care of, so that its slave ids stay its own
 until the configuration says who has them. Where the port is lost `LineLostError` is thrown into it.
 """
 
@@ -23,19 +23,19 @@ SLICE = 0.25
 
 
 class LineLostError(Exception):
-    """The port is lost in the middle of a course."""
+    """The port is lost in the middle of a procedure."""
 
 
 @dataclass(frozen=True, slots=True)
 class Await:
-    """Something to be done off the line; the course goes on when it is."""
+    """Something to be done off the line; the procedure goes on when it is."""
 
     what: object
 
 
 @dataclass(frozen=True, slots=True)
 class Finished:
-    """The course is at its end: `result` is what it returned, None where the port was lost before it could say."""
+    """The procedure is at its end: `result` is what it returned, None where the port was lost before it could say."""
 
     result: Any
 
@@ -45,14 +45,14 @@ Steps: TypeAlias = "Generator[Step, Any, Any]"
 
 
 class ProcedureClock:
-    """The time at which a course goes on."""
+    """The time at which a procedure goes on."""
 
     def __init__(self) -> None:
         self.now = 0.0
 
 
 class Procedure:
-    """The job. `aside(course, what)` is told what to do off the line, and in the end `Finished` with what was returned.
+    """The job. `on_await(procedure, what)` is called with what to do off the line, and in the end with `Finished`.
 
     It is called once for each, in the line's thread, and is answered with `resume` and a wake. `line_rate` is the
     line's own rate.
@@ -62,7 +62,7 @@ class Procedure:
         self,
         steps: Steps,
         clock: ProcedureClock,
-        aside: Callable[[Procedure, object], None],
+        on_await: Callable[[Procedure, object], None],
         *,
         line_rate: int,
         excludes: frozenset[int] = frozenset(),
@@ -74,7 +74,7 @@ class Procedure:
         self.purpose = purpose
         self._steps = steps
         self._clock = clock
-        self._aside = aside
+        self._on_await = on_await
         self._line_rate = line_rate
         self._following: Step | None = None
         self._begun = self._told = self._over = False
@@ -83,11 +83,11 @@ class Procedure:
         self._slice_until = -inf
 
     def halt(self) -> None:
-        """Send no new frame from now on, and tell nothing; from any thread."""
+        """Send no new frame from now on, and report nothing; from any thread."""
         self._over = True
 
     def resume(self, answer: object = None) -> None:
-        """Tell what came of the thing done aside; the scheduler must be told to wake the job then."""
+        """Take what came of the thing done off the line; the scheduler must be told to wake the job then."""
         self._answer = (answer,)
 
     # -- as a job
@@ -109,7 +109,7 @@ class Procedure:
                     return step
                 self._advance(None)
             elif self._answer is None:
-                self._tell_aside()
+                self._announce()
                 if self._answer is None:
                     return Hold()
             else:
@@ -121,14 +121,14 @@ class Procedure:
                     self._advance(answer)
         return Done()
 
-    def _tell_aside(self) -> None:
+    def _announce(self) -> None:
         if not self._told:
             self._told = True
             step = self._following
             if isinstance(step, Await):
-                self._aside(self, step.what)
+                self._on_await(self, step.what)
             else:
-                self._aside(self, Finished(self._result))
+                self._on_await(self, Finished(self._result))
 
     def _advance(self, value: object) -> None:
         try:
@@ -154,7 +154,7 @@ class Procedure:
         return Requeue(now)
 
     def cut_off(self, now: float) -> None:
-        """Learn that the port is lost: the course says what that makes of it."""
+        """Learn that the port is lost: the procedure says what that makes of it."""
         self._clock.now = now
         if self._over or (self._begun and self._following is None):
             return
@@ -165,6 +165,6 @@ class Procedure:
         try:
             self._steps.throw(LineLostError())
         except StopIteration as end:
-            self._aside(self, Finished(end.value))
+            self._on_await(self, Finished(end.value))
         except LineLostError:
-            self._aside(self, Finished(None))
+            self._on_await(self, Finished(None))

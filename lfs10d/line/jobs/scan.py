@@ -1,4 +1,4 @@
-"""A scan: who is on the line? Every slave id at every rate is asked once, whoever is heard is interviewed. Pure.
+"""A scan of the line: every slave id is asked once at every rate, and each that answers is identified. Pure.
 
 Rules
 -----
@@ -28,7 +28,7 @@ from lfs10d.modbus.outcome import Outcome
 from lfs10d.reading import Fault, FaultCode, Purpose
 
 PATIENT_TIMEOUT = 0.4
-"""How long an id is waited for in an interview or asked once more, in s."""
+"""How long an id is waited for while it is identified, or asked once more, in s."""
 SLICE = 0.25
 """The longest stay at another rate than the line's, in s."""
 BEFORE_NOISE = 5
@@ -71,8 +71,8 @@ class Noise:
     last: Fault | None = None
 
 
-def _nobody(_: Scan) -> None:
-    """Tell nobody."""
+def _ignore(_: Scan) -> None:
+    """Report to nobody."""
 
 
 class Scan:
@@ -84,38 +84,38 @@ class Scan:
     purpose = Purpose.SCAN
     excludes: frozenset[int] = frozenset()
 
-    def __init__(self, search: ScanPlan, ended: Callable[[Scan], None] = _nobody) -> None:
-        self.search = search
-        self.share = search.share
+    def __init__(self, plan: ScanPlan, ended: Callable[[Scan], None] = _ignore) -> None:
+        self.plan = plan
+        self.share = plan.share
         self.over = self.complete = self.lost = False
         self._ended = ended
         self.noise = Noise()
         self._found: dict[tuple[int, int], FoundDevice] = {}
         self._slow: set[int] = set()
-        self._asked_at: dict[int, set[int]] = {timing.baudrate: set() for timing in search.timings}
+        self._asked_at: dict[int, set[int]] = {timing.baudrate: set() for timing in plan.timings}
         self._asked = 0
-        self._total = sum(len(ids) for _, ids in search.rounds)
-        self._place = (search.rounds[0][1][0], search.rounds[0][0].baudrate)
+        self._total = sum(len(ids) for _, ids in plan.rounds)
+        self._place = (plan.rounds[0][1][0], plan.rounds[0][0].baudrate)
         self._began: float | None = None
         self._now = 0.0
         self._slice_until = -inf
-        self._course = self._whole_course()
-        self._following: Ask | None = next(self._course, None)
+        self._steps = self._all_rounds()
+        self._following: Ask | None = next(self._steps, None)
 
     @property
     def found(self) -> tuple[FoundDevice, ...]:
         """Who was found so far, by rate and id."""
-        answering = {finding.slave for finding in tuple(self._found.values()) if finding.answers}
-        findings = (
-            replace(finding, suspect=finding.slave >= RESERVED_FROM and bool(answering - {finding.slave}))
-            for finding in tuple(self._found.values())
+        answering = {device.slave for device in tuple(self._found.values()) if device.answers}
+        devices = (
+            replace(device, suspect=device.slave >= RESERVED_FROM and bool(answering - {device.slave}))
+            for device in tuple(self._found.values())
         )
-        return tuple(sorted(findings, key=lambda finding: (finding.baudrate, finding.slave)))
+        return tuple(sorted(devices, key=lambda device: (device.baudrate, device.slave)))
 
     @property
     def progress(self) -> Progress:
         """How far it is, by the pace so far."""
-        expected = self.search.expected
+        expected = self.plan.expected
         done = expected * self._asked / self._total
         elapsed = 0.0 if self._began is None else self._now - self._began
         pace = (SETTLING + elapsed) / (SETTLING + done)
@@ -142,15 +142,15 @@ class Scan:
         asked, self._now = self._following, now
         if asked is not None:
             try:
-                self._following = self._course.send(outcome)
+                self._following = self._steps.send(outcome)
             except StopIteration:
                 self._following, self.complete = None, True
         following = self._following
         if following is None or asked is None:
             return self._end()
-        stays = following.baudrate == asked.baudrate != self.search.line_rate
+        stays = following.baudrate == asked.baudrate != self.plan.line_rate
         ends = now + following.timeout + self._cost_at(following.baudrate)
-        if stays and self.search.line_rate is not None and ends <= self._slice_until:
+        if stays and self.plan.line_rate is not None and ends <= self._slice_until:
             return Continue()
         self._slice_until = -inf
         return Requeue(now)
@@ -166,19 +166,19 @@ class Scan:
         return Done()
 
     def _cost_at(self, baudrate: int | None) -> float:
-        return next(self.search.cost(timing) for timing in self.search.timings if timing.baudrate == baudrate)
+        return next(self.plan.cost(timing) for timing in self.plan.timings if timing.baudrate == baudrate)
 
-    # -- the course of questions
+    # -- what is asked, one id after the other
 
-    def _whole_course(self) -> Generator[Ask, Outcome, None]:
-        for timing, ids in self.search.rounds:
+    def _all_rounds(self) -> Generator[Ask, Outcome, None]:
+        for timing, ids in self.plan.rounds:
             yield from self._round(ids, timing.baudrate)
 
     def _round(self, ids: tuple[int, ...], baudrate: int) -> Generator[Ask, Outcome, None]:
         noisy: list[int] = []
         for place, slave in enumerate(ids):
             self._place = slave, baudrate
-            timeout = self.search.timeout if place < len(ids) - 1 else max(LAST_TIMEOUT, self.search.timeout)
+            timeout = self.plan.timeout if place < len(ids) - 1 else max(LAST_TIMEOUT, self.plan.timeout)
             outcome = yield from self._question(slave, baudrate, timeout)
             self._asked += 1
             if self._disturbed(outcome):
@@ -198,33 +198,33 @@ class Scan:
     def _question(
         self, slave: int, baudrate: int, timeout: float, *, again: bool = False
     ) -> Generator[Ask, Outcome, Outcome]:
-        """Ask one id; whoever is heard is interviewed at once, of bytes that are no frame only the second time."""
-        codec = self.search.codec
+        """Ask one id; whoever is heard is identified at once, of bytes that are no frame only the second time."""
+        codec = self.plan.codec
         self._asked_at[baudrate].add(slave)
-        outcome = yield Ask(self.search.opening(slave), codec, timeout, None, baudrate)
+        outcome = yield Ask(self.plan.opening(slave), codec, timeout, None, baudrate)
         self._note_late(outcome, baudrate)
         if speaks(outcome, codec) or (again and spoilt(outcome, codec)):
-            yield from self._interview(slave, baudrate, PATIENT_TIMEOUT, outcome)
+            yield from self._identify(slave, baudrate, PATIENT_TIMEOUT, outcome)
         return outcome
 
     def _late_ones(self, baudrate: int) -> Generator[Ask, Outcome, None]:
-        """Interview those who answered later than they were waited for."""
+        """Identify those who answered later than they were waited for."""
         while self._slow:
             slave = self._slow.pop()
             if (slave, baudrate) not in self._found:
-                yield from self._interview(slave, baudrate, LAST_TIMEOUT, None)
+                yield from self._identify(slave, baudrate, LAST_TIMEOUT, None)
 
-    def _interview(
+    def _identify(
         self, slave: int, baudrate: int, timeout: float, first: Outcome | None
     ) -> Generator[Ask, Outcome, None]:
-        search = self.search
-        conversation = Identification(FoundDevice(slave, baudrate), search.profiles, search.codec, first).converse()
+        plan = self.plan
+        steps = Identification(FoundDevice(slave, baudrate), plan.profiles, plan.codec, first).steps()
         try:
-            request = next(conversation)
+            request = next(steps)
             while True:
-                outcome = yield Ask(request, search.codec, timeout, timeout / 4, baudrate)
+                outcome = yield Ask(request, plan.codec, timeout, timeout / 4, baudrate)
                 self._note_late(outcome, baudrate)
-                request = conversation.send(outcome)
+                request = steps.send(outcome)
         except StopIteration as end:
             if end.value is not None:
                 self._found[slave, baudrate] = end.value
@@ -232,16 +232,16 @@ class Scan:
     def _note_late(self, outcome: Outcome, baudrate: int) -> None:
         """Note whose answer came though another is asked now: an id asked before at this rate, slower than expected."""
         late = {late.request.slave for late in outcome.late}
-        self._slow.update(self._asked_at[baudrate] & (late | strangers(outcome, self.search.codec)))
+        self._slow.update(self._asked_at[baudrate] & (late | strangers(outcome, self.plan.codec)))
 
     def _disturbed(self, outcome: Outcome) -> bool:
         """Note what else was heard; whether it makes it worth asking this id again."""
         noise, fault = self.noise, outcome.fault
         noise.echoed = noise.echoed or outcome.echoed is True
-        if fault is None or self._slow or speaks(outcome, self.search.codec):
+        if fault is None or self._slow or speaks(outcome, self.plan.codec):
             return False
         if fault.code in (FaultCode.TIMEOUT, FaultCode.LATE):  # what came before the request counts here only
-            return outcome.unsolicited >= shortest_answer(self.search.codec)
+            return outcome.unsolicited >= shortest_answer(self.plan.codec)
         noise.ids += 1
         noise.refused += outcome.began is None
         noise.last = fault

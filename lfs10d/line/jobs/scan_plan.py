@@ -1,4 +1,4 @@
-"""What to look for on a line: ids, rates, profiles, and how long that takes. Plain values, known before a scan."""
+"""The plan of a scan: ids, rates, profiles, and how long it takes. Plain values, known before."""
 
 from __future__ import annotations
 

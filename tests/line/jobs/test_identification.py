@@ -71,12 +71,12 @@ def interview(
 ) -> tuple[FoundDevice | None, list[ReadRegisters]]:
     """Hold an interview with a device; return what was found, and what was asked."""
     asked: list[ReadRegisters] = []
-    conversation = Identification(FoundDevice(slave, 9600), profiles, CODEC, first).converse()
+    steps = Identification(FoundDevice(slave, 9600), profiles, CODEC, first).steps()
     try:
-        request = next(conversation)
+        request = next(steps)
         while True:
             asked.append(request)
-            request = conversation.send(device(request))
+            request = steps.send(device(request))
     except StopIteration as end:
         return end.value, asked
 

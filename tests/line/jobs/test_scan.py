@@ -129,7 +129,7 @@ def test_nobody_is_found_on_an_empty_line() -> None:
 def test_an_empty_line_takes_as_long_as_was_said_before() -> None:
     done = scanned(line_of())
     assert len(done.exchanges) == 255
-    assert done.exchanges[-1].at == pytest.approx(done.scan.search.expected, rel=0.02)
+    assert done.exchanges[-1].at == pytest.approx(done.scan.plan.expected, rel=0.02)
 
 
 def test_sensors_are_found_at_each_rate() -> None:
@@ -290,12 +290,12 @@ def test_a_line_that_never_falls_silent_is_told_and_not_spoken_on() -> None:
 def test_while_the_first_answer_is_awaited_all_of_the_time_remains() -> None:
     scan = Scan(search(range(1, 50)))
     scan.ask(24_000.0)
-    assert scan.progress.remaining == pytest.approx(scan.search.expected)
+    assert scan.progress.remaining == pytest.approx(scan.plan.expected)
 
 
 def test_progress_goes_up_and_the_remaining_time_down() -> None:
     running = Scanned(line_of(3), Scan(search(range(1, 50))))
-    assert running.scan.progress.remaining == pytest.approx(running.scan.search.expected)
+    assert running.scan.progress.remaining == pytest.approx(running.scan.plan.expected)
     seen = []
     while not running.scan.over:
         seen.append((running.scan.progress.percent, running.scan.progress.remaining))
