@@ -1,6 +1,6 @@
 """Keeps one connection to the broker for as long as it is wanted: the shell around `Reconnect`.
 
-It says nothing of what is sent: the daemon's uplink and the verbs of the command line are above it.
+It does not know what is sent: the daemon's uplink and the verbs of the command line are above it.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class BrokerClient:
         self._accepted: Accepted | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._wanted = False
-        self._told: dict[str, str] = {}
+        self._logged: dict[str, str] = {}
         self._warned_version = False
         self._waiters: list[asyncio.Future[Accepted]] = []
         self._over: asyncio.Event = asyncio.Event()
@@ -150,7 +150,7 @@ class BrokerClient:
     # Events of the connection
 
     def accepted(self, accepted: Accepted) -> None:
-        """Tell that it stands."""
+        """Report that it stands."""
         self._accepted = accepted
         self._reconnect.accepted(self._now())
         place = self.settings.place
@@ -159,36 +159,36 @@ class BrokerClient:
             log.warning("%s: refuses MQTT 5; connected by MQTT %s, which hides reason codes", place, accepted.version)
         else:
             log.info("%s: connected by MQTT %s", place, accepted.version)
-        self._told.clear()
+        self._logged.clear()
         self._answer_waiters(accepted)
         self._events.accepted(accepted)
 
     def ended(self, ended: Disconnect) -> None:
-        """Tell that it is over, and try again when `Reconnect` says."""
+        """Report that it is over, and try again when `Reconnect` says."""
         stood, self._accepted = self._accepted is not None, None
         self._connection = None
         self._over.set()
         now, place = self._now(), self.settings.place
         self._reconnect.ended(ended, now, explained=stood and ended.by_message and self._explained())
         if self._wanted:
-            self._tell(ended, place, self._reconnect.due - now)
+            self._log_end(ended, place, self._reconnect.due - now)
             self._timer = asyncio.get_running_loop().call_at(self._reconnect.due, self._try)
         if stood:
             self._events.ended(ended)
 
-    def _tell(self, ended: Disconnect, place: str, delay: float) -> None:
+    def _log_end(self, ended: Disconnect, place: str, delay: float) -> None:
         if self._reconnect.version is not self._settings.version:
             log.debug("%s; trying MQTT %s", ended.message, self._reconnect.version)
             return
-        level = logging.DEBUG if ended.message == self._told.get(place) else logging.WARNING
-        self._told[place] = ended.message
+        level = logging.DEBUG if ended.message == self._logged.get(place) else logging.WARNING
+        self._logged[place] = ended.message
         if self._reconnect.duplicate:
             log.log(level, "%s; is another client using our id %s? trying again in %.0f s",
                     ended.message, self._settings.client_id, delay)  # fmt: skip
         else:
             others = f"{self.settings.place} is next" if self.settings.place != place else "trying again until it works"
             log.log(level, "%s; %s", ended.message, others)
-        if len(self._told) < len(self._nodes):
+        if len(self._logged) < len(self._nodes):
             return  # the others have not been tried
         self._answer_waiters(BrokerError(ended.message))
 

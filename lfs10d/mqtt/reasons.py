@@ -39,7 +39,7 @@ _REASONS = {
     0x89: "the broker is busy",
     0x8A: "the broker has banned this client",
     0x8B: "the broker is shutting down",
-    KEEP_ALIVE_TIMEOUT: "the broker heard nothing from us for too long",
+    KEEP_ALIVE_TIMEOUT: "the broker received nothing from us for too long",
     SESSION_TAKEN_OVER: "another client has connected with our client id: give each its own mqtt.client_id",
     0x83: "a reason of the broker's own, see its log",
     0x90: "the broker does not take this topic",

@@ -1,8 +1,8 @@
 """The daemon at the broker: its will, its bursts, its requests, and what is left over from before.
 
 After a connect: subscribe to requests and to our own availability; every retained topic; when the broker has
-them all, availability `online`; then live samples; then clear the retained topics that nobody stands behind any
-more; 10 s later the backlog. Nothing here blocks. `Outbox`, `Reconnect` and `OrphanSearch` decide.
+them all, availability `online`; then live samples; then clear the retained topics of devices that are no longer
+configured; 10 s later the backlog. Nothing here blocks. `Outbox`, `Reconnect` and `OrphanSearch` decide.
 """
 
 from __future__ import annotations
@@ -179,7 +179,7 @@ class Uplink:
             await self._spooler.stop(KEEP_WITHIN)
 
     async def reload(self, settings: BrokerSettings | None = None) -> None:
-        """Try again what the broker refused, clear what nobody stands behind; connect anew if given settings."""
+        """Try again what the broker refused, clear what is no longer ours; connect anew if given settings."""
         refused = self._outbox.reload(asyncio.get_running_loop().time())
         if settings is not None:
             self._leaving = True

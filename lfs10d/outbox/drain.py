@@ -17,7 +17,7 @@ LOOK_EVERY = 5.0
 """Seconds from one look at the backlog to the next, at least."""
 
 LOOK_BATCHES = 4
-"""Arrays settled between two looks, at least: one more or less must not decide."""
+"""Batches acknowledged between two looks, at least: one more or less must not decide."""
 
 
 class Drain:
@@ -27,7 +27,7 @@ class Drain:
         self.level = 1
         """1, 2, 4 or 8."""
         self._look_at = float("-inf")
-        self._settled = 0
+        self._acknowledged = 0
         self._depth: int | None = None
         self._full = False
 
@@ -45,9 +45,9 @@ class Drain:
         self._full = full
 
     def on_ack(self, now: float) -> bool:
-        """Note that a batch is settled; return True if `look` is to follow."""
-        self._settled += 1
-        return now >= self._look_at and self._settled >= LOOK_BATCHES
+        """Note that a batch is acknowledged; return True if `look` is to follow."""
+        self._acknowledged += 1
+        return now >= self._look_at and self._acknowledged >= LOOK_BATCHES
 
     def look(self, now: float, depth: int) -> None:
         """Take how many samples of the backlog wait, and decide."""
@@ -59,5 +59,5 @@ class Drain:
 
     def _again(self, now: float, depth: int | None) -> None:
         self._look_at = now + LOOK_EVERY
-        self._settled = 0
+        self._acknowledged = 0
         self._depth = depth

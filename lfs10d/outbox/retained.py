@@ -26,7 +26,7 @@ class RetainedQueue:
         self._under_way: set[str] = set()
         self._burst: set[str] = set()
         self._last: Retained | None = None
-        self._closing: Retained | None = None  # the `last` that is not settled yet
+        self._closing: Retained | None = None  # the `last` that is not acknowledged yet
 
     def __bool__(self) -> bool:
         """Tell whether anything waits."""
@@ -34,7 +34,7 @@ class RetainedQueue:
 
     @property
     def announced(self) -> bool:
-        """The last burst is settled, its `last` too."""
+        """The last burst is acknowledged, its `last` too."""
         return self._closing is None
 
     @property
@@ -121,7 +121,7 @@ class RetainedQueue:
             self._wait(item)
 
     def over(self, item: Retained) -> None:
-        """Note that an item is no longer under way, settled or dead."""
+        """Note that an item is no longer under way, acknowledged or dead."""
         self._under_way.discard(item.topic)
         self._burst.discard(item.topic)
         if item is self._closing:

@@ -148,7 +148,7 @@ def test_a_payload_of_any_size_comes_cut_is_acknowledged_and_followed_by_the_nex
         (b"\xe0\x00", "the connection is lost: the broker closed it and did not say why"),
     ],
 )
-def test_why_a_connection_ended_is_told(serving: Serving, bytes_said: bytes, words: str) -> None:
+def test_why_a_connection_ended_is_reported(serving: Serving, bytes_said: bytes, words: str) -> None:
     async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         await reader.read(1000)
         writer.write(b"\x20\x03\x00\x00\x00")

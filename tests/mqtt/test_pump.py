@@ -122,7 +122,7 @@ def test_what_waits_is_written_when_the_socket_takes_it(ends: Ends) -> None:
     asyncio.run(run())
 
 
-def test_an_error_of_the_client_is_told(ends: Ends) -> None:
+def test_an_error_of_the_client_is_reported(ends: Ends) -> None:
     async def run() -> None:
         error = ValueError("garbage")
         client = Client(ends[0], ends_with=error)

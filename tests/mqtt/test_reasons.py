@@ -84,7 +84,7 @@ def test_an_unknown_reason_code_is_shown_as_the_number_it_is() -> None:
         (UnicodeError("label too long"), DisconnectReason.REFUSED),
     ],
 )
-def test_a_broker_that_is_not_there_is_told_from_one_that_refuses_us(
+def test_a_broker_that_is_not_there_is_distinguished_from_one_that_refuses_us(
     error: Exception, ending: DisconnectReason
 ) -> None:
     """The first is tried every second, the other with back-off."""
@@ -94,7 +94,7 @@ def test_a_broker_that_is_not_there_is_told_from_one_that_refuses_us(
 # A connection that was there and is gone
 
 
-def test_why_it_ended_is_always_told() -> None:
+def test_why_it_ended_is_always_reported() -> None:
     causes: list[BaseException | str | None] = [
         None,
         ConnectionResetError(errno.ECONNRESET, "Connection reset by peer"),

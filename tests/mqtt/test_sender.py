@@ -344,7 +344,7 @@ TELEMETRY = "b/line0/device/a/telemetry"
         (0x95, f"refuses a message of 9 bytes to {TELEMETRY}: a packet was too large for the broker; it is dropped"),
     ],
 )
-def test_a_refusal_is_told_once_with_what_becomes_of_it(
+def test_a_refusal_is_reported_once_with_what_becomes_of_it(
     reason: int, words: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     async def scenario() -> None:

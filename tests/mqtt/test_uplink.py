@@ -348,7 +348,7 @@ def test_retained_topics_of_devices_that_are_gone_are_cleared_and_nothing_else(m
 # What the broker does not take
 
 
-def test_a_refused_topic_is_told_once_stops_nothing_and_is_tried_again_at_reload(
+def test_a_refused_topic_is_reported_once_stops_nothing_and_is_tried_again_at_reload(
     mosquitto: Mosquitto, caplog: pytest.LogCaptureFixture
 ) -> None:
     acl = mosquitto.folder / "acl"
@@ -383,7 +383,7 @@ def test_a_refused_topic_is_told_once_stops_nothing_and_is_tried_again_at_reload
     assert len([each for each in warnings if "device/a/telemetry: not authorized" in each]) == 1
 
 
-def test_what_is_larger_than_the_broker_takes_is_told_once_and_stops_nothing(
+def test_what_is_larger_than_the_broker_takes_is_reported_once_and_stops_nothing(
     mosquitto: Mosquitto, caplog: pytest.LogCaptureFixture
 ) -> None:
     mosquitto.stop()
@@ -406,7 +406,7 @@ def test_what_is_larger_than_the_broker_takes_is_told_once_and_stops_nothing(
     assert f"not sent to {B}/event" in told
 
 
-def test_what_is_no_json_is_told_and_stops_nothing(mosquitto: Mosquitto, caplog: pytest.LogCaptureFixture) -> None:
+def test_what_is_no_json_is_reported_and_stops_nothing(mosquitto: Mosquitto, caplog: pytest.LogCaptureFixture) -> None:
     async def scenario() -> None:
         listener = mosquitto.subscribe(f"{B}/#")
         site = Site(mosquitto.port)
@@ -419,7 +419,7 @@ def test_what_is_no_json_is_told_and_stops_nothing(mosquitto: Mosquitto, caplog:
     assert "cannot be written as JSON" in caplog.text
 
 
-def test_refused_subscriptions_are_told(old_broker: OldBroker, caplog: pytest.LogCaptureFixture) -> None:
+def test_refused_subscriptions_are_reported(old_broker: OldBroker, caplog: pytest.LogCaptureFixture) -> None:
     async def scenario() -> None:
         old_broker.granted = b"\x80\x01"
         async with old_broker.running() as port, running(Site(port)) as uplink:
@@ -474,7 +474,7 @@ def test_nothing_is_lost_when_the_broker_is_killed_and_comes_back(mosquitto: Mos
     asyncio.run(scenario())
 
 
-def test_beyond_ten_thousand_samples_the_oldest_go_and_that_is_told_once(
+def test_beyond_ten_thousand_samples_the_oldest_go_and_that_is_reported_once(
     unused_port: int, caplog: pytest.LogCaptureFixture
 ) -> None:
     async def scenario() -> None:
