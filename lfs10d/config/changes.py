@@ -1,6 +1,6 @@
-"""What requests changed of the configuration, each with what the file said then; and what a request does to it. Pure.
+"""The changes that requests made to the configuration, each with the value that the file had then. Pure.
 
-How the changes and the file as it is now go together is told in `lfs10d.config.merge`. What is said of a device is a
+How the changes and the file as it is now are merged is in `lfs10d.config.merge`. The values of a device are a
 mapping of keys of `SlaveConfig`, without its name, to values as the program uses them.
 """
 
@@ -18,7 +18,7 @@ Values: TypeAlias = Mapping[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class FileValues:
-    """What the file says: each slave by its name, in order; `usual` are the values of keys it says nothing of."""
+    """The values of the file: each slave by its name, in order; `usual` are the values of keys that are absent."""
 
     slaves: Mapping[str, Values]
     baudrate: int = 9600
@@ -27,7 +27,7 @@ class FileValues:
 
 @dataclass(frozen=True, slots=True)
 class Rate:
-    """The line's rate: `now` was verified, `file` is what the file said then."""
+    """The line's rate: `now` was verified, `file` is the value of the file then."""
 
     file: int
     now: int
@@ -53,10 +53,10 @@ class Verified:
 class DeviceChange:
     """What was changed of one name.
 
-    `removed` is what the file said of a device that is polled no more, `added` what holds of one that a request
+    `removed` are the file's values of a device that is polled no more, `added` the values of one that a request
     added (after the removal, if both are there), and `added_at` where that one answered. `options` hold of a device
-    of the file, which said `instead_of` of these keys; a key missing there was not in the file. `verified` is of the
-    device of the file, removed or not.
+    of the file, which had the values `instead_of` for these keys; a key missing there was not in the file. `verified`
+    is of the device of the file, removed or not.
     """
 
     removed: Values | None = None
@@ -110,21 +110,23 @@ class Changes:
         """Return the changes with one more device; nobody has this name now."""
         return self.with_device(name, replace(self.of(name), added=entry, added_at=verified))
 
-    def removing(self, name: str, said: FileValues) -> Changes:
+    def removing(self, name: str, file_values: FileValues) -> Changes:
         """Return the changes without this device, be it the file's or one that was added."""
-        return self.with_device(name, DeviceChange(removed=said.slaves.get(name), verified=self.of(name).verified))
+        return self.with_device(
+            name, DeviceChange(removed=file_values.slaves.get(name), verified=self.of(name).verified)
+        )
 
-    def moving(self, name: str, place: Place, said: FileValues) -> Changes:
+    def moving(self, name: str, place: Place, file_values: FileValues) -> Changes:
         """Return the changes with another place for a device that is there now: there it was verified."""
         change = self.of(name)
         if change.added is not None:
             moved = replace(change, added={**change.added, "id": place.id}, added_at=place)
             return self.with_device(name, moved)
-        filed = said.slaves[name]["id"]
+        filed = file_values.slaves[name]["id"]
         verified = None if place == Place(filed) else Verified(place, file=filed)
         return self.with_device(name, replace(change, verified=verified))
 
-    def setting(self, name: str, options: Values, said: FileValues) -> Changes:
+    def setting(self, name: str, options: Values, file_values: FileValues) -> Changes:
         """Return the changes with other options of a device that is there now.
 
         An option that is set to what the file gives anyway is no change any more.
@@ -132,9 +134,9 @@ class Changes:
         change = self.of(name)
         if change.added is not None:
             return self.with_device(name, replace(change, added={**change.added, **options}))
-        entry = said.slaves[name]
+        entry = file_values.slaves[name]
         wanted = {**change.options, **options}
-        wanted = {key: value for key, value in wanted.items() if value != value_of(entry, key, said)}
+        wanted = {key: value for key, value in wanted.items() if value != value_of(entry, key, file_values)}
         base = {key: entry[key] for key in wanted if key in entry}
         return self.with_device(name, replace(change, options=wanted, instead_of=base))
 
@@ -163,6 +165,6 @@ def keys(changes: Changes) -> Iterator[str]:
             yield f"slaves.{name}.id"
 
 
-def value_of(entry: Values, key: str, said: FileValues) -> Any:  # noqa: ANN401  # any value of the configuration
-    """Return what the file gives for a key of a slave, said there or not."""
-    return entry.get(key, said.usual.get(key))
+def value_of(entry: Values, key: str, file_values: FileValues) -> Any:  # noqa: ANN401  # any value of the configuration
+    """Return what the file gives for a key of a slave, its default where it is absent."""
+    return entry.get(key, file_values.usual.get(key))

@@ -120,8 +120,8 @@ class ChangesFile:
 _Baudrate = Annotated[int, Choice(BAUDRATES)]
 
 
-def _saying(value: object, *, keys: tuple[str, ...], whole: bool) -> Values:
-    """Take what is said of a device in the words of the configuration."""
+def _device_values(value: object, *, keys: tuple[str, ...], whole: bool) -> Values:
+    """Return the values of a device from the keys of the configuration."""
     if not isinstance(value, dict) or not set(value) <= set(keys) or ("id" in value) is not whole:
         raise plain_error(f"must be a mapping of {', '.join(keys)}" + (" with an id" if whole else ""))
     slave = SlaveConfig.model_validate({"id": 1, **value})
@@ -129,8 +129,8 @@ def _saying(value: object, *, keys: tuple[str, ...], whole: bool) -> Values:
 
 
 _ENTRY = tuple(key for key in SlaveConfig.model_fields if key != "name")
-_Entry = Annotated[dict[str, Any], BeforeValidator(lambda value: _saying(value, keys=_ENTRY, whole=True))]
-_Options = Annotated[dict[str, Any], BeforeValidator(lambda value: _saying(value, keys=OPTIONS, whole=False))]
+_Entry = Annotated[dict[str, Any], BeforeValidator(lambda value: _device_values(value, keys=_ENTRY, whole=True))]
+_Options = Annotated[dict[str, Any], BeforeValidator(lambda value: _device_values(value, keys=OPTIONS, whole=False))]
 
 
 class _Place(Section):
@@ -210,9 +210,9 @@ def written(changes: Changes) -> bytes:
 def _device(change: DeviceChange) -> dict[str, Any]:
     data: dict[str, Any] = {}
     for key in ("removed", "added", "options", "instead_of"):
-        saying = getattr(change, key)
-        if saying:
-            data[key] = in_words(saying)
+        values = getattr(change, key)
+        if values:
+            data[key] = in_words(values)
     if change.added_at is not None:
         data["added_at"] = _place(change.added_at)
     if change.verified is not None:
@@ -226,9 +226,9 @@ def _place(place: Place) -> dict[str, int]:
     return {"id": place.id} if place.baudrate is None else {"id": place.id, "baudrate": place.baudrate}
 
 
-def in_words(saying: Values) -> dict[str, Any]:
-    """Return what is said of a device as one writes it into the file: durations with their unit, auto for None."""
-    return {key: _word(key, value) for key, value in saying.items()}
+def in_words(values: Values) -> dict[str, Any]:
+    """Return the values of a device as one writes them into the file: durations with their unit, auto for None."""
+    return {key: _word(key, value) for key, value in values.items()}
 
 
 def _word(key: str, value: object) -> object:

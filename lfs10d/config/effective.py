@@ -42,7 +42,7 @@ class Effective:
 
     file: LoadedConfig
     loaded: LoadedConfig
-    said: FileValues
+    file_values: FileValues
     changes: Changes
     dropped: tuple[DroppedChange, ...]
     places: Mapping[str, tuple[Place, ...]]
@@ -65,7 +65,7 @@ class Effective:
         return next((slave for slave in self.config.slaves if slave.name == name), None)
 
 
-def said(file: LoadedConfig) -> FileValues:
+def file_values_of(file: LoadedConfig) -> FileValues:
     """Return what a file says itself, key by key."""
     config, document = file.config, file.document
     slaves: dict[str, dict[str, Any]] = {}
@@ -79,8 +79,8 @@ def said(file: LoadedConfig) -> FileValues:
 
 def effective(file: LoadedConfig, changes: Changes) -> Effective:
     """Return what holds of a valid file and the changes."""
-    sayings = said(file)
-    merged = merge(sayings, changes)
+    file_values = file_values_of(file)
+    merged = merge(file_values, changes)
     builder = _Builder(file, merged)
     config = file.config.model_copy(
         update={
@@ -94,11 +94,11 @@ def effective(file: LoadedConfig, changes: Changes) -> Effective:
     return Effective(
         file=file,
         loaded=replace(file, config=config, profiles=builder.profiles, origins=_origins(file, config, merged)),
-        said=sayings,
+        file_values=file_values,
         changes=merged.changes,
         dropped=merged.dropped,
         places=places,
-        conflicts=_conflicts(config, sayings, merged.changes),
+        conflicts=_conflicts(config, file_values, merged.changes),
         suspended=builder.suspended,
     )
 
@@ -114,20 +114,20 @@ class _Builder:
         self.suspended: dict[str, str] = {}
 
     def slaves(self) -> tuple[SlaveConfig, ...]:
-        built = (self._slave(name, saying) for name, saying in self._merged.devices.items())
+        built = (self._slave(name, values) for name, values in self._merged.devices.items())
         return tuple(slave for slave in built if slave is not None)
 
-    def _slave(self, name: str, saying: Mapping[str, Any]) -> SlaveConfig | None:
+    def _slave(self, name: str, values: Mapping[str, Any]) -> SlaveConfig | None:
         changed = self._merged.changed[name]
         if self._merged.changes.of(name).added is not None:
-            added = inherited(SlaveConfig.model_validate({"name": name, **in_words(saying)}), self._file.config.poll)
+            added = inherited(SlaveConfig.model_validate({"name": name, **in_words(values)}), self._file.config.poll)
             return added if self._can_hold(added) else None
         filed = self._filed[name]
-        slave = filed.model_copy(update={key: saying[key] for key in changed})
+        slave = filed.model_copy(update={key: values[key] for key in changed})
         if not changed or self._can_hold(slave):
             return slave
         # A fact stays one, whatever becomes of the wishes.
-        return filed.model_copy(update={"id": saying["id"]})
+        return filed.model_copy(update={"id": values["id"]})
 
     def _can_hold(self, slave: SlaveConfig) -> bool:
         why = self._why_not(slave)
@@ -148,14 +148,14 @@ class _Builder:
         return None if found is None else f"{found.path[-1]}: {found.message}"
 
 
-def _conflicts(config: Config, sayings: FileValues, changes: Changes) -> dict[str, str]:
+def _conflicts(config: Config, file_values: FileValues, changes: Changes) -> dict[str, str]:
     """Return who must yield where two have one id: the one last verified there keeps it, or else the file's."""
     holders: dict[int, str] = {}
     yielding: dict[str, str] = {}
 
     def rank(slave: SlaveConfig) -> tuple[bool, bool]:
         proven = changes.of(slave.name).proven
-        return proven is None or proven.id != slave.id, slave.name not in sayings.slaves
+        return proven is None or proven.id != slave.id, slave.name not in file_values.slaves
 
     for slave in sorted(config.slaves, key=rank):
         holder = holders.setdefault(slave.id, slave.name)
@@ -204,21 +204,21 @@ def merged_data(now: Effective) -> Any:  # noqa: ANN401  # YAML
     if not now.changes.count:
         return data
     raw = dict(zip((slave.name for slave in now.file.config.slaves), data.get("slaves", ()), strict=True))
-    merged = merge(now.said, now.changes)
+    merged = merge(now.file_values, now.changes)
     slaves: list[Any] = []
-    for name, saying in merged.devices.items():
+    for name, values in merged.devices.items():
         change = now.changes.of(name)
         if change.added is not None:
             if name in now.suspended:
                 continue
-            slaves.append(_named(name, in_words(saying)))
+            slaves.append(_named(name, in_words(values)))
         elif not merged.changed[name] or name in now.suspended:
             slaves.append(raw[name])
         else:
             entry = raw[name] if isinstance(raw[name], dict) else {"id": raw[name]}
-            slaves.append(_named(name, {**entry, **in_words({key: saying[key] for key in merged.changed[name]})}))
+            slaves.append(_named(name, {**entry, **in_words({key: values[key] for key in merged.changed[name]})}))
     line = data["line"]
-    if merged.baudrate != now.said.baudrate:
+    if merged.baudrate != now.file_values.baudrate:
         line = {**line, "baudrate": merged.baudrate}
     return {**data, "line": line, "slaves": slaves}
 

@@ -2,9 +2,9 @@
 
 Rules
 -----
-1. A change holds as long as the file still says what it said when the change was made (`instead_of`, `removed`,
-   `file`). Nothing said is a saying too: who writes a default out after a request changed it wants it back. Keys are
-   compared one by one, as values; devices go by their names.
+1. A change holds as long as the file still has the value that it had when the change was made (`instead_of`,
+   `removed`, `file`). An absent key counts as a value: writing the default into the file afterwards is an edit and
+   wins. Keys are compared one by one, as values; devices go by their names.
 2. Once a person edits such a key the file wins and the change is dropped; silently where both now say the same.
 3. A slave id or a baud rate is a fact, not a wish: where the file was edited to another one than was last verified,
    neither has won before the line was asked. The file's place is then tried first, and the change is kept.
@@ -39,7 +39,7 @@ class DroppedChange:
 
 @dataclass(frozen=True, slots=True)
 class Merged:
-    """What holds: `devices` by name, in order, with what is said of each; `changed` are the keys that changes say.
+    """What holds: `devices` by name, in order, with the values of each; `changed` are the keys set by changes.
 
     `changes` are those left, `dropped` those a person should know of. `contested` are the places where the file and
     what was verified differ: the file's first. `baudrate` is the line's.
@@ -53,21 +53,21 @@ class Merged:
     contested: Mapping[str, tuple[Place, ...]]
 
 
-def merge(said: FileValues, changes: Changes) -> Merged:
+def merge(file_values: FileValues, changes: Changes) -> Merged:
     """Return what the file and the changes give together, by the rules above."""
-    names = [*said.slaves, *(name for name in changes.devices if name not in said.slaves)]
+    names = [*file_values.slaves, *(name for name in changes.devices if name not in file_values.slaves)]
     devices: dict[str, Values] = {}
     changed: dict[str, frozenset[str]] = {}
     left: dict[str, DeviceChange] = {}
     dropped: list[DroppedChange] = []
     contested: dict[str, tuple[Place, ...]] = {}
-    rate, baudrate, rates = _merge_rate(said, changes.baudrate)
+    rate, baudrate, rates = _merge_rate(file_values, changes.baudrate)
     for name in names:
-        change, lost = _settle(name, said, changes.of(name))
+        change, lost = _settle(name, file_values, changes.of(name))
         dropped += lost
         if change:
             left[name] = change
-        entry, keys = _entry(said.slaves.get(name), change)
+        entry, keys = _entry(file_values.slaves.get(name), change)
         if entry is None:
             continue
         devices[name], changed[name] = entry, keys
@@ -77,17 +77,17 @@ def merge(said: FileValues, changes: Changes) -> Merged:
     return Merged(devices, changed, baudrate, Changes(left, rate), tuple(dropped), contested)
 
 
-def _merge_rate(said: FileValues, rate: Rate | None) -> tuple[Rate | None, int, tuple[int, ...]]:
+def _merge_rate(file_values: FileValues, rate: Rate | None) -> tuple[Rate | None, int, tuple[int, ...]]:
     """Return what is left of the change, the rate to begin with, and all that come into question."""
-    if rate is None or said.baudrate == rate.now:
-        return None, said.baudrate, (said.baudrate,)
-    if said.baudrate == rate.file:
+    if rate is None or file_values.baudrate == rate.now:
+        return None, file_values.baudrate, (file_values.baudrate,)
+    if file_values.baudrate == rate.file:
         return rate, rate.now, (rate.now,)
-    return rate, said.baudrate, (said.baudrate, rate.now)
+    return rate, file_values.baudrate, (file_values.baudrate, rate.now)
 
 
 def _places(slave: int, change: DeviceChange, rates: tuple[int, ...]) -> tuple[Place, ...]:
-    """Return where a device may be: where it is said to be first, then where it was verified."""
+    """Return where a device may be: where it is expected first, then where it was verified."""
     proven = change.proven
     if proven is None:
         return tuple(Place(slave, rate) for rate in rates)
@@ -113,29 +113,29 @@ def _entry(entry: Values | None, change: DeviceChange) -> tuple[Values | None, f
 # -- one device, three ways
 
 
-def _settle(name: str, said: FileValues, change: DeviceChange) -> tuple[DeviceChange, list[DroppedChange]]:
+def _settle(name: str, file_values: FileValues, change: DeviceChange) -> tuple[DeviceChange, list[DroppedChange]]:
     """Return what is left of the changes of one device, and what of it a person should know is lost."""
-    entry = said.slaves.get(name)
+    entry = file_values.slaves.get(name)
     if change.removed is not None:
         if entry == change.removed:
             return change, []
         if entry is not None:
-            return _unremoved(name, entry, said, change)
+            return _unremoved(name, entry, file_values, change)
         change = replace(change, removed=None, verified=None)
     if change.added is not None:
-        return (change, []) if entry is None else _adopted(name, entry, said, change)
+        return (change, []) if entry is None else _adopted(name, entry, file_values, change)
     if entry is None:
         what = {**change.options, **({} if change.verified is None else {"id": change.verified.place.id})}
         gone = "the file has this device no more"
         return DeviceChange(), [_dropped(name, key, value, gone) for key, value in what.items()]
-    return _kept(name, entry, said, change)
+    return _kept(name, entry, file_values, change)
 
 
 def _unremoved(
-    name: str, entry: Values, said: FileValues, change: DeviceChange
+    name: str, entry: Values, file_values: FileValues, change: DeviceChange
 ) -> tuple[DeviceChange, list[DroppedChange]]:
     """Give a device that was removed by request back to the file, where a person edited it."""
-    kept, lost = _kept(name, entry, said, DeviceChange(verified=change.verified))
+    kept, lost = _kept(name, entry, file_values, DeviceChange(verified=change.verified))
     if entry != change.added:
         what = {"removed": True} if change.added is None else dict(change.added)
         lost.append(DroppedChange(f"slaves.{name}", name, what, "the file's entry of this device was edited"))
@@ -143,32 +143,36 @@ def _unremoved(
 
 
 def _adopted(
-    name: str, entry: Values, said: FileValues, change: DeviceChange
+    name: str, entry: Values, file_values: FileValues, change: DeviceChange
 ) -> tuple[DeviceChange, list[DroppedChange]]:
     """Take a device that was added by request for one of the file, where a person put it (rule 4)."""
     added = change.added or _NOTHING
     options = {key: added[key] for key in OPTIONS if key in added}
     proof = None if change.added_at is None else Verified(change.added_at)
-    kept, lost = _kept(name, entry, said, DeviceChange(options=options, verified=proof))
+    kept, lost = _kept(name, entry, file_values, DeviceChange(options=options, verified=proof))
     for key in ("id", "profile", "checksum"):
-        if key in added and added[key] != value_of(entry, key, said) and not (key == "id" and proof):
+        if key in added and added[key] != value_of(entry, key, file_values) and not (key == "id" and proof):
             lost.append(_dropped(name, key, added[key], _says(entry, key)))
     return kept, lost
 
 
-def _kept(name: str, entry: Values, said: FileValues, change: DeviceChange) -> tuple[DeviceChange, list[DroppedChange]]:
+def _kept(
+    name: str, entry: Values, file_values: FileValues, change: DeviceChange
+) -> tuple[DeviceChange, list[DroppedChange]]:
     """Compare what was changed of a device of the file, key by key."""
     options: dict[str, Any] = {}
     lost: list[DroppedChange] = []
     for key, value in change.options.items():
         if entry.get(key, _UNSAID) == change.instead_of.get(key, _UNSAID):
             options[key] = value
-        elif value_of(entry, key, said) != value:
+        elif value_of(entry, key, file_values) != value:
             lost.append(_dropped(name, key, value, _says(entry, key)))
     verified = change.verified
     if verified is not None and entry["id"] == verified.place.id and verified.file != entry["id"]:
         # The file names the id that was verified; the rate it was verified at is the line's, or still a fact.
-        verified = None if verified.place.baudrate in (None, said.baudrate) else replace(verified, file=entry["id"])
+        verified = (
+            None if verified.place.baudrate in (None, file_values.baudrate) else replace(verified, file=entry["id"])
+        )
     base = {key: change.instead_of[key] for key in options if key in change.instead_of}
     return replace(change, options=options, instead_of=base, verified=verified), lost
 

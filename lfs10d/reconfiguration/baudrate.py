@@ -180,7 +180,7 @@ class BaudrateChange:
         """Have the line use the rate its sensors were found at, on the disk first."""
 
         def edit(now: Effective) -> Changes:
-            filed = now.said.baudrate
+            filed = now.file_values.baudrate
             return replace(now.changes, baudrate=None if to == filed else Rate(filed, to))
 
         await self._runner.change(edit)

@@ -61,7 +61,7 @@ class BaudrateWatch:
             if isinstance(found, dict):
                 now = self._running()
                 polled = sum(slave.enabled for slave in now.config.slaves)
-                self._say(message(found, rate, polled, filed=now.said.baudrate) if found else None)
+                self._say(message(found, rate, polled, filed=now.file_values.baudrate) if found else None)
             run.resume()
 
     def _say(self, words: str | None) -> None:

@@ -116,8 +116,8 @@ class Locator:
         def edit(now: Effective) -> Changes:
             if now.slave(name) is None:
                 return now.changes
-            changes = now.changes.moving(name, Place(endpoint.slave), now.said)
-            filed = now.said.baudrate
+            changes = now.changes.moving(name, Place(endpoint.slave), now.file_values)
+            filed = now.file_values.baudrate
             if endpoint.baudrate != now.config.line.baudrate or changes.baudrate is not None:
                 changes = replace(
                     changes, baudrate=None if endpoint.baudrate == filed else Rate(filed, endpoint.baudrate)

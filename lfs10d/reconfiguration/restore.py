@@ -121,7 +121,7 @@ class Restore:
 
 def topics(now: Effective) -> frozenset[str]:
     """Return the topics under `B` that say where the file's devices were."""
-    return frozenset((LINE_STATE, *(device_topic(name, CONFIG) for name in now.said.slaves)))
+    return frozenset((LINE_STATE, *(device_topic(name, CONFIG) for name in now.file_values.slaves)))
 
 
 def retained_state(payloads: Mapping[str, bytes]) -> RetainedState:
@@ -153,13 +153,13 @@ def restored(
 
     `online` are the devices that answer at the file's place now.
     """
-    filed = {name: entry["id"] for name, entry in now.said.slaves.items() if now.slave(name) is not None}
+    filed = {name: entry["id"] for name, entry in now.file_values.slaves.items() if now.slave(name) is not None}
     unproven = {name: slave for name, slave in filed.items() if _unproven(now.changes, name)}
     elsewhere = _elsewhere(now, state, unproven)
     answering = unproven.keys() & online
     claimed = frozenset(elsewhere.values())
     there = [name for name in filed if name in answering and filed[name] not in claimed]
-    rate, last_rate = now.said.baudrate, _last_rate(now, state)
+    rate, last_rate = now.file_values.baudrate, _last_rate(now, state)
     changes = now.changes
     for name, last in elsewhere.items():
         if name not in there:
@@ -189,10 +189,10 @@ def _elsewhere(now: Effective, state: RetainedState, filed: Mapping[str, int]) -
 def _last_rate(now: Effective, state: RetainedState) -> int:
     """Return the rate last published where a command can have given it to the line, else the file's."""
     if state.baudrate is None or now.changes.baudrate is not None:
-        return now.said.baudrate
+        return now.file_values.baudrate
     used = (now.loaded.profiles[slave.profile].baudrate for slave in now.config.slaves)
     settable = frozenset(rate for baudrate in used if baudrate is not None for rate in baudrate.codes)
-    return state.baudrate if state.baudrate in settable else now.said.baudrate
+    return state.baudrate if state.baudrate in settable else now.file_values.baudrate
 
 
 def _unproven(changes: Changes, name: str) -> bool:

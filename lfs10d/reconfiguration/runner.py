@@ -267,7 +267,7 @@ class ChangeRunner:
         def edit(now: Effective) -> Changes:
             if now.slave(device) is None:
                 return now.changes if added is None else now.changes.adding(device, added, Place(endpoint.slave))
-            return now.changes.moving(device, Place(endpoint.slave), now.said)
+            return now.changes.moving(device, Place(endpoint.slave), now.file_values)
 
         await self._change(edit)
 

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from lfs10d.cli.config import command
 from lfs10d.config.changes import Changes
 from lfs10d.config.changes_file import FILE_NAME, ChangesFile
-from lfs10d.config.effective import said
+from lfs10d.config.effective import file_values_of
 from lfs10d.config.json_schema import json_schema
 from lfs10d.config.loader import load
 from lfs10d.errors import FailedError, StateError
@@ -88,7 +88,7 @@ def changed(directory: str = "state") -> None:
     """Leave what a daemon leaves: slave-2 is polled every 250 ms, slave-3 no more, roof is new."""
     Path("lfs10d.yaml").write_text(TEXT)
     Path("secret").write_text("hunter2")
-    file = said(load(Path("lfs10d.yaml")))
+    file = file_values_of(load(Path("lfs10d.yaml")))
     changes = Changes().setting("slave-2", {"interval": 0.25, "response_timeout": 0.1}, file).removing("slave-3", file)
     Path(directory).mkdir()
     ChangesFile(Path(directory), Disk()).save(changes.adding("roof", {"id": 9, "label": "Roof"}))

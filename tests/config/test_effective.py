@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from lfs10d import profiles
 from lfs10d.config.changes import Changes, DeviceChange, Place, Rate, Verified
-from lfs10d.config.effective import effective, merged_data, said
+from lfs10d.config.effective import effective, file_values_of, merged_data
 from lfs10d.config.loader import LoadedConfig, load
 from lfs10d.schema.yaml12 import render
 
@@ -40,13 +40,13 @@ def _file(tmp_path: Path) -> Callable[[str], LoadedConfig]:
 
 
 def test_what_the_file_says_is_told_key_by_key(file: Callable[[str], LoadedConfig]) -> None:
-    sayings = said(file(TEXT))
-    assert sayings.slaves == {
+    file_values = file_values_of(file(TEXT))
+    assert file_values.slaves == {
         "slave-2": {"id": 2},
         "mast": {"id": 3, "interval": 1.0, "label": "Mast", "checksum": None},
         "slave-4": {"id": 4, "profile": "fuling-dzb"},
     }
-    assert sayings.usual == {
+    assert file_values.usual == {
         "interval": 2.0,
         "enabled": True,
         "label": None,
@@ -69,8 +69,8 @@ def test_every_value_has_its_origin_wherever_its_device_stands_now(file: Callabl
     loaded = file(TEXT)
     changes = (
         Changes(baudrate=Rate(9600, 19200))
-        .removing("slave-2", said(loaded))
-        .setting("mast", {"interval": 5.0, "enabled": False}, said(loaded))
+        .removing("slave-2", file_values_of(loaded))
+        .setting("mast", {"interval": 5.0, "enabled": False}, file_values_of(loaded))
         .adding("roof", {"id": 9, "label": "Roof"}, Place(9))
     )
     now = effective(loaded, changes)
@@ -99,7 +99,7 @@ def test_every_value_has_its_origin_wherever_its_device_stands_now(file: Callabl
 
 def test_a_list_that_becomes_empty_has_an_origin(file: Callable[[str], LoadedConfig]) -> None:
     loaded = file("line: {port: x}\nslaves: [2]")
-    now = effective(loaded, Changes().removing("slave-2", said(loaded)))
+    now = effective(loaded, Changes().removing("slave-2", file_values_of(loaded)))
     assert str(now.loaded.origins["slaves"]) == "default"
     assert now.config.slaves == ()
 
@@ -216,9 +216,9 @@ def test_put_into_the_file_no_change_is_left_and_the_same_holds(
             if number not in {slave.id for slave in now.config.slaves}:
                 changes = changes.adding(name, {"id": number, **options}, Place(number))
         elif removing:
-            changes = changes.removing(name, now.said)
+            changes = changes.removing(name, now.file_values)
         else:
-            changes = changes.setting(name, options, now.said)
+            changes = changes.setting(name, options, now.file_values)
         now = effective(loaded, changes)
         assert (now.dropped, now.conflicts, now.suspended) == ((), {}, {})
     path.write_text(render(merged_data(now)))

@@ -88,7 +88,7 @@ def site(tmp_path: Path) -> Site:
 
 
 def slower(now: Effective) -> Changes:
-    return now.changes.setting("slave-2", {"interval": 5.0}, now.said)
+    return now.changes.setting("slave-2", {"interval": 5.0}, now.file_values)
 
 
 def test_a_change_takes_effect_and_is_there_after_a_power_cut(site: Site) -> None:
@@ -128,13 +128,13 @@ def test_what_cannot_be_kept_is_not_done(site: Site) -> None:
 
 def test_what_was_learnt_of_the_line_is_so_though_the_disk_does_not_keep_it(site: Site) -> None:
     site.disk.full = 0
-    run(site.running.learn(lambda now: now.changes.moving("slave-2", Place(9), now.said)))
+    run(site.running.learn(lambda now: now.changes.moving("slave-2", Place(9), now.file_values)))
     assert site.taken == [("slaves.slave-2.id",)]
     news = site.news()
     assert news.storage is not None
     assert "changes.yaml cannot be written" in news.storage
     site.disk.full = None
-    run(site.running.learn(lambda now: now.changes.moving("slave-2", Place(10), now.said)))
+    run(site.running.learn(lambda now: now.changes.moving("slave-2", Place(10), now.file_values)))
     site.disk.power_cut()
     site.start()
     assert site.running.now.places["slave-2"] == (Place(10, 9600),)
@@ -162,7 +162,7 @@ def test_changes_at_the_same_time_follow_each_other(site: Site) -> None:
     async def both() -> None:
         await asyncio.gather(
             site.running.change(slower),
-            site.running.change(lambda now: now.changes.setting("slave-3", {"enabled": False}, now.said)),
+            site.running.change(lambda now: now.changes.setting("slave-3", {"enabled": False}, now.file_values)),
         )
 
     run(both())

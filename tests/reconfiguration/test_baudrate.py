@@ -219,5 +219,5 @@ def test_a_device_removed_while_its_change_is_carried_out_has_one_answer(bench: 
 
 async def removed(life: Life, device: str) -> Result:
     """Take a device out of the configuration, as `device/remove` does."""
-    await life.running.change(lambda now: now.changes.removing(device, now.said))
+    await life.running.change(lambda now: now.changes.removing(device, now.file_values))
     return Result("ok")

@@ -113,9 +113,9 @@ def test_what_a_change_says_already_holds(now: Effective) -> None:
     known = Changes({"a": DeviceChange(verified=Verified(Place(7), file=2))}, Rate(9600, 19200))
     held = effective(now.file, known)
     assert restored(held, RetainedState({"a": 9}, 4800), frozenset()) == (held.changes, ())
-    removed = effective(now.file, Changes().removing("a", now.said))
+    removed = effective(now.file, Changes().removing("a", now.file_values))
     assert restored(removed, RetainedState({"a": 9}), frozenset()) == (removed.changes, ())
-    optioned = effective(now.file, Changes().setting("a", {"enabled": False}, now.said))
+    optioned = effective(now.file, Changes().setting("a", {"enabled": False}, now.file_values))
     changes, _ = restored(optioned, RetainedState({"a": 9}), frozenset())
     assert changes.of("a").verified == Verified(Place(9))
     assert changes.of("a").options == {"enabled": False}

@@ -155,7 +155,7 @@ async def remove(parameters: OneDevice, context: Context, command: Command) -> R
     def edit(now: Effective) -> Changes:
         if now.changes.of(device).added is None:  # else it may be one that cannot be polled as things are
             known_device(device, now)
-        return now.changes.removing(device, now.said)
+        return now.changes.removing(device, now.file_values)
 
     try:
         before, _ = await apply_edit(edit, context)
@@ -173,7 +173,7 @@ async def options(parameters: Options, context: Context, command: Command) -> Re
 
     def edit(now: Effective) -> Changes:
         known_device(device, now)
-        changes = now.changes.setting(device, wanted, now.said)
+        changes = now.changes.setting(device, wanted, now.file_values)
         why = effective(now.file, changes).suspended.get(device)
         if why is not None:
             param = why.partition(":")[0]
