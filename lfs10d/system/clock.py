@@ -1,7 +1,7 @@
 """Is the wall clock synchronised? Asked of systemd, for the daemon's sandbox forbids adjtimex.
 
 systemd-timesyncd leaves a mark in /run once it has set the clock. Any other (chrony, ntpd) is known to timedate1,
-which reads the kernel's flag. Without both nobody knows.
+which reads the kernel's flag. Without both the state is unknown.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ QUESTION = ("timedatectl", "show", "--property=NTPSynchronized", "--value")
 """org.freedesktop.timedate1 in words; prints yes or no."""
 
 PATIENCE = 2.0
-"""How long timedate1 may take, s: it is started by the question."""
+"""Seconds that timedate1 may take: it is started by the question."""
 
 LOOK_AGAIN: dict[ClockState, float] = {"synced": 600.0, "unsynced": 15.0, "unknown": 600.0}
-"""How long an answer is good for, s. A clock is usually synchronised within a minute of the network."""
+"""Seconds until an answer is asked for again. A clock is usually synchronised within a minute of the network."""
 
 SOON_AFTER_START = 600.0
-"""For so long, s, nobody knowing is no answer yet: timedate1 and what it asks may still be starting."""
+"""Seconds after the start during which `unknown` is asked again soon: timedate1 may still be starting."""
 
 
 def look_again(state: ClockState, age: float) -> float:
@@ -43,7 +43,7 @@ def look_again(state: ClockState, age: float) -> float:
 
 
 def look(*, mark: Path = MARK, question: Sequence[str] = QUESTION, patience: float = PATIENCE) -> ClockState:
-    """Tell the state of the wall clock. Blocks up to `patience` seconds, so never call it on loop or line thread."""
+    """Return the state of the wall clock. Blocks up to `patience` seconds, so never call it on loop or line thread."""
     if os.path.lexists(mark):
         return "synced"
     return judge(_ask(question, patience))

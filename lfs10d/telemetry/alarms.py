@@ -24,7 +24,7 @@ from lfs10d.reading import PORT_CODES, Fault, FaultCode, LineFaultCode
 from lfs10d.telemetry.publication import VERSION
 
 HEARD_LIMIT = 32
-"""So many of the last bytes heard are shown."""
+"""Bytes shown of those heard last."""
 
 AT_ONCE = frozenset({FaultCode.CONFIG_CONFLICT})
 

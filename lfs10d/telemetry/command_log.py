@@ -1,4 +1,4 @@
-"""What the log says of each request: what, which device, from, to, and from which request. Pure.
+"""The log entry of each request: what, which device, from, to, and its id. Pure.
 
 One line for each, whatever it holds came over the network and is escaped.
 """

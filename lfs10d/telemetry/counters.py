@@ -15,16 +15,16 @@ from lfs10d.reading import PORT_CODES, Exchanged, FaultCode, Purpose, Reading, U
 from lfs10d.telemetry.publication import VERSION, BacklogStats
 
 WINDOW = 30
-"""Rates are of the last so many s."""
+"""Seconds over which rates are computed."""
 
 LEAST_SPAN = 1.0
-"""A rate over fewer s than this is chance and not told."""
+"""Seconds below which a rate is chance, and is not published."""
 
 RECENT_GAPS = 1000
 RECENT_RTTS = 100
 
 OTHER_RATES = frozenset({Purpose.SCAN, Purpose.CHANGE})
-"""Errands that may use another baud rate: their gaps say nothing about the line's own."""
+"""Purposes that may use another baud rate: their gaps say nothing about the line's own."""
 
 
 def percentile(values: Iterable[float], percent: int) -> float | None:

@@ -1,4 +1,4 @@
-"""What is said about one device: its samples, state, availability, error and statistics.
+"""The state of one device as the broker knows it: its samples, state, availability, error and statistics.
 
 Rules
 -----
@@ -40,8 +40,8 @@ from lfs10d.telemetry.publication import (
 )
 
 STATE_EARLY: Final = 0.01
-"""So many s a state may come before its time (the next one then waits as much longer): a device polled every
-second would else miss its turn by the jitter of its polls and be shown late each time."""
+"""Seconds that a state may come before its time (the next one then waits as much longer): otherwise a device polled
+every second would miss its turn by the jitter of its polls and be shown late each time."""
 
 
 class DeviceState:

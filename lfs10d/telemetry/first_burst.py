@@ -1,6 +1,6 @@
 """The first burst of a boot says that nothing is known of any device, whatever was measured meanwhile. Pure.
 
-A broker may retain what the daemon said in an earlier life; a subscriber must see it taken back before anything new.
+A broker may retain publications from before a restart; a subscriber must see them replaced before anything new.
 Until that burst is settled, newer states are held back; then they follow at once. Every device's state in it has the
 error `starting`, a disabled one's too: whatever was retained before, a restart is no alarm.
 """
