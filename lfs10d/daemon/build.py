@@ -82,7 +82,7 @@ def build(file: LoadedConfig, boot: Boot, state_directory: Path, notifier: Notif
         running=lambda: config.now,
         new_run=reconfiguration.new_run,
         devices=line.devices,
-        tell=partial(publisher.set_line_error, FaultCode.WRONG_RATE),
+        report=partial(publisher.set_line_error, FaultCode.WRONG_RATE),
     )
     if config.missing:
         restore = Restore(

@@ -33,42 +33,42 @@ log = logging.getLogger(__name__)
 
 NAME = "line/adopt"
 FIRST_ID = 2
-"""The first id that is given; 1 is the factory's, and is kept free for the next newcomer."""
+"""The first id that is given; 1 is the factory's, and is kept free for the next new sensor."""
 LAST_ID = 247
 """The last id that is given: those above are reserved (Modbus over Serial Line V1.02, section 2.2)."""
 CANDIDATES = 8
-"""So many ids are looked at before it is told that somebody who is not configured has them all."""
+"""How many free ids are tried; where each turns out to be in use, the command is rejected."""
 
 _ERRORS: Mapping[ReaddressEnding, tuple[ErrorCode, str]] = {
     ReaddressEnding.TAKEN: (
         "address_in_use",
-        "somebody is heard at slave id {to}, who is not configured; see line/scan",
+        "slave id {to} is in use by a device that is not configured; see line/scan",
     ),
     ReaddressEnding.ABSENT: (
         "timeout",
-        "nobody answers at slave id {old}{refusal}; is the new sensor connected and powered?",
+        "nothing answers at slave id {old}{refusal}; is the new sensor connected and powered?",
     ),
     ReaddressEnding.DEAF: (
         "line_error",
-        "whether the adapter returns our own bytes is not clear yet; try again, or set line.echo to on or off",
+        "it is not known yet whether the adapter echoes what is sent; try again, or set line.echo to on or off",
     ),
     ReaddressEnding.LOST_BEFORE: ("line_error", "the port was lost; nothing was written"),
     ReaddressEnding.UNWRITTEN: ("storage_full", "{why}; nothing was written"),
     ReaddressEnding.UNRECOGNISED: (
         "not_recognised",
         (
-            "at slave id {old}, at {at} baud, a device answers that is not recognised as {title}: {why}. Nothing was "
-            "written. If it is another kind of sensor, name its profile; else take it off the line"
+            "the device at slave id {old}, at {at} baud, is not recognised as {title}: {why}. Nothing was written. "
+            "If it is another kind of sensor, give its profile; else take it off the line"
         ),
     ),
     ReaddressEnding.TWINS: (
         "duplicate_id",
         "two sensors seem to have slave id {old}: {why}; nothing was written. Connect one at a time",
     ),
-    ReaddressEnding.BOTH: ("duplicate_id", "more than one sensor is heard at slave id {old}; connect one at a time"),
+    ReaddressEnding.BOTH: ("duplicate_id", "more than one sensor answers at slave id {old}; connect one at a time"),
     ReaddressEnding.GARBAGE: (
         "duplicate_id",
-        "at slave id {to} several answer at once since the write; take the other off",
+        "since the write several sensors answer at once at slave id {to}; take the other one off the line",
     ),
     ReaddressEnding.REFUSED: (
         "refused",
@@ -78,28 +78,28 @@ _ERRORS: Mapping[ReaddressEnding, tuple[ErrorCode, str]] = {
         "dip_switch",
         (
             "the sensor stays at slave id {old}: its {lock} overrules the write; set that to 0 and try again. "
-            "Or it wants its power switched off and on before it obeys"
+            "Or it needs its power switched off and on first"
         ),
     ),
     ReaddressEnding.PENDING: (
         "power_cycle_needed",
         (
-            "the sensor took what was written but is still at slave id {old}: switch its power off and on, and ask "
+            "the sensor stored what was written but is still at slave id {old}: switch its power off and on, and ask "
             "again if it does not appear. If that does not help, its {lock} overrules the write"
         ),
     ),
     ReaddressEnding.NOWHERE: (
         "not_verified",
-        "since the write the sensor answers neither at slave id {old} nor at {to}; it is looked for until it is found",
+        "since the write the sensor answers neither at slave id {old} nor at {to}; both are queried until it is found",
     ),
 }
 
 
 @dataclass(frozen=True, slots=True)
 class AdoptRequest:
-    """What a request wants: the sensor at `factory` (None: as the profile says) at id `to` (None: the next free).
+    """What a command wants: the sensor at `factory` (None: as the profile says) at id `to` (None: the next free).
 
-    `profile` is the configuration's word for its profile.
+    `profile` is its profile's name or path, as in the configuration.
     """
 
     name: str | None = None
@@ -110,7 +110,7 @@ class AdoptRequest:
 
     @property
     def slaves(self) -> frozenset[int]:
-        """The ids that are known to be used by it."""
+        """The ids that it is known to use."""
         return frozenset(slave for slave in (self.factory, self.to) if slave is not None)
 
 

@@ -140,7 +140,7 @@ class _Undo:
             own=self._runner.running().config.line.baudrate,
             pause=pause,
             longest_pause=longest,
-            tell_at=inf if self._change.answered else give_up_at,
+            give_up_at=inf if self._change.answered else give_up_at,
         )
         found: tuple[RateSensor, ...] | None = await self._result_of(steps, share=1.0, purpose=Purpose.PROBE)
         return found

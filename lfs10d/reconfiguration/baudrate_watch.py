@@ -1,4 +1,4 @@
-"""Raises `wrong_rate` while no sensor answers at the line's rate but some do at another. Used in the asyncio loop."""
+"""Reports `wrong_rate` while no sensor answers at the line's rate but some do at another."""
 
 from __future__ import annotations
 
@@ -18,7 +18,10 @@ log = logging.getLogger(__name__)
 
 
 class BaudrateWatch:
-    """`tell(words)` raises the line's error, `tell(None)` clears it; `devices()` are those of the line's thread."""
+    """Used in the thread of the asyncio loop.
+
+    `report(message)` raises the line's error, `report(None)` clears it; `devices()` are those of the line's thread.
+    """
 
     def __init__(
         self,
@@ -26,47 +29,47 @@ class BaudrateWatch:
         running: Callable[[], Effective],
         new_run: Callable[[], ProcedureRun],
         devices: Callable[[], Iterable[Device]],
-        tell: Callable[[str | None], None],
+        report: Callable[[str | None], None],
     ) -> None:
         self._running = running
         self._new_run = new_run
         self._devices = devices
-        self._tell = tell
+        self._report = report
         self._tasks = BackgroundTasks()
-        self._told: str | None = None
+        self._reported: str | None = None
         self._task: tuple[int, ProcedureRun, asyncio.Task[None]] | None = None
 
     def begin(self) -> None:
-        """Look out from now on, at the line's rate as it is; the port is open."""
+        """Watch from now on, at the line's rate as it is; the port is open."""
         rate = self._running().config.line.baudrate
         if self._task is not None and self._task[0] == rate and not self._task[2].done():
             return
         self.stop()
         run = self._new_run()
-        self._task = rate, run, self._tasks.start("rate watch", self._look_out(rate, run))
-        self._say(None)
+        self._task = rate, run, self._tasks.start("rate watch", self._watch(rate, run))
+        self._report_change(None)
 
     def stop(self) -> None:
-        """Look out no more."""
+        """Watch no more."""
         if self._task is not None:
             _, run, task = self._task
             run.stop()
             task.cancel()
             self._task = None
 
-    async def _look_out(self, rate: int, run: ProcedureRun) -> None:
+    async def _watch(self, rate: int, run: ProcedureRun) -> None:
         clock = ProcedureClock()
         run.begin(find_other_rates(self._devices, clock, rate), clock, line_rate=rate, share=1.0, purpose=Purpose.PROBE)
         while not isinstance(found := await run.next_await(), Finished):
             if isinstance(found, dict):
                 now = self._running()
                 polled = sum(slave.enabled for slave in now.config.slaves)
-                self._say(message(found, rate, polled, filed=now.file_values.baudrate) if found else None)
+                self._report_change(message(found, rate, polled, filed=now.file_values.baudrate) if found else None)
             run.resume()
 
-    def _say(self, words: str | None) -> None:
-        if words != self._told:
-            self._told = words
-            self._tell(words)
-            if words is not None:
-                log.warning("%s", words)
+    def _report_change(self, text: str | None) -> None:
+        if text != self._reported:
+            self._reported = text
+            self._report(text)
+            if text is not None:
+                log.warning("%s", text)

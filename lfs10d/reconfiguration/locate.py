@@ -1,4 +1,4 @@
-"""Devices whose place in the file is not where they were verified last: the line is asked, and what answers is used."""
+"""Devices that the file has at another place than where they were verified last: used is the place that answers."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ log = logging.getLogger(__name__)
 
 
 class Locator:
-    """A part of `Reconfiguration`; `repoll()` has the devices polled that are no longer `withheld`."""
+    """Queries the line; `repoll()` has the devices polled that are no longer `withheld`."""
 
     def __init__(self, runner: ChangeRunner, repoll: Callable[[], None]) -> None:
         self._runner = runner
         self._repoll = repoll
-        self._asked: dict[str, tuple[Place, ...]] = {}
-        """Devices that answered nowhere when they were asked, with where that was."""
+        self._answered_nowhere: dict[str, tuple[Place, ...]] = {}
+        """Devices that answered at none of these places when they were queried."""
         self._tasks = BackgroundTasks()
         self._searches: dict[str, tuple[tuple[Place, ...], ProcedureRun, asyncio.Task[None]]] = {}
 
@@ -45,34 +45,37 @@ class Locator:
         return {name: places for name, places in contested.items() if places}
 
     def withheld(self) -> frozenset[str]:
-        """Return the devices that must not be polled before the line was asked where they are."""
-        return frozenset(name for name, places in self.contested().items() if self._asked.get(name) != places)
+        """Return the devices that must not be polled before they were queried."""
+        return frozenset(
+            name for name, places in self.contested().items() if self._answered_nowhere.get(name) != places
+        )
 
     def begin(self) -> None:
-        """Ask for every contested device that nobody asks for now, and whose turn it is."""
+        """Query every contested device that is not queried now, and whose turn it is."""
         if self._runner.ending:
             return
         contested = self.contested()
-        turn = in_turn({name: places for name, places in contested.items() if self._asked.get(name) != places})
+        turn = in_turn(
+            {name: places for name, places in contested.items() if self._answered_nowhere.get(name) != places}
+        )
         for name, (places, _, _) in tuple(self._searches.items()):
             if contested.get(name) != places:
                 self._end(name)
         for name, places in contested.items():
-            if name in self._searches or (name not in turn and self._asked.get(name) != places):
+            if name in self._searches or (name not in turn and self._answered_nowhere.get(name) != places):
                 continue
             now = self._runner.running()
             slave = now.slave(name)
-            if (
-                slave is None or now.loaded.profiles[slave.profile].slave_id is None
-            ):  # it cannot be asked who it is: the file's place is kept
-                self._asked[name] = places
+            if slave is None or now.loaded.profiles[slave.profile].slave_id is None:
+                # It has no id register: the file's place is kept.
+                self._answered_nowhere[name] = places
                 continue
             run = self._runner.new_run()
             task = self._tasks.start(f"locate {name}", self._locate(name, places, run), partial(self._over, name))
             self._searches[name] = places, run, task
 
     def stop(self) -> None:
-        """Ask no more."""
+        """Query no more."""
         for name in tuple(self._searches):
             self._end(name)
 
@@ -98,13 +101,13 @@ class Locator:
         )
         clock = ProcedureClock()
         query = runner.query(slave, clock, line_rate=0)
-        purpose = Purpose.PROBE if self._asked.get(name) == places else Purpose.CHANGE
+        purpose = Purpose.PROBE if self._answered_nowhere.get(name) == places else Purpose.CHANGE
         steps = locate(endpoints, query, longest_pause=now.config.poll.probe_interval_max)
         run.begin(steps, clock, line_rate=rate, purpose=purpose)
         while not isinstance(awaited := await run.next_await(), Finished):
-            if self._asked.get(name) != places:
-                self._asked[name] = places
-                self._tell(name, known, None)
+            if self._answered_nowhere.get(name) != places:
+                self._answered_nowhere[name] = places
+                self._announce(name, known, None)
                 self._repoll()
                 self.begin()
             run.resume()
@@ -124,27 +127,28 @@ class Locator:
                 )
             return changes
 
-        self._searches.pop(name, None)  # it is found: another configuration ends no search any more
+        self._searches.pop(name, None)  # found: another configuration must not end this task
         await self._runner.learn(edit)
-        self._tell(name, known, endpoint)
+        self._announce(name, known, endpoint)
         self._repoll()
         self.begin()
 
-    def _tell(self, name: str, known: list[Endpoint], used: Endpoint | None) -> None:
+    def _announce(self, name: str, known: list[Endpoint], used: Endpoint | None) -> None:
         first, last = known[0], known[-1]
         facts = {"device": name, "file": first.model_dump(), "last": last.model_dump()}
         self._runner.announce("change_conflict", {**facts, "used": None if used is None else used.model_dump()})
-        where = "at neither; both are asked" if used is None else f"at slave id {used.slave}, {used.baudrate} baud"
+        where = "at neither; both are queried" if used is None else f"at slave id {used.slave}, {used.baudrate} baud"
         log.warning(
-            "%s: the file says slave id %d at %d baud, it was last verified at %d at %d: it answers %s",
+            "%s: the file has it at slave id %d, %d baud; it was last verified at %d, %d baud: it answers %s",
             name, first.slave, first.baudrate, last.slave, last.baudrate, where,
         )  # fmt: skip
 
 
 def in_turn(waiting: Mapping[str, tuple[Place, ...]]) -> frozenset[str]:
-    """Return the devices to ask for now: those at whose first place no other was last; all, where that is nobody.
+    """Return the devices to query now.
 
-    Where another one was last, that one is asked for first: it may be the one that answers there.
+    A device waits while another one's last place has the id of its first one: that one may answer there. If that blocks
+    every device, all are queried.
     """
     last = {name: places[-1].id for name, places in waiting.items()}
     free = (

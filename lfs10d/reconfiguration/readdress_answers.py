@@ -1,6 +1,6 @@
-"""What is answered when a sensor was given another place: the contract's codes, and words for the one on the ladder.
+"""The results of `device/readdress`: the contract's codes, and messages to the person on the ladder. Pure.
 
-Pure. Each message says what was heard and what to do next, and names the other possible cause.
+Each message says what was observed and what to do next, and names the other possible cause.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ _ERRORS: Mapping[ReaddressEnding, tuple[ErrorCode, str]] = {
     ReaddressEnding.TAKEN: (
         "address_in_use",
         (
-            "somebody is heard at slave id {to}, at {at} baud; choose another id, or see who it is: "
+            "slave id {to} is in use: something answers there at {at} baud; choose another id, or identify the device: "
             "lfs10d request line/scan ids={to}"
         ),
     ),
@@ -24,7 +24,7 @@ _ERRORS: Mapping[ReaddressEnding, tuple[ErrorCode, str]] = {
     ReaddressEnding.DEAF: (
         "line_error",
         (
-            "whether the adapter returns our own bytes is not clear yet, and nothing was written; "
+            "it is not known yet whether the adapter echoes what is sent, and nothing was written; "
             "try again later, or set line.echo to on or off"
         ),
     ),
@@ -33,13 +33,13 @@ _ERRORS: Mapping[ReaddressEnding, tuple[ErrorCode, str]] = {
     ReaddressEnding.TWINS: (
         "duplicate_id",
         (
-            "two sensors seem to have slave id {old}: {why}; nothing was written, for both would move. Take one of "
-            "them off the line. A repeater or noise looks alike; try again"
+            "two sensors seem to have slave id {old}: {why}; nothing was written, as it would change both. Take one of "
+            "them off the line. A repeater or noise looks the same; then try again"
         ),
     ),
     ReaddressEnding.UNRECOGNISED: (
         "not_recognised",
-        "what answers at slave id {old} is not recognised as {device}: {why}; nothing was written",
+        "the device at slave id {old} is not recognised as {device}: {why}; nothing was written",
     ),
     ReaddressEnding.BOTH: (
         "duplicate_id",
@@ -51,8 +51,8 @@ _ERRORS: Mapping[ReaddressEnding, tuple[ErrorCode, str]] = {
     ReaddressEnding.GARBAGE: (
         "duplicate_id",
         (
-            "at slave id {to} several answer at once since the write, or there is noise, and {old} is silent; take the "
-            "other sensor off the line. {device} was at {old} last"
+            "since the write several sensors answer at once at slave id {to}, or there is noise, and {old} is silent; "
+            "take the other sensor off the line. {device} was last at {old}"
         ),
     ),
     ReaddressEnding.REFUSED: (
@@ -63,13 +63,13 @@ _ERRORS: Mapping[ReaddressEnding, tuple[ErrorCode, str]] = {
         "dip_switch",
         (
             "{device} stays at slave id {old}: its {lock} overrules the write; set that to 0 and try again. "
-            "Or it wants its power switched off and on before it obeys"
+            "Or it needs its power switched off and on first"
         ),
     ),
     ReaddressEnding.PENDING: (
         "power_cycle_needed",
         (
-            "{device} took slave id {to} but still answers at {old}: switch its power off and on. "
+            "{device} stored slave id {to} but still answers at {old}: switch its power off and on. "
             "If it stays at {old} then, its {lock} overrules the write"
         ),
     ),

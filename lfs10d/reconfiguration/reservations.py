@@ -1,4 +1,4 @@
-"""Who has the one place that scans and physical changes share, and the slave ids that nobody may be given now. Pure."""
+"""One scan or change of sensors at a time, and the slave ids that no device may be given now. Pure."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from lfs10d.reconfiguration.journal import OpenChange
 
 
 class Reservations:
-    """`underway` is the name of the request that has the place, None if nobody has it.
+    """`underway` is the name of the command that is being carried out, None if none is.
 
     `opened()` are the open changes; `update` must be called when they are others.
     """
@@ -18,21 +18,21 @@ class Reservations:
     def __init__(self, opened: Callable[[], Iterable[OpenChange]]) -> None:
         self.underway: str | None = None
         self.brought: frozenset[int] = frozenset()
-        """The slave ids that the request underway may bring into use."""
+        """The slave ids that the command underway may bring into use."""
         self.reserved: Mapping[int, str] = {}
-        """The slave ids that nobody may be given now, with the reason."""
+        """The slave ids that no device may be given now, with the reason."""
         self._opened = opened
 
     @property
     def busy(self) -> Result | None:
-        """The rejection of whatever must wait until a scan or a physical change is over, None if nothing must."""
+        """The rejection of whatever must wait until a scan or a change is over, None if nothing must."""
         if self.underway is None:
             return None
         return rejected("busy", f"{self.underway} is being carried out; try again when it is over")
 
     @contextlib.contextmanager
     def held(self, request: str, slaves: frozenset[int] = frozenset()) -> Iterator[None]:
-        """Hold the place; raises RefusedError where it is taken. `slaves` are the ids that it may bring into use."""
+        """Reserve the line; raises RefusedError where it is reserved. `slaves` are the ids that may come into use."""
         if (busy := self.busy) is not None:
             raise RefusedError(busy)
         self.underway, self.brought = request, slaves

@@ -18,7 +18,7 @@ def looking_out(bench: Bench, life: Life) -> list[str | None]:
             running=lambda: life.running.now,
             new_run=life.physical.new_run,
             devices=lambda: tuple(life.poller.scheduler.devices.values()),
-            tell=told.append,
+            report=told.append,
         ).begin()
 
     bench.loop.run_until_complete(begin())

@@ -68,7 +68,7 @@ def test_a_taken_id_is_the_fault_of_the_parameter_to_and_no_other_refusal_is() -
     taken = result("mast", WISH, ReaddressReport(ReaddressEnding.TAKEN, at=19200), LFS10).error()
     assert taken is not None
     assert taken["param"] == "to"
-    assert "slave id 9, at 19200 baud" in str(taken["message"])
+    assert "slave id 9 is in use: something answers there at 19200 baud" in str(taken["message"])
     absent = result("mast", WISH, ReaddressReport(ReaddressEnding.ABSENT), LFS10).error()
     assert absent is not None
     assert absent.get("param") is None

@@ -1,12 +1,12 @@
-"""Taking in a factory-new sensor: found at its factory id, brought to the line's rate, given a free id. Pure.
+"""Adopts a factory-new sensor: found at its factory id, brought to the line's rate, given a free id. Pure.
 
 Rules
 -----
 1. It is looked for at the line's rate first, then at its factory's and at each other rate of its profile. Where
-   something answers at several, or garbage is heard, there is more than one: plug in one at a time.
+   something answers at several, or garbage is received, there is more than one: plug in one at a time.
 2. What answers must be recognised as a sensor of the profile, and must be there alone (see `recognition`):
    nothing is ever written to another device.
-3. A new id is free if not one byte is heard there, at no rate. The candidates are tried in order.
+3. A new id is free if not one byte is received from it, at any rate. The candidates are tried in order.
 4. One intent, on the disk before the first write, covers all. First the rate is written, while the sensor still has
    its factory id: cut short there, it is found again by the same request. Then it is given its id, verified as in
    `lfs10d.reconfiguration.procedures.readdress`.
@@ -94,7 +94,7 @@ def adopt(wish: AdoptWish, query: IdentityQuery, echo_known: Callable[[], bool])
 def _check_before_write(
     wish: AdoptWish, query: IdentityQuery, echo_known: Callable[[], bool]
 ) -> Generator[Step, Any, AdoptReport]:
-    """Find the newcomer and a free id; `FREE` where it may be written."""
+    """Find the new sensor and a free id; `FREE` where it may be written."""
     newcomer = yield from _newcomer(wish, query)
     old = newcomer.old
     if newcomer.readdress.ending is not ReaddressEnding.FREE or old is None:
@@ -130,7 +130,7 @@ def _newcomer(wish: AdoptWish, query: IdentityQuery) -> Generator[Step, Any, Ado
         if reply.answers:
             recognition = yield from recognise(endpoint, reply, query)
             why, code = recognition.why or "", recognition.rate_code
-            if not recognition.spoilt:  # the winds of two differ, though both say the same id
+            if not recognition.spoilt:  # the values of two differ, though both answer the same id
                 ending = ReaddressEnding.UNRECOGNISED if why else ReaddressEnding.FREE
         report = ReaddressReport(ending, reply.register, reply.exception, rate, why)
         found.append(AdoptReport(report, endpoint, rate_code=code))
@@ -144,9 +144,9 @@ def _newcomer(wish: AdoptWish, query: IdentityQuery) -> Generator[Step, Any, Ado
 def _free_id(
     wish: AdoptWish, old: Endpoint, query: IdentityQuery
 ) -> Generator[Step, Any, tuple[int | None, ReaddressReport | None]]:
-    """Return the first candidate at which nothing is heard, None if there is none, and why it must not be written.
+    """Return the first candidate that is silent, None if there is none, and why it must not be written.
 
-    At the newcomer's own rate the candidate is listened to while it is found out whether the newcomer is alone.
+    At the new sensor's own rate the candidate is read while it is checked that the new sensor is alone.
     """
     for candidate in wish.candidates:
         clear = True
@@ -160,7 +160,7 @@ def _free_id(
 
 
 def _at_line_rate(old: Endpoint, rate: int, query: IdentityQuery) -> Generator[Step, Any, ReaddressReport | None]:
-    """Bring the newcomer to the line's rate; return why that failed, None if it did not."""
+    """Bring the new sensor to the line's rate; return why that failed, None if it did not."""
     sensor = RateSensor("", old.slave, query)
     exception, at, twins = yield from write_rate(sensor, old.baudrate, rate)
     if twins:

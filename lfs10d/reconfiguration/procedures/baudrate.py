@@ -1,8 +1,8 @@
-"""Moving every sensor of a line to another rate, one after the other, or back. Pure.
+"""Moves every sensor of a line to another rate, one after the other, or back. Pure.
 
 Rules
 -----
-1. Before anything is written every sensor answers, disabled ones too, and how the adapter echoes is known. The intent
+1. Before anything is written every sensor answers, disabled ones too, and the adapter's echo is known. The intent
    is on the disk before the first write. Only the register of the rate is written, and only to one slave at a time.
 2. The first sensor is the canary: if it answers only at the old rate its register is written back, and nothing else
    is touched. Each next one is written when the one before answers at the new rate.
@@ -10,7 +10,7 @@ Rules
    new rate since an earlier change and wait for their power cycle. One that answers at both rates since the write is
    two sensors: they are moved back too. The other of two may be deaf just then: all are looked for once more.
 4. With `power_cycle` all are written and none is expected at the new rate yet; each register must say the new rate.
-5. A sensor that is found nowhere is looked for until it is found, and brought to the line's (see `recover_baudrate`).
+5. A sensor that is lost is looked for until it is found, and brought to the line's rate (see `recover_baudrate`).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from lfs10d.reconfiguration.procedures.readdress import ECHO_READS, TRIES, VERIF
 ROLL_BACK = 60.0
 """How long sensors are moved back, in s."""
 FIRST_PAUSE = 1.0
-"""Between two rounds of questions to missing sensors, in s; doubled after each."""
+"""Pause between two rounds of reads of missing sensors, in s; doubled after each."""
 
 
 class BaudrateEnding(StrEnum):
@@ -62,7 +62,7 @@ UNTOUCHED = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class RateSensor:
-    """One sensor: its name, its slave id, and how it is asked."""
+    """One sensor: its name, its slave id, and its query."""
 
     name: str
     slave: int
@@ -73,13 +73,13 @@ class RateSensor:
         return Endpoint(slave=self.slave, baudrate=baudrate)
 
     def code(self, baudrate: int) -> int:
-        """Return what its register says for a rate."""
+        """Return the content of its register for a rate."""
         register = self.query.profile.baudrate
         return -1 if register is None else register.codes[baudrate]
 
     @property
     def register(self) -> int:
-        """Where its rate is set."""
+        """The address of the register of its rate."""
         register = self.query.profile.baudrate
         return -1 if register is None else register.register
 
@@ -97,7 +97,7 @@ class RateWish:
     """Those that have stored the new rate since an earlier change, and would obey it at their next power-up."""
 
     def touched(self, last: int) -> tuple[RateSensor, ...]:
-        """Return the sensors that have, or may have, the new rate in mind when the `last` one was written."""
+        """Return the sensors that have, or may have, stored the new rate when the `last` one was written."""
         return tuple(each for n, each in enumerate(self.sensors) if n <= last or each.name in self.stored)
 
 
@@ -187,7 +187,7 @@ def _one_by_one(wish: RateWish, where: dict[str, int | None]) -> Generator[Step,
 
 
 def _twins(wish: RateWish, last: int, where: dict[str, int | None]) -> Generator[Step, Any, BaudrateReport]:
-    """Bring everybody back, for the last one written is two."""
+    """Bring all back, as the last one written is two."""
     report = yield from roll_back(wish.touched(last), wish.old, wish.to, where)
     names = (wish.sensors[last].name,)
     return replace(report, ended=BaudrateEnding.TWINS, names=names) if report.restored else report
@@ -221,7 +221,7 @@ def write_rate(sensor: RateSensor, old: int, to: int) -> Generator[Step, Any, tu
 def find_rate(
     sensor: RateSensor, rates: Sequence[int], *, tries: int = TRIES, timeout: float | None = None
 ) -> Generator[Step, Any, tuple[int | None, int | None]]:
-    """Look for a sensor at these rates; return what its register of the rate says, and the rate it answers at."""
+    """Look for a sensor at these rates; return the content of its rate register, and the rate it answers at."""
     for _ in range(tries):
         for rate in rates:
             reply = yield from sensor.query.read_register(sensor.at(rate), timeout, register=sensor.register)
@@ -261,7 +261,7 @@ def roll_back(
 ) -> Generator[Step, Any, BaudrateReport]:
     """Bring these sensors to `rate`, for up to `ROLL_BACK`; `where` learns where they are.
 
-    All are looked for at the other rate in the end, after `VERIFY`, in which nobody is polled.
+    All are looked for at the other rate in the end, after `VERIFY`, during which none is polled.
     """
     until: float | None = None
     missing = list(sensors)
@@ -282,7 +282,7 @@ def roll_back(
 
 
 def _left_behind(sensors: Sequence[RateSensor], rate: int) -> Generator[Step, Any, list[RateSensor]]:
-    """Return the sensors that somebody answers for at a rate they all have left: he was deaf after his last write."""
+    """Return the sensors that still answer at a rate they all have left: those were deaf after their last write."""
     yield Hold(sensors[0].query.clock.now + VERIFY)
     left = []
     for sensor in sensors:

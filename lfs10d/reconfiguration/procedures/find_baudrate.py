@@ -1,7 +1,7 @@
-"""Asking at the other rates where every sensor of the line has been offline for a while. Pure; it only reads.
+"""Reads at the other rates where every sensor of the line has been offline for a while. Pure; writes nothing.
 
-It says what was found and uses nothing of it: a line that speaks at the wrong rate is for a person, or for
-`line/baudrate`, to put right.
+It reports what was found and uses nothing of it: a line at the wrong rate is for a person, or for `line/baudrate`, to
+put right.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from lfs10d.modbus.ask import Ask
 LOST_AFTER = 30.0
 """Seconds for which every sensor must be offline."""
 TIMEOUT = 0.2
-"""How long each is waited for, in s."""
+"""Time-out of each read, in s."""
 
 Found: TypeAlias = "dict[str, int]"
 """The rate at which each device answered that did."""
@@ -30,9 +30,9 @@ Found: TypeAlias = "dict[str, int]"
 def find_other_rates(
     devices: Callable[[], Iterable[Device]], clock: ProcedureClock, line_rate: int
 ) -> Generator[Step, Any, None]:
-    """Ask one device after the other, between the probes, at each other rate of its profile; tell what was found.
+    """Read one device after the other, between the probes, at each other rate of its profile; report what was found.
 
-    What goes aside is `Found`, anew whenever it changes; it is empty again when somebody answers at the line's rate.
+    `Found` is awaited whenever it changes; it is empty again when a device answers at the line's rate.
     """
     found: Found = {}
     since = inf
@@ -63,7 +63,7 @@ def find_other_rates(
 
 
 def message(found: Found, line_rate: int, polled: int, *, filed: int) -> str:
-    """Return the message for a person: what was found, and what to do.
+    """Return the message to a person: what was found, and what to do.
 
     `filed` is `line.baudrate` of the file; it differs from the `line_rate` where line/baudrate has moved the line.
     """

@@ -1,16 +1,16 @@
-"""Following a sensor that was written to and may answer at either of two places, until it is found. Pure.
+"""Follows a sensor that was written to and may answer at either of two places, until it is found. Pure.
 
 Rules
 -----
 1. The first look is as long as the verification of a write, for the daemon may have died right after that.
-2. Then both places are asked now and then, within the share of probes: after 1 s, 2 s, 4 s ... Anything new has the
-   places looked at in full, and told.
+2. Then both places are read now and then, within the share of probes: after 1 s, 2 s, 4 s ... Any new answer causes
+   another full look, which is reported.
 3. It is over when the sensor answers at the new place and the old one is silent, or when it answers at the old one
-   and its register does not say the new id. A register that does may still be obeyed, at the next power cycle.
-4. A newcomer at its new place is found though somebody answers at the factory's id: that is the next newcomer,
-   unless the register there says the new id too.
-5. It writes in one case only: where somebody is at the new place, one at the old place whose register says the new id
-   has his own written back. They would meet at his next power-up.
+   and its register does not hold the new id. If it does, the id may still take effect at the next power cycle.
+4. A new sensor at its new place is found though a device answers at the factory's id: that is the next new sensor,
+   unless the register there holds the new id too.
+5. It writes in one case only: where a sensor is at the new place, one at the old place whose register holds the new
+   id has its own written back. Else both would have that id after its next power-up.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def follow(
     before: Endpoint | None = None,
     newcomer: bool = False,
 ) -> Generator[Step, Any, ReaddressReport]:
-    """Ask until the sensor is found; each look that did not find it goes aside.
+    """Query until the sensor is found; each look that did not find it is awaited.
 
     `before` is where it was before it came to `old`: it may be there still. `newcomer`: `old` is a factory's id.
     """
@@ -94,7 +94,7 @@ def _judged(
 def _still_there(
     before: Endpoint | None, new: Endpoint, query: IdentityQuery
 ) -> Generator[Step, Any, ReaddressReport | None]:
-    """Ask the place of before, while the later ones are silent; return that the sensor stays there, None if not."""
+    """Read the place of before, while the later ones are silent; return that the sensor stays there, None if not."""
     if before is None:
         return None
     reply = yield from query.read_register(before)

@@ -1,12 +1,12 @@
-"""Asking one place who is there, so that a late answer to an older question never passes for the answer. Pure.
+"""Reads the identity at one place, so that a late answer to an older request is never taken for the reply. Pure.
 
 Rules
 -----
-1. The register of the slave id is asked. While an older read of that shape may still be answered, a read of the
+1. The register of the slave id is read. While an older read of that shape may still be answered, a read of the
    values goes first: its answer, having another length, proves that nothing older is to come.
-2. A slave that may not be asked for the moment is waited for.
-3. Echoes of writes prove nothing and are not looked at.
-4. A slave whose answers have come late is waited for long, whoever was being asked when they came.
+2. A slave that must be left alone for the moment is waited for.
+3. Echoes of writes prove nothing and are ignored.
+4. A slave whose answers have come late gets a long time-out, whichever request they came during.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ from lfs10d.reading import FaultCode
 from lfs10d.reconfiguration.journal import Endpoint
 
 QUICK = 0.2
-"""How long a sensor is usually waited for, in s."""
+"""The usual time-out, in s."""
 SLOW_FROM = 0.1
-"""A sensor that took longer than this, in s, is waited for `PATIENT` from then on."""
+"""A sensor that took longer than this, in s, gets the time-out `PATIENT` from then on."""
 PATIENT = 1.0
-"""How long one that is slow, or must not be missed, is waited for, in s."""
+"""Time-out for one that is slow, or must not be missed, in s."""
 
 
 @dataclass(frozen=True, slots=True)
 class IdentityReply:
-    """What one place said.
+    """What one place answered.
 
     `answers`: a right frame of its own, with `register` as the content of its id register, or `exception`.
     `noise`: other bytes came. Neither: silence. `words` are the registers of an answered read of values; replies are
@@ -52,7 +52,7 @@ class IdentityReply:
 
     @property
     def silent(self) -> bool:
-        """Nothing at all was heard."""
+        """Nothing at all was received."""
         return not (self.answers or self.noise)
 
 
@@ -60,7 +60,7 @@ SILENCE = IdentityReply()
 
 
 class IdentityQuery:
-    """Asks devices of one profile. `line_rate` is the line's own; `clock` is that of the course this is for."""
+    """Reads devices of one profile. `line_rate` is the line's own; `clock` is that of the procedure this is for."""
 
     def __init__(
         self, profile: Profile, codec: Codec, pending: PendingRequests, clock: ProcedureClock, *, line_rate: int
@@ -78,7 +78,7 @@ class IdentityQuery:
     def read_register(
         self, endpoint: Endpoint, timeout: float | None = None, *, register: int | None = None
     ) -> Generator[Step, Outcome, IdentityReply]:
-        """Ask a place for its id register, or for another one."""
+        """Read the id register at a place, or another one."""
         identity = ReadRegisters(endpoint.slave, self.id_register if register is None else register, 1)
         allowed = yield from self._allowed(identity, endpoint, timeout)
         if allowed is not None:
@@ -100,9 +100,9 @@ class IdentityQuery:
     def read_values(
         self, endpoint: Endpoint, timeout: float | None = None, *, block: Block | None = None
     ) -> Generator[Step, Outcome, IdentityReply]:
-        """Ask a place for its values, whatever they are (the first `block` of the profile, or this one).
+        """Read the values at a place, whatever they are (the first `block` of the profile, or this one).
 
-        A late answer to an older such question counts.
+        A late answer to an older such read counts.
         """
         until = self._pending.left_alone_until(endpoint.slave, self.clock.now)
         if until is not None:
@@ -116,7 +116,7 @@ class IdentityQuery:
     def listen(
         self, silent: Endpoint, timeout: float, before: int
     ) -> Generator[Step, Outcome, tuple[IdentityReply, bool]]:
-        """Ask a place that is expected to be silent directly behind another question; return what was received there.
+        """Read a place that is expected to be silent directly behind another read; return what was received.
 
         The second says that a right frame of slave `before` came which answers no older request to it: another device
         of that id, or a repeater.
@@ -128,7 +128,7 @@ class IdentityQuery:
         return self._reply(outcome, values=True), extra
 
     def settle(self, endpoint: Endpoint) -> Generator[Step, Outcome, bool]:
-        """Ask until no answer to an older question can come from a place; whether that could be reached."""
+        """Read until no answer to an older request can come from a place; whether that could be reached."""
         for _ in range(8):
             if not self._pending.earlier(endpoint.slave):
                 return True
@@ -158,7 +158,7 @@ class IdentityQuery:
     def _allowed(
         self, request: ReadRegisters, endpoint: Endpoint, timeout: float | None
     ) -> Generator[Step, Outcome, IdentityReply | None]:
-        """Wait and ask what must be asked before `request` may be; return what came instead of an answer, if so."""
+        """Wait, and read what must go before `request`; return the reply that came in place of an answer, if any."""
         other = self._values_of(endpoint)
         barrier = other if self.codec.shapes(other)[0] != self.codec.shapes(request)[0] else None
         while True:
@@ -191,7 +191,7 @@ class IdentityQuery:
 
 
 def quiet(outcome: Outcome) -> bool:
-    """Whether nothing was heard but our own echo, and late answers of others."""
+    """Whether nothing was received but our own echo, and late answers of others."""
     fault = outcome.fault
     if fault is None or outcome.unsolicited:
         return False

@@ -1,4 +1,4 @@
-"""Looking for a sensor where the file and what was verified last do not agree. Pure; it reads."""
+"""Looks for a sensor where the file and its last verified place differ. Pure; writes nothing."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FIRST_PAUSE = 1.0
 
 
 def locate(places: Sequence[Endpoint], query: IdentityQuery, *, longest_pause: float) -> Generator[Step, Any, Endpoint]:
-    """Return the first of `places` at which somebody answers; None goes aside once if nobody does at first."""
+    """Return the first of `places` at which a device answers; None is awaited once if none does at first."""
     for endpoint in places:
         if (yield from present(endpoint, query)).answers:
             return endpoint

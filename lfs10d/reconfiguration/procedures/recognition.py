@@ -1,20 +1,20 @@
-"""Is there one sensor of a profile at a place, and one only? Asked before anything is written to it. Pure.
+"""Checks that there is one sensor of a profile at a place, and one only, before anything is written to it. Pure.
 
 Rules
 -----
-1. *Recognised*: the register of the slave id has answered with the id it was asked by, the register of the rate (where
+1. *Recognised*: the register of the slave id has answered with the id of the request, the register of the rate (where
    the profile has one) holds one of its codes, and every value has answered in range each time it was read.
-2. *One alone*: the value is read three times, and behind each read a silent slave id is asked, so that the line is
+2. *One alone*: the value is read three times, and behind each read a silent slave id is read, so that the line is
    listened to for 0.2, 0.2 and 0.6 s. Two sensors share the id where any of these answers collides, is followed by
-   another or by bytes that no longer come when the silent id alone is asked, or is impossible (not in range, no finite
+   another or by bytes that no longer come when the silent id alone is read, or is impossible (not in range, no finite
    number), and where the values are those of two sensors (rule 3).
-3. Wind varies: two reads of one sensor may differ by any amount. So values are those of two only if they jump there
-   and back between two groups: nine reads fall into two groups, the distance between these is more than `APART` times
+3. Wind varies: two reads of one sensor may differ by any amount. So values are those of two only if they jump back
+   and forth between two groups: nine reads fall into two groups, the distance between these is more than `APART` times
    the width of each and more than `LEAST` of the profile's range, and it was crossed at least `CROSSINGS` times. Where
-   the first three do not jump there and back, six more are not read.
+   the first three do not jump back and forth, six more are not read.
 4. Two sensors share the id, too, where a second answer came to earlier requests: such a slave is left alone until
    that one has come, so that nothing of it is received behind a read.
-5. Two sensors that answer bit-identically at the same time are one to whoever listens.
+5. Two sensors that answer bit-identically at the same time cannot be told from one.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ READS = 3
 LISTENING = (QUICK, QUICK, 0.6)
 """How long the line is listened to behind each read, in s."""
 MORE_READS = 6
-"""How often it is read besides where the first reads jump there and back."""
+"""How often it is read besides where the first reads jump back and forth."""
 APART = 5.0
 """Two groups of values are so many times as far apart as each is wide."""
 LEAST = 0.02
 """The least distance between two groups, as a part of the range: a display that flickers by one digit is one sensor."""
 CROSSINGS = 3
-"""So often two sensors take turns in nine reads; a gust comes and goes once."""
+"""Two sensors take turns at least so often in nine reads; a gust comes and goes once."""
 FULL_CIRCLE = 360.0
 
 
@@ -61,7 +61,7 @@ class Recognition:
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What was found out about one place. `answers`: the value could be read. `twins`: how two show, in words.
+    """What was found out about one place. `answers`: the value could be read. `twins`: the sign of two sensors.
 
     `taken`: something was received from the place that was to be silent. `exception` is the code of a refusal.
     """
@@ -75,7 +75,7 @@ class Look:
 def recognise(
     endpoint: Endpoint, identity: IdentityReply, query: IdentityQuery
 ) -> Generator[Step, Outcome, Recognition]:
-    """Find out whether a sensor of the profile is at a place where `identity` was the answer to who is there."""
+    """Find out whether a sensor of the profile is at a place where `identity` was the reply of its id register."""
     profile = query.profile
     if identity.exception is not None:
         return Recognition(f"it refuses register 0x{query.id_register:04X} (exception {identity.exception:02X})")
@@ -165,7 +165,7 @@ def _whose(silent: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, L
 def _take_turns(
     value: Value, block: Block, numbers: list[float], endpoint: Endpoint, query: IdentityQuery
 ) -> Generator[Step, Outcome, Look]:
-    """Read it more often where the `numbers` so far jump there and back; find out whether that goes on."""
+    """Read it more often where the `numbers` so far jump back and forth; find out whether that goes on."""
     if jumps(value, numbers) < READS - 1:
         return Look()
     for _ in range(MORE_READS):
@@ -175,7 +175,7 @@ def _take_turns(
         numbers.append(look)
     if jumps(value, numbers) < CROSSINGS:
         return Look()
-    return Look(twins=f"its values jump there and back between {numbers[0]:g} and {numbers[1]:g} {value.unit}")
+    return Look(twins=f"its values jump back and forth between {numbers[0]:g} and {numbers[1]:g} {value.unit}")
 
 
 def _measured(
@@ -190,14 +190,14 @@ def _measured(
         if reply.words is not None:
             values = block.decode(reply.words)
             if isinstance(values, Fault):
-                return Look(twins=f"what it answers is impossible: {values.message}")
+                return Look(twins=f"its values are impossible: {values.message}")
             return float(values[value.name])
         exception = reply.exception
     return Look(answers=False, exception=exception)
 
 
 def jumps(value: Value, numbers: Sequence[float]) -> int:
-    """Return how often numbers jump between two groups that are apart as those of two sensors are; 0 if none are.
+    """Return how often numbers jump between two groups that are as far apart as those of two sensors; 0 if none are.
 
     There are at least two numbers.
     """

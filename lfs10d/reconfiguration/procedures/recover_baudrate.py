@@ -1,9 +1,9 @@
-"""Sensors of a change of rate that is still open: put back, or awaited, however long it takes. Pure.
+"""Recovers the sensors of an open change of the rate: put back, or awaited, however long it takes. Pure.
 
 What the daemon did not live to finish is undone, unless every sensor is at the new rate already: what answers is put
 back at once, what is lost is looked for until it is found and then put back too. Sensors that have
-stored the new rate and want their power switched are asked there until they come up; nothing is written to them. Where
-somebody answers at the old rate too there are two of that slave id, and one of them has still to come.
+stored the new rate and need a power cycle are read there until they come up; nothing is written to them. Where a
+sensor answers at the old rate too there are two of that slave id, and one of them is still to come.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from lfs10d.reconfiguration.procedures.baudrate import (
 from lfs10d.reconfiguration.procedures.identity_query import PATIENT
 
 PATIENT_EVERY = 4
-"""Every so many rounds a lost sensor is waited for long, at each rate in turn: it may be slow."""
+"""In every fourth round a lost sensor gets a long time-out, at each rate in turn: it may be slow."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ def look_back(
     """Look once for each sensor after a change of rate that was cut short, at the line's `own` rate first.
 
     One that answers at `rate` and has stored another is written back at once, before it comes up there: none waits
-    for one that is lost. `where` learns where each is, and is returned.
+    for one that is lost. `where` is updated and returned.
     """
     for sensor in sensors:
         says, at = yield from find_rate(sensor, _first(own, rate, other), tries=1)
@@ -68,9 +68,9 @@ def look_back(
 def put_back(
     sensors: Sequence[RateSensor], rate: int, other: int, where: dict[str, int | None]
 ) -> Generator[Step, Any, BaudrateReport]:
-    """Bring those of these sensors that were found to `rate`; the verdict speaks of all in `where`.
+    """Bring those of these sensors that were found to `rate`; the report is of all in `where`.
 
-    One that answers at the `other` rate too is two sensors: that goes aside, and it counts as being there.
+    One that answers at the `other` rate too is two sensors: that is awaited, and it counts as being there.
     """
     for sensor in sensors:
         if where[sensor.name] is None:
@@ -92,20 +92,20 @@ def await_lost(
     own: int,
     pause: float,
     longest_pause: float,
-    tell_at: float,
+    give_up_at: float,
 ) -> Generator[Step, Any, tuple[RateSensor, ...]]:
     """Return the first of these sensors that can be put back, however long it takes; nothing is written.
 
-    They are asked after `pause` s, twice that ... up to `longest_pause`, at the line's `own` rate first, but where each
+    They are read after `pause` s, twice that ... up to `longest_pause`, at the line's `own` rate first, but where each
     was found if it was. One that answers at the `other` rate and has stored `rate` waits for its power cycle, and is
-    waited for. From the time `tell_at` on, once, `StillLost` goes aside.
+    waited for. From the time `give_up_at` on, once, `StillLost` is awaited.
     """
     rounds = 0
     while True:
         now = sensors[0].query.clock.now
-        if now >= tell_at:
+        if now >= give_up_at:
             yield Await(StillLost())
-            tell_at = inf
+            give_up_at = inf
         yield Hold(now + pause)
         pause = min(2 * pause, longest_pause)
         found: list[RateSensor] = []
@@ -130,9 +130,9 @@ def _first(own: int, *rates: int) -> tuple[int, ...]:
 def await_power(
     sensors: Sequence[RateSensor], old: int, to: int, *, longest_pause: float
 ) -> Generator[Step, Any, BaudrateReport]:
-    """Ask sensors that want a power cycle at the new rate until all have come up there; each goes aside.
+    """Read sensors that need a power cycle at the new rate until all have come up there; each is awaited.
 
-    So does, once, each that is two.
+    So is, once, each that is two.
     """
     missing = list(sensors)
     twins: set[str] = set()

@@ -250,7 +250,7 @@ def test_a_value_that_cannot_be_is_of_two(pretence: Pretence) -> None:
     pretence.sensor(3, wind=words(1e6))
     found = look(pretence)
     assert found.twins is not None
-    assert found.twins.startswith("what it answers is impossible: wind_speed")
+    assert found.twins.startswith("its values are impossible: wind_speed")
 
 
 def test_one_that_gives_no_value_is_not_there(pretence: Pretence) -> None:
@@ -285,7 +285,7 @@ def test_the_wind_of_one_sensor_may_vary_as_it_likes(pretence: Pretence, numbers
 
 def test_values_that_take_turns_are_of_two(pretence: Pretence) -> None:
     found = blowing(pretence, cycle([3.0, 12.5, 3.1, 12.4]))
-    assert found == Look(twins="its values jump there and back between 3 and 12.5 m/s")
+    assert found == Look(twins="its values jump back and forth between 3 and 12.5 m/s")
     assert len(pretence.asked) == 2 * READS + MORE_READS
 
 

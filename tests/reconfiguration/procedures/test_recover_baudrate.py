@@ -37,11 +37,11 @@ def put(
 
 
 def awaited(
-    pretence: Pretence, *slaves: int, tell_at: float = inf, own: int = 9600, at: int | None = None
+    pretence: Pretence, *slaves: int, give_up_at: float = inf, own: int = 9600, at: int | None = None
 ) -> list[str]:
     where = {f"s{slave}": at for slave in slaves}
     steps = await_lost(
-        sensors_of(pretence, *slaves), *UP, where, own=own, pause=1.0, longest_pause=15.0, tell_at=tell_at
+        sensors_of(pretence, *slaves), *UP, where, own=own, pause=1.0, longest_pause=15.0, give_up_at=give_up_at
     )  # fmt: skip
     return [sensor.name for sensor in pretence.carry_out(steps)]
 
@@ -78,7 +78,7 @@ def test_a_verdict_speaks_of_those_that_were_found_before_too(pretence: Pretence
 def test_a_lost_one_is_waited_for_however_long_it_takes_and_nothing_is_written(pretence: Pretence) -> None:
     sensor = pretence.sensor(2, baudrate=19200, silent=True)
     pretence.later.append((300.0, lambda: setattr(sensor, "silent", False)))
-    assert awaited(pretence, 1, 2, tell_at=60.0) == ["s2"]
+    assert awaited(pretence, 1, 2, give_up_at=60.0) == ["s2"]
     assert pretence.writes == []
     assert pretence.awaited == [StillLost()]
     assert 300.0 < pretence.clock.now < 320.0
