@@ -1,4 +1,4 @@
-"""Where every verb begins: signals are heard before anything is imported that takes its time."""
+"""Entry point of every verb: signals are handled before any slow import."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from types import FrameType
 from typing import NoReturn
 
 LASTING = frozenset({"run", "watch", "trace", "simulate", "demo"})
-"""Verbs that go on until they are told to end, which is no failure then; `read --watch` is one more."""
+"""Verbs that run until a signal ends them, which is success then; `read --watch` is one more."""
 
 ENDING = (signal.SIGINT, signal.SIGTERM)
 
@@ -19,7 +19,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     words = sys.argv[1:] if arguments is None else arguments
     interrupted = 0 if lasting(words) else 1
     try:
-        # Also where whoever started us ignores SIGINT, as a shell does for what it puts into the background.
+        # Also where the parent ignores SIGINT, as a shell does for background jobs.
         for number in ENDING:
             signal.signal(number, _interrupted)
         from lfs10d.cli.exit_status import conclude  # noqa: PLC0415  # a tenth of a second, in which a signal may come
@@ -32,13 +32,13 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
 
 
 def lasting(words: Sequence[str]) -> bool:
-    """Tell whether these arguments name a verb that goes on until it is told to end."""
+    """Return whether these arguments name a verb that runs until a signal ends it."""
     verb = next((word for word in words if not word.startswith("-")), None)
     return verb in LASTING or (verb == "read" and "--watch" in words)
 
 
 def _interrupted(signum: int, frame: FrameType | None) -> NoReturn:
-    """End the verb, whose end takes less than 2 s; who asks for it twice meanwhile gets no other end."""
+    """End the verb, which takes less than 2 s; further signals are ignored meanwhile."""
     del signum, frame
     _ignore()
     raise KeyboardInterrupt

@@ -24,23 +24,23 @@ SERVICE_FILE = Path("/etc/lfs10d/lfs10d.yaml")
 VERBS = {
     "run": "Run the daemon.",
     "check": "Validate the configuration; print the line's time budget.",
-    "config": "Print the effective configuration, each value with its origin.",
-    "scan": "Find out who is on a line.",
-    "read": "Read one sensor, now.",
+    "config": "Print the effective configuration with the origin of each value.",
+    "scan": "Find the devices on a line.",
+    "read": "Read one sensor.",
     "request": "Send a request to the running daemon, print its response.",
-    "watch": "Show a live table of every slave.",
-    "trace": "Show the live frames of the line, decoded.",
+    "watch": "Show a live table of all slaves.",
+    "trace": "Show the frames on the line, decoded.",
     "profiles": "Show the device profiles.",
     "simulate": "Run a simulated line on a pseudo terminal.",
-    "demo": "See it all at work: simulated line, broker, daemon, live view.",
+    "demo": "Show it at work: simulated line, broker, daemon, live view.",
 }
 """Each has a module of its name with `command` in it; the short help stands here so that --help imports none."""
 
 EXAMPLES = """\b
 Examples:
-  lfs10d demo                  see it work, without hardware
-  lfs10d scan /dev/ttyUSB0     who is on the line?
-  lfs10d check -c lfs10d.yaml  is the file right, can the line carry it?
+  lfs10d demo                  show it at work, without hardware
+  lfs10d scan /dev/ttyUSB0     find the devices on a line
+  lfs10d check -c lfs10d.yaml  validate the file and the time budget
   lfs10d run -c lfs10d.yaml    measure and publish
 """
 
@@ -49,7 +49,7 @@ class Verbs(click.Group):
     """Looks a verb's module up when it is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the verbs in the order of a newcomer's day."""
+        """Return the verbs in the order of first use."""
         del ctx
         return [verb for verb in VERBS if importlib.util.find_spec(f"{__name__}.{verb}")]
 
@@ -91,7 +91,7 @@ def config_option(function: Callable[..., Any]) -> Callable[..., Any]:
         default=SERVICE_FILE,
         show_default=True,
         metavar="FILE",
-        type=click.Path(path_type=Path, readable=False),  # whether it can be read is told in our words
+        type=click.Path(path_type=Path, readable=False),  # whether it can be read is reported in our words
         help="The configuration file.",
     )(function)
 

@@ -21,108 +21,108 @@ from lfs10d.errors import BrokerError, FailedError
 
 ADOPT: Final = "line/adopt"
 HEALTH_WITHIN: Final = 10.0
-WORDS: Final = "waiting for a sensor ..."
+WAITING: Final = "waiting for a sensor ..."
 
 
-async def mount(visited: Login, mounting: AdoptLoop, *, as_json: bool) -> int:
-    """Have sensors adopted until all names are given or it is cancelled; return the exit code.
+async def repeat(login: Login, loop: AdoptLoop, *, as_json: bool) -> int:
+    """Adopt sensors until all names are given or it is cancelled; return the exit code.
 
     0 if all were adopted that were named, or, without names, any. Raises BrokerError where broker or daemon is not
-    there at the beginning; later they are waited for.
+    there at the beginning; later it waits for them.
     """
-    visitor = CommandClient(visited)
+    client = CommandClient(login)
     ended_well = True
     try:
-        with contextlib.suppress(asyncio.CancelledError):  # a signal: all are mounted
-            ended_well = await _Repeating(visitor, mounting, as_json=as_json).go_on()
+        with contextlib.suppress(asyncio.CancelledError):  # a signal: all are adopted
+            ended_well = await _AdoptRepeat(client, loop, as_json=as_json).run()
     finally:
-        await visitor.leave()
-        if mounting.adopted and not as_json:
-            for text in summary(mounting.adopted):
+        await client.disconnect()
+        if loop.adopted and not as_json:
+            for text in summary(loop.adopted):
                 click.echo(text)
-    if not mounting.adopted:
+    if not loop.adopted:
         click.echo("No sensor was adopted.", err=True)
-    return 0 if ended_well and mounting.adopted and not mounting.lacking else EXIT_FAILED
+    return 0 if ended_well and loop.adopted and not loop.unfinished else EXIT_FAILED
 
 
 def summary(adopted: Sequence[AdoptedSensor]) -> list[str]:
-    """Return what was mounted, as a table."""
+    """Return the adopted sensors as a table."""
     rows = [[each.device, str(each.slave or "?"), str(each.baudrate or "?")] for each in adopted]
     count = f"{len(adopted)} {'sensor' if len(adopted) == 1 else 'sensors'} adopted:"
     return [count, *columns(("name", "id", "baud"), rows, right={1, 2})]
 
 
-class _Repeating:
-    """What is asked and told, until it is cancelled."""
+class _AdoptRepeat:
+    """The requests and reports, until it is cancelled."""
 
-    def __init__(self, visitor: CommandClient, mounting: AdoptLoop, *, as_json: bool) -> None:
-        self._visitor = visitor
-        self._mounting = mounting
+    def __init__(self, client: CommandClient, loop: AdoptLoop, *, as_json: bool) -> None:
+        self._client = client
+        self._loop = loop
         self._as_json = as_json
 
-    async def go_on(self) -> bool:
-        """Adopt one after the other; whether nothing stopped it."""
+    async def run(self) -> bool:
+        """Adopt one after the other; return whether nothing stopped it."""
         async with spinning(f"{ADOPT} ..."):
-            await self._visitor.enter()
-            await self._visitor.find_daemon()
-            await self._look()
-        self._say(FIRST)
-        while not self._mounting.complete:
+            await self._client.connect()
+            await self._client.require_daemon()
+            await self._check_health()
+        self._print(FIRST)
+        while not self._loop.complete:
             try:
                 if not await self._turn():
                     return False
             except BrokerError as error:
-                self._mounting.lost()
-                self._say(f"{error}; waiting until it is there again", trouble=True)
-                async with spinning(WORDS):
-                    await self._visitor.come_back()
-                self._say("It is there again.", trouble=True)
+                self._loop.answer_lost()
+                self._print(f"{error}; waiting until it is there again", problem=True)
+                async with spinning(WAITING):
+                    await self._client.wait_for_daemon()
+                self._print("It is there again.", problem=True)
         return True
 
     async def _turn(self) -> bool:
-        """Ask once; whether it can go on."""
-        mounting = self._mounting
-        async with spinning(WORDS):
-            if mounting.doubtful and await self._look():
+        """Send one request; return whether to go on."""
+        loop = self._loop
+        async with spinning(WAITING):
+            if loop.uncertain and await self._check_health():
                 return True
-            response = await self._visitor.ask(ADOPT, self._identified(mounting.content), None)
-            turn = mounting.heard(response or {})
+            response = await self._client.request(ADOPT, self._with_id(loop.content), None)
+            turn = loop.on_response(response or {})
         if turn.adopted is not None:
-            self._tell(turn.adopted)
-        if turn.trouble is not None:
-            self._say(turn.trouble, trouble=True)
+            self._report(turn.adopted)
+        if turn.problem is not None:
+            self._print(turn.problem, problem=True)
         if turn.ends:
             return False
-        async with spinning(WORDS):
+        async with spinning(WAITING):
             await asyncio.sleep(turn.pause)
         return True
 
-    async def _look(self) -> bool:
-        """Ask how the daemon is; whether that shows a sensor that was adopted meanwhile."""
-        response = await self._visitor.ask("health", self._identified({}, always=True), HEALTH_WITHIN)
+    async def _check_health(self) -> bool:
+        """Request the daemon's health; return whether it shows a sensor that was adopted meanwhile."""
+        response = await self._client.request("health", self._with_id({}, always=True), HEALTH_WITHIN)
         if response is None:
             raise FailedError(f"no response to health within {HEALTH_WITHIN:g} s")
-        found = list(self._mounting.looked(response.get("data")))
+        found = list(self._loop.on_health(response.get("data")))
         for each in found:
-            self._tell(each)
+            self._report(each)
         return bool(found)
 
-    def _identified(self, content: dict[str, Any], *, always: bool = False) -> dict[str, Any]:
-        """Return a request's content, with an id only where its answer is told by nothing else.
+    def _with_id(self, content: dict[str, Any], *, always: bool = False) -> dict[str, Any]:
+        """Return a request's content, with an id only where nothing else identifies its response.
 
-        The daemon keeps the answer to each id on its disk for a day: too much for a question asked every few seconds.
+        The daemon keeps the response to each id on its disk for a day: too much for a request every few seconds.
         """
-        if self._visitor.by_response_topic and not always:
+        if self._client.by_response_topic and not always:
             return content
         return {**content, "id": secrets.token_hex(6)}
 
-    def _tell(self, adopted: AdoptedSensor) -> None:
+    def _report(self, adopted: AdoptedSensor) -> None:
         if self._as_json:
             click.echo(json.dumps(adopted.data))
         else:
-            self._say(adopted.words)
-        if not self._mounting.complete:
-            self._say(NEXT)
+            self._print(adopted.words)
+        if not self._loop.complete:
+            self._print(NEXT)
 
-    def _say(self, words: str, *, trouble: bool = False) -> None:
-        click.echo(words, err=trouble or self._as_json)
+    def _print(self, words: str, *, problem: bool = False) -> None:
+        click.echo(words, err=problem or self._as_json)

@@ -1,4 +1,4 @@
-"""What is allowed but hardly meant: the warnings of `lfs10d check`, each at its place in the file."""
+"""Warnings of `lfs10d check`: valid settings that are probably a mistake, each at its place in the file."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from lfs10d.schema.messages import KeyPath
 from lfs10d.schema.quantities import duration_text
 
 COMMON_HOST_NAMES = frozenset({"localhost", "raspberrypi", "debian", "raspbian", "ubuntu", "linux", "openwrt"})
-"""Names that systems come with: two gateways soon have the same."""
+"""Default host names of systems, which two gateways may share."""
 
 
 def advice(loaded: LoadedConfig, budget: Budget, host: str) -> tuple[Problem, ...]:

@@ -1,4 +1,4 @@
-"""`lfs10d check`: whether the file is right, and the line carries what it asks for."""
+"""`lfs10d check`: validates the configuration and computes the time budget of the line."""
 
 from __future__ import annotations
 
@@ -41,7 +41,9 @@ def command(config: Path, *, as_json: bool) -> int:
     except ConfigError as error:
         if not as_json:
             raise
-        click.echo(json.dumps({"valid": False, "problems": [_plain(problem) for problem in error.problems]}, indent=2))
+        click.echo(
+            json.dumps({"valid": False, "problems": [_problem_json(problem) for problem in error.problems]}, indent=2)
+        )
         click.echo(str(error), err=True)
         return EXIT_CONFIG
     found = budget(loaded.config, loaded.profiles)
@@ -56,7 +58,7 @@ def command(config: Path, *, as_json: bool) -> int:
     return 0
 
 
-def _plain(problem: Problem) -> dict[str, Any]:
+def _problem_json(problem: Problem) -> dict[str, Any]:
     return {
         "file": problem.file,
         "line": problem.line,
@@ -69,7 +71,7 @@ def _plain(problem: Problem) -> dict[str, Any]:
 def _report(loaded: LoadedConfig, found: Budget, warnings: tuple[Problem, ...]) -> dict[str, Any]:
     return {
         "valid": True,
-        "warnings": [_plain(warning) for warning in warnings],
+        "warnings": [_problem_json(warning) for warning in warnings],
         "budget": {
             "gap_us": round(found.gap * 1e6, 1),
             "load_pct": round(found.load * 100, 2),

@@ -1,6 +1,6 @@
 """A verb's connection to the broker, and the requests it sends to the daemon behind it.
 
-A visitor has a client id of its own, no will and no queue, and keeps nothing on the broker.
+The connection has a client id of its own, no will and no queue, and leaves nothing retained.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from lfs10d.mqtt.reasons import REFUSED_FROM, Disconnect, reason_in_words
 from lfs10d.mqtt.topics import OFFLINE, ONLINE
 
 CONNECTS_WITHIN: Final = 15.0
-"""s for the broker to accept us: one that does not know MQTT 5 and says nothing costs 5 of them."""
+"""s for the broker to accept the connection; one that does not know MQTT 5 and stays silent takes 5 of them."""
 RETAINED_WITHIN: Final = 1.0
-"""s after a subscription in which what is retained must have come; brokers send it at once."""
-LEAVES_WITHIN: Final = 0.3
-REFUSALS: Final = ("not authorized", "user name")
-"""What a broker that wants a password says, in the words of `lfs10d.mqtt.reasons`."""
-NOBODY_LISTENS: Final = 0x10
+"""s after a subscription within which retained messages must have arrived; brokers send them at once."""
+DISCONNECTS_WITHIN: Final = 0.3
+PASSWORD_REFUSALS: Final = ("not authorized", "user name")
+"""The reasons of a broker that wants a password, in the words of `lfs10d.mqtt.reasons`."""
+NO_SUBSCRIBERS: Final = 0x10
 """PUBACK of a message without a subscriber (MQTT 5.0, section 3.4.2.1)."""
 
 
 class CommandClient:
-    """One visit. `arrived` is given what comes on `filters`; responses and our daemon's availability are kept here."""
+    """One connection. `arrived` gets what comes on `filters`; responses and the availability are kept here."""
 
     def __init__(
         self,
@@ -40,11 +40,11 @@ class CommandClient:
     ) -> None:
         self.topics = login.topics
         self.place = login.settings.place
-        self._lacking = login.lacking
+        self._missing_password = login.missing_password
         self.availability: str | None = None
-        """What our daemon said last, or its will; None: nothing."""
+        """The last availability of the daemon, published or its will; None: none yet."""
         self.ended_by: str | None = None
-        """Why the connection was lost, in words; None while it stands."""
+        """Why the connection was lost, in words; None while there is one."""
         self._arrived = arrived
         self._own = self.topics.full(self.topics.response(f"cli-{secrets.token_hex(6)}"))
         self._filters = [
@@ -55,67 +55,67 @@ class CommandClient:
         self._link = BrokerClient(login.settings, self)
         self._changed = asyncio.Event()
         self._settled: dict[int, tuple[int, ...]] = {}
-        """What the broker said to a subscription or a publication, by message id."""
-        self._asked: tuple[str, frozenset[str]] | None = None
-        """The id that is asked for, and the topics on which a daemon answers that knows no Response Topic."""
+        """Reason codes of acknowledged subscriptions and publications, by message id."""
+        self._pending: tuple[str, frozenset[str]] | None = None
+        """The id of the pending request, and the topics of its response from a daemon that knows no Response Topic."""
         self._response: dict[str, Any] | None = None
         self.by_response_topic = False
-        """The daemon answers where it is asked to (MQTT 5.0, section 4.10), so that a request needs no id."""
+        """The daemon answers on the Response Topic (MQTT 5.0, section 4.10), so that a request needs no id."""
 
     @property
     def connected(self) -> bool:
-        """The broker is there."""
+        """Whether there is a connection."""
         return self._link.standing is not None
 
     @property
-    def asked(self) -> bool:
-        """A request was on its way, whatever became of it."""
-        return self._asked is not None
+    def request_sent(self) -> bool:
+        """Whether a request was sent, whatever became of it."""
+        return self._pending is not None
 
     @property
     def daemon_online(self) -> bool:
-        """Our daemon says so, and we would hear if it did not."""
+        """Whether the daemon is online, as far as a standing connection shows."""
         return self.connected and self.availability == ONLINE
 
     @property
     def daemon_gone(self) -> bool:
-        """Our daemon, or the broker for it, says that it is not there."""
+        """Whether the daemon, or the broker by its will, has published that it is offline."""
         return self.availability not in {None, ONLINE}
 
-    async def enter(self, within: float = CONNECTS_WITHIN) -> None:
-        """Connect and subscribe; raises BrokerError, FailedError where the broker does not let us hear."""
+    async def connect(self, within: float = CONNECTS_WITHIN) -> None:
+        """Connect and subscribe; raises BrokerError, or FailedError where the broker refuses a subscription."""
         self._link.start()
         try:
             await self._link.opened(within)
         except BrokerError as error:
-            if self._lacking and any(word in str(error) for word in REFUSALS):
-                raise BrokerError(f"{error}; {self._lacking}") from None
+            if self._missing_password and any(word in str(error) for word in PASSWORD_REFUSALS):
+                raise BrokerError(f"{error}; {self._missing_password}") from None
             raise
         await self._subscribe(self._filters)
 
-    async def leave(self) -> None:
+    async def disconnect(self) -> None:
         """Disconnect."""
-        await self._link.leave(LEAVES_WITHIN)
+        await self._link.leave(DISCONNECTS_WITHIN)
 
-    async def find_daemon(self) -> None:
-        """Raise BrokerError unless our daemon is there."""
-        await self.until(lambda: self.availability is not None, RETAINED_WITHIN)
+    async def require_daemon(self) -> None:
+        """Raise BrokerError unless the daemon is online."""
+        await self.wait_until(lambda: self.availability is not None, RETAINED_WITHIN)
         base = self.topics.base
         if self.availability is None:
             raise BrokerError(
-                f"{self.place}: no daemon has ever been seen at {base}: does it run, "
+                f"{self.place}: no daemon has ever published at {base}: is it running, "
                 "and with this line.name and mqtt.base_topic?"
             )
         if self.availability != ONLINE:
-            raise BrokerError(f"{self.place}: the daemon of {base} is {OFFLINE}: start it, or look into its log")
+            raise BrokerError(f"{self.place}: the daemon of {base} is {OFFLINE}: start it, or see its log")
 
-    async def come_back(self) -> None:
-        """Wait until the broker and our daemon are there again."""
+    async def wait_for_daemon(self) -> None:
+        """Wait until the broker is connected and the daemon online again."""
         while not self.daemon_online:
             self._changed.clear()
             await self._changed.wait()
 
-    async def ask(self, name: str, content: dict[str, Any], within: float | None) -> dict[str, Any] | None:
+    async def request(self, name: str, content: dict[str, Any], within: float | None) -> dict[str, Any] | None:
         """Send a request and return its response, None if none came `within` s.
 
         `content` has a text as `id` or as `transaction`, unless `by_response_topic`. Raises BrokerError where broker
@@ -123,7 +123,7 @@ class CommandClient:
         """
         token = str(content.get("id") or content.get("transaction") or secrets.token_hex(6))
         usual = [self.topics.full(self.topics.response(each)) for each in (name, "unknown")]
-        self._asked, self._response = (token, frozenset(usual)), None
+        self._pending, self._response = (token, frozenset(usual)), None
         await self._subscribe([Filter(topic) for topic in usual])
         connection = self._link.standing
         mid = None
@@ -133,51 +133,51 @@ class CommandClient:
         if mid is None:
             raise BrokerError(f"{self.place}: the connection is lost; nothing was sent")
         try:
-            await self.until(lambda: mid in self._settled or self._answered, within)
-            self._judge(self._settled.get(mid, (0,))[0], name)
-            await self.until(lambda: self._answered or self.daemon_gone, within)
+            await self.wait_until(lambda: mid in self._settled or self._answered, within)
+            self._check_acknowledgement(self._settled.get(mid, (0,))[0], name)
+            await self.wait_until(lambda: self._answered or self.daemon_gone, within)
         except BrokerError as error:
-            raise BrokerError(f"{error}; whether {name} was obeyed is not known") from None
+            raise BrokerError(f"{error}; {name} may or may not have been carried out") from None
         if not self._answered and self.daemon_gone:
-            raise BrokerError(f"{self.place}: the daemon went away before it answered {name}")
+            raise BrokerError(f"{self.place}: the daemon went offline before it answered {name}")
         return self._response
 
     def send(self, name: str, content: dict[str, Any]) -> None:
-        """Send a request whose response nobody waits for: what was asked for before may still be answered."""
+        """Send a request without waiting for its response; the request before may still be answered."""
         connection = self._link.standing
         if connection is not None:
             connection.publish(self.topics.full(f"request/{name}"), json.dumps(content).encode())
 
     @property
     def response(self) -> dict[str, Any] | None:
-        """What was answered to what was asked last; None while nothing was."""
+        """The response to the last request; None while there is none."""
         return self._response
 
     @property
     def _answered(self) -> bool:
         return self._response is not None
 
-    def _judge(self, reason: int, name: str) -> None:
-        if reason == NOBODY_LISTENS:
-            raise BrokerError(f"{self.place}: nobody takes requests for {self.topics.base}: is the daemon allowed to?")
+    def _check_acknowledgement(self, reason: int, name: str) -> None:
+        if reason == NO_SUBSCRIBERS:
+            raise BrokerError(f"{self.place}: no subscriber for requests on {self.topics.base}: check the broker's ACL")
         if reason >= REFUSED_FROM:
-            raise FailedError(f"{self.place}: does not let us send {name}: {reason_in_words(reason)}")
+            raise FailedError(f"{self.place} refuses the request {name}: {reason_in_words(reason)}")
 
     async def _subscribe(self, filters: list[Filter]) -> None:
         connection = self._link.standing
         mid = None if connection is None else connection.subscribe(filters)
         if mid is None:
             raise BrokerError(self.ended_by or f"{self.place}: the connection is lost")
-        await self.until(lambda: mid in self._settled, CONNECTS_WITHIN)
+        await self.wait_until(lambda: mid in self._settled, CONNECTS_WITHIN)
         for each, reason in zip(filters, self._settled.get(mid, ()), strict=False):
             if reason >= REFUSED_FROM:
-                raise FailedError(f"{self.place}: does not let us hear {each.topic}: {reason_in_words(reason)}")
+                raise FailedError(f"{self.place} refuses the subscription to {each.topic}: {reason_in_words(reason)}")
 
-    async def until(self, claim: Callable[[], bool], within: float | None) -> bool:
-        """Wait until the claim holds; return whether it does `within` s. BrokerError when the connection goes."""
+    async def wait_until(self, condition: Callable[[], bool], within: float | None) -> bool:
+        """Wait until the condition holds; return whether it does `within` s. Raises BrokerError when disconnected."""
         try:
             async with asyncio.timeout(within):
-                while not claim():
+                while not condition():
                     if self.ended_by is not None:
                         raise BrokerError(self.ended_by)
                     self._changed.clear()
@@ -189,7 +189,7 @@ class CommandClient:
     # Events of the link
 
     def accepted(self, accepted: Accepted) -> None:
-        """Note that the connection stands, and subscribe again after a loss."""
+        """Note the connection, and subscribe again after a loss."""
         del accepted
         again, self.ended_by = self.ended_by is not None, None
         if again and self._link.standing is not None:
@@ -203,21 +203,21 @@ class CommandClient:
         self._changed.set()
 
     def acknowledged(self, mid: int, reason: int) -> None:
-        """Note what became of a request."""
+        """Note that a request was acknowledged."""
         self._settled[mid] = (reason,)
         self._changed.set()
 
     def subscribed(self, mid: int, reasons: tuple[int, ...]) -> None:
-        """Note what became of a subscription."""
+        """Note that a subscription was acknowledged."""
         self._settled[mid] = reasons
         self._changed.set()
 
     def arrived(self, message: Incoming) -> None:
-        """Keep a response or our daemon's availability; pass on the rest."""
+        """Keep a response or the daemon's availability; pass on the rest."""
         if message.topic == self.topics.availability:
             self.availability = message.payload.decode("utf-8", "replace")
-        elif self._asked is not None and message.topic in {self._own, *self._asked[1]}:
-            self._take(message, self._asked[0])
+        elif self._pending is not None and message.topic in {self._own, *self._pending[1]}:
+            self._take(message, self._pending[0])
         else:
             self._arrived(message)
         self._changed.set()
@@ -233,7 +233,7 @@ class CommandClient:
 
 
 def parsed(payload: bytes) -> Any:  # noqa: ANN401  # any JSON
-    """Return what a payload says, None if it is no JSON; it may come from anybody."""
+    """Return a payload's JSON, None if it is none; it may come from any client."""
     try:
         return json.loads(payload)
     except (ValueError, RecursionError):

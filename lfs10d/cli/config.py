@@ -1,4 +1,4 @@
-"""`lfs10d config`: what is in force, and where each value comes from."""
+"""`lfs10d config`: prints the effective configuration and the origin of each value."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A line of the verb's own: the daemon's line thread for as long as one verb needs it."""
+"""Direct access to the line for a verb: the daemon's line thread, as long as the verb runs."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from lfs10d.modbus.realtime import sharpen_timers
 from lfs10d.reading import Event, FaultCode, PortChanged, UartCounters
 
 SWITCH_INTERVAL = 1e-4
-"""Seconds the interpreter lets one thread run on, so that drawing does not delay the line."""
+"""Seconds after which the interpreter switches threads, so that drawing does not delay the line."""
 STOPS_WITHIN = 1.0
-"""How long the thread is waited for at the end, in s."""
+"""How long to wait for the thread's end, in s."""
 
-_Told: TypeAlias = "list[Event] | BaseException"
+_Message: TypeAlias = "list[Event] | BaseException"
 
 
 class DirectLine:
@@ -34,15 +34,15 @@ class DirectLine:
     def __init__(self, settings: PortSettings) -> None:
         self.path = settings.path
         self.uart: UartCounters | None = None
-        self._told: SimpleQueue[_Told] = SimpleQueue()
+        self._queue: SimpleQueue[_Message] = SimpleQueue()
         self._first: UartCounters | None = None
         self._bus = Bus(SerialPort(settings), LineRules(), time.monotonic)
         scheduler = Scheduler(self._bus.line_timing, time.monotonic())
         self._poller = Poller(self._bus, scheduler, self._take, time.monotonic)
-        self._thread = LineThread(self._poller, prepare=_prepare, failed=self._told.put)
+        self._thread = LineThread(self._poller, prepare=_prepare, failed=self._queue.put)
 
     def __enter__(self) -> Self:
-        """Start the thread; it opens the port, and tells if it cannot."""
+        """Start the thread; it opens the port, or reports why it cannot."""
         sys.setswitchinterval(SWITCH_INTERVAL)
         self._thread.start()
         return self
@@ -53,31 +53,31 @@ class DirectLine:
         self._thread.join(STOPS_WITHIN)
 
     def submit(self, job: Job) -> None:
-        """Have a job done."""
+        """Submit a job to the line thread."""
         self._poller.submit(job)
         self._thread.wake()
 
     def poll(self, specs: Iterable[DeviceSpec], rules: PollRules) -> None:
-        """Have these devices polled."""
+        """Poll these devices from now on."""
         self._poller.replace(specs, rules)
         self._thread.wake()
 
     def events(self, within: float) -> list[Event]:
         """Return what happened next, [] if nothing did within so many s; PortError if the port cannot be used."""
         try:
-            told = self._told.get(timeout=within)
+            message = self._queue.get(timeout=within)
         except Empty:
             return []
-        if isinstance(told, BaseException):
-            raise told
-        for event in told:
+        if isinstance(message, BaseException):
+            raise message
+        for event in message:
             if isinstance(event, PortChanged) and event.fault is not None:
                 error = PortBusyError if event.fault.code is FaultCode.PORT_BUSY else PortLostError
                 raise error(self.path, event.fault.message.removeprefix(f"{self.path}: "))
-        return told
+        return message
 
     def _take(self, events: list[Event]) -> None:
-        """Take what the line thread tells, in that thread."""
+        """Queue events of the line thread; called in that thread."""
         now = self._bus.counters()
         if now is not None:
             first = self._first = self._first or now
@@ -87,7 +87,7 @@ class DirectLine:
                 now.overrun - first.overrun,
                 now.breaks - first.breaks,
             )
-        self._told.put(events)
+        self._queue.put(events)
 
 
 def _prepare() -> None:

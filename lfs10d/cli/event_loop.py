@@ -1,4 +1,4 @@
-"""A loop for a verb that a signal may end at any moment."""
+"""An event loop for a verb; SIGINT and SIGTERM cancel its work."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a verb ends: errors become one line and an exit code, never a traceback."""
+"""The exit status of a verb: errors become one line and an exit code, never a traceback."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from lfs10d.system import startup
 
 STANDARD_ERROR = 2
 TRACEBACK = "LFS10D_TRACEBACK"
-"""Set in the environment, it lets an error of the program itself show where it happened."""
+"""Set in the environment, an internal error shows its traceback."""
 
 
 def conclude(arguments: Sequence[str], *, interrupted: int) -> int:
@@ -52,9 +52,9 @@ def _run(arguments: Sequence[str], interrupted: int) -> int:
     except BrokenPipeError:
         return EXIT_FAILED
     except Lfs10dError as error:
-        _tell(str(error) if isinstance(error, ConfigError) else f"lfs10d: {error}")
+        _report(str(error) if isinstance(error, ConfigError) else f"lfs10d: {error}")
         return _code_of(error)
-    except Exception as error:  # noqa: BLE001  # the last line of defence: no traceback reaches a user
+    except Exception as error:  # noqa: BLE001  # no traceback reaches a user
         return _failed(error)
     return code if isinstance(code, int) else 0
 
@@ -73,11 +73,11 @@ def _failed(error: Exception) -> int:
     if isinstance(error, OSError):
         message = f"{error.strerror or error}{f': {error.filename}' if error.filename else ''}"
     else:
-        message = f"{_where(error)}: {type(error).__name__}: {error}; this is a fault of lfs10d itself"
+        message = f"{_where(error)}: {type(error).__name__}: {error}; this is an internal error of lfs10d"
     if os.environ.get(TRACEBACK):
         traceback.print_exception(error)
     one_line = "".join(character if character.isprintable() else " " for character in message)
-    _tell(f"lfs10d: {one_line}")
+    _report(f"lfs10d: {one_line}")
     return EXIT_FAILED
 
 
@@ -86,7 +86,7 @@ def _where(error: Exception) -> str:
     return f"{Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else "?"
 
 
-def _tell(message: str) -> None:
+def _report(message: str) -> None:
     with contextlib.suppress(OSError, ValueError):
         print(message, file=sys.stderr, flush=True)  # noqa: T201  # click.echo would raise on a closed stderr
 
@@ -99,7 +99,7 @@ def _flushed(code: int) -> int:
     except BrokenPipeError:
         pass
     except (OSError, ValueError) as error:
-        _tell(f"lfs10d: the output cannot be written: {getattr(error, 'strerror', None) or error}")
+        _report(f"lfs10d: the output cannot be written: {getattr(error, 'strerror', None) or error}")
     else:
         return code
     # What is left in the buffer would fail once more when the interpreter ends.

@@ -1,4 +1,4 @@
-"""JSON that a person may look at: nothing in it moves a cursor or turns the direction of the text. Pure."""
+"""JSON safe to print on a terminal: control and direction characters are escaped. Pure."""
 
 from __future__ import annotations
 

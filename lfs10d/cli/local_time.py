@@ -1,6 +1,6 @@
-"""Times as a verb's text has them: of this machine's zone, with its name. JSON has UTC. Pure: the zone may be given.
+"""Times in a verb's text: in this machine's zone, with its name (JSON has UTC). Pure: the zone may be given.
 
-Times are epoch milliseconds; `zone` None is that of this machine. What no calendar holds (it may come from anybody) is
+Times are epoch milliseconds; `zone` None is that of this machine. A time outside the calendar is
 shown as dashes.
 """
 

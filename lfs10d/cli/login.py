@@ -1,4 +1,4 @@
-"""How a verb logs in at the broker: as the configuration says, or with a name and a password of its own."""
+"""How a verb logs in at the broker: with the configuration's login, or with the name and password it is given."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ from lfs10d.mqtt.topics import Topics
 from lfs10d.system.secret import Secret, leave_no_core
 
 DENIED: Final = "permission denied"
-"""What the system says of a file that is not for us, in the words of `lfs10d.config.credentials.reason`."""
+"""The system's reason for a file we may not read, in the words of `lfs10d.config.credentials.reason`."""
 REMEDY: Final = "call it as root or as a member of the service's group, or give --username and --password-file"
 
 
 @dataclass(frozen=True, slots=True)
 class Login:
-    """Whom a verb visits: the daemon of `config`, by the broker of `settings`; `topics` are those of its line."""
+    """The daemon of `config`, reached by the broker of `settings`; `topics` are those of its line."""
 
     config: Config
     settings: BrokerSettings
     topics: Topics
-    lacking: str = ""
+    missing_password: str = ""
     """Why there is no password where the configuration names a user, in words; empty where there is one."""
 
 
 def login_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Add `--username` and `--password-file`, which `login` takes."""
+    """Add `--username` and `--password-file`, which `log_in` takes."""
     name = click.option("--username", metavar="NAME", help="Log in with this name, not the file's.")
     password = click.option(
         "--password-file",
@@ -48,34 +48,34 @@ def login_options(function: Callable[..., Any]) -> Callable[..., Any]:
     return name(password(function))
 
 
-def login(file: Path, verb: str, *, username: str | None, password_file: Path | None, needed: bool = True) -> Login:
-    """Return whom to visit with a client id of our own; raises ConfigError.
+def log_in(file: Path, verb: str, *, username: str | None, password_file: Path | None, needed: bool = True) -> Login:
+    """Return the login, with a client id of the verb's own; raises ConfigError.
 
-    A name without a password file logs in without a password: that of the configuration belongs to its own name. Else
-    the service's own login is used, as far as whoever calls may read it: its password file, or the credential that
-    systemd hands to it. Where a password file is not `needed`, one that may not be read is done without.
+    A name without a password file logs in without a password: that of the configuration belongs to its own name.
+    Otherwise the service's own login is used, as far as the caller may read it: its password file, or the credential
+    that systemd hands to it. Where a password file is not `needed`, one that may not be read is left out.
     """
     leave_no_core()
     own = username is not None or password_file is not None
-    loaded, lacking = _loaded(file, own=own, needed=needed)
+    loaded, missing = _loaded(file, own=own, needed=needed)
     given = None if password_file is None else _password(password_file)
     mqtt = loaded.config.mqtt
     if username is not None:
         mqtt = mqtt.model_copy(update={"username": username})
     elif given is not None and mqtt.username is None:
         raise click.UsageError("--password-file needs a name: give --username")
-    known = (given,) if own or lacking else None
+    known = (given,) if own or missing else None
     if not own and mqtt.username is not None and mqtt.password_file is None and loaded.credential is None:
-        found, lacking = _service_password(file)
+        found, missing = _service_password(file)
         known = (found,)
     settings = BrokerSettings.of(
         mqtt,
         client_id=f"lfs10d-{verb}-{secrets.token_hex(4)}",  # 23 characters are what every broker takes by 3.1.1
         password=loaded.password if known is None else lambda: known[0],
     )
-    # The verb itself tells what a person must know.
+    # The verb itself reports what a person must know.
     logging.getLogger("lfs10d").addHandler(logging.NullHandler())
-    return Login(loaded.config, settings, Topics.of(mqtt.base_topic, loaded.config.line.name), lacking)
+    return Login(loaded.config, settings, Topics.of(mqtt.base_topic, loaded.config.line.name), missing)
 
 
 def _loaded(file: Path, *, own: bool, needed: bool) -> tuple[LoadedConfig, str]:

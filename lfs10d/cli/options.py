@@ -1,9 +1,10 @@
-"""Options of the verbs that open a port themselves: how its characters look, and how long to wait."""
+"""What several verbs share of their options: kinds of arguments, the line's parameters, completion of profiles."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 import click
@@ -12,10 +13,49 @@ from lfs10d.modbus.frames import Framing
 from lfs10d.modbus.port_settings import PARITIES, PortSettings
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.library import builtin_names
-from lfs10d.schema.quantities import BAUDRATES, seconds
+from lfs10d.schema.quantities import BAUDRATES, duration_text, seconds
 
 TIMEOUTS = (0.01, 10.0)
-"""The shortest and the longest time-out that can be asked for, in s."""
+"""The shortest and the longest time-out, in s."""
+
+
+# What an argument may be
+
+PORT = click.Path(readable=False)
+"""Any path, completed as one; whether it can be opened is reported by the verb."""
+
+
+class SlaveId(click.IntRange):
+    """A slave id, and called one when it is wrong."""
+
+    name = "slave id"
+
+    def __init__(self) -> None:
+        super().__init__(1, 255)
+
+
+class DurationType(click.ParamType):  # type: ignore[type-arg]  # generic in newer versions of click alone
+    """A duration such as 200ms, in s; `example` is what to write, `least` and `most` are the limits in s."""
+
+    name = "duration"
+
+    def __init__(self, example: str, least: float = 0.0, most: float = inf) -> None:
+        self._example, self._least, self._most = example, least, most
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:  # noqa: ANN401  # click's
+        """Return the seconds; raises click.BadParameter."""
+        try:
+            duration = seconds(str(value))
+        except ValueError:
+            self.fail(f"{value!r} is not a duration; write {self._example}", param, ctx)
+        if not self._least <= duration <= self._most:
+            least = duration_text(self._least)
+            limits = f"{least} or more" if self._most == inf else f"from {least} to {duration_text(self._most)}"
+            self.fail(f"must be {limits}", param, ctx)
+        return duration
+
+
+# How the characters on the line look
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +84,7 @@ class LineOptions:
 
 
 def take(options: dict[str, Any]) -> LineOptions:
-    """Take what `line_options` added out of a command's parameters."""
+    """Remove from a command's parameters what `line_options` added, and return it."""
     framing = Framing(options.pop("framing"))
     databits = options.pop("databits")
     if framing is Framing.RTU and databits == "7":
@@ -64,20 +104,8 @@ def baudrate_of(text: str) -> int:
     """Return the rate that a text names; raises click.BadParameter."""
     text = text.strip()
     if text not in map(str, BAUDRATES):
-        raise click.BadParameter(f"{text!r} is none of {', '.join(map(str, BAUDRATES))}")
+        raise click.BadParameter(f"{text!r} is not one of {', '.join(map(str, BAUDRATES))}")
     return int(text)
-
-
-def _duration(context: click.Context, parameter: click.Parameter, value: str | None) -> float | None:
-    if value is None:
-        return None
-    try:
-        duration = seconds(value)
-    except ValueError:
-        raise click.BadParameter(f"{value!r} is no duration; write 200ms or 1s", context, parameter) from None
-    if not TIMEOUTS[0] <= duration <= TIMEOUTS[1]:
-        raise click.BadParameter("must lie between 10ms and 10s", context, parameter)
-    return duration
 
 
 def _choice(name: str, choices: Collection[str], default: str | None, text: str) -> Callable[..., Any]:
@@ -85,9 +113,9 @@ def _choice(name: str, choices: Collection[str], default: str | None, text: str)
 
 
 def line_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Add them to a command that has the argument `port`; `take` gives them back as one value."""
+    """Add the options of the line to a command that has the argument `port`; `take` returns them as one value."""
     for option in (
-        click.option("--timeout", callback=_duration, metavar="DURATION", help="How long to wait for each answer."),
+        click.option("--timeout", type=DurationType("200ms or 1s", *TIMEOUTS), help="How long to wait for each reply."),
         _choice("--framing", ("rtu", "ascii"), "rtu", "How bytes become frames."),
         _choice("--stopbits", ("1", "2"), "1", "Stop bits per character."),
         _choice("--databits", ("8", "7"), None, "Data bits per character.  [default: 8; 7 with ascii]"),
@@ -97,17 +125,7 @@ def line_options(function: Callable[..., Any]) -> Callable[..., Any]:
     return function
 
 
-PORT = click.Path(readable=False)
-"""Any path, completed as one; whether it can be opened is told in our words."""
-
-
-class SlaveId(click.IntRange):
-    """A slave id, and called one when it is wrong."""
-
-    name = "slave id"
-
-    def __init__(self) -> None:
-        super().__init__(1, 255)
+# What a shell completes
 
 
 def profile_names(context: click.Context, parameter: click.Parameter, incomplete: str) -> list[Any]:

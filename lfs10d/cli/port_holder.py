@@ -1,4 +1,4 @@
-"""Who holds a busy port, and what to type instead: the daemon does more than scan and read."""
+"""Which process holds a busy port, and which command to use instead."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ DAEMON = "lfs10d"
 
 @dataclass(frozen=True, slots=True)
 class HoldingDaemon:
-    """A running `lfs10d run`; `config` is the file as it was told, "" for the usual one."""
+    """A running `lfs10d run`; `config` is the file it was given, "" for the usual one."""
 
     pid: int
     config: str = ""
 
     @property
     def option(self) -> str:
-        """What a verb needs to talk to it."""
+        """The option that a verb needs to reach it."""
         return f" -c {shlex.quote(self.config)}" if self.config else ""
 
 

@@ -91,7 +91,7 @@ def explain(profile: Profile) -> list[Table]:
     tables = [
         Table(f"{profile.title} (profile {profile.name})", (), tuple(_device(profile))),
         Table(
-            "Values: what a sample carries",
+            "Values in a sample",
             ("name", "registers", "content", "number", "believed", ""),
             tuple(_value(value) for value in profile.values),
         ),
@@ -99,14 +99,14 @@ def explain(profile: Profile) -> list[Table]:
     if profile.settings:
         tables.append(
             Table(
-                "Settings: what configures the device",
+                "Settings of the device",
                 ("name", "register", "content", "allowed", "writable", ""),
                 tuple(_setting(setting) for setting in profile.settings),
             )
         )
     remarks = tuple(_remarks(profile))
     if remarks:
-        tables.append(Table("Where this is from, and what to know", (), remarks))
+        tables.append(Table("Sources and notes", (), remarks))
     return tables
 
 
@@ -124,7 +124,7 @@ def _device(profile: Profile) -> Iterator[Row]:
         codes = ", ".join(f"{code} for {baudrate}" for baudrate, code in rate.codes.items())
         yield "", f"set in register {_register(rate.register)} ({codes}){_unless(rate.locked_by)}"
     else:
-        yield "baud rates", f"how they are set is not known; lfs10d never changes them{usual_rate}"
+        yield "baud rates", f"not known how to set; lfs10d never changes them{usual_rate}"
     yield "framings", ", ".join(profile.framings)
     yield "check of rtu", _alternatives(profile.checksums)
     yield "one read", f"at most {profile.max_words} registers{_ascii_limit(profile)}"
@@ -132,9 +132,9 @@ def _device(profile: Profile) -> Iterator[Row]:
     yield "one poll", f"reads {' and '.join(reads)}"
     barrier = profile.barrier
     if barrier is None:
-        yield "after silence", "twice the time-out is waited, for no read of another length is known"
+        yield "after silence", "the line rests for twice the time-out, for no read of another length is known"
     else:
-        yield "after silence", f"{_span_of_registers(barrier.register, barrier.count)} is asked first (the barrier)"
+        yield "after silence", f"{_span_of_registers(barrier.register, barrier.count)} is read first (the barrier)"
     if profile.run_commands:
         yield "never written", f"{', '.join(map(_register, profile.run_commands))}: run commands"
     if profile.min_interval:

@@ -1,4 +1,4 @@
-"""`lfs10d request`: ask the running daemon for something and show what it says."""
+"""`lfs10d request`: sends a request to the running daemon and shows its response."""
 
 from __future__ import annotations
 
@@ -16,12 +16,13 @@ from pydantic import ValidationError
 
 from lfs10d.cli import EXIT_FAILED, config_option, event_loop, json_option, request_words
 from lfs10d.cli.adopt_loop import AdoptLoop
-from lfs10d.cli.adopt_repeat import ADOPT, mount
+from lfs10d.cli.adopt_repeat import ADOPT, repeat
 from lfs10d.cli.client import RETAINED_WITHIN, CommandClient, parsed
 from lfs10d.cli.json_text import json_text
-from lfs10d.cli.login import Login, login, login_options
+from lfs10d.cli.login import Login, log_in, login_options
+from lfs10d.cli.options import DurationType
 from lfs10d.cli.render.live_lines import health
-from lfs10d.cli.render.response import told, verdict
+from lfs10d.cli.render.response import content_lines, status_line
 from lfs10d.cli.render.spinner import spinning
 from lfs10d.cli.requested_scan import SCAN, scan
 from lfs10d.commands.handlers.registry import HANDLERS
@@ -31,13 +32,17 @@ from lfs10d.errors import ConfigError, FailedError
 from lfs10d.mqtt.messages import Filter
 from lfs10d.profiles.library import builtin_names
 from lfs10d.schema.fields import Name
-from lfs10d.schema.quantities import duration_text, seconds
+from lfs10d.schema.quantities import duration_text
 from lfs10d.telemetry.publication import DEVICES
 
 USUAL_TIMEOUT = 10.0
-"""Seconds after which the response no longer comes."""
-PATIENT = frozenset({"line/scan", "line/baudrate", "line/adopt", "device/readdress"})
-"""Requests that take as long as they take: scans and physical changes."""
+"""Seconds to wait for the response where nothing else is given."""
+UNLIMITED = frozenset({"line/scan", "line/baudrate", "line/adopt", "device/readdress"})
+"""Requests without a time limit: scans and changes of sensors."""
+
+IDS = ("id", "transaction")
+"""Parameters that are text whatever is typed."""
+_HEXADECIMAL = re.compile(r"0x[0-9A-Fa-f]{1,8}")
 
 EXAMPLES = """\b
 Examples:
@@ -46,24 +51,17 @@ Examples:
   lfs10d request health                       how daemon, line and sensors are
   lfs10d request device/read device=mast-top  poll one sensor now
   lfs10d request line/trace for=1m            a minute of frames, on a topic
-  lfs10d request line/adopt --repeat          mount one sensor after the other
+  lfs10d request line/adopt --repeat          adopt one sensor after the other
   lfs10d request config/reload -c site.yaml   another daemon reads its file
   lfs10d request device/read device=2 --json  the response as JSON
 """
-
-
-def _timeout(context: click.Context, parameter: click.Parameter, value: str | None) -> float | None:
-    try:
-        return None if value is None else seconds(value)
-    except ValueError:
-        raise click.BadParameter(f"{value!r} is no duration; write 500ms or 10s", context, parameter) from None
 
 
 def _name(context: click.Context, parameter: click.Parameter, value: str) -> str:
     levels = value.split("/")
     if not value.isprintable() or "+" in value or "#" in value or "" in levels:
         known = ", ".join(sorted(HANDLERS))
-        raise click.BadParameter(f"{value!r} is no name of a request; known are: {known}", context, parameter)
+        raise click.BadParameter(f"{value!r} is not a request; known are: {known}", context, parameter)
     return value
 
 
@@ -126,8 +124,7 @@ def _list(context: click.Context, parameter: click.Parameter, wanted: bool) -> N
 @config_option
 @click.option(
     "--timeout",
-    callback=_timeout,
-    metavar="DURATION",
+    type=DurationType("500ms or 10s"),
     help=f"How long to wait for the response. Default: {duration_text(USUAL_TIMEOUT)}, no end for what takes longer.",
 )
 @click.option(
@@ -137,33 +134,33 @@ def _list(context: click.Context, parameter: click.Parameter, wanted: bool) -> N
 )
 @login_options
 @json_option
-def command(**options: Any) -> int:  # noqa: ANN401  # nine options; `_Wanted` names and types them
+def command(**values: Any) -> int:  # noqa: ANN401  # nine options; `_RequestOptions` names and types them
     """Send the request NAME to the running daemon; print its response.
 
     NAME is one such as device/read; --list prints them all, NAME --help what one takes. Each VALUE is read as the
     request wants it: text, a number, true, a duration, or JSON; a device may be given by its slave id. Exit code 0 if
-    it was carried out, 1 if not or if nothing was answered in time, 69 if the broker or the daemon is away.
+    it was carried out, 1 if not or if no response came in time, 69 if the broker or the daemon is away.
     """
-    wanted = _RequestOptions(**options)
-    if wanted.repeat:
-        mounting = wanted.mounting
-        visited = login(wanted.config, "adopt", username=wanted.username, password_file=wanted.password_file)
-        return event_loop.run(mount(visited, mounting, as_json=wanted.as_json))
-    content = wanted.content
-    visited = login(wanted.config, "request", username=wanted.username, password_file=wanted.password_file)
-    if wanted.name == SCAN:
-        return event_loop.run(scan(visited, content, wanted.patience, as_json=wanted.as_json))
-    response = event_loop.run(_ask(wanted, visited, content))
+    options = _RequestOptions(**values)
+    if options.repeat:
+        loop = options.adopt_loop
+        login = log_in(options.config, "adopt", username=options.username, password_file=options.password_file)
+        return event_loop.run(repeat(login, loop, as_json=options.as_json))
+    content = options.content
+    login = log_in(options.config, "request", username=options.username, password_file=options.password_file)
+    if options.name == SCAN:
+        return event_loop.run(scan(login, content, options.time_limit, as_json=options.as_json))
+    response = event_loop.run(_ask(options, login, content))
     if response is None:
-        message = f"no response to {wanted.name} within {duration_text(wanted.patience or 0)}"
-        raise FailedError(f"{message}; whether it was obeyed is not known")
+        message = f"no response to {options.name} within {duration_text(options.time_limit or 0)}"
+        raise FailedError(f"{message}; it may or may not have been carried out")
     done = response.get("status") == "ok"
-    if wanted.as_json:
+    if options.as_json:
         click.echo(json_text(response, indent=2))
     else:
-        click.echo(verdict(response), err=not done)
+        click.echo(status_line(response), err=not done)
         data = response.get("data")
-        for text in health(data) if wanted.name == "health" and isinstance(data, dict) else told(response):
+        for text in health(data) if options.name == "health" and isinstance(data, dict) else content_lines(response):
             click.echo(text)
     return 0 if done else EXIT_FAILED
 
@@ -182,7 +179,7 @@ class _RequestOptions:
     repeat: bool
 
     @property
-    def mounting(self) -> AdoptLoop:
+    def adopt_loop(self) -> AdoptLoop:
         """What is adopted with `--repeat`."""
         if self.name != ADOPT:
             raise click.UsageError(f"--repeat goes with {ADOPT} alone")
@@ -202,13 +199,13 @@ class _RequestOptions:
         if wrong is not None:
             raise click.UsageError(f"name: {wrong!r} is not {Name().words}")
         if len(set(names)) < len(names):
-            raise click.UsageError("a name is given twice; each sensor needs its own")
+            raise click.UsageError("a name is given twice; each sensor needs a name of its own")
         return AdoptLoop(names, self._parsed(others))
 
     @property
-    def patience(self) -> float | None:
+    def time_limit(self) -> float | None:
         """How long to wait for the response in s; None: until it comes."""
-        if self.timeout is not None or self.name in PATIENT:
+        if self.timeout is not None or self.name in UNLIMITED:
             return self.timeout
         return USUAL_TIMEOUT
 
@@ -230,32 +227,29 @@ class _RequestOptions:
             raise click.UsageError(str(error)) from None
 
 
-async def _ask(wanted: _RequestOptions, visited: Login, content: dict[str, Any]) -> dict[str, Any] | None:
-    told: list[object] = []
+async def _ask(options: _RequestOptions, login: Login, content: dict[str, Any]) -> dict[str, Any] | None:
+    devices: list[object] = []
     by_id = request_words.is_slave_id(content.get("device"))
-    filters = [Filter(visited.topics.full(DEVICES), qos=0, retain_as_published=False)] if by_id else []
-    visitor = CommandClient(visited, filters, lambda message: told.append(parsed(message.payload)))
+    filters = [Filter(login.topics.full(DEVICES), qos=0, retain_as_published=False)] if by_id else []
+    client = CommandClient(login, filters, lambda message: devices.append(parsed(message.payload)))
     try:
-        async with spinning(f"{wanted.name} ..."):
-            await visitor.enter()
-            await visitor.find_daemon()
+        async with spinning(f"{options.name} ..."):
+            await client.connect()
+            await client.require_daemon()
             if by_id:
-                await visitor.until(lambda: bool(told), RETAINED_WITHIN)
-                device = request_words.named_device(content["device"], told[-1] if told else None)
+                await client.wait_until(lambda: bool(devices), RETAINED_WITHIN)
+                device = request_words.named_device(content["device"], devices[-1] if devices else None)
                 content = {**content, "device": device}
-            return await visitor.ask(wanted.name, content, wanted.patience)
+            return await client.request(options.name, content, options.time_limit)
     except asyncio.CancelledError:  # Ctrl-C, SIGTERM
-        if visitor.asked:
-            click.echo(f"lfs10d: {wanted.name} was sent and is not called back by this", err=True)
+        if client.request_sent:
+            click.echo(f"lfs10d: {options.name} was sent; this does not cancel it", err=True)
         raise
     finally:
-        await visitor.leave()
+        await client.disconnect()
 
 
-IDS = ("id", "transaction")
-
-
-_HEXADECIMAL = re.compile(r"0x[0-9A-Fa-f]{1,8}")
+# What is typed as the parameters of a request
 
 
 class KeyValueError(ValueError):
@@ -271,7 +265,7 @@ def content_of(arguments: Iterable[str], form: type[Parameters] | None) -> dict[
     for argument in arguments:
         key, equals, text = argument.partition("=")
         if not key or not equals:
-            raise KeyValueError(f"{argument!r} is no KEY=VALUE; write device=mast-top for example")
+            raise KeyValueError(f"{argument!r} is not KEY=VALUE; write device=mast-top for example")
         if key in content:
             raise KeyValueError(f"{key} is given twice")
         content[key] = text if key in IDS else _value(key, text, form)

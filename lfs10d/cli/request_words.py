@@ -1,4 +1,4 @@
-"""Requests and their parameters as a person reads and types them: list, help, what the Tab key completes. Pure."""
+"""Requests and their parameters in words: list, help, completion by the Tab key. Pure."""
 
 from __future__ import annotations
 
@@ -88,8 +88,8 @@ def listing() -> Iterator[str]:
         if keys:
             yield from _block(f"parameters: {', '.join(keys)}")
     yield ""
-    yield "Classes: `commands` in the configuration says which are obeyed; always needs no leave."
-    yield "What each parameter may be: lfs10d request NAME --help"
+    yield "Classes: `commands` in the configuration allows classes of requests; `always` needs no permission."
+    yield "The values of each parameter: lfs10d request NAME --help"
 
 
 def help_of(name: str) -> Iterator[str]:
@@ -116,10 +116,10 @@ def _block(text: str, indent: str = "      ") -> list[str]:
 
 
 def named_device(text: str, devices: object) -> str:
-    """Return the name of the device that a person calls so, by its name or by its slave id.
+    """Return the name of the device that is meant by its name or by its slave id.
 
-    `devices` is what the daemon tells on topic `devices`. A name comes before an id; what nobody has is returned as
-    it is, and the daemon says so.
+    `devices` is the payload of topic `devices`. A name comes before an id; what no device has is returned as it is,
+    and the daemon rejects it.
     """
     entries = [each for each in devices if isinstance(each, dict)] if isinstance(devices, list) else []
     if any(each.get("name") == text for each in entries) or not is_slave_id(text):

@@ -1,4 +1,4 @@
-"""`lfs10d request line/scan`: the daemon scans while it polls; here is how far it is, and what it found as a table."""
+"""`lfs10d request line/scan`: the daemon scans while it polls; shows the progress, then the devices as a table."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from lfs10d.cli.client import CommandClient, parsed
 from lfs10d.cli.json_text import json_text
 from lfs10d.cli.login import Login
 from lfs10d.cli.render import scan_findings
-from lfs10d.cli.render.response import told, verdict
-from lfs10d.cli.render.scan_progress import TELL_EVERY, progress_bar, span
+from lfs10d.cli.render.response import content_lines, status_line
+from lfs10d.cli.render.scan_progress import REPORT_EVERY, progress_bar, span
 from lfs10d.errors import FailedError
 from lfs10d.mqtt.messages import Filter, Incoming
 from lfs10d.profiles.library import builtin_names, load_profile
@@ -26,43 +26,43 @@ from lfs10d.schema.quantities import duration_text
 from lfs10d.system.logs import escape
 from lfs10d.telemetry.publication import EVENT
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # rich is imported where something is drawn, and nowhere else
     from rich.progress import Progress as Bar
 
 SCAN: Final = "line/scan"
 CANCEL: Final = "line/cancel"
 ENDS_WITHIN: Final = 1.4
-"""s for a scan to end when it is told to; the verb itself must end within 2 s."""
+"""s for a cancelled scan to end; the verb itself must end within 2 s."""
 
 
-async def scan(visited: Login, content: dict[str, Any], patience: float | None, *, as_json: bool) -> int:
-    """Have the daemon scan and show how far it is; return the exit code. Being cancelled ends the scan, too."""
+async def scan(login: Login, content: dict[str, Any], patience: float | None, *, as_json: bool) -> int:
+    """Have the daemon scan and show its progress; return the exit code. Cancelling ends the scan, too."""
     with _view(quiet=as_json) as shown:
 
         def arrived(message: Incoming) -> None:
             event = parsed(message.payload)
             if isinstance(event, dict) and event.get("type") == "scan_progress":
-                shown.heard(event)
+                shown.on_progress(event)
 
-        visitor = CommandClient(visited, [Filter(visited.topics.full(EVENT))], arrived)
+        client = CommandClient(login, [Filter(login.topics.full(EVENT))], arrived)
         cancelled = False
         try:
-            await visitor.enter()
-            await visitor.find_daemon()
-            response = await visitor.ask(SCAN, content, patience)
+            await client.connect()
+            await client.require_daemon()
+            response = await client.request(SCAN, content, patience)
         except asyncio.CancelledError:  # Ctrl-C, SIGTERM
-            if not visitor.asked:
+            if not client.request_sent:
                 raise
             cancelled = True
-            visitor.send(CANCEL, {"id": secrets.token_hex(6)})
-            await visitor.until(lambda: visitor.response is not None, ENDS_WITHIN)
-            response = visitor.response
+            client.send(CANCEL, {"id": secrets.token_hex(6)})
+            await client.wait_until(lambda: client.response is not None, ENDS_WITHIN)
+            response = client.response
         finally:
-            await visitor.leave()
+            await client.disconnect()
     if response is None:
         if cancelled:
-            raise FailedError(f"{CANCEL} was sent, and the daemon has not said yet that the scan is over")
-        raise FailedError(f"no response to {SCAN} within {duration_text(patience or 0)}; whether it scans is not known")
+            raise FailedError(f"{CANCEL} was sent, but the daemon has not confirmed the end of the scan yet")
+        raise FailedError(f"no response to {SCAN} within {duration_text(patience or 0)}; the scan may be under way")
     return show(response, as_json=as_json)
 
 
@@ -72,7 +72,7 @@ def show(response: Mapping[str, Any], *, as_json: bool) -> int:
     if as_json:
         click.echo(json_text(response, indent=2))
         return 0 if done else EXIT_FAILED
-    click.echo(verdict(response), err=not done)
+    click.echo(status_line(response), err=not done)
     data = response.get("data")
     found = data.get("found") if isinstance(data, dict) else None
     if isinstance(data, dict) and isinstance(found, list):
@@ -80,15 +80,15 @@ def show(response: Mapping[str, Any], *, as_json: bool) -> int:
         if rows:
             scan_findings.show(rows)
         else:
-            click.echo("Nobody was found.")
+            click.echo("No device was found.")
         rest = {key: value for key, value in data.items() if key != "found"}
-        for text in told({"data": rest}) if rest else ():
+        for text in content_lines({"data": rest}) if rest else ():
             click.echo(text)
     return 0 if done else EXIT_FAILED
 
 
 def row(entry: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return what the daemon tells of one that was found as a row of the table of `lfs10d scan`."""
+    """Return a found device as a row of the table of `lfs10d scan`."""
     rtt = entry.get("rtt_ms")
     answers_in = f"{rtt:.0f} ms" if isinstance(rtt, int | float) else "-"
     cells = (str(entry.get("id")), str(entry.get("baudrate")), answers_in, _what(entry), "; ".join(_remarks(entry)))
@@ -113,22 +113,22 @@ def _remarks(entry: Mapping[str, Any]) -> Iterator[str]:
         yield "the factory id"
 
 
-# While it lasts
+# Progress
 
 
-class _View(Protocol):
-    def heard(self, progress: Mapping[str, Any]) -> None:
+class _ProgressView(Protocol):
+    def on_progress(self, progress: Mapping[str, Any]) -> None:
         """Take an event `scan_progress`."""
 
 
 @contextmanager
-def _view(*, quiet: bool) -> Iterator[_View]:
+def _view(*, quiet: bool) -> Iterator[_ProgressView]:
     """Give what shows the progress on standard error; `quiet`: only on a terminal, where it leaves nothing behind."""
     if not sys.stderr.isatty():
         yield _Lines(quiet=quiet)
         return
     with progress_bar() as bar:
-        yield _Drawn(bar)
+        yield _Bar(bar)
 
 
 def _figures(progress: Mapping[str, Any]) -> tuple[float, float]:
@@ -143,23 +143,23 @@ def _figures(progress: Mapping[str, Any]) -> tuple[float, float]:
 class _Lines:
     def __init__(self, *, quiet: bool) -> None:
         self._quiet = quiet
-        self._next = TELL_EVERY
+        self._next = REPORT_EVERY
 
-    def heard(self, progress: Mapping[str, Any]) -> None:
+    def on_progress(self, progress: Mapping[str, Any]) -> None:
         """Print a line now and then."""
         percent, remaining = _figures(progress)
         if not self._quiet and self._next <= percent < 100.0:  # noqa: PLR2004  # of a hundred percent
-            self._next = percent + TELL_EVERY
+            self._next = percent + REPORT_EVERY
             click.echo(f"{percent:.0f} %, about {span(remaining)} to go", err=True)
 
 
-class _Drawn:
+class _Bar:
     def __init__(self, bar: Bar) -> None:
         self._bar = bar
         self._task = bar.add_task("line/scan", total=100.0, remaining="?")
         bar.refresh()
 
-    def heard(self, progress: Mapping[str, Any]) -> None:
+    def on_progress(self, progress: Mapping[str, Any]) -> None:
         """Move the bar."""
         percent, remaining = _figures(progress)
         where = f"{progress.get('baudrate')} baud, id {progress.get('slave')!s:>3}"

@@ -42,9 +42,9 @@ Examples:
 )
 def command(config: Path, state_dir: Path | None) -> int:
     """Run the daemon: poll the line, publish to the broker, until SIGTERM or Ctrl-C."""
-    # Before the daemon takes its signals: the files are read as they are anyway, and an end is an end.
+    # Until the daemon handles signals: the files are about to be read anyway, so SIGHUP has nothing to reload.
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    # The watchdog of the service manager ends us by SIGABRT: where every thread stood is the last thing told.
+    # The watchdog of the service manager ends us by SIGABRT: the stacks of all threads are the last thing logged.
     faulthandler.enable(STANDARD_ERROR)
     leave_no_core()
     try:
@@ -57,7 +57,7 @@ def _run(config: Path, state_dir: Path | None) -> int:
     loaded = load(config)
     logs.install(loaded.config.log.level, loaded.config.log.format)
     directory = state_directory(config, loaded.config.line.name, chosen=state_dir, environment=os.environ)
-    with contextlib.suppress(StateError):  # the daemon looks again, and tells
+    with contextlib.suppress(StateError):  # the daemon tries again, and reports it
         prepare(directory)
     life = boot.begin(directory, Disk(), time.time())
     with asyncio.Runner(loop_factory=lambda: asyncio.SelectorEventLoop(selectors.EpollSelector())) as runner:

@@ -1,4 +1,4 @@
-"""`lfs10d scan`: who is on the line, and what to write into the configuration."""
+"""`lfs10d scan`: finds the devices on a line and prints the configuration for them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.reading import FaultCode
 
 LOOK_EVERY = 0.1
-"""How often the progress is drawn, in s."""
+"""Seconds between two updates of the progress."""
 
 EXAMPLES = """\b
 Examples:
@@ -65,10 +65,10 @@ def _rates(context: click.Context, parameter: click.Parameter, value: str) -> tu
 @line_options
 @json_option
 def command(ids: tuple[int, ...], rates: tuple[int, ...], profiles: tuple[str, ...], **options: Any) -> int:  # noqa: ANN401  # `take` types them
-    """Find out who is on the line at PORT.
+    """Find the devices on the line at PORT.
 
-    Asks every id at every rate; nothing is ever written to a device. Devices set to the other checksum hear nothing:
-    scan once with each. The port must be free. Exit code 1 if nobody answers.
+    Polls every id at every rate; nothing is ever written to a device. A device set to the other checksum does not
+    answer: scan once with each. The port must be free. Exit code 1 if no device answers.
     """
     as_json, checksum = options.pop("as_json"), options.pop("checksum")
     line = take(options)
@@ -120,7 +120,7 @@ class _Result:
         }
 
     def show(self) -> None:
-        """Print what was found, or what it means that nobody was."""
+        """Print what was found, or what it means that nothing was."""
         found = self.scan.found
         if found:
             scan_findings.show([scan_findings.row(finding) for finding in found])
@@ -138,13 +138,13 @@ class _Result:
     def _explanation(self) -> Iterator[str]:
         noise, asked = self.scan.noise, self.scan.progress.asked
         if noise.last is not None:
-            yield f"At {noise.ids} of {asked} ids bytes were heard that are no answer: {noise.last.message}."
+            yield f"At {noise.ids} of {asked} ids bytes were received that are no valid reply: {noise.last.message}."
             yield f"The last of them: {noise.last.heard.hex(' ').upper() or 'nothing'}"
         if self.scan.found or not self.scan.complete:
             return
         code = FaultCode.TIMEOUT if noise.last is None else noise.last.code
         seen = troubleshooting.Symptoms(code, noise.echoed, self.framing_errors)
-        other = "Do the sensors speak at another rate, or with parity? See --baudrate and --parity."
+        other = "Do the sensors use another rate, or parity? See --baudrate and --parity."
         yield from troubleshooting.lines(troubleshooting.meaning(seen), (*troubleshooting.checks(seen), other))
 
 
@@ -167,7 +167,7 @@ def _scan(result: _Result, *, as_json: bool) -> int:
                 pass  # the reason why it did not come to its end is among them
     except KeyboardInterrupt:
         progress = scan.progress
-        click.echo(f"Stopped after {progress.asked} of {progress.total} ids; this was found so far:", err=True)
+        click.echo(f"Stopped after {progress.asked} of {progress.total} ids; found so far:", err=True)
         return EXIT_FAILED
     except PortError as error:
         click.echo(f"lfs10d: {error}", err=True)

@@ -1,4 +1,4 @@
-"""`lfs10d simulate`: a simulated line on a pseudo terminal, for any master; its judge's figures at the end."""
+"""`lfs10d simulate`: a simulated line on a pseudo terminal for any master; prints its figures at the end."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from typing import Any
 import click
 
 from lfs10d.cli import json_option
-from lfs10d.cli.options import profile_names
+from lfs10d.cli.options import DurationType, profile_names
 from lfs10d.profiles.library import load_profile
-from lfs10d.schema.quantities import BAUDRATES, seconds
+from lfs10d.schema.quantities import BAUDRATES
 from lfs10d.simulator.builder import LinePlan, build, slave_ids
 from lfs10d.simulator.fault_file import FaultFile, load_faults
 from lfs10d.simulator.line import SimulatedLine
@@ -23,15 +23,17 @@ from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.registers import LFS10, blueprint_of
 from lfs10d.simulator.wire import SECOND, Format, Framing, Parity
 
+DURATION = DurationType("5ms, 1s or 2m")
+
 EXAMPLES = """\b
 Examples:
   lfs10d simulate --link /tmp/line0                       eight sensors
   lfs10d simulate --link /tmp/line0 --slaves 1-4,255      these ids
-  lfs10d simulate --link /tmp/line0 --faults faults.yaml  some of them ill
+  lfs10d simulate --link /tmp/line0 --faults faults.yaml  some of them faulty
   lfs10d read /tmp/line0 3                                in another terminal
 
   \b
-  A faults file:
+  A fault file:
   slaves:
   3: silent
   4: [{fault: noisy, rate: 0.1}]
@@ -48,17 +50,8 @@ def _ids(context: click.Context, parameter: click.Parameter, value: str) -> tupl
         raise click.BadParameter(str(error), context, parameter) from error
 
 
-def _time(context: click.Context, parameter: click.Parameter, value: str | None) -> float | None:
-    """Return the seconds of text such as 5ms."""
-    try:
-        duration = None if value is None else seconds(value)
-    except ValueError as error:
-        raise click.BadParameter(f"{value!r} is no duration; write 5ms, 1s or 2m", context, parameter) from error
-    return duration
-
-
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class SimulateOptions:
     """The options as given; times in seconds."""
 
     link: Path | None
@@ -110,52 +103,50 @@ class Wanted:
 )
 @click.option(
     "--turnaround",
-    callback=_time,
-    metavar="DURATION",
+    type=DURATION,
     default="5ms",
     show_default=True,
     help="Time before an answer begins.",
 )
 @click.option(
     "--jitter",
-    callback=_time,
-    metavar="DURATION",
+    type=DURATION,
     default="0ms",
     show_default=True,
     help="Random additional time, up to this.",
 )
-@click.option(
-    "--latency", callback=_time, metavar="DURATION", default=None, help="Interval at which the adapter delivers bytes."
-)
+@click.option("--latency", type=DURATION, default=None, help="Interval at which the adapter delivers bytes.")
+@click.option("--jitter", type=DURATION, default="0ms", show_default=True, help="Random addition to the turnaround.")
+@click.option("--latency", type=DURATION, default=None, help="The adapter delivers in pieces this far apart.")
 @click.option("--echo", is_flag=True, help="The adapter returns the master's own bytes.")
 @click.option("--values", type=click.Choice(["wind", "unique"]), default="wind", show_default=True)
 @click.option("--seed", type=int, default=1, show_default=True, help="Seed of wind and faults.")
-@click.option("--interval", callback=_time, metavar="DURATION", default=None, help="Print the counts at this interval.")
+@click.option("--interval", type=DURATION, default=None, help="Print the counts at this interval.")
 @json_option
-def command(**options: Any) -> None:  # noqa: ANN401  # sixteen options; `Wanted` names and types them
+def command(**values: Any) -> None:  # noqa: ANN401  # sixteen options; `SimulateOptions` names and types them
     """Run a line full of simulated sensors on a pseudo terminal, and judge who polls it.
 
-    A request that begins before 3.5 characters of silence, or pauses for more than 1.5 inside, is not heard, and
-    counted. Ends with Ctrl-C.
+    A request that begins before 3.5 characters of silence, or pauses for more than 1.5 inside, is ignored and
+    counted. Ctrl-C ends it.
     """
-    wanted = Wanted(**options)
-    plan = wanted.plan
-    faults = FaultFile() if wanted.faults is None else load_faults(wanted.faults, plan.slaves)
-    latency = faults.line.latency if wanted.latency is None else wanted.latency
+    options = SimulateOptions(**values)
+    plan = options.plan
+    faults = FaultFile() if options.faults is None else load_faults(options.faults, plan.slaves)
+    latency = faults.line.latency if options.latency is None else options.latency
     port = PtyLine(
         build(plan, faults),
-        link=wanted.link,
-        echo=wanted.echo or faults.line.echo,
+        link=options.link,
+        echo=options.echo or faults.line.echo,
         latency=latency,
         realtime=True,
     )
     with contextlib.suppress(KeyboardInterrupt), port:
         signal.signal(signal.SIGUSR1, lambda *_: port.tell(_power_cycle))
-        _tell_ready(wanted, port)
+        _report_ready(options, port)
         while True:
-            threading.Event().wait(wanted.interval or None)
-            _tell_figures(wanted, port, "figures")
-    _tell_figures(wanted, port, "end")
+            threading.Event().wait(options.interval or None)
+            _report_figures(options, port, "figures")
+    _report_figures(options, port, "end")
 
 
 simulate = command
@@ -166,18 +157,18 @@ def _power_cycle(line: SimulatedLine) -> None:
     line.power_up()
 
 
-def _tell_ready(wanted: Wanted, port: PtyLine) -> None:
-    if wanted.as_json:
-        _print({"event": "ready", "path": port.path, "terminal": port.terminal, "slaves": wanted.slaves})
+def _report_ready(options: SimulateOptions, port: PtyLine) -> None:
+    if options.as_json:
+        _print({"event": "ready", "path": port.path, "terminal": port.terminal, "slaves": options.slaves})
         return
-    shape = f"{wanted.baudrate} baud, {wanted.framing}"
-    count = f"{len(wanted.slaves)} sensor{'s' if len(wanted.slaves) > 1 else ''}"
+    shape = f"{options.baudrate} baud, {options.framing}"
+    count = f"{len(options.slaves)} sensor{'s' if len(options.slaves) > 1 else ''}"
     click.echo(f"simulated line at {port.path}: {count}, {shape}; Ctrl-C ends it")
 
 
-def _tell_figures(wanted: Wanted, port: PtyLine, event: str) -> None:
+def _report_figures(options: SimulateOptions, port: PtyLine, event: str) -> None:
     figures = port.summary()
-    if wanted.as_json:
+    if options.as_json:
         _print({"event": event, **figures})
         return
     gap = figures["min_gap_us"]

@@ -1,4 +1,4 @@
-"""`lfs10d trace`: the frames of the line as they go over the wire, from the running daemon."""
+"""`lfs10d trace`: shows the frames on the running daemon's line, decoded."""
 
 from __future__ import annotations
 
@@ -20,19 +20,20 @@ from lfs10d.cli import EXIT_FAILED, config_option, event_loop, json_option
 from lfs10d.cli.client import CommandClient, parsed
 from lfs10d.cli.json_text import json_text
 from lfs10d.cli.local_time import NO_CLOCK, clock_text
-from lfs10d.cli.login import Login, login, login_options
-from lfs10d.cli.render.response import verdict
+from lfs10d.cli.login import Login, log_in, login_options
+from lfs10d.cli.options import DurationType
+from lfs10d.cli.render.response import status_line
 from lfs10d.cli.render.spinner import spinning
 from lfs10d.commands.handlers.line import LONGEST, USUAL
 from lfs10d.errors import BrokerError, FailedError
 from lfs10d.mqtt.messages import Filter, Incoming
-from lfs10d.schema.quantities import duration_text, seconds
+from lfs10d.schema.quantities import duration_text
 from lfs10d.system.logs import escape
 from lfs10d.telemetry import publication
 
 ANSWERS_WITHIN: Final = 10.0
 LAST_FRAMES: Final = 0.5
-"""s after its end in which the last frames of a trace come in."""
+"""s after the end of a trace within which its last frames arrive."""
 ONE_LINE: Final = 100
 """Columns from which the bytes stand beside their meaning, below it otherwise."""
 LEAST_WORDS: Final = 20
@@ -49,26 +50,14 @@ Examples:
 """
 
 
-def _duration(context: click.Context, parameter: click.Parameter, value: str) -> float:
-    try:
-        duration = seconds(value)
-    except ValueError:
-        duration = 0.0
-    if not 0.1 <= duration <= LONGEST:  # noqa: PLR2004 - as the request has it
-        message = f"{value!r} is no duration up to {duration_text(LONGEST)}; write 30s or 2m"
-        raise click.BadParameter(message, context, parameter)
-    return duration
-
-
 @click.command("trace", epilog=EXAMPLES)
 @config_option
 @click.option(
     "--for",
     "duration",
-    callback=_duration,
+    type=DurationType("30s or 2m", 0.1, LONGEST),
     default=duration_text(USUAL),
     show_default=True,
-    metavar="DURATION",
     help=f"How long, at most {duration_text(LONGEST)}.",
 )
 @login_options
@@ -76,56 +65,56 @@ def _duration(context: click.Context, parameter: click.Parameter, value: str) ->
 def command(config: Path, duration: float, username: str | None, password_file: Path | None, *, as_json: bool) -> int:
     """Show the frames of the running daemon's line, decoded, for a while or until Ctrl-C.
 
-    Each with its time, the silence before it, where it goes (> sent, < heard), its meaning and its bytes. It needs
-    requests of class `sensors`. Exit code 1 if the daemon refuses, 69 if the broker or the daemon is away.
+    Each with its time, the silence before it, its direction (> sent, < received), its meaning and its bytes. The daemon
+    must allow requests of class `sensors`. Exit code 1 if the daemon refuses, 69 if the broker or the daemon is away.
     """
     with contextlib.suppress(KeyboardInterrupt):
-        visited = login(config, "trace", username=username, password_file=password_file)
-        return event_loop.run(_trace(visited, duration, as_json=as_json))
+        login = log_in(config, "trace", username=username, password_file=password_file)
+        return event_loop.run(_trace(login, duration, as_json=as_json))
     return 0
 
 
-async def _trace(visited: Login, duration: float, *, as_json: bool) -> int:
-    topic = visited.topics.full(publication.TRACE)
+async def _trace(login: Login, duration: float, *, as_json: bool) -> int:
+    topic = login.topics.full(publication.TRACE)
     frames: deque[Any] = deque()
 
     def arrived(message: Incoming) -> None:
         if message.topic == topic:
             frames.append(parsed(message.payload))
 
-    visitor = CommandClient(visited, [Filter(topic, qos=0)], arrived)
+    client = CommandClient(login, [Filter(topic, qos=0)], arrived)
     try:
-        return await _show(visitor, frames, duration, as_json=as_json)
+        return await _show(client, frames, duration, as_json=as_json)
     finally:
-        await visitor.leave()
+        await client.disconnect()
 
 
-async def _show(visitor: CommandClient, frames: deque[Any], duration: float, *, as_json: bool) -> int:
-    response = await _begin(visitor, duration)
+async def _show(client: CommandClient, frames: deque[Any], duration: float, *, as_json: bool) -> int:
+    response = await _begin(client, duration)
     if response.get("status") != "ok":
-        click.echo(verdict(response), err=True)
+        click.echo(status_line(response), err=True)
         return EXIT_FAILED
     loop = asyncio.get_running_loop()
     deadline = loop.time() + duration + LAST_FRAMES
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else ONE_LINE
-    while await visitor.until(lambda: bool(frames) or visitor.daemon_gone, max(0.0, deadline - loop.time())):
+    while await client.wait_until(lambda: bool(frames) or client.daemon_gone, max(0.0, deadline - loop.time())):
         while frames:
             frame = frames.popleft()
             if not isinstance(frame, dict):
                 continue
             for text in [json_text(frame)] if as_json else lines(frame, width):
                 click.echo(text)
-        if visitor.daemon_gone:
-            raise BrokerError(f"{visitor.place}: the daemon went away")
+        if client.daemon_gone:
+            raise BrokerError(f"{client.place}: the daemon went offline")
     return 0
 
 
-async def _begin(visitor: CommandClient, duration: float) -> Mapping[str, Any]:
+async def _begin(client: CommandClient, duration: float) -> Mapping[str, Any]:
     async with spinning("line/trace ..."):
-        await visitor.enter()
-        await visitor.find_daemon()
+        await client.connect()
+        await client.require_daemon()
         content = {"id": secrets.token_hex(6), "for": duration}
-        response = await visitor.ask("line/trace", content, ANSWERS_WITHIN)
+        response = await client.request("line/trace", content, ANSWERS_WITHIN)
     if response is None:
         raise FailedError(f"no response to line/trace within {duration_text(ANSWERS_WITHIN)}")
     return response

@@ -1,4 +1,4 @@
-"""`lfs10d watch`: every slave of the line, live: for the person on the roof who spins a cup."""
+"""`lfs10d watch`: a live table of every slave, from MQTT or from the daemon's status file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import click
 
 from lfs10d.cli import config_option, event_loop, json_option
 from lfs10d.cli.client import RETAINED_WITHIN, CommandClient, parsed
-from lfs10d.cli.login import Login, login, login_options
+from lfs10d.cli.login import Login, log_in, login_options
 from lfs10d.cli.render.live_state import LiveState
 from lfs10d.cli.render.live_table import DataSource, age_text
 from lfs10d.cli.render.live_view import LiveView, live_view
@@ -26,11 +26,11 @@ from lfs10d.system.regular_file import read_regular
 from lfs10d.telemetry import publication
 
 EVERY: Final = 0.5
-"""s between two looks: fast enough for a hand at a cup."""
+"""s between two updates: fast enough to follow a cup that is turned by hand."""
 SETTLES_WITHIN: Final = 0.2
-"""s for the rest of what is retained, so that nothing is called unknown that is only on its way."""
+"""s for the rest of what is retained, so that no device is shown as unknown whose messages are still on their way."""
 CONNECTS_WITHIN: Final = 6.0
-"""s the broker is given before the daemon's status file is shown; it is tried on."""
+"""s to connect before the daemon's status file is shown; connecting goes on meanwhile."""
 FRESH: Final = 3.0
 """s after which a status file, written every second, is no longer that of a running daemon."""
 LARGEST_STATUS: Final = 2**22
@@ -57,9 +57,9 @@ def command(config: Path, username: str | None, password_file: Path | None, *, a
     value is one line. Exit code 69 if there is neither a broker with this daemon nor a status file.
     """
     with contextlib.suppress(KeyboardInterrupt):
-        visited = login(config, "watch", username=username, password_file=password_file, needed=False)
-        files = status_places(config, visited.config.line.name, os.environ)
-        event_loop.run(_watch(Watch(visited, files), as_json=as_json))
+        login = log_in(config, "watch", username=username, password_file=password_file, needed=False)
+        files = status_places(config, login.config.line.name, os.environ)
+        event_loop.run(_watch(Watch(login, files), as_json=as_json))
     return 0
 
 
@@ -85,8 +85,8 @@ class _Status:
 class Watch:
     """Reads both sources, MQTT and the status file, and shows the better one."""
 
-    def __init__(self, visited: Login, files: tuple[Path, ...] = ()) -> None:
-        self._line = visited.config.line.name
+    def __init__(self, login: Login, files: tuple[Path, ...] = ()) -> None:
+        self._line = login.config.line.name
         self._files = files
         self._live = LiveState(self._line)
         self._why = ""
@@ -94,7 +94,7 @@ class Watch:
         self._heard_at = 0.0
         """When anything came by MQTT last, epoch s."""
         self._status: _Status | None = None
-        topics = visited.topics
+        topics = login.topics
         once = [publication.DEVICES, publication.LINE_STATE, publication.LINE_ERROR, publication.LINE_STATS]
         leaves = (
             publication.STATE,
@@ -104,8 +104,8 @@ class Watch:
             publication.ERROR,
         )
         filters = [*once, *(publication.device_topic("+", leaf) for leaf in leaves)]
-        self._visitor = CommandClient(
-            visited, [Filter(topics.full(each), qos=0, retain_as_published=False) for each in filters], self._arrived
+        self._client = CommandClient(
+            login, [Filter(topics.full(each), qos=0, retain_as_published=False) for each in filters], self._arrived
         )
 
     @property
@@ -116,23 +116,23 @@ class Watch:
     @property
     def online(self) -> bool:
         """Whether the daemon is at the broker and its devices are known."""
-        return self._visitor.daemon_online and self._live.known
+        return self._client.daemon_online and self._live.known
 
     async def connect(self) -> None:
         """Connect to the broker and subscribe; raises BrokerError, FailedError."""
-        await self._visitor.enter(CONNECTS_WITHIN)
+        await self._client.connect(CONNECTS_WITHIN)
 
     async def disconnect(self) -> None:
         """Disconnect from the broker."""
-        await self._visitor.leave()
+        await self._client.disconnect()
 
     async def find(self) -> None:
         """Wait for the first thing to show; raises BrokerError where there is nothing."""
         async with spinning("looking for the daemon ..."):
             try:
                 await self.connect()
-                await self._visitor.until(lambda: self._live.known, RETAINED_WITHIN)
-                await self._visitor.find_daemon()
+                await self._client.wait_until(lambda: self._live.known, RETAINED_WITHIN)
+                await self._client.require_daemon()
                 await asyncio.sleep(SETTLES_WITHIN)
             except (BrokerError, FailedError) as error:
                 self._why = str(error)
@@ -153,13 +153,11 @@ class Watch:
 
     def _best(self) -> tuple[LiveState, DataSource]:
         """Return the better source: the broker where the daemon is online there, else a file that is being written."""
-        visitor, status = self._visitor, self._status
+        client, status = self._client, self._status
         if self.online:
-            return self._live, DataSource(f"live from {visitor.place}", alive=True)
-        if not visitor.connected:
-            why = visitor.ended_by or self._why
-        else:
-            why = f"{visitor.place}: the daemon is offline there"
+            return self._live, DataSource(f"live from {client.place}", alive=True)
+        offline = f"{client.place}: the daemon is offline there"
+        why = offline if client.connected else client.ended_by or self._why
         if status is not None:
             age = time.time() - status.ts
             if abs(age) <= FRESH:
@@ -170,14 +168,14 @@ class Watch:
         return self._live, DataSource(f"NOT LIVE: these are the last values heard ({why})", alive=False)
 
     def _arrived(self, message: Incoming) -> None:
-        relative = self._visitor.topics.relative(message.topic)
+        relative = self._client.topics.relative(message.topic)
         if relative is None:
             return
         payload = parsed(message.payload)
         if payload is None:
             payload = message.payload.decode("utf-8", "replace")
         self._heard_at = time.time()
-        self._live.heard(relative, payload, old=message.retained, now=time.monotonic(), wall=self._heard_at)
+        self._live.on_message(relative, payload, old=message.retained, now=time.monotonic(), wall=self._heard_at)
 
     def _read(self) -> None:
         """Read the status file of our line, if there is one; what was read before stays and grows old."""
@@ -190,7 +188,7 @@ class Watch:
             if not isinstance(line, dict) or line.get("name") != self._line:
                 continue
             live = LiveState(self._line) if self._status is None else self._status.live
-            live.read(status, now=time.monotonic())
+            live.on_status(status, now=time.monotonic())
             ts = status.get("ts")
             self._status = _Status(path, live, ts / 1000 if isinstance(ts, int) else 0.0)
             return

@@ -212,4 +212,4 @@ def test_if_the_daemon_ends_it_says_so_and_ends_too(demo: Start) -> None:
 def test_a_duration_that_is_none_is_refused(demo: Start) -> None:
     code, errors = demo("--for", "soon").ended()
     assert code == 2
-    assert "'soon' is no duration; write 10s or 2m" in errors
+    assert "'soon' is not a duration; write 10s or 2m" in errors

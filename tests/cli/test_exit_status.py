@@ -54,7 +54,7 @@ def ended(monkeypatch: pytest.MonkeyPatch, end: BaseException | int | None) -> i
             "lfs10d: No space left on device: /full\n",
         ),
         (OSError("odd"), 1, "lfs10d: odd\n"),
-        (RuntimeError("a\x1b[2Jb\nc"), 1, "RuntimeError: a [2Jb c; this is a fault of lfs10d itself\n"),
+        (RuntimeError("a\x1b[2Jb\nc"), 1, "RuntimeError: a [2Jb c; this is an internal error of lfs10d\n"),
     ],
 )
 def test_every_error_ends_in_its_exit_code_and_a_line(

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from lfs10d.cli import login as logins
-from lfs10d.cli.login import DENIED, REMEDY, Login, login
+from lfs10d.cli.login import DENIED, REMEDY, Login, log_in
 from lfs10d.errors import ConfigError
 from lfs10d.system.secret import Secret
 
@@ -31,7 +31,7 @@ def written(folder: Path, more: str = "", name: str = "lfs10d.yaml") -> Path:
 def entered(
     file: Path, *, username: str | None = None, password_file: Path | None = None, needed: bool = True
 ) -> Login:
-    return login(file, "request", username=username, password_file=password_file, needed=needed)
+    return log_in(file, "request", username=username, password_file=password_file, needed=needed)
 
 
 def password(found: Login) -> str | None:
@@ -57,7 +57,7 @@ def test_the_credential_of_the_service_is_found(
 ) -> None:
     units = of_service(monkeypatch, "of the service")
     found = entered(written(tmp_path, name=name))
-    assert (password(found), found.settings.username, found.lacking, units) == (
+    assert (password(found), found.settings.username, found.missing_password, units) == (
         "of the service",
         "daemon-line0",
         "",
@@ -71,7 +71,7 @@ def test_where_it_may_not_be_read_that_is_kept_for_when_the_broker_refuses(
     of_service(monkeypatch, None, '"x" cannot be read: permission denied')
     found = entered(written(tmp_path))
     assert password(found) is None
-    assert found.lacking == (
+    assert found.missing_password == (
         f'the password of lfs10d.service was not read: "x" cannot be read: permission denied; {REMEDY}'
     )
 
@@ -80,7 +80,7 @@ def test_a_file_that_is_no_service_s_has_no_credential(tmp_path: Path, monkeypat
     (tmp_path / "elsewhere").mkdir()
     units = of_service(monkeypatch, "of the service")
     found = entered(written(tmp_path / "elsewhere"))
-    assert (password(found), found.lacking, units) == (None, "", [])
+    assert (password(found), found.missing_password, units) == (None, "", [])
 
 
 def test_a_password_file_comes_before_a_credential_and_a_login_of_ones_own_before_both(
@@ -118,7 +118,7 @@ def test_a_password_file_that_may_not_be_read_is_an_error_with_what_to_do_unless
     assert capsys.readouterr().err == f"lfs10d: {REMEDY}\n"
     found = entered(file, needed=False)
     assert password(found) is None
-    assert found.lacking.endswith(f"cannot be read: permission denied; {REMEDY}")
+    assert found.missing_password.endswith(f"cannot be read: permission denied; {REMEDY}")
 
 
 def test_a_password_file_that_is_not_there_is_an_error_always(

@@ -46,5 +46,5 @@ def test_rtu_needs_eight_data_bits() -> None:
 def test_a_rate_is_one_of_the_known_ones() -> None:
     assert baudrate_of(" 19200 ") == 19200
     for text in ("", "9601", "9600.0", "²"):
-        with pytest.raises(click.BadParameter, match="is none of 1200"):
+        with pytest.raises(click.BadParameter, match="is not one of 1200"):
             baudrate_of(text)

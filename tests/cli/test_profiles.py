@@ -64,7 +64,7 @@ def test_a_profile_is_explained_in_words() -> None:
     assert said["slave ids"] == ["1 to 255; 1 from the factory"]
     assert said["baud rates"] == ["9600, 19200; 9600 from the factory"]
     assert said["one poll"] == ["reads 0x0001-0x0002"]
-    assert said["after silence"] == ["0x0005 is asked first (the barrier)"]
+    assert said["after silence"] == ["0x0005 is read first (the barrier)"]
     text = run("show", "lfs10")
     assert "set in register 0x0005, unless the DIP switch overrules it" in text
     assert "set in register 0x0004 (1 for 9600, 2 for 19200)\n" in text
@@ -94,7 +94,7 @@ def test_a_profile_of_the_user_is_explained_like_any_other() -> None:
 def test_the_unusual_is_spelled_out() -> None:
     tables = explain(parse_profile(TANK, "tank.yaml"))
     device = dict(row for row in tables[0].rows if len(row) == 2)
-    assert device["after silence"] == "twice the time-out is waited, for no read of another length is known"
+    assert device["after silence"] == "the line rests for twice the time-out, for no read of another length is known"
     assert device["interval"] == "at least 0.5 s"
     assert tables[1].rows == (("level", "input 0x0007", "int16, bytes swapped", "x 0.1 -40 m", "any", ""),)
     assert tables[2].rows == (("mode", "0x0009", "uint16 x 2", "0 = off, 1 = on", "no", ""),)
@@ -105,7 +105,7 @@ def test_a_profile_without_remarks_is_shown_without_them(tmp_path: Path) -> None
     (tmp_path / "tank.yaml").write_text(TANK)
     text = run("show", str(tmp_path / "tank.yaml"))
     assert text.startswith("Tank (profile tank)\n")
-    assert "Where this is from" not in text
+    assert "Sources and notes" not in text
 
 
 @pytest.mark.parametrize("name", [*builtin_names(), WIND_VANE])

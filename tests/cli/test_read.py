@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner
 
 from lfs10d.cli.options import take
-from lfs10d.cli.read import _Course, _explained, _ReadOptions, command
+from lfs10d.cli.read import _Attempts, _explanation, _ReadOptions, command
 from lfs10d.profiles.library import load_profile
 from lfs10d.reading import Exchanged, Fault, FaultCode, Purpose
 from lfs10d.simulator.line import SimulatedLine
@@ -74,8 +74,8 @@ def test_silence_is_shown_and_explained(lfs10d: Lfs10d, sensors: PtyLine) -> Non
         "lfs10d: no value from slave 9 at 9600 baud 8N1 after 3 attempts: no answer in 1000 ms"
     )
     assert "09 03 00 01 00 02 94 83  read 2 registers at 0x0001 of slave 9" in done.stderr
-    assert "heard  nothing" in done.stderr
-    assert "Nobody answered: not a single byte came back." in done.stderr
+    assert "received  nothing" in done.stderr
+    assert "No reply: not a single byte came back." in done.stderr
     assert f"`lfs10d scan {sensors.path}` tries them all; or try --baudrate 19200" in done.stderr
 
 
@@ -90,7 +90,7 @@ def test_garbled_answers_are_shown_in_hex_and_explained(lfs10d: Lfs10d, sensors:
     assert done.returncode == 1
     assert "Bytes came, as many as an answer has, but their check is wrong." in done.stderr
     assert "Do two sensors share this id?" in done.stderr
-    assert len(re.findall(r"heard  (?:[0-9A-F]{2} ){6,8}[0-9A-F]{2}", done.stderr)) == 3
+    assert len(re.findall(r"received  (?:[0-9A-F]{2} ){6,8}[0-9A-F]{2}", done.stderr)) == 3
 
 
 def test_a_refusal_is_explained_at_once(lfs10d: Lfs10d, sensors: PtyLine) -> None:
@@ -119,11 +119,11 @@ def test_a_line_on_which_nothing_could_be_sent_is_told() -> None:
     profile = load_profile("lfs10", relative_to=Path())
     wanted = _ReadOptions(line, 9, profile, 9600, checksum=None, watch=False, interval=1.0, as_json=False)
     babble = Exchanged(0.2, 0.0, None, None, 9, Purpose.POLL, FaultCode.COLLISION, b"", bytes(40), 40)
-    told = list(_explained(wanted, _Course([babble], 3), Fault(FaultCode.COLLISION, "no silence"), None))
+    told = list(_explanation(wanted, _Attempts([babble], 3), Fault(FaultCode.COLLISION, "no silence"), None))
     assert told[0] == "lfs10d: no value from slave 9 at 9600 baud 8O2 after 3 attempts: no silence"
     assert told[2].split() == ["sent", "nothing"]
     assert told[3].split()[:2] == ["heard", "00"]
-    assert "Somebody else speaks on the line." in told
+    assert "Another device transmits on the line." in told
     assert any("second master" in text for text in told)
 
 
@@ -240,8 +240,8 @@ def test_a_port_held_by_the_daemon_is_69_and_says_what_to_type(
         (["256"], "256 is not in the range"),
         (["x"], "not a valid slave id"),
         ([], "Missing argument 'ID'"),
-        (["2", "--baudrate", "9601"], "'9601' is none of 1200"),
-        (["2", "--interval", "often"], "is no duration"),
+        (["2", "--baudrate", "9601"], "'9601' is not one of 1200"),
+        (["2", "--interval", "often"], "is not a duration"),
         (["2", "--interval", "1ms"], "must be 50ms or more"),
         (["2", "--framing", "ascii"], "profile lfs10 does not speak ascii"),
         (["250", "--profile", "ld-e"], "profile ld-e has ids 1 to 247, not 250"),

@@ -71,7 +71,7 @@ def test_who_was_added_is_told_below_the_table(capsys: pytest.CaptureFixture[str
     assert show({"request": "line/scan", "status": "ok", "error": None, "data": data}, as_json=False) == 0
     assert capsys.readouterr().out.splitlines() == [
         "line/scan: ok",
-        "Nobody was found.",
+        "No device was found.",
         "added:",
         "  -",
         "    device: slave-7",

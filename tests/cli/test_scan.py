@@ -106,7 +106,7 @@ def test_json_is_all_that_standard_output_carries(lfs10d: Lfs10d, sensors: PtyLi
 def test_who_finds_nobody_is_told_what_to_check(lfs10d: Lfs10d, sensors: PtyLine) -> None:
     done = lfs10d("scan", sensors.path, "--ids", "1-2")
     assert (done.returncode, done.stdout) == (1, "")
-    assert "Nobody answered: not a single byte came back." in done.stderr
+    assert "No reply: not a single byte came back." in done.stderr
     assert "Are A and B swapped?" in done.stderr
 
 
@@ -120,7 +120,7 @@ def test_noise_is_told_beside_what_was_found(lfs10d: Lfs10d, sensors: PtyLine) -
     stray(sensors.line)
     done = lfs10d("scan", sensors.path, "--ids", "1-8", "--baudrate", "9600")
     assert done.returncode == 0
-    assert "At 7 of 8 ids bytes were heard that are no answer" in done.stderr
+    assert "At 7 of 8 ids bytes were received that are no valid reply" in done.stderr
     assert "What to check" not in done.stderr
 
 
@@ -206,9 +206,9 @@ def test_a_busy_port_is_69_and_says_what_the_daemon_does_instead(sensors: PtyLin
     [
         (["--ids", "0-5"], "ids go from 1 to 255"),
         (["--ids", "x"], "neither an id such as 3"),
-        (["--baudrate", "9600,1234"], "'1234' is none of 1200"),
+        (["--baudrate", "9600,1234"], "'1234' is not one of 1200"),
         (["--databits", "7"], "rtu frames need 8 data bits"),
-        (["--timeout", "soon"], "is no duration"),
+        (["--timeout", "soon"], "is not a duration"),
         (["--timeout", "1m"], "between 10ms and 10s"),
     ],
 )

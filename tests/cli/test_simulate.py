@@ -129,7 +129,7 @@ def test_a_power_cycle_can_be_asked_for_by_signal(tmp_path: Path) -> None:
     [
         (("--faults", "none.yaml"), 78, "none.yaml:1:1: cannot be read: No such file or directory"),
         (("--slaves", "0"), 2, "'0': ids go from 1 to 255, the smaller first"),
-        (("--turnaround", "soon"), 2, "'soon' is no duration; write 5ms, 1s or 2m"),
+        (("--turnaround", "soon"), 2, "'soon' is not a duration; write 5ms, 1s or 2m"),
         (("--link", "none/line0"), 1, "none/line0: the link cannot be made: No such file or directory"),
     ],
 )

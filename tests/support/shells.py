@@ -136,7 +136,7 @@ class Shell:
             running.process.wait()
             os.close(running.source)
             assert "Traceback" not in running.text
-            assert "fault of lfs10d" not in running.text
+            assert "internal error of lfs10d" not in running.text
 
 
 def running(site: Site, **sections: Any) -> Run:  # noqa: ANN401 - as Site.write

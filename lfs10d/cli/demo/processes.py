@@ -1,4 +1,4 @@
-"""The demo's processes and its folder; nothing of either outlives the demo, however that ends.
+"""The demo's processes and its folder; neither outlives the demo, however it ends.
 
 In order: `end` asks the children to go and the folder is removed. Killed: the kernel kills the children
 (`parent_guard`), and the caretaker, a shell in a session of its own that waits for the end of a pipe only we hold open,

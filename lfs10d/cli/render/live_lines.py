@@ -1,4 +1,4 @@
-"""The live view as lines, for pipes and programs: one for each new value, and one when something else changes. Pure."""
+"""The live view as lines for pipes and programs: one for each new value or other change. Pure."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ WIDE = 10_000
 
 
 class LiveLines:
-    """Keeps what was told last; text has the times of `zone` (None: this machine's), data those of UTC."""
+    """Keeps what was printed last; text has the times of `zone` (None: this machine's), data those of UTC."""
 
     def __init__(self, zone: tzinfo | None = None) -> None:
         self._zone = zone
         self._heading: tuple[str, ...] = ()
-        self._told: dict[str, tuple[object, ...]] = {}
+        self._printed: dict[str, tuple[object, ...]] = {}
 
-    def news(
+    def changes(
         self, live: LiveState, source: DataSource, *, now: float, wall: float
     ) -> Iterator[tuple[str, dict[str, Any] | None]]:
         """Yield each new line as text and as data for JSON; a heading, which begins with #, has no data."""
@@ -34,9 +34,9 @@ class LiveLines:
         for row, device in zip(
             rows(live, source, now=now, wall=wall, zone=self._zone), live.devices.values(), strict=True
         ):
-            told = (device.boot, device.seq, row.state, row.value)
-            if self._told.get(device.name) != told:
-                self._told[device.name] = told
+            printed = (device.boot, device.seq, row.state, row.value)
+            if self._printed.get(device.name) != printed:
+                self._printed[device.name] = printed
                 ts = round(wall * 1000)
                 data = _data(device, row, iso_time(ts), age=live.age(device, wall), alive=source.alive)
                 yield _text(row, stamp(ts, self._zone)), data
@@ -46,10 +46,10 @@ class LiveLines:
 
 
 def health(status: Mapping[str, Any], zone: tzinfo | None = None) -> Iterator[str]:
-    """Yield how everything is, as the daemon tells it in its status."""
+    """Yield the daemon's status in words."""
     line, broker, ts = status.get("line"), status.get("broker"), status.get("ts")
     live = LiveState(str(line.get("name")) if isinstance(line, dict) else "?")
-    live.read(status, now=0.0)
+    live.on_status(status, now=0.0)
     connected = isinstance(broker, dict) and broker.get("connected") is True
     waiting = broker.get("depth") if isinstance(broker, dict) else None
     words = f"broker {'connected' if connected else 'away'}" + (f", {waiting} samples wait" if waiting else "")

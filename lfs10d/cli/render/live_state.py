@@ -1,7 +1,7 @@
-"""What a visitor knows of a line and its devices, from MQTT or from the daemon's status file. Pure.
+"""The state of a line and its devices as MQTT or the daemon's status file shows it. Pure.
 
-Whatever comes in may come from anybody: what is not of the promised form is passed over, text is escaped when shown.
-Ages are by the daemon's clock: how far it is off ours is learned from samples as they come in.
+Messages may come from any client: what is not of the documented form is ignored, text is escaped when shown.
+Ages are by the daemon's clock; its difference from ours is taken from the samples as they arrive.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from typing import Any, Final
 from lfs10d.cli.render.response import BESIDES
 
 MOVES_WITHIN: Final = 3.0
-"""s in which a value's movement is looked at: a turn of the hand."""
+"""s over which a value's movement is measured."""
 STANDS_OUT: Final = 3.0
-"""So many times as far as the next one a value must have moved to be marked."""
+"""A value is marked if it moved this many times as far as the next one."""
 LATE_AFTER: Final = 3.0
-"""s beyond three intervals after which a good value is no longer that of now."""
+"""s beyond three intervals after which a good value counts as old."""
 
 
 @dataclass(slots=True)
@@ -44,7 +44,7 @@ class ShownDevice:
     """When its error rose, epoch ms of the daemon's clock; None while it has none."""
     trail: deque[tuple[float, float]] = field(default_factory=deque)
     turned: tuple[float, bool] | None = None
-    """When it came or went last, and whether it came."""
+    """When it came online or went offline last, and whether it came."""
 
     @property
     def value(self) -> float | None:
@@ -65,7 +65,7 @@ class ShownDevice:
 
 
 class LiveState:
-    """One line as it is known from one source. `now` is monotonic, `wall` epoch s of our own clock."""
+    """One line as one source shows it. `now` is monotonic, `wall` epoch s of our own clock."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -78,34 +78,34 @@ class LiveState:
         self.line_error_since: float | None = None
         """Epoch ms of the daemon's clock."""
         self.known = False
-        """Something of a daemon was heard."""
-        self._met: dict[str, ShownDevice] = {}
-        """Every device something was heard of: a broker sends what is retained in any order."""
+        """Whether the devices of a daemon are known."""
+        self._by_name: dict[str, ShownDevice] = {}
+        """Every device with a message: a broker sends retained messages in any order."""
         self._ahead = 0.0
         """Seconds our clock is ahead of the daemon's."""
 
     # -- from MQTT
 
-    def heard(self, topic: str, payload: Any, *, old: bool, now: float, wall: float) -> None:  # noqa: ANN401 - parsed JSON
+    def on_message(self, topic: str, payload: Any, *, old: bool, now: float, wall: float) -> None:  # noqa: ANN401 - parsed JSON
         """Take a message under B; `payload` is its JSON or its bare word, `old` that it was retained before."""
         match topic.split("/"):
             case ["devices"] if isinstance(payload, list):
-                self._list([entry for entry in payload if isinstance(entry, dict)])
+                self._on_devices([entry for entry in payload if isinstance(entry, dict)])
             case ["line", "state" | "stats"] if isinstance(payload, dict):
                 self.line.update(payload)
             case ["line", "error"] if isinstance(payload, dict):
-                self._line_failed(payload)
+                self._on_line_error(payload)
             case ["device", name, leaf]:
-                self._told(self._device(name), leaf, payload, old=old, now=now, wall=wall)
+                self._on_device(self._device(name), leaf, payload, old=old, now=now, wall=wall)
 
-    def _line_failed(self, error: Mapping[str, Any] | None) -> None:
+    def _on_line_error(self, error: Mapping[str, Any] | None) -> None:
         """Take the line's error object; None: there is none."""
         error = {} if error is None else error
         self.line_error = _active(error)
         self.line_error_code = str(error.get("code")) if self.line_error is not None else None
         self.line_error_since = _since(error)
 
-    def _list(self, entries: list[dict[str, Any]]) -> None:
+    def _on_devices(self, entries: list[dict[str, Any]]) -> None:
         self.known = True
         self.devices = {}
         for entry in entries:
@@ -115,11 +115,11 @@ class LiveState:
                 _describe(device, entry, slave=entry.get("id"))
 
     def _device(self, name: str) -> ShownDevice:
-        return self._met.setdefault(name, ShownDevice(name))
+        return self._by_name.setdefault(name, ShownDevice(name))
 
-    def _told(self, device: ShownDevice, leaf: str, payload: Any, *, old: bool, now: float, wall: float) -> None:  # noqa: ANN401 - parsed JSON
+    def _on_device(self, device: ShownDevice, leaf: str, payload: Any, *, old: bool, now: float, wall: float) -> None:  # noqa: ANN401 - parsed JSON
         if leaf == "availability":
-            self._available(device, payload == "online", now=None if old else now)
+            self._on_availability(device, payload == "online", now=None if old else now)
         elif isinstance(payload, dict):
             if leaf == "stats":
                 last = _number(payload.get("last_good_ts"))
@@ -128,12 +128,12 @@ class LiveState:
             elif leaf == "error":
                 device.since = _since(payload)
             elif leaf in {"state", "telemetry"}:
-                self._sampled(device, payload, old=old, now=now, wall=wall)
+                self._on_sample(device, payload, old=old, now=now, wall=wall)
 
-    def _sampled(self, device: ShownDevice, sample: Mapping[str, Any], *, old: bool, now: float, wall: float) -> None:
+    def _on_sample(self, device: ShownDevice, sample: Mapping[str, Any], *, old: bool, now: float, wall: float) -> None:
         seq, boot, ts = sample.get("seq"), str(sample.get("boot")), _number(sample.get("ts"))
         if not isinstance(seq, int) or ts is None or (boot == device.boot and seq <= device.seq):
-            return  # the state of a sample that telemetry has told, or none
+            return  # the state repeats a sample of telemetry, or is no sample
         if not device.enabled and sample.get("error") != "disabled":
             return  # polled for a request alone
         values = {name: value for name, value in sample.items() if name not in BESIDES}
@@ -149,14 +149,14 @@ class LiveState:
         if not old:
             _trail(device, now)
 
-    def _available(self, device: ShownDevice, online: bool, *, now: float | None) -> None:  # noqa: FBT001 - what it says
+    def _on_availability(self, device: ShownDevice, online: bool, *, now: float | None) -> None:  # noqa: FBT001 - what it says
         if now is not None and online is not device.online:
             device.turned = now, online
         device.online = online
 
     # -- from the status file
 
-    def read(self, status: Mapping[str, Any], *, now: float) -> None:
+    def on_status(self, status: Mapping[str, Any], *, now: float) -> None:
         """Take the daemon's status as it was written, by the clock of this machine."""
         ts = _number(status.get("ts")) or 0.0
         self.known = True
@@ -164,19 +164,19 @@ class LiveState:
         if isinstance(line, dict):
             self.line = line
             error = line.get("error")
-            self._line_failed(error if isinstance(error, dict) else None)
+            self._on_line_error(error if isinstance(error, dict) else None)
         self.devices = {}
         entries = status.get("devices")
         for entry in entries if isinstance(entries, list) else ():
             if isinstance(entry, dict) and isinstance(entry.get("name"), str):
                 name = entry["name"]
-                known = name in self._met
+                known = name in self._by_name
                 self.devices[name] = device = self._device(name)
-                self._restate(device, entry, ts, now=now if known else None)
+                self._on_device_status(device, entry, ts, now=now if known else None)
 
-    def _restate(self, device: ShownDevice, entry: Mapping[str, Any], ts: float, *, now: float | None) -> None:
+    def _on_device_status(self, device: ShownDevice, entry: Mapping[str, Any], ts: float, *, now: float | None) -> None:
         _describe(device, entry, slave=entry.get("slave"))
-        self._available(device, entry.get("online") is True, now=now)
+        self._on_availability(device, entry.get("online") is True, now=now)
         values, units, seq = entry.get("values"), entry.get("units"), entry.get("seq")
         fresh = seq != device.seq
         device.seq = seq if isinstance(seq, int) else -1
@@ -188,7 +188,7 @@ class LiveState:
         if fresh and now is not None:
             _trail(device, now)
 
-    # -- what is to be shown
+    # -- what is shown
 
     def age(self, device: ShownDevice, wall: float) -> float | None:
         """Return how many s ago it gave its last good value; None: never as far as we know."""

@@ -1,4 +1,4 @@
-"""The live table: what is known of a line as lines of styled text, for a terminal of any size. Pure.
+"""The live table: the state of a line as lines of styled text, for a terminal of any size. Pure.
 
 A line is a tuple of pieces, each a text and its style in rich's words ("" is plain).
 """
@@ -23,7 +23,7 @@ LONGEST_WORD: Final = 200
 JUST: Final = 5.0
 """s for which it is marked that a device came or went."""
 
-_TROUBLES: Final = {
+_MEANINGS: Final = {
     "timeout": "no answer",
     "crc": "garbled answer",
     "malformed": "broken answer",
@@ -40,16 +40,16 @@ _TROUBLES: Final = {
     "port_busy": "another program has the port",
     "config_conflict": "two devices with one id",
 }
-"""What a code says, in a word or two; the code itself stands before it, as in docs/when-it-goes-wrong.md."""
+"""A code in a word or two, shown behind the code itself; details in docs/when-it-goes-wrong.md."""
 _OF_THE_LINE: Final = frozenset({"starting", "port_lost", "port_busy", "config_conflict"})
-"""Codes that say nothing of the device itself."""
+"""Codes that are not about the device itself."""
 _MARKS: Final = {"moved": ">", "came": "+", "went": "-"}
 _MARK_STYLES: Final = {"moved": "bold black on green", "came": "bold green", "went": "bold red"}
 
 
 @dataclass(frozen=True, slots=True)
 class DataSource:
-    """Where it comes from, in words; `alive`: what is shown is of now."""
+    """Where the state comes from, in words; `alive`: it is current."""
 
     words: str
     alive: bool
@@ -57,7 +57,7 @@ class DataSource:
 
 @dataclass(frozen=True, slots=True)
 class TableRow:
-    """One device as it is shown. `stale`: what is shown is not of now."""
+    """One device as it is shown. `stale`: its value is not current."""
 
     name: str
     slave: str
@@ -124,7 +124,7 @@ def _number(value: float) -> str:
 
 
 def _state(device: ShownDevice, moment: _Moment, *, stale: bool) -> str:
-    """Return availability and what ails it, as code and words, and since when."""
+    """Return availability and error, as code and words, and since when."""
     if not device.enabled:
         return "disabled"
     if device.good:
@@ -132,7 +132,7 @@ def _state(device: ShownDevice, moment: _Moment, *, stale: bool) -> str:
     if device.error is None:
         return "not heard yet"
     code = escape(device.error)
-    trouble = f"{code}, {_TROUBLES[code]}" if code in _TROUBLES else code
+    trouble = f"{code}, {_MEANINGS[code]}" if code in _MEANINGS else code
     if not device.online and code not in _OF_THE_LINE:
         trouble = f"offline: {trouble}"
     return trouble + _since(device.since, moment.wall, moment.zone)
@@ -174,9 +174,9 @@ _LABEL = _Column("label", lambda row: row.label, most=30)
 
 _ALL: Final = (_NAME, _ID, _VALUE, _STATE, _AGE, _RTT, _LABEL)
 _GIVEN_UP_FIRST: Final = (_LABEL, _RTT, _AGE, _ID)
-"""What a narrow terminal does without, in this order."""
+"""Columns left out on a narrow terminal, in this order."""
 LEAST_LABEL: Final = 6
-"""A label cut shorter than this tells nothing."""
+"""A label is not cut shorter than this."""
 
 
 def table(shown: Sequence[TableRow], width: int) -> list[Line]:
@@ -243,9 +243,9 @@ def _cut(line: Line, width: int) -> Line:
 def header(
     live: LiveState, source: DataSource, width: int, *, pace: bool = True, wall: float = 0.0, zone: tzinfo | None = None
 ) -> list[Line]:
-    """Return what is to be known of the line and where all this comes from; `pace`: also what changes all the time.
+    """Return the line and the source; `pace`: also load and rate, which change all the time.
 
-    `wall` (epoch s) is now: what began on another day is told with its date.
+    `wall` (epoch s) is now: what began on another day is shown with its date.
     """
     line = live.line
     words = [f"{escape(live.name)}: {_said(line, 'port')}"]
@@ -296,7 +296,7 @@ def screen(
     zone: tzinfo | None = None,
     remarks: Sequence[str] = (),
 ) -> list[Line]:
-    """Return everything for a terminal of `size` columns and lines; where lines are short, the worst rows first.
+    """Return everything for a terminal of `size` columns and lines; without room for all rows, the worst of them.
 
     `remarks` stand below where there is room for them and all rows.
     """
@@ -319,7 +319,7 @@ def screen(
 
 
 def _rank(row: TableRow) -> int:
-    """Return how much a row wants to be seen: what moves, what fails, the rest."""
+    """Return the order of importance: what moves, what fails, the rest."""
     if row.just:
         return 0
     return 2 if row.good and not row.stale else 1

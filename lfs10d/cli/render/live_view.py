@@ -56,7 +56,7 @@ class LivePrinter:
 
     def draw(self, live: LiveState, source: DataSource, *, now: float, wall: float) -> None:
         """Print what is new."""
-        for plain, data in self._lines.news(live, source, now=now, wall=wall):
+        for plain, data in self._lines.changes(live, source, now=now, wall=wall):
             if self._as_json and data is not None:
                 click.echo(json_text(data))
             elif not self._as_json:

@@ -1,4 +1,4 @@
-"""A response in words: what a request did, for people. Pure; whatever it holds came over the network and is escaped."""
+"""A response in words, for people. Pure; everything in it came over the network and is escaped."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from lfs10d.system.logs import escape
 
 INDENT = "  "
 SAMPLE = frozenset({"device", "seq", "quality", "error"})
-"""What tells a sample."""
+"""Keys by which a sample is recognized."""
 BESIDES = SAMPLE | {"v", "line", "boot", "ts", "time", "clock", "unit", "units", "rtt_ms", "historical"}
-"""What a sample has besides its values."""
+"""Keys of a sample besides its values."""
 DEEPEST = 20
-"""Levels that are laid out; what lies deeper is shown as JSON."""
+"""Levels that are indented; what lies deeper is shown as JSON."""
 
 
-def verdict(response: Mapping[str, Any]) -> str:
+def status_line(response: Mapping[str, Any]) -> str:
     """Return how a request ended, in one line."""
     name, status = _plain(response.get("request")), _plain(response.get("status"))
     error = response.get("error")
@@ -29,8 +29,8 @@ def verdict(response: Mapping[str, Any]) -> str:
     return f"{name}: {status}: {_plain(error.get('code'))}: {_plain(error.get('message'))}"
 
 
-def told(response: Mapping[str, Any], zone: tzinfo | None = None) -> Iterator[str]:
-    """Yield what it brought, line by line; the time of a sample is that of `zone` (None: this machine's)."""
+def content_lines(response: Mapping[str, Any], zone: tzinfo | None = None) -> Iterator[str]:
+    """Yield the content, line by line; the time of a sample is that of `zone` (None: this machine's)."""
     data = response.get("data")
     if isinstance(data, dict) and data.keys() >= SAMPLE:
         yield _sample(data, zone)

@@ -64,7 +64,7 @@ def what(finding: FoundDevice) -> str:
     if profile is not None:
         return profile.title if finding.duplicate else f"{profile.title}, {value_text(finding)}"
     if not finding.answers:
-        return "something that gives no right answer"
+        return "something that gives no valid reply"
     if finding.exception is not None:
         name = EXCEPTION_NAMES.get(finding.exception, "of its own")
         how = "refuses" if finding.exception == ILLEGAL_FUNCTION else "answers"
@@ -76,18 +76,18 @@ def value_text(finding: FoundDevice) -> str:
     """Return its first value with its unit."""
     profile = finding.profile
     if profile is None or profile.value_names[0] not in finding.values:
-        return "no believable value"
+        return "no plausible value"
     first = profile.values[0]
     unit = "" if first.unit == "1" else f" {first.unit}"
     return f"{finding.values[first.name]}{unit}"
 
 
 def remarks(finding: FoundDevice) -> Iterator[str]:
-    """Yield what a newcomer should know of it."""
+    """Yield what a person should know of it."""
     if finding.duplicate:
-        yield f"DUPLICATE? {finding.spoilt} of {finding.tries} answers garbled: two sensors with this id?"
+        yield f"DUPLICATE? {finding.spoilt} of {finding.tries} replies garbled: two sensors with this id?"
     elif finding.spoilt:
-        yield f"{finding.spoilt} of {finding.tries} answers garbled"
+        yield f"{finding.spoilt} of {finding.tries} replies garbled"
     other = finding.id_register if finding.id_register != finding.slave else None
     if finding.suspect and other is not None:
         yield f"SUSPECT: probably sensor {other}, which answers {finding.slave} too"
@@ -101,7 +101,7 @@ def remarks(finding: FoundDevice) -> Iterator[str]:
 
 @dataclass(frozen=True, slots=True)
 class ScanRequest:
-    """How the line was scanned: with which check, and in which files the user's own profiles lie, by their names."""
+    """How the line was scanned: the checksum, and the files of the user's own profiles, by their names."""
 
     checksum: str = "crc"
     files: Mapping[str, str] = field(default_factory=dict)

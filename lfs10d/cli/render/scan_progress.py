@@ -1,4 +1,4 @@
-"""A scan while it runs: a bar on a terminal, plain lines elsewhere; all of it on standard error."""
+"""The progress of a scan on standard error: a bar on a terminal, plain lines elsewhere."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from lfs10d.cli.render import scan_findings
 from lfs10d.line.jobs.identification import FoundDevice
 from lfs10d.line.jobs.scan import Scan
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # rich is imported where something is drawn, and nowhere else
     from rich.progress import Progress as Bar
 
-TELL_EVERY = 10.0
+REPORT_EVERY = 10.0
 """Percent between two lines where no bar can be drawn."""
 
 
@@ -38,7 +38,7 @@ def view(scan: Scan, port: str, *, quiet: bool) -> Iterator[ScanView]:
         return
     bar = progress_bar()
     with bar:
-        yield _Drawn(scan, bar)
+        yield _ProgressBar(scan, bar)
 
 
 def announcement(scan: Scan, port: str) -> str:
@@ -58,19 +58,19 @@ def span(seconds: float) -> str:
     return f"{minutes} min {rest} s" if rest else f"{minutes} min"
 
 
-class _News:
-    """Tells each finding once."""
+class _NewFindings:
+    """Yields each finding once."""
 
     def __init__(self, scan: Scan) -> None:
         self._scan = scan
-        self._told: set[tuple[int, int]] = set()
+        self._reported: set[tuple[int, int]] = set()
 
     def fresh(self) -> Iterator[FoundDevice]:
         """Yield what was found since the last call."""
         for finding in self._scan.found:
             key = finding.slave, finding.baudrate
-            if key not in self._told:
-                self._told.add(key)
+            if key not in self._reported:
+                self._reported.add(key)
                 yield finding
 
 
@@ -82,31 +82,31 @@ class _ProgressLines:
     def __init__(self, scan: Scan, *, quiet: bool) -> None:
         self._scan = scan
         self._quiet = quiet
-        self._news = _News(scan)
-        self._next = TELL_EVERY
+        self._new = _NewFindings(scan)
+        self._next = REPORT_EVERY
 
     def update(self) -> None:
         """Print a line for each finding, and one now and then."""
         if self._quiet:
             return
-        for finding in self._news.fresh():
+        for finding in self._new.fresh():
             click.echo(_sentence(finding), err=True)
         progress = self._scan.progress
         if self._next <= progress.percent < 100.0:  # noqa: PLR2004  # of a hundred percent
-            self._next = progress.percent + TELL_EVERY
+            self._next = progress.percent + REPORT_EVERY
             click.echo(f"{progress.percent:.0f} %, about {span(progress.remaining)} to go", err=True)
 
 
-class _Drawn:
+class _ProgressBar:
     def __init__(self, scan: Scan, bar: Bar) -> None:
         self._scan = scan
         self._bar = bar
-        self._news = _News(scan)
+        self._new = _NewFindings(scan)
         self._task = bar.add_task("", total=100.0, remaining=span(scan.plan.expected))
 
     def update(self) -> None:
         """Move the bar; put each finding above it."""
-        for finding in self._news.fresh():
+        for finding in self._new.fresh():
             self._bar.console.print(_sentence(finding), markup=False, highlight=False)
         progress = self._scan.progress
         where = f"{progress.baudrate} baud, id {progress.slave:>3}"

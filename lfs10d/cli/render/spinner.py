@@ -1,4 +1,4 @@
-"""A sign of life on a terminal while something is waited for."""
+"""A spinner on a terminal while the verb waits."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from itertools import cycle
 from typing import Final
 
 AFTER: Final = 0.3
-"""s after which a person wants to see that something is going on."""
+"""s after which it is shown."""
 EVERY: Final = 0.12
 ERASE: Final = "\r\x1b[K"
 """To the first column, and clear the line (ECMA-48, EL)."""

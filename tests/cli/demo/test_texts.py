@@ -24,10 +24,10 @@ def test_no_remark_is_wider_than_a_terminal() -> None:
 
 def test_the_summary_counts_samples_and_sensors() -> None:
     live = LiveState("line0")
-    live.heard("devices", [{"name": "a", "id": 2}, {"name": "b", "id": 3}], old=False, now=0.0, wall=0.0)
+    live.on_message("devices", [{"name": "a", "id": 2}, {"name": "b", "id": 3}], old=False, now=0.0, wall=0.0)
     for topic, payload in (
         ("device/a/availability", "online"),
         ("device/a/telemetry", json.loads('{"seq": 7, "boot": "b", "ts": 1, "wind_speed": 1.5, "quality": "good"}')),
     ):
-        live.heard(topic, payload, old=False, now=0.0, wall=0.0)
+        live.on_message(topic, payload, old=False, now=0.0, wall=0.0)
     assert summary(live, 4.2) == "lfs10d demo: 7 samples in 4 s, 1 of 2 sensors online; nothing is left running"

@@ -41,8 +41,8 @@ class Pipe:
         self.data: list[dict[str, Any]] = []
 
     def read(self, told: dict[str, Any], source: DataSource = HERE) -> list[str]:
-        self.live.read(told, now=1.0)
-        news = list(self.lines.news(self.live, source, now=1.0, wall=WALL))
+        self.live.on_status(told, now=1.0)
+        news = list(self.lines.changes(self.live, source, now=1.0, wall=WALL))
         self.data += [data for _, data in news if data is not None]
         return [text for text, _ in news]
 

@@ -30,7 +30,7 @@ class Heard:
         return WALL + self.now + self.ahead
 
     def tell(self, topic: str, payload: Any, *, old: bool = False) -> None:  # noqa: ANN401 - any JSON
-        self.live.heard(topic, payload, old=old, now=self.now, wall=self.wall)
+        self.live.on_message(topic, payload, old=old, now=self.now, wall=self.wall)
 
     def sample(
         self,
@@ -85,9 +85,9 @@ def test_what_is_retained_may_come_in_any_order() -> None:
 
 def test_nothing_is_known_before_a_list_of_devices() -> None:
     live = LiveState("line0")
-    live.heard("line/state", {"port": "/dev/x"}, old=True, now=0, wall=0)
+    live.on_message("line/state", {"port": "/dev/x"}, old=True, now=0, wall=0)
     assert not live.known
-    live.heard("devices", [], old=True, now=0, wall=0)
+    live.on_message("devices", [], old=True, now=0, wall=0)
     assert live.known
 
 
@@ -271,7 +271,7 @@ def status(**device: Any) -> dict[str, Any]:  # noqa: ANN401 - any JSON
 
 def test_the_status_file_says_all_that_mqtt_says() -> None:
     live = LiveState("line0")
-    live.read(status(), now=10.0)
+    live.on_status(status(), now=10.0)
     (device,) = live.devices.values()
     assert (device.name, device.slave, device.label, device.online, device.good) == ("a", 2, "Mast", True, True)
     assert (device.value, device.unit, device.rtt_ms) == (4.5, "m/s", 18.0)
@@ -282,22 +282,22 @@ def test_the_status_file_says_all_that_mqtt_says() -> None:
 def test_what_moves_and_comes_and_goes_is_seen_in_the_status_file_too() -> None:
     live = LiveState("line0")
     for step, value in enumerate((1.0, 1.0, 6.0)):
-        live.read(status(values={"wind_speed": value}, seq=step), now=10.0 + step)
+        live.on_status(status(values={"wind_speed": value}, seq=step), now=10.0 + step)
     assert [device.name for device in live.movers(12.0)] == ["a"]
-    live.read(status(online=False), now=13.0)
+    live.on_status(status(online=False), now=13.0)
     assert live.devices["a"].turned == (13.0, False)
 
 
 def test_the_same_status_read_twice_is_one_sample() -> None:
     live = LiveState("line0")
     for now in (10.0, 10.5, 11.0):
-        live.read(status(), now=now)
+        live.on_status(status(), now=now)
     assert len(live.devices["a"].trail) == 0
 
 
 def test_a_device_that_never_answered_has_no_age() -> None:
     live = LiveState("line0")
-    live.read(status(age_s=None, values={"wind_speed": None}, quality="bad", error="timeout"), now=1.0)
+    live.on_status(status(age_s=None, values={"wind_speed": None}, quality="bad", error="timeout"), now=1.0)
     assert live.age(live.devices["a"], WALL) is None
 
 
@@ -324,8 +324,8 @@ def test_whatever_comes_in_can_be_shown(messages: list[tuple[str, Any, bool]], w
     for topic, payload, old in messages:
         heard.tell(topic, payload, old=old)
     file = LiveState("line0")
-    file.read({**status(), **written}, now=1.0)
-    file.read({**status(**written), "line": written}, now=2.0)
+    file.on_status({**status(), **written}, now=1.0)
+    file.on_status({**status(**written), "line": written}, now=2.0)
     for live in (heard.live, file):
         for line in screen(live, DataSource("live", alive=True), (80, 24), now=heard.now, wall=heard.wall):
             text = "".join(piece for piece, _ in line)

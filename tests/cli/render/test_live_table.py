@@ -45,7 +45,7 @@ def live(*entries: dict[str, Any], **line: Any) -> LiveState:  # noqa: ANN401 - 
     shown = LiveState("line0")
     shape = {"port": "/dev/ttyUSB0", "baudrate": 9600, "databits": 8, "parity": "none", "stopbits": 1, "open": True}
     status = {"ts": round(WALL * 1000), "line": {**shape, "load_pct": 34.5, "polls_per_s": 12.0, **line}}
-    shown.read({**status, "devices": list(entries)}, now=0.0)
+    shown.on_status({**status, "devices": list(entries)}, now=0.0)
     return shown
 
 
@@ -91,8 +91,10 @@ def test_the_sensor_that_moved_is_marked_and_stands_out() -> None:
         "ts": round(WALL * 1000),
         "devices": [entry("a", 2, seq=2), entry("b", 3, seq=2, values={"wind_speed": 1.0})],
     }
-    shown.read(status, now=1.0)
-    shown.read({**status, "devices": [entry("a", 2, seq=3), entry("b", 3, seq=3, values={"wind_speed": 9.0})]}, now=2.0)
+    shown.on_status(status, now=1.0)
+    shown.on_status(
+        {**status, "devices": [entry("a", 2, seq=3), entry("b", 3, seq=3, values={"wind_speed": 9.0})]}, now=2.0
+    )
     _, first, second = table(rows(shown, HERE, now=2.0, wall=WALL), 80)
     assert (text(first)[:3], text(second)[:3]) == ("  a", "> b")
     assert [style for piece, style in second if "9.00" in piece] == ["bold green"]
@@ -101,7 +103,7 @@ def test_the_sensor_that_moved_is_marked_and_stands_out() -> None:
 @pytest.mark.parametrize(("online", "mark"), [(True, "+ a"), (False, "- a")])
 def test_one_that_just_came_or_went_is_marked_for_five_seconds(online: bool, mark: str) -> None:  # noqa: FBT001 - the test's parameter
     shown = live(entry("a", 2, online=not online))
-    shown.read({"ts": round(WALL * 1000), "devices": [entry("a", 2, online=online)]}, now=10.0)
+    shown.on_status({"ts": round(WALL * 1000), "devices": [entry("a", 2, online=online)]}, now=10.0)
     assert [text(table(rows(shown, HERE, now=now, wall=WALL), 80)[1])[:3] for now in (14.9, 15.1)] == [mark, "  a"]
 
 

@@ -19,7 +19,7 @@ HERE = DataSource("live from broker here", alive=True)
 def line() -> LiveState:
     """Return the state of a line with one sensor."""
     live = LiveState("line0")
-    live.heard("devices", [{"name": "mast", "id": 2}], old=False, now=0.0, wall=0.0)
+    live.on_message("devices", [{"name": "mast", "id": 2}], old=False, now=0.0, wall=0.0)
     return live
 
 

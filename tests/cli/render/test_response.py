@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.cli.render.response import DEEPEST, told, verdict
+from lfs10d.cli.render.response import DEEPEST, content_lines, status_line
 
 SAMPLE = {
     "v": 1,
@@ -45,7 +45,7 @@ SAMPLE = {
     ],
 )
 def test_how_it_ended_is_one_line(response: dict[str, Any], words: str) -> None:
-    assert verdict(response) == words
+    assert status_line(response) == words
 
 
 @pytest.mark.parametrize(
@@ -68,7 +68,7 @@ def test_how_it_ended_is_one_line(response: dict[str, Any], words: str) -> None:
     ],
 )
 def test_a_sample_is_one_line_with_every_value_and_its_unit(sample: dict[str, Any], words: str) -> None:
-    assert list(told({"data": sample}, UTC)) == [words]
+    assert list(content_lines({"data": sample}, UTC)) == [words]
 
 
 def test_what_belongs_together_is_indented() -> None:
@@ -79,7 +79,7 @@ def test_what_belongs_together_is_indented() -> None:
         "broker": {"connected": False, "since": None},
         "empty": {},
     }
-    assert list(told({"data": data})) == [
+    assert list(content_lines({"data": data})) == [
         "applied: [poll.interval]",
         "none: []",
         "found:",
@@ -95,18 +95,18 @@ def test_what_belongs_together_is_indented() -> None:
 
 
 def test_without_data_nothing_is_told() -> None:
-    assert list(told({"data": None})) == []
+    assert list(content_lines({"data": None})) == []
 
 
 def test_a_plain_value_is_told_as_it_is() -> None:
-    assert list(told({"data": "a\x07b"})) == [r"a\x07b"]
+    assert list(content_lines({"data": "a\x07b"})) == [r"a\x07b"]
 
 
 def test_what_lies_very_deep_is_shown_as_json() -> None:
     data: Any = {"bottom": 1}
     for _ in range(2 * DEEPEST):
         data = {"a": data}
-    lines = list(told({"data": data}))
+    lines = list(content_lines({"data": data}))
     assert len(lines) == DEEPEST + 1
     assert lines[-1].endswith('"bottom": 1' + "}" * (DEEPEST + 1))
 
@@ -120,4 +120,4 @@ ANYTHING = st.recursive(
 
 @given(st.dictionaries(st.sampled_from(["request", "status", "data", "error", "took_ms"]), ANYTHING))
 def test_whatever_a_response_holds_every_line_can_be_shown(response: dict[str, Any]) -> None:
-    assert all(line.isprintable() for line in (verdict(response), *told(response)))
+    assert all(line.isprintable() for line in (status_line(response), *content_lines(response)))

@@ -55,8 +55,8 @@ def test_a_bare_count_has_no_unit() -> None:
             "unknown device, refuses function 03 (exception 01 illegal function)",
         ),
         (FoundDevice(9, 9600, answers=True), "unknown device, answers function 03"),
-        (FoundDevice(9, 9600, duplicate=True), "something that gives no right answer"),
-        (FoundDevice(9, 9600, answers=True, profile=LFS10), "LFS10 wind speed sensor, no believable value"),
+        (FoundDevice(9, 9600, duplicate=True), "something that gives no valid reply"),
+        (FoundDevice(9, 9600, answers=True, profile=LFS10), "LFS10 wind speed sensor, no plausible value"),
         (sensor(9, duplicate=True), "LFS10 wind speed sensor"),
     ],
 )
@@ -70,10 +70,10 @@ def test_what_it_is_is_told_as_far_as_it_is_known(finding: FoundDevice, text: st
         (sensor(3), []),
         (sensor(1), ["the factory id"]),
         (FoundDevice(1, 9600, answers=True), []),
-        (FoundDevice(3, 9600, spoilt=2, tries=5), ["2 of 5 answers garbled"]),
+        (FoundDevice(3, 9600, spoilt=2, tries=5), ["2 of 5 replies garbled"]),
         (
             FoundDevice(3, 9600, spoilt=4, tries=5, duplicate=True),
-            ["DUPLICATE? 4 of 5 answers garbled: two sensors with this id?"],
+            ["DUPLICATE? 4 of 5 replies garbled: two sensors with this id?"],
         ),
         (sensor(250, suspect=True), ["SUSPECT: others answer too, so it may be no sensor of its own"]),
         (FoundDevice(255, 9600, suspect=True, id_register=2), ["SUSPECT: probably sensor 2, which answers 255 too"]),

@@ -20,6 +20,7 @@ OF_AN_EXCHANGE = [
         FaultCode.CONFIG_CONFLICT,
         FaultCode.STORAGE_FULL,
         FaultCode.DUPLICATE_CLIENT,
+        FaultCode.DUPLICATE_ID,
     }
 ]
 
@@ -36,7 +37,9 @@ def test_framing_errors_speak_of_another_rate_or_swapped_wires() -> None:
 
 
 def test_an_echo_is_no_answer_but_a_good_sign() -> None:
-    assert "the adapter echoes, which is fine" in meaning(Symptoms(FaultCode.TIMEOUT, echoed=True, framing_errors=0))
+    assert "the adapter echoes, which is harmless" in meaning(
+        Symptoms(FaultCode.TIMEOUT, echoed=True, framing_errors=0)
+    )
 
 
 def test_advice_is_numbered() -> None:

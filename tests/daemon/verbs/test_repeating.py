@@ -16,7 +16,7 @@ from tests.support.shells import BASE, Shell, typed
 from tests.support.sites import Run, Site, eventually, tell
 
 REPEAT = ("line/adopt", "--repeat")
-FIRST = "Plug in a sensor. Ctrl-C when all are mounted.\n"
+FIRST = "Plug in a sensor. Ctrl-C when all are adopted.\n"
 ADOPTED_WITHIN = 60.0
 """Seconds; with its share of 30 % an adoption takes about 15, and what was asked before it about 10."""
 NEXT = "Plug in the next one.\n"
@@ -44,16 +44,16 @@ def test_one_sensor_after_the_other_gets_the_next_id_and_a_table_tells_them_in_t
 ) -> None:
     del mosquitto
     served, run = mounted(site)
-    mounting = shell.pipe("request", *REPEAT, "label=Roof")
-    mounting.says(FIRST)
+    loop = shell.pipe("request", *REPEAT, "label=Roof")
+    loop.says(FIRST)
     run.says("request line/adopt: rejected (timeout)")  # nobody is there yet, and nothing is told
     first = plug(served)
-    mounting.says(f"slave-3: slave id 3, 19200 baud\n{NEXT}", within=ADOPTED_WITHIN)
+    loop.says(f"slave-3: slave id 3, 19200 baud\n{NEXT}", within=ADOPTED_WITHIN)
     plug(served, baudrate=19200)
-    mounting.says("slave-4: slave id 4, 19200 baud\n", within=ADOPTED_WITHIN)
-    assert mounting.ends(signal.SIGINT) == 0
+    loop.says("slave-4: slave id 4, 19200 baud\n", within=ADOPTED_WITHIN)
+    assert loop.ends(signal.SIGINT) == 0
     told = f"{FIRST}slave-3: slave id 3, 19200 baud\n{NEXT}slave-4: slave id 4, 19200 baud\n{NEXT}"
-    assert mounting.text == f"{told}2 sensors adopted:\nname     id   baud\nslave-3   3  19200\nslave-4   4  19200\n"
+    assert loop.text == f"{told}2 sensors adopted:\nname     id   baud\nslave-3   3  19200\nslave-4   4  19200\n"
     assert (first.slave, first.format.baudrate) == (3, 19200)
     assert json.loads((site.folder / "state" / "journal.json").read_text())["answers"] == []
 
@@ -79,13 +79,13 @@ def test_by_3_1_1_too_a_sensor_whose_switch_is_set_is_told_once_and_the_next_one
     listener = mosquitto.subscribe(f"{BASE}/request/line/adopt")
     served, _ = mounted(site, version="3.1.1")
     locked = plug(served, "dip_locked")
-    mounting = shell.pipe("request", *REPEAT)
-    mounting.says("dip_switch: the sensor stays at slave id 1", within=ADOPTED_WITHIN)
+    loop = shell.pipe("request", *REPEAT)
+    loop.says("dip_switch: the sensor stays at slave id 1", within=ADOPTED_WITHIN)
     tell(served, lambda _: locked.power_cut())
     plug(served)
-    mounting.says("slave-3: slave id 3, 19200 baud\n", within=ADOPTED_WITHIN)
-    assert mounting.text.count("dip_switch") == 1
-    assert mounting.ends(signal.SIGTERM) == 0
+    loop.says("slave-3: slave id 3, 19200 baud\n", within=ADOPTED_WITHIN)
+    assert loop.text.count("dip_switch") == 1
+    assert loop.ends(signal.SIGTERM) == 0
     ids = [json.loads(each.payload)["id"] for each in listener.on(f"{BASE}/request/line/adopt")]
     assert len(set(ids)) == len(ids) >= 2, "by 3.1.1 an answer is known by its id alone"
 
@@ -96,40 +96,40 @@ def test_a_sensor_that_obeys_after_a_power_cycle_is_adopted_then(
     del mosquitto
     served, _ = mounted(site)
     sensor = plug(served, "power_cycle", baudrate=19200)
-    mounting = shell.pipe("request", *REPEAT)
-    mounting.says("power_cycle_needed: the sensor took what was written", within=ADOPTED_WITHIN)
+    loop = shell.pipe("request", *REPEAT)
+    loop.says("power_cycle_needed: the sensor took what was written", within=ADOPTED_WITHIN)
     tell(served, lambda _: sensor.power_cycle())
-    mounting.says(f"slave-3: slave id 3, 19200 baud\n{NEXT}", within=ADOPTED_WITHIN)
-    assert mounting.ends(signal.SIGINT) == 0
-    assert mounting.text.count("power_cycle_needed") == 1
+    loop.says(f"slave-3: slave id 3, 19200 baud\n{NEXT}", within=ADOPTED_WITHIN)
+    assert loop.ends(signal.SIGINT) == 0
+    assert loop.text.count("power_cycle_needed") == 1
 
 
 def test_a_broker_that_goes_away_is_waited_for(site: Site, mosquitto: Mosquitto, shell: Shell) -> None:
     served, run = mounted(site)
-    mounting = shell.pipe("request", *REPEAT)
-    mounting.says(FIRST)
+    loop = shell.pipe("request", *REPEAT)
+    loop.says(FIRST)
     mosquitto.stop()
-    mounting.says("waiting until it is there again")
+    loop.says("waiting until it is there again")
     plug(served)
     mosquitto.start()
     run.says("connected by MQTT", 2)
-    mounting.says("It is there again.")
-    mounting.says("slave-3: slave id 3, 19200 baud\n", within=ADOPTED_WITHIN)
-    assert mounting.ends(signal.SIGINT) == 0
+    loop.says("It is there again.")
+    loop.says("slave-3: slave id 3, 19200 baud\n", within=ADOPTED_WITHIN)
+    assert loop.ends(signal.SIGINT) == 0
 
 
 def test_a_daemon_that_is_started_again_is_waited_for(site: Site, mosquitto: Mosquitto, shell: Shell) -> None:
     del mosquitto
     served, run = mounted(site)
-    mounting = shell.pipe("request", *REPEAT)
-    mounting.says(FIRST)
+    loop = shell.pipe("request", *REPEAT)
+    loop.says(FIRST)
     run.says("request line/adopt: rejected (timeout)")
     assert run.ends(signal.SIGTERM) == 0
-    mounting.says("waiting until it is there again")
+    loop.says("waiting until it is there again")
     plug(served)
     site.run()
-    mounting.says("slave-3: slave id 3, 19200 baud\n", within=ADOPTED_WITHIN)
-    assert mounting.ends(signal.SIGINT) == 0
+    loop.says("slave-3: slave id 3, 19200 baud\n", within=ADOPTED_WITHIN)
+    assert loop.ends(signal.SIGINT) == 0
 
 
 def test_on_a_terminal_something_turns_while_a_sensor_is_waited_for(
@@ -137,10 +137,10 @@ def test_on_a_terminal_something_turns_while_a_sensor_is_waited_for(
 ) -> None:
     del mosquitto
     mounted(site)
-    mounting = shell.terminal("request", *REPEAT)
-    mounting.says("waiting for a sensor ... 1 s")
-    assert mounting.ends(signal.SIGINT) == 1
-    assert mounting.text.endswith("No sensor was adopted.\n")
+    loop = shell.terminal("request", *REPEAT)
+    loop.says("waiting for a sensor ... 1 s")
+    assert loop.ends(signal.SIGINT) == 1
+    assert loop.text.endswith("No sensor was adopted.\n")
 
 
 def test_without_a_broker_or_a_daemon_it_ends_with_69_at_once(site: Site) -> None:
@@ -155,7 +155,7 @@ def test_where_the_broker_does_not_let_requests_through_it_ends(site: Site, mosq
     site.write()
     asking = shell.pipe("request", *REPEAT)
     eventually(lambda: asking.ends() == 69, "it ends")
-    assert "nobody takes requests" in asking.text
+    assert "no subscriber for requests" in asking.text
 
 
 @pytest.mark.parametrize(

@@ -72,7 +72,7 @@ def test_trace_ends_with_69_when_the_daemon_goes_away(site: Site, mosquitto: Mos
     tracing.says("slave 1")
     run.process.send_signal(signal.SIGTERM)
     assert tracing.ends() == 69
-    assert "the daemon went away" in tracing.text
+    assert "the daemon went offline" in tracing.text
 
 
 def test_trace_ends_with_69_when_the_broker_goes_away(site: Site, mosquitto: Mosquitto, shell: Shell) -> None:

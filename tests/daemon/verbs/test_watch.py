@@ -128,7 +128,7 @@ def test_watch_at_a_broker_that_knows_no_daemon_ends_with_69(site: Site, mosquit
     site.write()
     done = typed(site, "watch")
     assert done.returncode == 69
-    assert "no daemon has ever been seen at lfs10d/line0" in done.stderr
+    assert "no daemon has ever published at lfs10d/line0" in done.stderr
 
 
 @pytest.mark.parametrize("content", ["", "nonsense", "[]", "{}", '{"line":{"name":"line1"},"devices":[]}', "[" * 5000])
