@@ -116,8 +116,6 @@ class SimulateOptions:
     help="Random additional time, up to this.",
 )
 @click.option("--latency", type=DURATION, default=None, help="Interval at which the adapter delivers bytes.")
-@click.option("--jitter", type=DURATION, default="0ms", show_default=True, help="Random addition to the turnaround.")
-@click.option("--latency", type=DURATION, default=None, help="The adapter delivers in pieces this far apart.")
 @click.option("--echo", is_flag=True, help="The adapter returns the master's own bytes.")
 @click.option("--values", type=click.Choice(["wind", "unique"]), default="wind", show_default=True)
 @click.option("--seed", type=int, default=1, show_default=True, help="Seed of wind and faults.")

@@ -8,6 +8,7 @@ import pytest
 
 from lfs10d.cli import login as logins
 from lfs10d.cli.login import DENIED, REMEDY, Login, log_in
+from lfs10d.config import credentials
 from lfs10d.errors import ConfigError
 from lfs10d.system.secret import Secret
 
@@ -104,14 +105,11 @@ def test_a_password_file_that_may_not_be_read_is_an_error_with_what_to_do_unless
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "pw").write_text("secret")
-    real = Path.open
 
-    def denied(self: Path, *args: object, **keys: object) -> object:
-        if self.name == "pw":
-            raise PermissionError(13, "Permission denied")
-        return real(self, *args, **keys)  # type: ignore[call-overload]  # passed on as they came
+    def denied(path: Path, most: int | None = None) -> bytes:
+        raise PermissionError(13, "Permission denied", path, most)
 
-    monkeypatch.setattr(Path, "open", denied)
+    monkeypatch.setattr(credentials, "read_regular", denied)
     file = written(tmp_path, ", password_file: pw")
     with pytest.raises(ConfigError, match=DENIED):
         entered(file)

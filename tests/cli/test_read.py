@@ -88,7 +88,7 @@ def test_garbled_answers_are_shown_in_hex_and_explained(lfs10d: Lfs10d, sensors:
     sensors.line.add(Sensor(3)).add_fault("noisy")
     done = lfs10d("read", sensors.path, "3")
     assert done.returncode == 1
-    assert "Bytes came, as many as an answer has, but their check is wrong." in done.stderr
+    assert "A reply of the right length came, but its checksum is wrong." in done.stderr
     assert "Do two sensors share this id?" in done.stderr
     assert len(re.findall(r"received  (?:[0-9A-F]{2} ){6,8}[0-9A-F]{2}", done.stderr)) == 3
 
@@ -98,7 +98,7 @@ def test_a_refusal_is_explained_at_once(lfs10d: Lfs10d, sensors: PtyLine) -> Non
     done = lfs10d("read", sensors.path, "3")
     assert done.returncode == 1
     assert "after 1 attempt: exception 02 illegal register address" in done.stderr
-    assert "The device is there and understood us, but refuses what was asked." in done.stderr
+    assert "The device is there and understood the request, but refuses it." in done.stderr
 
 
 def test_a_busy_device_is_asked_again(lfs10d: Lfs10d, sensors: PtyLine) -> None:
@@ -109,7 +109,7 @@ def test_a_busy_device_is_asked_again(lfs10d: Lfs10d, sensors: PtyLine) -> None:
 def test_an_echoing_adapter_is_told(lfs10d: Lfs10d, sensors: PtyLine) -> None:
     sensors.adapter.echo = True
     done = lfs10d("read", sensors.path, "9")
-    assert "Only our own bytes came back: the adapter echoes" in done.stderr
+    assert "Only the request itself came back: the adapter echoes" in done.stderr
 
 
 def test_a_line_on_which_nothing_could_be_sent_is_told() -> None:
@@ -122,7 +122,7 @@ def test_a_line_on_which_nothing_could_be_sent_is_told() -> None:
     told = list(_explanation(wanted, _Attempts([babble], 3), Fault(FaultCode.COLLISION, "no silence"), None))
     assert told[0] == "lfs10d: no value from slave 9 at 9600 baud 8O2 after 3 attempts: no silence"
     assert told[2].split() == ["sent", "nothing"]
-    assert told[3].split()[:2] == ["heard", "00"]
+    assert told[3].split()[:2] == ["received", "00"]
     assert "Another device transmits on the line." in told
     assert any("second master" in text for text in told)
 

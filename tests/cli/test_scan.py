@@ -163,7 +163,7 @@ def test_who_ends_it_sees_what_was_found_so_far(sensors: PtyLine, number: signal
         out, err = process.communicate(timeout=10)
         assert time.monotonic() - begun < 2
     assert process.returncode == 1
-    assert "of 510 ids; this was found so far:" in err
+    assert "of 510 ids; found so far:" in err
     assert "LFS10 wind speed sensor" in out
 
 
@@ -209,7 +209,7 @@ def test_a_busy_port_is_69_and_says_what_the_daemon_does_instead(sensors: PtyLin
         (["--baudrate", "9600,1234"], "'1234' is not one of 1200"),
         (["--databits", "7"], "rtu frames need 8 data bits"),
         (["--timeout", "soon"], "is not a duration"),
-        (["--timeout", "1m"], "between 10ms and 10s"),
+        (["--timeout", "1m"], "from 10ms to 10s"),
     ],
 )
 def test_what_cannot_be_meant_is_a_usage_error(arguments: list[str], complaint: str) -> None:
