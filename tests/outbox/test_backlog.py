@@ -9,7 +9,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from lfs10d.outbox.backlog import HISTORY_AFTER
+from lfs10d.outbox.backlog import HISTORY_AFTER, Backlog
 from lfs10d.outbox.items import HistoryBatch, LiveSample, LossNotice, OutboxItem, samples_of
 from lfs10d.outbox.losses import DECLARED_EVERY, Loss
 from lfs10d.outbox.outbox import Outbox
@@ -820,3 +820,10 @@ class PastLaws(RuleBasedStateMachine):
 PastLaws.TestCase.settings = settings(max_examples=150, stateful_step_count=60, deadline=None)
 
 TestPastLaws = PastLaws.TestCase
+
+
+def test_a_loss_notice_that_cannot_be_sent_waits_again() -> None:
+    backlog = Backlog(capacity=10, detection=40.0)
+    notice = LossNotice(Loss("a", "k", 1, 2, 2))
+    backlog.dead(notice)
+    assert backlog.losses.waiting() == [notice.loss]
