@@ -9,11 +9,11 @@ file.
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, GetJsonSchemaHandler
-from pydantic_core import CoreSchema
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
+from lfs10d.config.short_forms import SLAVE_ID, OrBareId, items, slave_mapping
 from lfs10d.schema.addresses import BaseTopic, Hosts, node_text, split_node
 from lfs10d.schema.fields import (
     Choice,
@@ -24,8 +24,6 @@ from lfs10d.schema.fields import (
     Size,
     Text,
     Whole,
-    plain_error,
-    shown,
 )
 from lfs10d.schema.quantities import BAUDRATES
 
@@ -41,7 +39,6 @@ DEFAULT_STEM = "lfs10d"
 
 DEFAULT_LINE = "line0"
 
-SLAVE_ID = Whole(1, 255)
 SlaveId: TypeAlias = Annotated[int, SLAVE_ID]
 Label: TypeAlias = Annotated[str | None, Text(200, null=True)]
 Interval: TypeAlias = Annotated[float, Duration(0.02, DAY, zero="as fast as the line allows")]
@@ -54,13 +51,6 @@ class Section(BaseModel):
     """Strict and frozen: no guessing of types, no unknown keys, no NaN, no change after loading."""
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-def _items(value: object) -> object:
-    """Turn a YAML list into a tuple; refuse anything else."""
-    if not isinstance(value, list | tuple):
-        raise plain_error(f"must be a list, [] for none, not {shown(value)}")
-    return tuple(value)
 
 
 class Rs485Config(Section):
@@ -168,24 +158,6 @@ class SlaveConfig(Section):
         description="Rest before each request to it, counted from the end of the exchange with it before; "
         "the longer of this and the profile's.",
     )
-
-
-def _slave(value: object) -> object:
-    """Let a bare id stand for a mapping with nothing else."""
-    if isinstance(value, int) and not isinstance(value, bool):
-        return {"id": value}
-    if not isinstance(value, dict):
-        raise plain_error(
-            f"must be a slave id, a whole number from 1 to 255, or a mapping with an id, not {shown(value)}"
-        )
-    return value
-
-
-class _OrBareId:
-    """Says in the JSON Schema what `_slave` permits."""
-
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        return {"anyOf": [SLAVE_ID.json_schema(), handler(schema)]}
 
 
 class TlsConfig(Section):
@@ -301,10 +273,10 @@ class Config(Section):
     line: LineConfig = Field(description="The RS485 line; at least `port`.")
     poll: PollConfig = Field(PollConfig(), description="How slaves are polled.")
     slaves: Annotated[
-        tuple[Annotated[SlaveConfig, BeforeValidator(_slave), _OrBareId()], ...], BeforeValidator(_items)
+        tuple[Annotated[SlaveConfig, BeforeValidator(slave_mapping), OrBareId()], ...], BeforeValidator(items)
     ] = Field((), description="A list of slave ids, of mappings, or both; may be empty.")
     mqtt: MqttConfig = Field(MqttConfig(), description="The broker.")
-    commands: Annotated[tuple[CommandChoice, ...], BeforeValidator(_items)] = Field(
+    commands: Annotated[tuple[CommandChoice, ...], BeforeValidator(items)] = Field(
         ("polling", "sensors"),
         description="Classes of requests that are accepted: polling (what is polled and how), sensors (changes and "
         "scans of the line), registers (raw access); [] for none.",
