@@ -100,11 +100,12 @@ class PollRules:
 
 
 class ResponseTimes:
-    """The last answers' response_times in s (last bit of the request to first byte of the answer) and their p99."""
+    """The last answers' response_times in s (last bit of the request to first byte of the answer), p99, least, most."""
 
     def __init__(self) -> None:
         self._last: deque[float] = deque(maxlen=LEARNED_FROM)
         self.p99: float | None = None
+        self.least = self.most = 0.0
 
     def __len__(self) -> int:
         return len(self._last)
@@ -114,6 +115,7 @@ class ResponseTimes:
         self._last.append(turnaround)
         ordered = sorted(self._last)
         self.p99 = ordered[ceil(0.99 * len(ordered)) - 1]
+        self.least, self.most = ordered[0], ordered[-1]
 
     def forget(self) -> None:
         """Begin anew, as after a change of rate."""

@@ -43,14 +43,14 @@ class Devices(dict[str, Device]):
         self.by_slave = {device.slave: device for device in self.values()}
         return fresh
 
-    def learn(self, outcome: Outcome) -> None:
-        """Learn how long answers take, late ones included, whoever asked."""
+    def learn(self, outcome: Outcome, *, doubtful: bool = False) -> None:
+        """Learn how long answers take, late ones included, whoever asked; nothing from a `doubtful` answer."""
         for late in outcome.late:
             device = self.by_slave.get(late.request.slave)
             # What is later than any time-out says nothing of the usual time, and may be an older answer's.
             if device is not None and late.ours and late.latency <= LEARNED_MOST:
                 device.response_times.learn(late.latency)
-        if outcome.turnaround is not None and outcome.answer is not None:
+        if outcome.turnaround is not None and outcome.answer is not None and not doubtful:
             device = self.by_slave.get(outcome.request.slave)
             if device is not None:
                 device.response_times.learn(outcome.turnaround)

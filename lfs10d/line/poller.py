@@ -134,6 +134,7 @@ class Poller:
             else:
                 self._ask(decision)
         step = self.bus.step(now, readable=readable)
+        quiet_until = self.scheduler.second_answers.quiet_until
         if self.bus.strays:
             strays, self.bus.strays = self.bus.strays, []
             self._events += self.scheduler.second_answers.on_strays(strays)
@@ -143,6 +144,8 @@ class Poller:
         if isinstance(step, Wait):
             if resting is None:
                 return step
+            if self.scheduler.second_answers.quiet_until < quiet_until:
+                return None
             return Wait(resting.until, listen=True)
         self._settled(step)
         self._count(self._clock())

@@ -173,6 +173,8 @@ class Scheduler:
 
     def next(self, now: float) -> Decision:
         """Decide what is asked next; the outcome of an `Ask` must come back through `on_outcome`."""
+        if now < self.second_answers.quiet_until:
+            return Rest(self.second_answers.quiet_until)
         for job in self._jobs.released(now):
             self._resume(job, now)
         while (chosen := self._choose(now)) is not None:
@@ -230,11 +232,14 @@ class Scheduler:
             raise RuntimeError("an outcome without an Ask")
         (job, ask), self._current = self._current, None
         self.pending.on_outcome(outcome, ask.codec, ask.timeout, now)
-        self.devices.learn(outcome)
+        at_line_rate = ask.baudrate in (None, self.timing.baudrate)
+        doubtful = at_line_rate and self.second_answers.is_doubtful(outcome, ask.timeout)
+        self.devices.learn(outcome, doubtful=doubtful)
         widened = self._rests.learn(outcome, ask, self.devices.by_slave, line_rate=self.timing.baudrate)
         self._spend(job, outcome, now)
         ignored = self._ignored(outcome)
-        if isinstance(job, Poll) and self._wanted(job) and (widened or (ignored and self._benefits(job.device))):
+        again = doubtful or widened or (ignored and isinstance(job, Poll) and self._benefits(job.device))
+        if isinstance(job, Poll) and self._wanted(job) and again:
             self._jobs.resume(job)
             return []
         following = job.on_outcome(outcome, now)

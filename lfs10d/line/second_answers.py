@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from lfs10d.line.device import Device
+from lfs10d.line.doubtful_answers import DoubtfulAnswers
+from lfs10d.line.quiet_watch import QuietWatch
 from lfs10d.modbus import diagnosis
 from lfs10d.modbus.frames import EXCEPTION_FLAG
 from lfs10d.modbus.outcome import Outcome
@@ -20,11 +22,26 @@ class SecondAnswers:
         self._pending = pending
         self._overhearing = Overhearing()
         self._devices: Mapping[int, Device] = {}
+        self._quiet = QuietWatch(pending.duplicates, 0.0)
+        self._doubts = DoubtfulAnswers(pending.duplicates)
+
+    @property
+    def quiet_until(self) -> float:
+        """Until when nobody is asked, so that a second answer is heard."""
+        return self._quiet.until
 
     def watch(self, devices: Mapping[int, Device]) -> None:
         """Watch these devices, by slave id, from now on."""
         self._devices = devices
         self._overhearing.listen_to({slave: device.spec.codec for slave, device in devices.items()})
+
+    def is_doubtful(self, outcome: Outcome, timeout: float) -> bool:
+        """Take an outcome at the line's rate; whether its answer may be a second one to the request before."""
+        device = self._devices.get(outcome.request.slave)
+        if device is None:
+            return False
+        self._quiet.exchanged(outcome, online=device.online)
+        return self._doubts.exchanged(outcome, device.response_times, timeout)
 
     def on_answer(self, outcome: Outcome) -> list[AnsweredTwice]:
         """Take an outcome that the scheduler knows of: a second answer may follow it, or none does any more."""
@@ -37,6 +54,7 @@ class SecondAnswers:
             and len(outcome.answer) == barrier.count
         )
         ended = self._pending.duplicates.answered(device.slave, outcome.ended, barrier=is_barrier)
+        self._quiet.answered(device.slave, outcome.ended)
         return [AnsweredTwice(outcome.ended, device.name, device.slave, None)] if ended else []
 
     def on_strays(self, strays: Iterable[tuple[bytes, float]], outcome: Outcome | None = None) -> list[AnsweredTwice]:
@@ -56,7 +74,8 @@ class SecondAnswers:
             owed = self._pending.overheard(frame.slave, size, exception=exception, now=frame.at)
             if owed or frame.slave == owing:
                 continue
-            twice = self._pending.duplicates.second(frame.slave, frame.at)
+            twice = self._pending.duplicates.second(frame.slave, frame.at, misplaced=owing is not None)
+            self._quiet.second(frame.slave, frame.at)
             if twice is not None:
                 fault = Fault(FaultCode.DUPLICATE_ID, diagnosis.twice(twice), heard=codec.wrap(frame.body))
                 events.append(AnsweredTwice(frame.at, device.name, frame.slave, fault))

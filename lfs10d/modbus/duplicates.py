@@ -20,6 +20,10 @@ WATCHED = 0.15
 """How long a slave is left alone after an answer to see whether another one follows, in s."""
 LATEST = 1.0
 """What comes later after an answer is no second one, in s."""
+MISPLACED_LATEST = 0.2
+"""What comes later than this in place of another's answer is no second one, in s."""
+AWAITED_MOST = 0.3
+"""For a second answer that may come later the rest of the line does not wait, in s."""
 TELLING = 2
 """So many extra answers tell."""
 CLEAN = 30
@@ -64,9 +68,9 @@ class Duplicates:
 
         A second answer to a `barrier` has another length than that to a value, and needs no rest.
         """
-        state = self._slaves.get(slave)
-        if state is None:
-            state = self._slaves[slave] = _Slave(until=float("-inf") if barrier else at + WATCHED)
+        state = self._slaves.setdefault(slave, _Slave())
+        if state.answered_at == float("-inf") and not barrier:
+            state.until = at + WATCHED
         state.answered_at = at
         if barrier or not state.extras:
             return False
@@ -79,10 +83,33 @@ class Duplicates:
         state.until = at + (WATCHED if state.extras < TELLING else 1.25 * state.delay + MARGIN)
         return False
 
-    def second(self, slave: int, at: float) -> Twice | None:
-        """Note a right frame of a slave that owes nothing, whole at `at`; return what it tells, once."""
+    def awaited(self, slave: int) -> float | None:
+        """Return how long a second answer of this slave is to be awaited after its answer, in s; None: not at all."""
         state = self._slaves.get(slave)
-        if state is None or not 0 < at - state.answered_at <= LATEST:
+        if state is None or not state.extras:
+            return None
+        if state.extras < TELLING:
+            return WATCHED
+        longest = 1.25 * state.delay + MARGIN
+        return longest if longest <= AWAITED_MOST else None
+
+    def extras(self, slave: int) -> int:
+        """Return how many extra answers of this slave were heard."""
+        state = self._slaves.get(slave)
+        return 0 if state is None else state.extras
+
+    def rest(self, slave: int, until: float) -> None:
+        """Leave a slave alone until then: what it was asked may be answered still."""
+        state = self._slaves.setdefault(slave, _Slave())
+        state.until = max(state.until, until)
+
+    def second(self, slave: int, at: float, *, misplaced: bool = False) -> Twice | None:
+        """Note a right frame of a slave that owes nothing, whole at `at`; return what it tells, once.
+
+        `misplaced`: it came in place of another slave's answer, which may have spoken with a wrong id.
+        """
+        state = self._slaves.get(slave)
+        if state is None or not 0 < at - state.answered_at <= (MISPLACED_LATEST if misplaced else LATEST):
             return None
         state.extras += 1
         state.followed = True

@@ -147,14 +147,16 @@ class PendingRequests:
     def overheard(self, slave: int, frame: int, *, exception: bool, now: float) -> bool:
         """Note a right answer of `slave`, of `frame` characters, which is none to us; whether it owed one.
 
-        What another master asked is answered by it.
+        What another master asked is answered by it. While one asks, it may have asked more than was heard.
         """
-        pending = self._pending.get(slave, ())
-        for each in pending:
-            if not each.ours and each.codec.shapes(each.request)[exception].size == frame:
+        owed = False
+        for each in self.earlier(slave):
+            fits = each.codec.shapes(each.request)[exception].size == frame
+            if fits and not each.ours:
                 self._drop(slave, [each], now)
                 return True
-        return bool(pending)
+            owed = owed or fits or not each.ours
+        return owed
 
     def abandoned(self, request: Request, codec: Codec, timeout: float, now: float) -> None:
         """Note that the exchange of `request` was cut off at `now`: it may have been sent."""

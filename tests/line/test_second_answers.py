@@ -117,3 +117,31 @@ def test_what_a_second_master_is_answered_is_never_ours(
         assert rig.good(2, since=5.0)
     else:
         assert len(rig.good(2)) > 90
+
+
+@pytest.mark.parametrize("kind", ["twin", "repeated"])
+@pytest.mark.parametrize(
+    ("slaves", "interval", "turnaround", "delay", "told_after"),
+    [
+        (1, 0.0, 0.005, 0.02, 7.0),
+        (1, 0.0, 0.04, 0.1, 7.0),
+        (2, 0.0, 0.02, 0.06, 5.0),
+        (3, 0.0, 0.005, 0.02, 5.0),
+        (3, 0.0, 0.04, 0.005, 5.0),
+        (4, 0.5, 0.005, 0.037, 5.0),
+        (8, 0.0, 0.02, 0.037, 5.0),
+        (8, 1.0, 0.02, 0.012, 6.0),
+    ],
+)
+def test_one_that_appears_on_a_running_line_is_told_whomever_it_meets(
+    rigs: Rigs, kind: str, slaves: int, interval: float, turnaround: float, delay: float, told_after: float
+) -> None:
+    rig = rigs(slaves, turnaround=turnaround, interval=interval)
+    rig.line.sensor(1).add_fault(kind, delay=delay, first=5.013)
+    rig.run(15.0).prove()
+    twice = told(rig)[0]
+    assert (twice.slave, len(told(rig))) == (1, 1)
+    assert 5.0 < twice.at < 5.0 + told_after
+    for slave in range(1, slaves + 1):  # from then on the neighbours are heard again
+        late = rig.of(slave, since=twice.at + 2.0)
+        assert len(rig.good(slave, since=twice.at + 2.0)) >= 0.9 * len(late)

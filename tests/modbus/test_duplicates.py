@@ -2,7 +2,18 @@
 
 from __future__ import annotations
 
-from lfs10d.modbus.duplicates import CLEAN, LATEST, MARGIN, WATCHED, Duplicates, Twice
+import pytest
+
+from lfs10d.modbus.duplicates import (
+    AWAITED_MOST,
+    CLEAN,
+    LATEST,
+    MARGIN,
+    MISPLACED_LATEST,
+    WATCHED,
+    Duplicates,
+    Twice,
+)
 
 
 def test_after_its_first_answer_a_slave_is_watched_once() -> None:
@@ -82,3 +93,37 @@ def test_another_device_or_an_opened_port_begins_anew() -> None:
     assert [duplicates.known(slave) for slave in (1, 2, 3)] == [False, True, True]
     duplicates.forget()
     assert not any(duplicates.known(slave) for slave in (1, 2, 3))
+
+
+def test_in_place_of_anothers_answer_only_what_comes_soon_is_a_second_one() -> None:
+    duplicates = Duplicates()
+    for at in (1.0, 2.0):
+        duplicates.answered(1, at)
+        duplicates.second(1, at + MISPLACED_LATEST + 0.01, misplaced=True)
+    assert duplicates.extras(1) == 0
+    duplicates.second(1, 2.0 + MISPLACED_LATEST - 0.01, misplaced=True)
+    assert duplicates.extras(1) == 1
+
+
+def test_how_long_a_second_answer_is_awaited() -> None:
+    duplicates = Duplicates()
+    assert duplicates.extras(1) == 0
+    assert duplicates.awaited(1) is None
+    duplicates.answered(1, 1.0)
+    assert duplicates.awaited(1) is None
+    duplicates.second(1, 1.04)
+    assert duplicates.awaited(1) == WATCHED
+    duplicates.answered(1, 2.0)
+    duplicates.second(1, 2.04)
+    assert duplicates.awaited(1) == pytest.approx(1.25 * 0.04 + MARGIN)
+    duplicates.second(1, 2.0 + AWAITED_MOST)
+    assert duplicates.awaited(1) is None
+
+
+def test_what_it_was_asked_may_be_answered_still() -> None:
+    duplicates = Duplicates()
+    duplicates.rest(1, 2.0)
+    duplicates.rest(1, 1.0)
+    assert duplicates.rests_until(1, 1.5) == 2.0
+    duplicates.answered(1, 3.0)
+    assert duplicates.rests_until(1, 3.0) == 3.0 + WATCHED
