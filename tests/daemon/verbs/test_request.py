@@ -203,7 +203,7 @@ def test_ctrl_c_ends_a_request_with_1_and_no_traceback(site: Site, mosquitto: Mo
         asking = shell.pipe("request", "health", "--timeout", "1h")
         somebody.wait_for(f"{BASE}/request/health", len([*shell.running]))
         assert asking.ends(number) == 1
-        assert asking.text.strip() == "lfs10d: health was sent and is not called back by this"
+        assert asking.text.strip() == "lfs10d: health was sent; this does not cancel it"
 
 
 def test_a_device_may_be_given_by_its_slave_id(site: Site, mosquitto: Mosquitto) -> None:
