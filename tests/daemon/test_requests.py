@@ -251,7 +251,7 @@ def test_a_trace_tells_frames_until_it_ends_by_itself_or_is_cancelled(operator: 
     for each in operator.listener.on(topic):
         check("trace", each.payload.decode())
     texts = [json.loads(each.payload)["text"] for each in operator.listener.on(topic)]
-    assert "read 2 registers at 0x0001 of slave 1" in texts
+    assert "slave-1: read 2 registers at 0x0001 of slave 1" in texts
 
     operator.ask("line/trace", {"for": "10m"})
     operator.listener.wait_for(topic, len(texts) + 2)

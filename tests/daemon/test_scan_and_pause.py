@@ -208,7 +208,7 @@ def test_a_pause_frees_the_port_for_another_program_and_ends_by_itself(
         view.wait(f"device/{device}/availability", "online".__eq__)
     assert view.newest("line/error")["active"] is False
     assert activities(view) == ["polling", "paused", "polling"]
-    assert run.log.count("freed for another program") == 1
+    assert run.log.count(f"{site.tty}: freed for another program") == 1, "the second pause is no news"
 
 
 def test_a_pause_is_cancelled_though_the_port_is_gone_by_then(site: Site, mosquitto: Mosquitto, view: View) -> None:

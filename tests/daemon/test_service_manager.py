@@ -19,7 +19,7 @@ START = "from lfs10d.__main__ import main; main()"
 
 LINE_WEDGES = f"""
 import time
-from lfs10d.poller import Poller
+from lfs10d.line.poller import Poller
 turn = Poller.turn
 def wedge(self, now, **more):
     if self.bus.open and now > begun + 1:
@@ -33,20 +33,20 @@ Poller.turn = wedge
 
 LOOP_WEDGES = f"""
 import asyncio, time
-from lfs10d.daemon import Daemon
-run = Daemon.run
-async def wedge(self):
+from lfs10d.daemon import daemon
+run = daemon.run
+async def wedge(*given):
     asyncio.get_running_loop().call_later(1.5, stand_still)
-    return await run(self)
+    return await run(*given)
 def stand_still():
     while True:
         time.sleep(1)
-Daemon.run = wedge
+daemon.run = wedge
 {START}
 """
 
 LINE_ENDS = f"""
-from lfs10d.poller import Poller
+from lfs10d.line.poller import Poller
 def fail(self, now, **more):
     raise LookupError("no such thing")
 Poller.turn = fail

@@ -6,18 +6,19 @@ from lfs10d.simulator.wire import Format
 from tests.support.sites import Site, View, good
 
 LOST_SOON = """
-import lfs10d.jobs.lost
 from lfs10d.__main__ import main
-lfs10d.reconfiguration.procedures.find_baudrate.LOST_AFTER = 1.0
+from lfs10d.reconfiguration.procedures import find_baudrate
+find_baudrate.LOST_AFTER = 1.0
 main()
 """
 BROKEN = """
-import lfs10d.physical.losing
 from lfs10d.__main__ import main
-def in_words(*_, **__):
-    raise KeyError("words")
-lfs10d.reconfiguration.procedures.find_baudrate.LOST_AFTER = 1.0
-lfs10d.reconfiguration.baudrate_watch.in_words = in_words
+from lfs10d.reconfiguration import baudrate_watch
+from lfs10d.reconfiguration.procedures import find_baudrate
+def message(*_, **__):
+    raise KeyError("message")
+find_baudrate.LOST_AFTER = 1.0
+baudrate_watch.message = message
 main()
 """
 MESSAGE = (
