@@ -34,7 +34,7 @@ TRUST_MOST = 600.0
 
 
 @dataclass(slots=True)
-class _Slave:
+class _SlaveTrust:
     ended: float = -inf
     """When bytes came last in an exchange with it."""
     broken_at: float = -inf
@@ -49,14 +49,14 @@ class DoubtfulAnswers:
 
     def __init__(self, duplicates: Duplicates) -> None:
         self._duplicates = duplicates
-        self._slaves: dict[int, _Slave] = {}
+        self._slaves: dict[int, _SlaveTrust] = {}
 
     def exchanged(self, outcome: Outcome, usual: ResponseTimes, timeout: float) -> bool:
         """Take an exchange that is over; whether its answer must not be believed. `usual` are the answers before."""
         slave, began = outcome.request.slave, outcome.began
         if began is None or not outcome.heard:
             return False
-        state = self._slaves.setdefault(slave, _Slave())
+        state = self._slaves.setdefault(slave, _SlaveTrust())
         before, state.ended = state.ended, outcome.ended
         self._settle(slave, state, outcome.ended)
         if outcome.answer is None:
@@ -72,14 +72,14 @@ class DoubtfulAnswers:
         self._duplicates.rest(slave, outcome.ended + max(WATCHED, timeout))
         return True
 
-    def _broken(self, slave: int, state: _Slave, outcome: Outcome) -> None:
+    def _broken(self, slave: int, state: _SlaveTrust, outcome: Outcome) -> None:
         near = outcome.asked - state.broken_at < APART
         state.broken_at = outcome.ended
         if near or outcome.ended >= state.trusted_until:
             state.doubted_at = self._duplicates.extras(slave)
             self._duplicates.rest(slave, outcome.ended + WATCHED)
 
-    def _settle(self, slave: int, state: _Slave, now: float) -> None:
+    def _settle(self, slave: int, state: _SlaveTrust, now: float) -> None:
         """Trust the slave's noise if the doubt was in vain."""
         known, state.doubted_at = state.doubted_at, None
         if known is not None and self._duplicates.extras(slave) == known:

@@ -54,7 +54,7 @@ def spoilt(outcome: Outcome) -> bool:
 
 
 @dataclass(slots=True)
-class _Slave:
+class _SlaveQuiet:
     answered_at: float = -inf
     hit: set[int] = field(default_factory=set)
     """The neighbours whose exchanges were spoilt since the last answer."""
@@ -77,7 +77,7 @@ class QuietWatch:
     def __init__(self, duplicates: Duplicates, now: float) -> None:
         self.until = -inf
         self._duplicates = duplicates
-        self._slaves: dict[int, _Slave] = {}
+        self._slaves: dict[int, _SlaveQuiet] = {}
         self._share = Quota(SHARE, credit=CREDIT, now=now)
 
     def exchanged(self, outcome: Outcome, *, online: bool) -> None:
@@ -92,7 +92,7 @@ class QuietWatch:
 
     def answered(self, slave: int, at: float) -> None:
         """Take a right answer of a slave, whole at `at`: the line may have to be quiet now."""
-        state = self._slaves.setdefault(slave, _Slave())
+        state = self._slaves.setdefault(slave, _SlaveQuiet())
         suspected, own = self._suspected(state), slave in state.hit
         for each in state.hit | state.same.keys():
             state.same[each] = _counted(state.same.get(each, 0.0), hit=each in state.hit)
@@ -113,7 +113,7 @@ class QuietWatch:
             state.again_at = at + state.again
             state.again = min(2 * state.again, AGAIN_MOST)
 
-    def _suspected(self, state: _Slave) -> bool:
+    def _suspected(self, state: _SlaveQuiet) -> bool:
         return state.any >= ANY or any(count >= SAME for count in state.same.values())
 
     def second(self, slave: int, at: float) -> None:

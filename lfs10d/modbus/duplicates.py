@@ -33,7 +33,7 @@ MARGIN = 0.05
 
 
 @dataclass(slots=True)
-class _Slave:
+class _SlaveExtras:
     answered_at: float = float("-inf")
     extras: int = 0
     clean: int = 0
@@ -56,7 +56,7 @@ class Duplicates:
     """What is known of each slave id of one line."""
 
     def __init__(self) -> None:
-        self._slaves: dict[int, _Slave] = {}
+        self._slaves: dict[int, _SlaveExtras] = {}
 
     def known(self, slave: int) -> bool:
         """Whether the id is answered twice."""
@@ -68,7 +68,7 @@ class Duplicates:
 
         A second answer to a `barrier` has another length than that to a value, and needs no rest.
         """
-        state = self._slaves.setdefault(slave, _Slave())
+        state = self._slaves.setdefault(slave, _SlaveExtras())
         if state.answered_at == float("-inf") and not barrier:
             state.until = at + WATCHED
         state.answered_at = at
@@ -78,7 +78,7 @@ class Duplicates:
         state.followed = False
         if state.clean > CLEAN:  # nothing is known yet of what follows the newest one
             ended = state.extras >= TELLING
-            self._slaves[slave] = _Slave(at)
+            self._slaves[slave] = _SlaveExtras(at)
             return ended
         state.until = at + (WATCHED if state.extras < TELLING else 1.25 * state.delay + MARGIN)
         return False
@@ -100,7 +100,7 @@ class Duplicates:
 
     def rest(self, slave: int, until: float) -> None:
         """Leave a slave alone until then: what it was asked may be answered still."""
-        state = self._slaves.setdefault(slave, _Slave())
+        state = self._slaves.setdefault(slave, _SlaveExtras())
         state.until = max(state.until, until)
 
     def second(self, slave: int, at: float, *, misplaced: bool = False) -> Twice | None:

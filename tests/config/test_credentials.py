@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from lfs10d.config import credentials
 from lfs10d.config.credentials import (
     UnreadableError,
     credential_file,
@@ -169,7 +170,7 @@ def test_a_password_of_a_service_that_cannot_be_read_is_named_with_the_reason(mo
     def denied(*_: object, **__: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(Path, "open", denied)
+    monkeypatch.setattr(credentials, "read_regular", denied)
     monkeypatch.setattr(Path, "stat", denied)
     _, why = service_password(unit, run, kept)
     assert why == (

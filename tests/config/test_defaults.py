@@ -49,6 +49,7 @@ def test_the_smallest_file_gets_every_default() -> None:
                 "interval": 1.0,
                 "enabled": True,
                 "response_timeout": None,
+                "request_gap": 0.0,
                 "checksum": None,
             }
             for number in (2, 3, 4)

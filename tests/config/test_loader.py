@@ -110,8 +110,8 @@ def test_all_problems_are_told_at_once_in_order_of_place() -> None:
             "line: {}",
             [
                 (
-                    "1:7: line.port: is missing; write here: path of the serial port; best one below "
-                    "/dev/serial/by-id, which stays the same when replugged"
+                    "1:7: line.port: is missing; write here: path of the serial port, best below "
+                    "/dev/serial/by-id: it stays the same after replugging"
                 )
             ],
         ),

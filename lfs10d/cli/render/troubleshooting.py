@@ -37,6 +37,16 @@ _MEANING = {
     FaultCode.EXCEPTION: "The device is there and understood the request, but refuses it.",
     FaultCode.OUT_OF_RANGE: "The device replies, but with an impossible value.",
     FaultCode.NOT_FINITE: "The device replies, but its value is not a number.",
+    FaultCode.STARTING: "The device has not been polled yet.",
+    FaultCode.DISABLED: "The device is disabled in the configuration.",
+    FaultCode.OVERRUN: "The poll was not made in time: the line is full.",
+    FaultCode.PORT_LOST: "The serial port is missing, or access to it is denied.",
+    FaultCode.PORT_BUSY: "Another program uses the serial port.",
+    FaultCode.WRONG_RATE: "No device replies at this rate, but some do at another.",
+    FaultCode.DUPLICATE_ID: "Two replies came to one request.",
+    FaultCode.CONFIG_CONFLICT: "Two devices would have this id.",
+    FaultCode.STORAGE_FULL: "The state directory cannot be written.",
+    FaultCode.DUPLICATE_CLIENT: "Another client of the broker uses the same client id.",
 }
 
 _NOISE = (
@@ -62,13 +72,35 @@ _CHECKS = {
         "Is it another device? `lfs10d profiles` lists the known ones.",
         "If it is not, the sensor itself may be broken: water, frost, or a worn bearing.",
     ),
+    FaultCode.STARTING: ("Wait a few seconds: it is polled soon after the start.",),
+    FaultCode.DISABLED: ("To poll it, set `enabled: true` in the configuration, then reload.",),
+    FaultCode.OVERRUN: ("Poll less often: a longer `interval`. `lfs10d check` shows how full the line is.",),
+    FaultCode.PORT_LOST: (
+        "Is the adapter plugged in? `ls -l /dev/serial/by-id` lists the adapters.",
+        "May this user open it? `ls -l` on the port shows its group, usually dialout.",
+    ),
+    FaultCode.PORT_BUSY: (
+        "Is the daemon running? Stop it: `sudo systemctl stop lfs10d`.",
+        "`sudo fuser -v` on the port names the program.",
+    ),
+    FaultCode.WRONG_RATE: ("`lfs10d scan` shows each device with its rate: use that one, or set the device.",),
+    FaultCode.DUPLICATE_ID: (
+        _NOISE[0],
+        "Is there a repeater or a bridge that sends each reply again? Check its settings.",
+    ),
+    FaultCode.CONFIG_CONFLICT: ("Give one of the two another id in the configuration, then reload.",),
+    FaultCode.STORAGE_FULL: (
+        "Is the disk full? `df -h /var/lib/lfs10d` shows it.",
+        "Has it become read-only? `dmesg` reports a worn-out SD card.",
+    ),
+    FaultCode.DUPLICATE_CLIENT: ("Give each client a `mqtt.client_id` of its own; a copied SD card has the old one.",),
 }
 _CHECKS[FaultCode.NOT_FINITE] = _CHECKS[FaultCode.OUT_OF_RANGE]
 
 
 def meaning(seen: Symptoms) -> str:
     """Return what the symptoms mean, in a sentence or two."""
-    words = _MEANING.get(seen.code, "The port failed.")
+    words = _MEANING[seen.code]
     if seen.code is not FaultCode.TIMEOUT:
         return words
     if seen.framing_errors:
@@ -81,7 +113,7 @@ def meaning(seen: Symptoms) -> str:
 
 def checks(seen: Symptoms) -> Iterator[str]:
     """Yield what to check, the likeliest first."""
-    yield from _CHECKS.get(seen.code, ())
+    yield from _CHECKS[seen.code]
 
 
 def lines(meant: str, advice: tuple[str, ...]) -> Iterator[str]:
