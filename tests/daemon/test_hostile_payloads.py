@@ -25,8 +25,9 @@ HOSTILE = {
     "control characters": (b'{"device":"\\u001b]0;x\\u0007\\u0000"}', "invalid_param"),
     "no UTF-8": (b'{"device":"\xff\xfe"}', "invalid_json"),
     "UTF-16": ('{"device":"slave-1"}'.encode("utf-16"), "invalid_json"),
-    "a megabyte": (b'{"device":"' + b"x" * 1_000_000 + b'"}', "too_large"),
+    "as large as is delivered": (b'{"device":"' + b"x" * 100_000 + b'"}', "too_large"),
 }
+MEGABYTE = b'{"device":"' + b"x" * 1_000_000 + b'"}'
 FLOOD = 2000
 """Messages of each of two floods at once."""
 
@@ -53,6 +54,26 @@ def test_a_hostile_payload_has_one_answer_with_its_code(
     view.wait_samples("slave-1", len(view.samples("slave-1")) + 2, good)
     assert len(view.history_of("response/device/read")) == 1
     assert "\x1b" not in run.log
+    assert run.ends(signal.SIGTERM) == 0
+
+
+@pytest.mark.parametrize("version", ["5", "3.1.1"])
+def test_a_megabyte_stops_nothing_and_is_answered_where_the_broker_delivers_it(
+    site: Site, view: View, mosquitto: Mosquitto, version: str
+) -> None:
+    """By MQTT 5 the broker keeps back what is larger than our Maximum Packet Size (MQTT 5.0, section 3.1.2.11.4)."""
+    site.line()
+    site.write(mqtt={"version": version})
+    run = site.run()
+    view.wait_samples("slave-1", 1, good)
+    before = len(view.samples("slave-1"))
+    mosquitto.publish(f"{BASE}/request/device/read", MEGABYTE)
+    mosquitto.publish(f"{BASE}/request/device/read", json.dumps({"id": "next", "device": "slave-1"}))
+    view.wait("response/device/read", lambda answer: answer["id"] == "next")
+    answers = {each["id"]: each["error"] and each["error"]["code"] for each in view.history_of("response/device/read")}
+    assert answers == {"next": None} | ({None: "too_large"} if version == "3.1.1" else {})
+    view.wait_samples("slave-1", before + 2, good)
+    assert view.history_of("availability") == ["online"], "the connection has lasted"
     assert run.ends(signal.SIGTERM) == 0
 
 

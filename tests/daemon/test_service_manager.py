@@ -138,6 +138,7 @@ def test_nothing_that_is_merely_absent_or_idle_ever_starves_the_watchdog(site: S
         for file in (idle, empty, absent)
     ]
     runs.append(site.run(program=("-c", CLOCK_STEPS), watchdog=WATCHDOG))
+    eventually(lambda: all(fed(run) for run in runs), "all have begun to feed")
     time.sleep(8)  # longer than the longest idle wait of the line's thread
 
     for run in runs:
@@ -181,7 +182,9 @@ def test_a_line_thread_that_ends_by_a_mistake_ends_the_daemon_with_1(site: Site)
     run = site.run(program=("-c", LINE_ENDS))
 
     assert run.ends() == 1
-    assert "the line's thread ended: LookupError: no such thing" in run.log
+    assert "error the line thread ended: an internal error: LookupError: no such thing" in run.log
+    site.runs.clear()  # what it logs is the point
+    run.manager.close()
 
 
 def test_the_status_file_is_renewed_readable_by_all_and_gone_at_the_end(site: Site, view: View) -> None:
