@@ -152,9 +152,6 @@ def age_text(seconds: float) -> str:
     return f"{seconds / 86_400:.0f}d"
 
 
-# The table
-
-
 @dataclass(frozen=True, slots=True)
 class _Column:
     head: str
@@ -306,10 +303,8 @@ def screen(
     below = [line for remark in remarks for line in _wrapped(((remark, ""),), width)]
     legend = f"> moved just now   + came   - went   times: {zone_name(wall * 1000, zone)}   Ctrl-C ends"
     room = max(1, height - len(above) - 3)
-    if below:
-        below = [(), *below] if len(shown) + len(below) + 1 <= room else []
-    left = len(shown) - room
-    if left > 0:
+    below = [(), *below] if below and len(shown) + len(below) < room else []
+    if len(shown) > room:
         kept = sorted(sorted(range(len(shown)), key=lambda place: _rank(shown[place]))[: room - 1])
         hidden = [row for place, row in enumerate(shown) if place not in kept]
         well = sum(row.good and not row.stale for row in hidden)

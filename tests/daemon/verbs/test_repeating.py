@@ -97,7 +97,7 @@ def test_a_sensor_that_obeys_after_a_power_cycle_is_adopted_then(
     served, _ = mounted(site)
     sensor = plug(served, "power_cycle", baudrate=19200)
     loop = shell.pipe("request", *REPEAT)
-    loop.says("power_cycle_needed: the sensor took what was written", within=ADOPTED_WITHIN)
+    loop.says("power_cycle_needed: the sensor stored what was written", within=ADOPTED_WITHIN)
     tell(served, lambda _: sensor.power_cycle())
     loop.says(f"slave-3: slave id 3, 19200 baud\n{NEXT}", within=ADOPTED_WITHIN)
     assert loop.ends(signal.SIGINT) == 0
@@ -167,7 +167,7 @@ def test_where_the_broker_does_not_let_requests_through_it_ends(site: Site, mosq
         ((*REPEAT, "id=9"), "id cannot be the same"),
         ((*REPEAT, "name=a,B"), "'B' is not a name of 1 to 32"),
         ((*REPEAT, "name=a,b,a"), "a name is given twice"),
-        ((*REPEAT, "label"), "is no KEY=VALUE"),
+        ((*REPEAT, "label"), "is not KEY=VALUE"),
     ],
 )
 def test_a_slip_on_the_command_line_is_an_error_of_usage(site: Site, arguments: tuple[str, ...], words: str) -> None:

@@ -168,10 +168,10 @@ def test_a_login_of_ones_own_comes_before_the_file_s(
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("device/read", "device"), "is no KEY=VALUE"),
+        (("device/read", "device"), "is not KEY=VALUE"),
         (("device/read", "device=a", "device=b"), "device is given twice"),
-        (("device/+",), "no name of a request; known are: config/get"),
-        (("device//read",), "no name of a request"),
+        (("device/+",), "is not a request; known are: config/get"),
+        (("device//read",), "is not a request"),
         (("health", "--timeout", "soon"), "not a duration"),
         (("health", f"x={'y' * 4096}"), "more than the 4096 bytes"),
     ],
