@@ -54,6 +54,11 @@ def _seq(queued: QueuedSample) -> int:
     return queued.sample.seq
 
 
+def _age(queued: QueuedSample) -> tuple[float, int]:
+    """Return what is the less, the older it is: of a page of the store all came at once, so its row tells."""
+    return queued.since, queued.row or 0
+
+
 @dataclass(slots=True)
 class History:
     """What waits; `len()` counts the samples. No sample is put here while it stands here already."""
@@ -106,7 +111,7 @@ class History:
         keys = [key for key in self._queues if key[0] not in passed_over]
         if not keys:
             return ()
-        key = min(keys, key=lambda each: self._queues[each][0].since)
+        key = min(keys, key=lambda each: _age(self._queues[each][0]))
         queue = self._queues[key]
         taken = tuple(queue[:most])
         del queue[:most]
@@ -138,4 +143,4 @@ class History:
 
     def oldest(self) -> QueuedSample | None:
         """Return the one that waits longest, None where none waits."""
-        return min((queue[0] for queue in self._queues.values()), key=lambda queued: queued.since, default=None)
+        return min((queue[0] for queue in self._queues.values()), key=_age, default=None)

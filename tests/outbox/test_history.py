@@ -32,6 +32,20 @@ def test_the_device_with_the_oldest_sample_is_taken_first() -> None:
     assert [seqs(history.take(100)) for _ in range(2)] == [[("b", 1), ("b", 2)], [("a", 1)]]
 
 
+def test_what_came_at_once_from_the_store_goes_by_its_rows_though_a_part_was_put_back() -> None:
+    """A batch that is cut to 8000 bytes must not let a later boot go before the rest of it."""
+    history = History()
+    older = [replace(queued("a", seq, 0.0), row=seq) for seq in (1, 2, 3)]
+    newer = replace(queued("a", 1, 0.0), row=4)
+    newer = replace(newer, sample=replace(newer.sample, boot="l"))
+    history.extend([*older, newer])
+    taken = history.take(100)
+    assert taken == tuple(older)
+    history.put_back(taken[1:])
+    assert history.oldest() == older[1]
+    assert [history.take(100), history.take(100)] == [tuple(older[1:]), (newer,)]
+
+
 def test_devices_that_are_passed_over_stay() -> None:
     history = History()
     history.extend([queued("a", 1), queued("b", 2), queued("b", 3)])
