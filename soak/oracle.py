@@ -1,7 +1,7 @@
 """What the sensors sent: every value once in the soak, so each published one names its answer. Pure.
 
-A value is the float32 of a number that counts up, scattered over all normal float32 up to 100 m/s, so no list of
-values is needed to find the answer again: the number is computed back.
+A value is the float32 of a number that counts up, scattered over all float32 that the daemon may publish (from 1e-6 to
+100 m/s), so no list of values is needed to find the answer again: the number is computed back.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 from soak.ledger import Told
 
-FIRST_BITS = 0x0080_0000
-"""The smallest normal float32 (IEEE 754-2019, section 3.4)."""
+FIRST_BITS = 0x3586_37BD
+"""1e-6: what is smaller and not zero is `out_of_range` (docs/profiles.md)."""
 
 LAST_BITS = 0x42C8_0000
 """100.0, the end of the LFS10's range."""

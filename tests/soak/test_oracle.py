@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import math
 import struct
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lfs10d.profiles.library import load_profile
 from soak import oracle as oracles
 from soak.ledger import Told
 from soak.oracle import COUNT, Excuse, Numbered, Oracle, Sent, number_of, value_of
@@ -43,7 +45,21 @@ def test_steps_of_the_numbers_leave_none_out() -> None:
     assert math.gcd(oracles.STRIDE, COUNT) == 1
 
 
-@given(st.one_of(st.just(0.0), st.floats(max_value=-1e-30), st.floats(min_value=100.1, max_value=1e300)))
+@pytest.mark.parametrize("bits", [oracles.FIRST_BITS, oracles.LAST_BITS])
+def test_the_daemon_believes_the_least_and_the_greatest_value(bits: int) -> None:
+    profile = load_profile("lfs10", relative_to=Path())
+    (block,) = profile.reads()
+    (value,) = struct.unpack(">f", bits.to_bytes(4, "big"))
+    decoded = profile.decode(block, struct.unpack(">HH", bits.to_bytes(4, "big")))
+    assert isinstance(decoded, dict)
+    assert decoded["wind_speed"] == pytest.approx(value, rel=1e-7)
+
+
+@given(
+    st.one_of(
+        st.just(0.0), st.floats(max_value=-1e-30), st.floats(1e-45, 9.9e-7), st.floats(min_value=100.1, max_value=1e300)
+    )
+)
 def test_what_no_sensor_sends_has_no_number(value: float) -> None:
     assert number_of(value) is None
 
