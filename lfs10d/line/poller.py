@@ -164,6 +164,11 @@ class Poller:
 
     def _settled(self, outcome: Outcome) -> None:
         now = self._clock()
+        told = (
+            self.scheduler.second_answers.on_strays(outcome.strays, outcome)
+            if outcome.answer is not None and outcome.strays
+            else []
+        )
         readings = self.scheduler.on_outcome(outcome, now)
         stray, self.bus.unsolicited = self.bus.unsolicited, 0
         self._events.append(
@@ -183,7 +188,8 @@ class Poller:
         )
         self._events += readings
         self._events += self.scheduler.second_answers.on_answer(outcome)
-        if outcome.strays:
+        self._events += told
+        if outcome.answer is None and outcome.strays:
             self._events += self.scheduler.second_answers.on_strays(outcome.strays, outcome)
 
     def _port_changed(self, changed: PortChanged) -> None:

@@ -40,7 +40,7 @@ VAIN = 2
 """After so many times in a row in which no second answer came the line does not wait for one."""
 SHARE = 0.005
 """The part of the line that watches for a suspicion may take."""
-CREDIT = 1.0
+CREDIT = 0.45
 """Line time in s that they may take ahead of it."""
 _SPOILT = frozenset({FaultCode.CRC, FaultCode.MALFORMED, FaultCode.COLLISION})
 """What two that speak at once look like; a whole frame of another slave is told by itself."""

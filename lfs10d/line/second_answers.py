@@ -14,6 +14,9 @@ from lfs10d.modbus.overhearing import Overhearing
 from lfs10d.modbus.pending import PendingRequests
 from lfs10d.reading import AnsweredTwice, Fault, FaultCode
 
+EXPLAINED = 1.0
+"""So long after another master was heard what is spoilt is its doing, in s."""
+
 
 class SecondAnswers:
     """Watches the configured devices of one line; what other masters ask goes to `pending`."""
@@ -22,6 +25,7 @@ class SecondAnswers:
         self._pending = pending
         self._overhearing = Overhearing()
         self._devices: Mapping[int, Device] = {}
+        self._asked_by_another: dict[int, float] = {}
         self._quiet = QuietWatch(pending.duplicates, 0.0)
         self._doubts = DoubtfulAnswers(pending.duplicates)
 
@@ -39,6 +43,12 @@ class SecondAnswers:
         """Take an outcome at the line's rate; whether its answer may be a second one to the request before."""
         device = self._devices.get(outcome.request.slave)
         if device is None:
+            return False
+        by_another = self._asked_by_another.get(outcome.request.slave, float("-inf")) >= outcome.asked
+        if by_another and outcome.answer is not None:  # it began before the exchange, which saw the rest of it only
+            self._pending.duplicates.rest(device.slave, outcome.ended + timeout)
+            return True
+        if outcome.ended - max(self._asked_by_another.values(), default=float("-inf")) <= EXPLAINED:
             return False
         self._quiet.exchanged(outcome, online=device.online)
         return self._doubts.exchanged(outcome, device.response_times, timeout)
@@ -69,6 +79,7 @@ class SecondAnswers:
             codec = device.spec.codec
             if frame.request is not None:
                 self._pending.asked_by_another(frame.request, codec, frame.at)
+                self._asked_by_another[frame.slave] = frame.at
                 continue
             size, exception = codec.size(len(frame.body)), bool(frame.body[1] & EXCEPTION_FLAG)
             owed = self._pending.overheard(frame.slave, size, exception=exception, now=frame.at)
