@@ -103,10 +103,12 @@ class Spell:
     ended: float
 
 
-def run_family(exchanges: int, seed: int, progress: Callable[[Account], None] = lambda _: None) -> Account:
-    """Run until the line has heard so many requests; what is wrong is in the account's `faults`."""
+def run_family(
+    exchanges: int, seed: int, progress: Callable[[Account], None] = lambda _: None, *, lives: int = 1
+) -> Account:
+    """Run until the line has heard so many requests, in so many lives; what is wrong is in the `faults`."""
     account = Account()
-    while account.exchanges < exchanges:
+    while account.exchanges < exchanges or account.lives < lives:
         Life(account, seed, account.lives).run()
         progress(account)
     return account

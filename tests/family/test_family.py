@@ -13,7 +13,7 @@ SEED = 11
 
 @pytest.fixture(scope="module")
 def account() -> Account:
-    return run_family(EXCHANGES, SEED)
+    return run_family(EXCHANGES, SEED, lives=LIVES_DIFFER)
 
 
 def test_no_wrong_number_no_gap_in_seq_no_request_too_early_and_everybody_recovers(account: Account) -> None:
