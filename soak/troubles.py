@@ -97,7 +97,8 @@ FAMILY: Mapping[str, Fault] = {
     "a flipped bit": _ill("crc", noisy={}),
     "garbage": _ill("crc", garbage={}),
     "garbage that is too short": _ill("malformed", garbage={"length": 4}),
-    "garbage that is too long": _ill("crc", garbage={"length": 60}),
+    # Of so many bytes some may look like another master's request: a collision.
+    "garbage that is too long": _ill("crc", "collision", garbage={"length": 60}),
     "cut short": _ill("malformed", truncated={"length": 5}),
     "another slave's id": _ill("wrong_slave", wrong_id={"value": STRANGER}),
     "another function": _ill("wrong_function", wrong_function={}),
