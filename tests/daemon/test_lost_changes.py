@@ -82,7 +82,9 @@ def test_a_sensor_that_was_moved_is_found_kept_and_told(
     view.wait("device/slave-2/config", lambda config: config["slave"] == 9)
     samples = view.wait_samples("slave-2", 3, good)
     assert conflicts(view) == [{"device": "slave-2", "file": spot(2), "last": spot(9), "used": spot(9)}]
-    run.says("slave-2: the file says slave id 2 at 19200 baud, it was last verified at 9 at 19200: it answers at slave")
+    run.says(
+        "slave-2: the file has it at slave id 2, 19200 baud; it was last verified at 9, 19200 baud: it answers at slave"
+    )
     assert view.samples("slave-1")[0]["quality"] == "good", "the others are measured from the first poll on"
     assert samples[0]["boot"] == view.newest("info")["boot"]
     run.process.kill()
