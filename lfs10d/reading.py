@@ -6,11 +6,18 @@ Times are monotonic seconds of the line thread's clock; durations are seconds.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Literal, TypeAlias
+from types import MappingProxyType
+from typing import Final, Literal, Never, TypeAlias
 
 Number: TypeAlias = int | float
+
+Value: TypeAlias = int | float | str | bool
+"""What a device says of one quantity: a number, a word of its profile, or whether something is so."""
+
+NOTHING: Final[Mapping[str, Never]] = MappingProxyType({})
+"""Nothing by name, one object for all who have nothing to tell."""
 
 
 class FaultCode(StrEnum):
@@ -24,6 +31,7 @@ class FaultCode(StrEnum):
     EXCEPTION = "exception"
     OUT_OF_RANGE = "out_of_range"
     NOT_FINITE = "not_finite"
+    UNAVAILABLE = "unavailable"
     LATE = "late"
     COLLISION = "collision"
     STARTING = "starting"
@@ -38,7 +46,7 @@ class FaultCode(StrEnum):
     DUPLICATE_CLIENT = "duplicate_client"
 
 
-ALIVE_CODES = frozenset({FaultCode.EXCEPTION, FaultCode.OUT_OF_RANGE, FaultCode.NOT_FINITE})
+ALIVE_CODES = frozenset({FaultCode.EXCEPTION, FaultCode.OUT_OF_RANGE, FaultCode.NOT_FINITE, FaultCode.UNAVAILABLE})
 """Faults that prove the device alive: an error, but online."""
 
 PORT_CODES = frozenset({FaultCode.PORT_LOST, FaultCode.PORT_BUSY})
@@ -72,9 +80,11 @@ class Fault:
 class Reading:
     """One finished poll (or probe) of one device, retries included: one sample.
 
-    Exactly one of `values` and `fault` is None. `at` is when the answer's last byte arrived, or when the poll
-    was given up. `rtt` runs from the request's first bit to the answer's last byte; None for a failed poll.
-    `online` and `response_timeout` are the device's state after this poll. `failed_attempts` are the codes of
+    Exactly one of `values` and `fault` is None. Of several values some may be None: then `value_errors` says why of
+    each (`unavailable`, `not_finite`, `out_of_range` or `exception`), and at least one value is there. `ages` are the
+    ages in s of those values that are older than the device's interval. `at` is when the answer's last byte arrived, or
+    when the poll was given up. `rtt` runs from the request's first bit to the answer's last byte; None for a failed
+    poll. `online` and `response_timeout` are the device's state after this poll. `failed_attempts` are the codes of
     the attempts before the last. `overruns` counts the points of the grid missed since the reading before.
     `requests` are the numbers of the requests that asked for it. `request_gap` is the rest in s that the device is
     given between two exchanges; `gap_learned`: more than configured, because it ignored requests.
@@ -82,7 +92,7 @@ class Reading:
 
     device: str
     at: float
-    values: Mapping[str, Number] | None
+    values: Mapping[str, Value | None] | None
     fault: Fault | None
     rtt: float | None
     online: bool
@@ -93,6 +103,8 @@ class Reading:
     requests: tuple[int, ...] = ()
     request_gap: float = 0.0
     gap_learned: bool = False
+    value_errors: Mapping[str, FaultCode] = field(default_factory=lambda: NOTHING)
+    ages: Mapping[str, float] = field(default_factory=lambda: NOTHING)
 
 
 class Purpose(StrEnum):

@@ -10,8 +10,9 @@ import pytest
 from lfs10d.reading import ALIVE_CODES, PORT_CODES, Fault, FaultCode
 
 CODES = (
-    "timeout crc malformed wrong_slave wrong_function exception out_of_range not_finite late collision starting "
-    "disabled overrun port_lost port_busy wrong_rate duplicate_id config_conflict storage_full duplicate_client"
+    "timeout crc malformed wrong_slave wrong_function exception out_of_range not_finite unavailable late collision "
+    "starting disabled overrun port_lost port_busy wrong_rate duplicate_id config_conflict storage_full "
+    "duplicate_client"
 )
 
 

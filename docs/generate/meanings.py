@@ -13,6 +13,8 @@ FAULT_CODES: Final = {
     "exception": "The device refused the request: see `exception_code`. It answers, so it stays online.",
     "out_of_range": "The value is outside the range of the profile, or a float32 below 1e-6. The device stays online.",
     "not_finite": "The value is NaN or infinite. The device stays online.",
+    "unavailable": "The device says itself that it has no value now: the register holds what the profile names in "
+    "`unavailable`. The device stays online.",
     "late": "Only the reply to an earlier request came.",
     "collision": "The line did not become silent, the bytes sent came back changed, or another master asked the same "
     "slave between the request and its reply.",

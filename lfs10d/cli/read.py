@@ -215,15 +215,16 @@ def _watched(options: _ReadOptions, reading: Reading) -> str:
     if reading.fault is not None:
         return f"{when}  {click.style(f'{reading.fault.code}: {reading.fault.message}', fg='red')}"
     text = "  ".join(f"{name} {number}" for name, number in _numbers(options, reading))
-    bar = _bar(options, reading) if terminal else ""
+    bar = _bar(reading) if terminal else ""
     return f"{when}  {text:<24}  {_milliseconds(reading):>8}  {bar}".rstrip()
 
 
-def _bar(options: _ReadOptions, reading: Reading) -> str:
-    if "wind_speed" not in options.profile.value_names or reading.values is None:
+def _bar(reading: Reading) -> str:
+    speed = (reading.values or {}).get("wind_speed")
+    if not isinstance(speed, int | float):
         return ""
     block = "\N{BOX DRAWINGS HEAVY HORIZONTAL}" if (sys.stdout.encoding or "").lower().startswith("utf") else "#"
-    return click.style(block * min(BAR_MOST, round(reading.values["wind_speed"] / BAR_UNIT)), fg="cyan")
+    return click.style(block * min(BAR_MOST, round(speed / BAR_UNIT)), fg="cyan")
 
 
 def _explanation(options: _ReadOptions, attempts: _Attempts, fault: Fault, uart: UartCounters | None) -> Iterator[str]:
@@ -270,7 +271,7 @@ def _json(options: _ReadOptions, reading: Reading) -> dict[str, Any]:
         "ts": int(_wall(reading) * 1000),
         **{name: values.get(name) for name in names},
         **({"unit": units[names[0]]} if len(names) == 1 else {"units": units}),
-        "quality": "good" if fault is None else "bad",
+        "quality": "bad" if fault is not None else "partial" if reading.value_errors else "good",
         "error": None if fault is None else fault.code.value,
         "message": None if fault is None else fault.message,
         "exception_code": None if fault is None else fault.exception_code,

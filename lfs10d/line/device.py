@@ -4,7 +4,7 @@ Rules
 -----
 1. A device is UNHEARD from the opening of the port until its first answer, ONLINE after an answer, OFFLINE after
    `offline_after` consecutive failed polls or while the port is lost.
-2. `exception`, `out_of_range` and `not_finite` prove it alive: a failed poll, but ONLINE.
+2. `exception`, `out_of_range`, `not_finite` and `unavailable` prove it alive: a failed poll, but ONLINE.
 3. An exception that means busy by its profile (06) proves it alive and counts neither as error nor towards offline.
 4. The time-out is fixed, or learned: 2 x p99 of the last 100 answers + 20 ms within 50 ms..1 s. A slave never
    heard is given 200, 400, 1000 ms on its first polls. A late answer counts with the time it took.

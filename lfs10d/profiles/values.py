@@ -30,6 +30,8 @@ RESERVED_NAMES = frozenset(
         "quality",
         "error",
         "rtt_ms",
+        "errors",
+        "ages",
     }
     | {"historical"}
 )

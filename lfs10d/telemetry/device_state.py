@@ -15,10 +15,11 @@ Rules
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
-from lfs10d.reading import PORT_CODES, AnsweredTwice, FaultCode, Reading
+from lfs10d.reading import NOTHING, PORT_CODES, AnsweredTwice, FaultCode, Reading
 from lfs10d.system.clock import Instant
 from lfs10d.telemetry.alarms import DeviceAlarm
 from lfs10d.telemetry.counters import DeviceCounters
@@ -33,6 +34,7 @@ from lfs10d.telemetry.publication import (
     WIND,
     Publication,
     PublicationKind,
+    Quality,
     Sample,
     device_topic,
     event,
@@ -202,8 +204,13 @@ class DeviceState:
     def _form(self, seq: int, ts: int, now: Instant, reading: Reading | None = None) -> Sample:
         """Return the sample of a reading, or of none: bad, and nobody's fault."""
         values = fault = rtt = None
+        errors: Mapping[str, FaultCode] = NOTHING
+        ages: Mapping[str, float] = NOTHING
         if reading is not None:
             values, fault, rtt = reading.values, reading.fault, reading.rtt
+            if values is not None:
+                errors, ages = reading.value_errors, reading.ages
+        quality: Quality = "bad" if values is None else "partial" if errors else "good"
         return Sample(
             device=self.info.name,
             boot=self._boot,
@@ -213,9 +220,11 @@ class DeviceState:
             values=values,
             units=self.info.units,
             names=self.info.value_names,
-            quality="bad" if values is None else "good",
+            quality=quality,
             error=None if fault is None else fault.code.value,
             rtt_ms=None if values is None or rtt is None else round(rtt * 1000, 1),
+            errors=errors,
+            ages=ages and {name: round(age, 3) for name, age in ages.items()},
         )
 
     def _show(self, sample: Sample, now: Instant, *, online: bool) -> list[Publication]:
@@ -227,7 +236,7 @@ class DeviceState:
         turned, self.online = online is not self.online, online
         if turned and online:
             published.append(self._availability())
-        if sample.error != shown.error or sample.quality != shown.quality:
+        if sample.error != shown.error or sample.quality != shown.quality or sample.errors != shown.errors:
             published.append(self._state(now))
         elif now.mono >= self._state_from - STATE_EARLY:
             published.append(self._state(now, refresh=True))

@@ -10,13 +10,18 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from lfs10d.reading import FaultCode, Number
+from lfs10d.reading import FaultCode, Value
 from lfs10d.system.clock_step import ClockState
+from lfs10d.telemetry.publication import Quality
 
 Milliseconds = Annotated[int, Field(description="epoch milliseconds, UTC")]
 Count = Annotated[int, Field(ge=0, description="since boot")]
 Version = Annotated[Literal[1], Field(description="version of the payload")]
 Clock = Annotated[ClockState, Field(description="state of the wall clock")]
+ValueFault: TypeAlias = Literal[
+    FaultCode.UNAVAILABLE, FaultCode.NOT_FINITE, FaultCode.OUT_OF_RANGE, FaultCode.EXCEPTION
+]
+"""What can ail one value among others."""
 Errors = Annotated[dict[FaultCode, Count], Field(description="how often each failure happened")]
 
 
@@ -30,7 +35,7 @@ class SamplePayload(Payload):
     """One finished poll; the values stand beside these keys under the names of the profile."""
 
     model_config = ConfigDict(extra="allow")
-    __pydantic_extra__: dict[str, int | float | None]
+    __pydantic_extra__: dict[str, int | float | str | bool | None]
 
     v: Version
     line: str
@@ -42,19 +47,23 @@ class SamplePayload(Payload):
     clock: Clock
     unit: str | None = Field(None, description="unit of the one value")
     units: dict[str, str] | None = Field(None, description="units by name, if there are several values")
-    quality: Literal["good", "bad"] = Field(description="of the value")
+    quality: Quality = Field(description="of the values: all are there, some, none")
     error: FaultCode | None = Field(description="why there is no value")
     rtt_ms: float | None = Field(ge=0, description="first bit of the request to last bit of the answer")
+    errors: dict[str, ValueFault] | None = Field(None, description="why values are null, if quality is partial")
+    ages: dict[str, Annotated[float, Field(ge=0)]] | None = Field(
+        None, description="age in s of the values older than the device's interval"
+    )
     historical: Literal[True] | None = Field(None, description="set on `history`")
 
     @property
-    def values(self) -> dict[str, Number | None]:
+    def values(self) -> dict[str, Value | None]:
         """The values by the profile's names."""
         return dict(self.__pydantic_extra__)
 
     @model_validator(mode="after")
     def _speak_with_one_voice(self) -> Self:
-        """Refuse a good sample without values, a bad one with one, and units that do not fit them."""
+        """Refuse values that do not fit the quality, and errors, ages and units that do not fit the values."""
         values = self.values.values()
         if not self.values:
             raise ValueError("a sample has a value")
@@ -62,6 +71,14 @@ class SamplePayload(Payload):
             raise ValueError("a good sample has every value, no error and a number")
         if self.quality == "bad" and (any(value is not None for value in values) or self.rtt_ms is not None):
             raise ValueError("a bad sample has neither a value nor a time of answer")
+        missing = {name for name, value in self.values.items() if value is None}
+        partial = self.quality == "partial"
+        if partial and (self.error is not None or self.seq == 0 or len(missing) in (0, len(values))):
+            raise ValueError("a partial sample has some of its values, a number, and no error")
+        if (None if self.errors is None else set(self.errors)) != (missing if partial else None):
+            raise ValueError("a partial sample says why of the values that it lacks, no other does")
+        if not set(self.ages or ()) <= set(self.values) - missing:
+            raise ValueError("only a value has an age")
         if {"unit", "units"} & self.model_fields_set != ({"unit"} if len(values) == 1 else {"units"}):
             raise ValueError("one value has a unit, several have units")
         return self

@@ -7,12 +7,12 @@ and the tests, are in `lfs10d.telemetry.payloads`: building them costs megabytes
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from enum import StrEnum
 from typing import Literal, TypeAlias
 
-from lfs10d.reading import Number
+from lfs10d.reading import NOTHING, FaultCode, Value
 from lfs10d.system.clock_step import ClockState
 
 VERSION = 1
@@ -49,6 +49,10 @@ def device_of(topic: str, leaf: str) -> str | None:
     return levels[1] if len(levels) == 3 and levels[0] == "device" and levels[2] == leaf else None  # noqa: PLR2004 - device/<name>/<leaf>
 
 
+Quality: TypeAlias = Literal["good", "partial", "bad"]
+"""Every value is there; some are; none is."""
+
+
 class PublicationKind(StrEnum):
     """How a publication is treated while the broker is away."""
 
@@ -72,7 +76,8 @@ class Sample:
     """One finished poll as it is published; (line, device, boot, seq) is its key for ever.
 
     `ts` is epoch milliseconds. `names` are the profile's value names, so that a bad sample carries nulls;
-    `values` is None exactly when `quality` is bad, and finite otherwise.
+    `values` is None exactly when `quality` is bad; numbers are finite. With quality partial some of them are None, and
+    `errors` says why. `ages` are those in s of the values that are older than the device's interval.
     """
 
     device: str
@@ -80,12 +85,14 @@ class Sample:
     seq: int
     ts: int
     clock: ClockState
-    values: Mapping[str, Number] | None
+    values: Mapping[str, Value | None] | None
     units: Mapping[str, str]
     names: tuple[str, ...]
-    quality: Literal["good", "bad"]
+    quality: Quality
     error: str | None
     rtt_ms: float | None
+    errors: Mapping[str, FaultCode] = field(default_factory=lambda: NOTHING)
+    ages: Mapping[str, float] = field(default_factory=lambda: NOTHING)
 
     def payload(self, line: str, *, historical: bool = False) -> dict[str, object]:
         """Return the flat JSON object: all value names, then `unit`, or `units` where there are several."""
@@ -99,10 +106,9 @@ class Sample:
             "time": iso_time(self.ts),
             "clock": self.clock,
         }
-        if self.values is None:
-            payload.update(dict.fromkeys(self.names))
-        else:
-            payload.update(self.values)
+        values = self.values or NOTHING
+        for name in self.names:
+            payload[name] = values.get(name)
         if len(self.names) == 1:
             payload["unit"] = self.units.get(self.names[0])
         else:
@@ -110,6 +116,10 @@ class Sample:
         payload["quality"] = self.quality
         payload["error"] = self.error
         payload["rtt_ms"] = self.rtt_ms
+        if self.errors:
+            payload["errors"] = dict(self.errors)
+        if self.ages:
+            payload["ages"] = dict(self.ages)
         if historical:
             payload["historical"] = True
         return payload

@@ -20,16 +20,36 @@ def bad(**changes: object) -> dict[str, object]:
     return GOOD | {"wind_speed": None, "quality": "bad", "error": "timeout", "rtt_ms": None} | changes
 
 
+def partial(**changes: object) -> dict[str, object]:
+    several: dict[str, object] = {key: GOOD[key] for key in GOOD if key != "unit"}
+    several |= {"rain": None, "units": {"wind_speed": "m/s", "rain": "mm"}, "quality": "partial"}
+    return several | {"errors": {"rain": "unavailable"}} | changes
+
+
 @pytest.mark.parametrize(
     "payload",
     [
         GOOD,
+        partial(),
+        partial(ages={"wind_speed": 60.0}),
+        GOOD | {"wind_speed": "calm"},
+        GOOD | {"wind_speed": False},
         GOOD | {"historical": True},
         bad(),
         bad(error=None, seq=0),
         {key: GOOD[key] for key in GOOD if key != "unit"} | {"gust": 13.1, "units": {"gust": "m/s"}},
     ],
-    ids=["good", "historical", "failed", "first of a boot", "two values"],
+    ids=[
+        "good",
+        "partial",
+        "partial and old",
+        "text",
+        "yes or no",
+        "historical",
+        "failed",
+        "first of a boot",
+        "two values",
+    ],
 )
 def test_a_sample_of_the_contract_is_accepted(payload: dict[str, object]) -> None:
     assert SamplePayload.model_validate_json(json.dumps(payload)).values
@@ -43,7 +63,23 @@ def test_a_sample_of_the_contract_is_accepted(payload: dict[str, object]) -> Non
         GOOD | {"seq": 0},
         GOOD | {"gust": 13.1},
         GOOD | {"units": {"wind_speed": "m/s"}},
-        GOOD | {"wind_speed": "12.34"},
+        GOOD | {"wind_speed": ["12.34"]},  # text by itself is a value: a profile may map contents to words
+        GOOD | {"errors": {}},
+        GOOD | {"errors": {"wind_speed": "unavailable"}},
+        GOOD | {"ages": {"gust": 3.0}},
+        GOOD | {"ages": {"wind_speed": -3.0}},
+        GOOD | {"quality": "partial"},
+        partial(rain=1),
+        partial(errors=None),
+        partial(errors={}),
+        partial(errors={"rain": "timeout"}),
+        partial(errors={"wind_speed": "unavailable"}),
+        partial(errors={"rain": "unavailable", "wind_speed": "unavailable"}),
+        partial(error="unavailable"),
+        partial(seq=0),
+        partial(wind_speed=None, errors={"rain": "unavailable", "wind_speed": "unavailable"}),
+        partial(ages={"rain": 60.0}),
+        bad(errors={"wind_speed": "unavailable"}),
         GOOD | {"time": "2026-11-21T21:53:42Z"},
         GOOD | {"clock": "perhaps"},
         GOOD | {"boot": "short"},

@@ -13,7 +13,20 @@ from lfs10d.system.logs import escape
 INDENT = "  "
 SAMPLE = frozenset({"device", "seq", "quality", "error"})
 """Keys by which a sample is recognized."""
-BESIDES = SAMPLE | {"v", "line", "boot", "ts", "time", "clock", "unit", "units", "rtt_ms", "historical"}
+BESIDES = SAMPLE | {
+    "v",
+    "line",
+    "boot",
+    "ts",
+    "time",
+    "clock",
+    "unit",
+    "units",
+    "rtt_ms",
+    "errors",
+    "ages",
+    "historical",
+}
 """Keys of a sample besides its values."""
 DEEPEST = 20
 """Levels that are indented; what lies deeper is shown as JSON."""

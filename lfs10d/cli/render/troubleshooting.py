@@ -37,6 +37,7 @@ _MEANING = {
     FaultCode.EXCEPTION: "The device is there and understood the request, but refuses it.",
     FaultCode.OUT_OF_RANGE: "The device replies, but with an impossible value.",
     FaultCode.NOT_FINITE: "The device replies, but its value is not a number.",
+    FaultCode.UNAVAILABLE: "The device replies, but says itself that it has no value now.",
     FaultCode.STARTING: "The device has not been polled yet.",
     FaultCode.DISABLED: "The device is disabled in the configuration.",
     FaultCode.OVERRUN: "The poll was not made in time: the line is full.",
@@ -95,6 +96,10 @@ _CHECKS = {
     ),
     FaultCode.DUPLICATE_CLIENT: ("Give each client a `mqtt.client_id` of its own; a copied SD card has the old one.",),
 }
+_CHECKS[FaultCode.UNAVAILABLE] = (
+    "Is the measuring head connected and free of ice and dirt? Some devices have no direction in a calm.",
+    "Does the device have this quantity at all? Another model may lack it: see its type plate.",
+)
 _CHECKS[FaultCode.NOT_FINITE] = _CHECKS[FaultCode.OUT_OF_RANGE]
 
 

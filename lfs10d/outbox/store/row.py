@@ -11,11 +11,11 @@ import json
 import struct
 import zlib
 from dataclasses import dataclass
-from typing import Literal, TypeAlias, cast
+from typing import TypeAlias, cast
 
 from lfs10d.profiles.registers import shortest
 from lfs10d.reading import Number
-from lfs10d.telemetry.publication import Sample
+from lfs10d.telemetry.publication import Quality, Sample
 
 Cell: TypeAlias = int | float | bytes | str | None
 """A number as SQLite keeps it; None where there is none."""
@@ -82,7 +82,7 @@ class Series:
 
     boot: str
     device: str
-    quality: Literal["good", "bad"]
+    quality: Quality
     error: str | None
     names: tuple[str, ...]
     units: tuple[tuple[str, str], ...]
@@ -124,7 +124,7 @@ def values_of(sample: Sample) -> tuple[Cell, ...]:
     if sample.values is None:
         return ()
     values = sample.values
-    return tuple(pack(values[name]) if name in values else None for name in sample.names)
+    return tuple(pack(cast("Number", values[name])) if name in values else None for name in sample.names)
 
 
 def values_from(series: Series, cells: tuple[Cell, ...]) -> dict[str, Number] | None:
