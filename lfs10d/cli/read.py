@@ -20,7 +20,8 @@ from lfs10d.cli.port_holder import instead
 from lfs10d.cli.render import troubleshooting
 from lfs10d.errors import PortBusyError
 from lfs10d.line.device import DeviceSpec, PollRules
-from lfs10d.modbus.frames import Checksum, Codec, describe
+from lfs10d.modbus.description import describe
+from lfs10d.modbus.frames import Checksum, Codec
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import ALIVE_CODES, Exchanged, Fault, FaultCode, Reading, UartCounters

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from lfs10d.modbus.frames import Codec, describe
+from lfs10d.modbus.description import describe
+from lfs10d.modbus.frames import Codec
 from lfs10d.modbus.request import READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Exchanged, Fault

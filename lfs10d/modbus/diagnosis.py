@@ -8,7 +8,16 @@ from lfs10d.modbus.ask import Ask
 from lfs10d.modbus.duplicates import Twice
 from lfs10d.modbus.frames import EXCEPTION_FLAG, EXCEPTION_NAMES, Codec
 from lfs10d.modbus.reception import Reception
-from lfs10d.modbus.request import BROADCAST, READ_INPUT_REGISTERS, ReadRegisters, Request
+from lfs10d.modbus.request import (
+    BROADCAST,
+    READ_COILS,
+    READ_DISCRETE_INPUTS,
+    READ_HOLDING_REGISTERS,
+    READ_INPUT_REGISTERS,
+    READS,
+    ReadRegisters,
+    Request,
+)
 from lfs10d.reading import FaultCode
 
 _REQUEST_BODY = 6
@@ -103,9 +112,18 @@ def refusal(code: int, request: Request) -> Diagnosis:
 def _asking(request: Request) -> str:
     """Return what was asked: `reading 2 registers at 0x0001`."""
     if isinstance(request, ReadRegisters):
-        kind = "input register" if request.function == READ_INPUT_REGISTERS else "register"
+        kind = _KINDS[request.function]
         return f"reading {request.count} {kind}{'s' * (request.count > 1)} at 0x{request.address:04X}"
     return f"writing 0x{request.value:04X} to 0x{request.address:04X}"
+
+
+_KINDS = {
+    READ_COILS: "coil",
+    READ_DISCRETE_INPUTS: "discrete input",
+    READ_HOLDING_REGISTERS: "register",
+    READ_INPUT_REGISTERS: "input register",
+}
+"""What each function reads."""
 
 
 def stranger(request: Request, codec: Codec, heard: bytes) -> Diagnosis | None:
@@ -142,7 +160,7 @@ def _closeness(verdict: Diagnosis) -> int:
 def _judge(request: Request, body: bytes) -> Diagnosis:
     """Judge a frame with a right check that is no answer to `request`."""
     slave, function, data = body[0], body[1] & ~EXCEPTION_FLAG, body[2:]
-    asked = len(body) == _REQUEST_BODY and function in (3, 4)
+    asked = len(body) == _REQUEST_BODY and function in READS
     if slave != request.slave:
         if asked:
             return Diagnosis(FaultCode.WRONG_SLAVE, f"a request to slave {slave} was heard: is there a second master?")
@@ -157,5 +175,5 @@ def _judge(request: Request, body: bytes) -> Diagnosis:
         return Diagnosis(FaultCode.COLLISION, told)
     else:
         came, announced = max(0, len(data) - 1), sum(data[:1])
-        told = f"slave {slave} sent {came} data bytes, announced as {announced}, in place of {2 * request.count}"
+        told = f"slave {slave} sent {came} data bytes, announced as {announced}, in place of {request.data_bytes}"
     return Diagnosis(FaultCode.MALFORMED, told)

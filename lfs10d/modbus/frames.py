@@ -14,7 +14,7 @@ from __future__ import annotations
 import re
 from binascii import Error as NotHexError
 from binascii import a2b_hex, b2a_hex
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
@@ -22,18 +22,25 @@ from struct import unpack
 
 from pymodbus.framer import FramerAscii, FramerRTU
 from pymodbus.pdu import DecodePDU, ExceptionResponse, ModbusPDU
+from pymodbus.pdu.bit_message import ReadCoilsRequest, ReadDiscreteInputsRequest
 from pymodbus.pdu.register_message import (
     ReadHoldingRegistersRequest,
     ReadInputRegistersRequest,
+    WriteMultipleRegistersRequest,
     WriteSingleRegisterRequest,
 )
 
 from lfs10d.modbus.request import (
+    BIT_READS,
+    READ_COILS,
+    READ_DISCRETE_INPUTS,
     READ_HOLDING_REGISTERS,
     READ_INPUT_REGISTERS,
-    WRITE_SINGLE_REGISTER,
+    READS,
+    WRITE_MULTIPLE_COILS,
+    WRITE_MULTIPLE_REGISTERS,
+    ReadRegisters,
     Request,
-    WriteRegister,
 )
 
 EXCEPTION_FLAG = 0x80
@@ -56,10 +63,13 @@ _ASCII_OVERHEAD = 3
 """Colon, carriage return, line feed."""
 
 _ASCII_FRAME = re.compile(rb":([0-9A-Fa-f]{6,510})\r\n")
-_COUNTED = frozenset({1, 2, 3, 4})
-"""Functions whose answer says its own length in its third byte."""
 _ECHOING = frozenset({5, 6, 8, 15, 16})
 """Functions whose answer has the shape of a single write: eight bytes in RTU."""
+_SEVERAL = frozenset({WRITE_MULTIPLE_COILS, WRITE_MULTIPLE_REGISTERS})
+"""Functions whose request says in its seventh byte how many bytes of data follow."""
+_COUNT_OF_SEVERAL = 6
+_SEVERAL_SIZE = 9
+"""Characters of such a request in RTU without its data."""
 _FIXED_SIZE = 8
 _EXCEPTION_SIZE = 5
 _RTU_MIN = 4
@@ -112,7 +122,7 @@ class Codec:
         return body + 2 if self.framing is Framing.RTU else 2 * (body + 1) + _ASCII_OVERHEAD
 
     def answer_size(self, request: Request) -> int:
-        """Return the characters of the normal answer: RTU 5 + 2 per register read, 8 for a write."""
+        """Return the characters of the normal answer: RTU 5 + 2 per register (1 per 8 bits) read, 8 for a write."""
         return self.shapes(request)[0].size
 
     def shapes(self, request: Request) -> tuple[Shape, Shape]:
@@ -150,11 +160,15 @@ class Codec:
     def decode(self, body: bytes) -> tuple[int, ...]:
         """Return the registers of a normal answer, or the code of an exception answer as the only item.
 
-        `body` must be of a frame that was found right and of a shape of `shapes`.
+        Of bits each is a 0 or a 1; those that fill up the last byte come too. A write of several (15, 16) is confirmed
+        without its content. `body` must be of a frame that was found right and of a shape of `shapes`.
         """
-        if body[1] in (READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS):
+        function = body[1]
+        if function in (READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS):
             # What pymodbus says, at a tenth of its price: it is asked at every poll.
             return unpack(f">{body[2] // 2}H", body[3:])
+        if function in BIT_READS:
+            return tuple(byte >> n & 1 for byte in body[3:] for n in range(8))
         answer = _ANSWERS.decode(body[1:])
         if isinstance(answer, ExceptionResponse):
             return (answer.exception_code,)
@@ -193,25 +207,34 @@ _ANSWERS = DecodePDU(is_server=False)
 @lru_cache(maxsize=1024)
 def _encoded(codec: Codec, request: Request) -> bytes:
     pdu: ModbusPDU
-    if isinstance(request, WriteRegister):
-        pdu = WriteSingleRegisterRequest(address=request.address, registers=[request.value])
-    elif request.function == READ_INPUT_REGISTERS:
-        pdu = ReadInputRegistersRequest(address=request.address, count=request.count)
+    if isinstance(request, ReadRegisters):
+        pdu = _READ_PDUS[request.function](address=request.address, count=request.count)
     else:
-        pdu = ReadHoldingRegistersRequest(address=request.address, count=request.count)
+        several = request.function == WRITE_MULTIPLE_REGISTERS
+        kind = WriteMultipleRegistersRequest if several else WriteSingleRegisterRequest
+        pdu = kind(address=request.address, registers=[request.value])
     return codec.wrap(bytes((request.slave, pdu.function_code)) + pdu.encode())
+
+
+_READ_PDUS: Mapping[int, type[ModbusPDU]] = {
+    READ_COILS: ReadCoilsRequest,
+    READ_DISCRETE_INPUTS: ReadDiscreteInputsRequest,
+    READ_HOLDING_REGISTERS: ReadHoldingRegistersRequest,
+    READ_INPUT_REGISTERS: ReadInputRegistersRequest,
+}
 
 
 @lru_cache(maxsize=1024)
 def _shapes(codec: Codec, request: Request) -> tuple[Shape, Shape]:
     address = bytes((request.slave, request.function))
     refused = bytes((request.slave, request.function | EXCEPTION_FLAG))
-    if isinstance(request, WriteRegister):
-        head = address + request.address.to_bytes(2, "big") + request.value.to_bytes(2, "big")
-        body = len(head)
+    if isinstance(request, ReadRegisters):
+        head = address + bytes((request.data_bytes,))
+        body = len(head) + request.data_bytes
     else:
-        head = address + bytes((2 * request.count,))
-        body = len(head) + 2 * request.count
+        confirmed = 1 if request.function == WRITE_MULTIPLE_REGISTERS else request.value
+        head = address + request.address.to_bytes(2, "big") + confirmed.to_bytes(2, "big")
+        body = len(head)
     return _shape(codec, head, body), _shape(codec, refused, len(refused) + 1)
 
 
@@ -226,52 +249,9 @@ def _rtu_sizes(stream: bytes, begin: int) -> set[int]:
     function = stream[begin + 1]
     if function & EXCEPTION_FLAG:
         return {_EXCEPTION_SIZE}
-    if function in _COUNTED:
+    if function in READS:
         return {_EXCEPTION_SIZE + stream[begin + 2], _FIXED_SIZE}
-    return {_FIXED_SIZE} if function in _ECHOING else set()
-
-
-_DESCRIBED = 16
-"""So many frames of one piece are put into words."""
-
-
-def describe(frame: bytes, codec: Codec) -> str:
-    """Return what was sent or heard in words, for traces and logs; our own words and hex digits only.
-
-    `frame` may hold several frames and noise.
-    """
-    stream = codec.fold(frame)
-    parts: list[str] = []
-    at = 0
-    for begin, end, body in codec.frames(stream, stream[0] if stream else 0, len(stream)):
-        if begin < at or len(parts) >= _DESCRIBED:
-            continue
-        parts += _noise(begin - at)
-        parts.append(_in_words(body))
-        at = end
-    return "; ".join(parts + _noise(len(stream) - at)) or "nothing"
-
-
-def _noise(count: int) -> list[str]:
-    return [f"{count} byte{'s' * (count > 1)} of no frame"] if count else []
-
-
-def _in_words(body: bytes) -> str:
-    slave, function, data = body[0], body[1], body[2:]
-    whose = f"slave {slave}" if slave else "every slave"
-    if function & EXCEPTION_FLAG and len(data) == 1:
-        name = EXCEPTION_NAMES.get(data[0], "of the device's own")
-        return f"{whose} refuses function {function - EXCEPTION_FLAG:02X}: exception {data[0]:02X} {name}"
-    if len(data) == _REQUEST_DATA:
-        first, second = int.from_bytes(data[:2], "big"), int.from_bytes(data[2:], "big")
-        if function in (READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS):
-            return f"read {second} register{'s' * (second != 1)} at 0x{first:04X} of {whose}"
-        if function == WRITE_SINGLE_REGISTER:
-            return f"write 0x{second:04X} to 0x{first:04X} of {whose}"
-    if function in (READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS) and data and data[0] == len(data) - 1:
-        return f"{whose} answers {data[1:].hex(' ', 2).upper()}"
-    return f"function {function:02X} of {whose}: {data.hex(' ').upper()}"
-
-
-_REQUEST_DATA = 4
-"""Address and count, or address and value."""
+    sizes = {_FIXED_SIZE} if function in _ECHOING else set()
+    if function in _SEVERAL and begin + _COUNT_OF_SEVERAL < len(stream):
+        sizes.add(_SEVERAL_SIZE + stream[begin + _COUNT_OF_SEVERAL])
+    return sizes

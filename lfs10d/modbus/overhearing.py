@@ -1,7 +1,7 @@
 """What others say on the line: right frames that are no answer to a request of ours. Pure.
 
-Only reads are looked for, of the slaves that are polled: requests of another master (slave id, function 03 or 04, two
-words), answers (a byte count that is even) and exceptions. Whatever else is on the line is passed over.
+Only reads are looked for, of the slaves that are polled: requests of another master (slave id, function 01 to 04, two
+words), answers (a byte count, of registers an even one) and exceptions. Whatever else is on the line is passed over.
 """
 
 from __future__ import annotations
@@ -11,13 +11,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from lfs10d.modbus.frames import EXCEPTION_FLAG, Codec, Framing
-from lfs10d.modbus.request import READ_COUNT_MAX, READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS, ReadRegisters
+from lfs10d.modbus.request import BIT_READS, READ_BITS_MAX, READ_COUNT_MAX, READS, ReadRegisters
 
 KEPT = 600
 """Characters kept of a frame whose end has not come: more than the longest has (513, ASCII)."""
 PAUSE = 0.1
 """Seconds of silence after which what was begun is no frame any more."""
-_READS = frozenset({READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS})
 _REQUEST_BODY = 6
 _LEAST_BODY = 3
 _REQUEST = 8
@@ -49,7 +48,7 @@ class Overhearing:
         """Look for frames of these slaves, by slave id; all have one framing."""
         self._codecs = codecs
         slaves = b"".join(re.escape(bytes((slave,))) for slave in codecs)
-        self._heads = re.compile(rb"(?=[" + slaves + rb"][\x03\x04\x83\x84])" if slaves else rb"(?!)", re.DOTALL)
+        self._heads = re.compile(rb"(?=[" + slaves + rb"][\x01-\x04\x81-\x84])" if slaves else rb"(?!)", re.DOTALL)
         self._ascii = any(codec.framing is Framing.ASCII for codec in codecs.values())
 
     def hear(self, pieces: Iterable[tuple[bytes, float]]) -> Iterator[Overheard]:
@@ -102,14 +101,14 @@ def _sizes(stream: bytes, begin: int) -> tuple[int, ...]:
 def _overheard(body: bytes, at: float) -> Overheard | None:
     """Return what a right frame is; None for what no read needs."""
     slave, function, size = body[0], body[1], len(body)
-    if function & ~EXCEPTION_FLAG not in _READS or size < _LEAST_BODY:
+    if function & ~EXCEPTION_FLAG not in READS or size < _LEAST_BODY:
         return None
     if function & EXCEPTION_FLAG:
         return Overheard(slave, at, body) if size == _LEAST_BODY else None
     if size == _REQUEST_BODY:
         address, count = int.from_bytes(body[2:4], "big"), int.from_bytes(body[4:6], "big")
-        if not 1 <= count <= READ_COUNT_MAX or address + count > 1 << 16:
+        if not 1 <= count <= (READ_BITS_MAX if function in BIT_READS else READ_COUNT_MAX) or address + count > 1 << 16:
             return None
         return Overheard(slave, at, body, ReadRegisters(slave, address, count, function))
-    right = body[2] == size - _LEAST_BODY and not body[2] % 2
+    right = body[2] == size - _LEAST_BODY and (function in BIT_READS or not body[2] % 2)
     return Overheard(slave, at, body) if right else None

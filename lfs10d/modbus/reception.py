@@ -11,7 +11,7 @@ from lfs10d.modbus.frame_search import ExpectedFrame, FoundFrame, FrameSearch
 from lfs10d.modbus.frames import EXCEPTION_FLAG, Shape
 from lfs10d.modbus.outcome import LateAnswer
 from lfs10d.modbus.pending import Pending
-from lfs10d.modbus.request import BROADCAST, ReadRegisters, WriteRegister
+from lfs10d.modbus.request import BROADCAST, ReadRegisters
 
 HEARD_KEPT = 1024
 """Bytes remembered as heard, the last ones; the longest frame has 513 (ASCII)."""
@@ -53,7 +53,7 @@ class Reception:
         self._undecided = self._echo_whole = self._owes_another = False
         # Echo and answer of a write look the same.
         self._expects_echo = line.echo is Echo.ON or (
-            line.echo is Echo.UNKNOWN and isinstance(ask.request, WriteRegister)
+            line.echo is Echo.UNKNOWN and not isinstance(ask.request, ReadRegisters)
         )
         self.sent_yet = False
         self.heard = bytearray()
@@ -174,7 +174,7 @@ class Reception:
 
     def _seek_ours(self) -> None:
         expected_frames = [self._normal, self._exception]
-        if self._expects_echo and not self._echo_whole and isinstance(self._ask.request, WriteRegister):
+        if self._expects_echo and not self._echo_whole and not isinstance(self._ask.request, ReadRegisters):
             del expected_frames[0]
         for expected in expected_frames:
             while self.answer is None and (found := self._search.seek(expected)) is not None:
@@ -276,7 +276,7 @@ class Reception:
     def echoed(self) -> bool | None:
         """Whether our own bytes came back; None without evidence, for only an answer proves that they did not."""
         caught = self.answer or self.spare
-        writes = isinstance(self._ask.request, WriteRegister)
+        writes = not isinstance(self._ask.request, ReadRegisters)
         if self._echo_whole:
             return None if writes and self._line.echo is Echo.UNKNOWN and caught is None else True
         if caught is None or writes:

@@ -20,6 +20,8 @@ from tests.support.exchanges import Attempt
 RTU = Codec(Framing.RTU)
 WIND = ReadRegisters(3, 0x0001, 2)
 MOVE = WriteRegister(3, 0x0005, 7)
+BITS = ReadRegisters(3, 0x0000, 9, 1)
+SEVERAL = WriteRegister(3, 0x0005, 7, 16)
 
 
 def framed(*bodies: str) -> bytes:
@@ -44,6 +46,14 @@ def framed(*bodies: str) -> bytes:
             FaultCode.COLLISION,  # the contract's new word for a second master
             "a request to slave 3 was heard in place of its answer: an echo, or a second master",
         ),
+        (BITS, "030101FF", FaultCode.MALFORMED, "slave 3 sent 1 data bytes, announced as 1, in place of 2"),
+        (
+            BITS,
+            "030100000009",
+            FaultCode.COLLISION,
+            "a request to slave 3 was heard in place of its answer: an echo, or a second master",
+        ),
+        (SEVERAL, "031000050002", FaultCode.MALFORMED, "slave 3 confirmed another write: 00 05 00 02"),
         (MOVE, "030600050008", FaultCode.MALFORMED, "slave 3 confirmed another write: 00 05 00 08"),
     ],
 )
@@ -95,6 +105,9 @@ def test_the_other_faults_have_words() -> None:
         (ReadRegisters(1, 0x1F4, 1), "reading 1 register at 0x01F4"),
         (ReadRegisters(1, 0, 10, 4), "reading 10 input registers at 0x0000"),
         (WriteRegister(1, 5, 9), "writing 0x0009 to 0x0005"),
+        (WriteRegister(1, 5, 9, 16), "writing 0x0009 to 0x0005"),
+        (ReadRegisters(1, 0, 1, 1), "reading 1 coil at 0x0000"),
+        (ReadRegisters(1, 0x10, 12, 2), "reading 12 discrete inputs at 0x0010"),
     ],
 )
 def test_an_exception_names_the_registers_that_were_asked(request_: Request, words: str) -> None:

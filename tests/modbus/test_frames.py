@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from pymodbus.framer import FramerAscii, FramerRTU
 from pymodbus.pdu import DecodePDU, ExceptionResponse
 
-from lfs10d.modbus.frames import Checksum, Codec, Framing, describe
+from lfs10d.modbus.description import describe
+from lfs10d.modbus.frames import Checksum, Codec, Framing
 from lfs10d.modbus.request import ReadRegisters, Request, WriteRegister
 
 RTU = Codec(Framing.RTU)
@@ -200,51 +201,6 @@ def test_a_frame_of_unknown_length_is_found_where_the_slave_begins_or_as_the_who
 def test_ascii_frames_are_found_from_colon_to_line_feed() -> None:
     stream = b"xx:0103" + b":0183027A\r\n" + b":0183027B\r\n" + b":010310040002E6\r\n"
     assert [body.hex() for _, _, body in ASCII.frames(stream, 1, 19)] == ["018302", "010310040002"]
-
-
-@pytest.mark.parametrize(
-    ("frame", "words"),
-    [
-        ("", "nothing"),
-        ("01030001000295CB", "read 2 registers at 0x0001 of slave 1"),
-        ("010304414FD70A002F", "slave 1 answers 414F D70A"),
-        ("018302C0F1", "slave 1 refuses function 03: exception 02 illegal register address"),
-        ("01060004000249CA", "write 0x0002 to 0x0004 of slave 1"),
-        ("FF", "1 byte of no frame"),
-        ("FF00018302C0F1", "2 bytes of no frame; slave 1 refuses function 03: exception 02 illegal register address"),
-        ("01060004000249CAFF", "write 0x0002 to 0x0004 of slave 1; 1 byte of no frame"),
-    ],
-)
-def test_frames_are_told_in_words(frame: str, words: str) -> None:
-    assert describe(bytes.fromhex(frame), RTU) == words
-
-
-@pytest.mark.parametrize(
-    ("body", "words"),
-    [
-        ("000600040002", "write 0x0002 to 0x0004 of every slave"),
-        ("010300010001", "read 1 register at 0x0001 of slave 1"),
-        ("0183AA", "slave 1 refuses function 03: exception AA of the device's own"),
-        ("018302FF", "function 83 of slave 1: 02 FF"),
-        ("010800010BB8", "function 08 of slave 1: 00 01 0B B8"),
-        ("0141AA", "function 41 of slave 1: AA"),
-        ("010306AABB", "function 03 of slave 1: 06 AA BB"),
-        ("0103", "function 03 of slave 1: "),
-    ],
-)
-def test_strange_frames_are_told_too(body: str, words: str) -> None:
-    assert describe(RTU.wrap(bytes.fromhex(body)), RTU) == words
-
-
-@given(CODECS, st.binary(max_size=300))
-def test_words_are_printable_whatever_was_heard(codec: Codec, frame: bytes) -> None:
-    words = describe(frame, codec)
-    assert words.isascii()
-    assert words.isprintable()
-
-
-def test_a_long_piece_is_told_briefly() -> None:
-    assert len(describe(bytes.fromhex("018302C0F1") * 200, RTU)) < 1500
 
 
 class TestWhatWeRelyOnInPymodbus:

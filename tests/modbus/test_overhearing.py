@@ -96,3 +96,18 @@ def test_noise_in_ascii_is_passed_over() -> None:
 def test_what_looks_like_a_head_inside_a_frame_is_data() -> None:
     frame = framed("0103040103040A")
     assert [each.body for each in hear((frame + ANSWER, 1.0))] == [frame[:-2], ANSWER[:-2]]
+
+
+@pytest.mark.parametrize(("function", "answer"), [(1, "01 01 01 05"), (2, "01 02 02 FF 01")])
+def test_bits_that_another_master_reads_are_overheard_too(function: int, answer: str) -> None:
+    request = ReadRegisters(1, 3, 9, function)
+    body = bytes.fromhex(answer)
+    assert hear((RTU.encode(request), 1.0), (RTU.wrap(body), 1.02)) == [
+        Overheard(1, 1.0, RTU.encode(request)[:-2], request),
+        Overheard(1, 1.02, body),
+    ]
+
+
+def test_more_bits_than_one_read_brings_are_no_request() -> None:
+    assert hear((framed("01 01 00 00 07 D1"), 1.0)) == []
+    assert hear((framed("01 03 00 00 00 7E"), 1.0)) == []
