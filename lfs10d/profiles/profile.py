@@ -7,7 +7,7 @@ plausible wrong number.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_validator
@@ -167,6 +167,7 @@ class Profile(Facts):
     notes: Annotated[tuple[Sentence, ...], Field(strict=False)] = Field((), description="What else to know.")
 
     _blocks: tuple[Block, ...] = PrivateAttr(default=())
+    _plain: Profile | None = PrivateAttr(default=None)
 
     # A field's validator sees those fields above it that have no error. So the order of the fields matters,
     # and every problem of a file is found at once, though another field is wrong.
@@ -251,6 +252,26 @@ class Profile(Facts):
     def model_post_init(self, _context: Any, /) -> None:  # noqa: ANN401 - pydantic's signature
         """Batch the values once; reads and decoding are on the path of every poll."""
         self._blocks = batch(self.values, self.most_words)
+
+    def calibrated(self, calibration: Mapping[str, tuple[Number, Number]]) -> Profile:
+        """Return the profile of a device with certificates: scale and offset by value name; itself where there is none.
+
+        Names that it does not have are passed over.
+        """
+        if not calibration:
+            return self
+        values = tuple(
+            value.calibrated(*calibration[value.name]) if value.name in calibration else value for value in self.values
+        )
+        profile = self.model_copy(update={"values": values})
+        profile._blocks = batch(profile.values, profile.most_words)  # noqa: SLF001 - its own copy
+        profile._plain = self.plain  # noqa: SLF001 - its own copy
+        return profile
+
+    @property
+    def plain(self) -> Profile:
+        """The profile without calibration: what the maker says."""
+        return self._plain or self
 
     @property
     def checksum(self) -> ChecksumName:

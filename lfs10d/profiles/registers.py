@@ -13,9 +13,10 @@ import struct
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
-from math import isnan
+from math import inf, isnan
 from typing import Literal, TypeAlias
 
+from lfs10d.profiles.calibration import Calibration
 from lfs10d.reading import Fault, FaultCode, Number
 
 RegisterType: TypeAlias = Literal["int16", "uint16", "int32", "uint32", "float32"]
@@ -136,6 +137,8 @@ class Cell:
     linear: Linear
     low: Number | None
     high: Number | None
+    calibration: Calibration | None = None
+    """Applied to the profile's number before its range is judged."""
 
     def decode(self, registers: tuple[int, ...]) -> Number | Fault:
         """Return the number, or why there is none: `not_finite`, or `out_of_range` (a tiny float32 too)."""
@@ -156,6 +159,10 @@ class Cell:
             number = self.linear.of_integer(bits - (bits >> 31 << 32))
         else:
             number = self.linear.of_integer(bits)
+        if self.calibration is not None:
+            number = self.calibration.apply(number)
+            if abs(number) == inf:
+                return Fault(FaultCode.NOT_FINITE, f"{self.name} is infinite with its calibration")
         if (self.low is not None and number < self.low) or (self.high is not None and number > self.high):
             return self._outside(number)
         return number

@@ -6,10 +6,21 @@ import re
 from dataclasses import dataclass
 from typing import Annotated, Literal, TypeAlias
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    PrivateAttr,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+)
 from pydantic_core import InitErrorDetails
 
+from lfs10d.profiles.calibration import Calibration
 from lfs10d.profiles.registers import WORDS, ByteOrder, Cell, Linear, RegisterType, WordOrder, span, spell
+from lfs10d.reading import Number
 from lfs10d.schema.fields import FieldError, FieldKind, Text, Whole, plain_error
 
 Place: TypeAlias = tuple[str | int, ...]
@@ -36,6 +47,9 @@ RESERVED_NAMES = frozenset(
     | {"historical"}
 )
 """Keys of a sample; value names stand flat beside them."""
+
+WIND_SPEED = "wind_speed"
+"""The name of a wind speed, and its device class."""
 
 LAST_REGISTER = 0xFFFF
 """Register addresses have 16 bits (Modbus Application Protocol V1.1b3, section 4.4)."""
@@ -165,6 +179,7 @@ class Value(Registered):
     range: Range | None = Field(None, description="Least and greatest number that is believed.")
     precision: Annotated[int, Whole(0, 9)] | None = Field(None, description="Decimals on a display.")
     device_class: Annotated[str, Word()] | None = Field(None, description="Home Assistant's word for its kind.")
+    _calibration: Calibration | None = PrivateAttr(None)
 
     # A field's validator sees those fields above it that have no error, so that each problem is found at once.
 
@@ -195,6 +210,17 @@ class Value(Registered):
         """The register after its last."""
         return self.register + self.words
 
+    @property
+    def is_wind_speed(self) -> bool:
+        """Whether it is a wind speed: by its name, or by its device class."""
+        return WIND_SPEED in (self.name, self.device_class)
+
+    def calibrated(self, scale: Number, offset: Number) -> Value:
+        """Return the value of a device whose certificate says `number * scale + offset`; a wind speed of 0 stays 0."""
+        value = self.model_copy()
+        value._calibration = Calibration(scale, offset, keeps_zero=self.is_wind_speed)  # noqa: SLF001 - its own copy
+        return value
+
     def cell(self, address: int) -> Cell:
         """Return where it lies in a read that begins at register `address`."""
         low, high = self.range or (None, None)
@@ -208,6 +234,7 @@ class Value(Registered):
             linear=Linear.of(self.scale, self.offset),
             low=low,
             high=high,
+            calibration=self._calibration,
         )
 
 

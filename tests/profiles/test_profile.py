@@ -251,3 +251,22 @@ def test_the_longest_read_fits_every_framing(profile_of: Build, limits: dict[str
 
 def test_where_a_key_comes_from_is_kept(profile_of: Build) -> None:
     assert profile_of(provenance={"ids": "the manual, section 2"}).provenance == {"ids": "the manual, section 2"}
+
+
+def test_a_calibrated_profile_reads_the_same_and_says_other_numbers(profile_of: Build) -> None:
+    profile = profile_of(values=TWO_VALUES)
+    calibrated = profile.calibrated({"level": (2, 3), "depth": (1, 1)})
+    assert [(read.address, read.count) for read in calibrated.reads()] == [(1, 3)]
+    (read,), (plain,) = calibrated.reads(), profile.reads()
+    assert calibrated.decode(read, (7, 0, 0x3FC0)) == {"level": 17, "volume": 1.5}
+    assert profile.decode(plain, (7, 0, 0x3FC0)) == {"level": 7, "volume": 1.5}
+
+
+def test_a_calibrated_profile_knows_what_the_maker_says(profile_of: Build) -> None:
+    profile = profile_of(values=TWO_VALUES)
+    assert profile.calibrated({}) is profile
+    assert profile.plain is profile
+    calibrated = profile.calibrated({"level": (2, 3)})
+    assert calibrated != profile
+    assert calibrated.plain == profile
+    assert calibrated.calibrated({"level": (1, 1)}).plain == profile

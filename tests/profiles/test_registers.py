@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from dataclasses import replace
 from fractions import Fraction
 from itertools import product
 
@@ -10,6 +11,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from lfs10d.profiles.calibration import Calibration
 from lfs10d.profiles.registers import WORDS, ByteOrder, Cell, Linear, RegisterType, WordOrder, shortest, span, spell
 from lfs10d.reading import Fault, FaultCode
 
@@ -257,3 +259,11 @@ def test_a_range_is_spelled_for_people(low: float | None, high: float | None, un
 )
 def test_a_number_is_spelled_with_its_unit(number: float, unit: str, text: str) -> None:
     assert spell(number, unit) == text
+
+
+def test_a_calibration_comes_before_the_range_and_after_the_scale() -> None:
+    tenths = replace(cell("uint16", linear=Linear.of(0.1, 0.0), high=10), calibration=Calibration(1.1, 0.2))
+    assert tenths.decode((71,)) == 8.01
+    assert tenths.decode((90,)) == Fault(FaultCode.OUT_OF_RANGE, "wind 10.1 m/s is outside ..10 m/s")
+    endless = replace(cell("uint16", linear=Linear.of(0.5, 0.0)), calibration=Calibration(1e308, 0.0))
+    assert endless.decode((0xFFFF,)) == Fault(FaultCode.NOT_FINITE, "wind is infinite with its calibration")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -9,7 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from lfs10d.profiles.calibration import Calibration
 from lfs10d.profiles.values import RESERVED_NAMES, Setting, Value
+from lfs10d.reading import Fault, FaultCode
 from lfs10d.telemetry.publication import Sample
 
 VALUE = {"name": "level", "register": 1, "type": "uint16", "unit": "m"}
@@ -179,3 +182,29 @@ def test_facts_do_not_change_after_loading() -> None:
     value = Value.model_validate(VALUE)
     with pytest.raises(ValidationError):
         value.unit = "ft"  # type: ignore[misc]  # that it is frozen is the claim
+
+
+def decoded(value: Value, *words: int) -> Any:  # noqa: ANN401 - a number or a fault
+    return value.cell(value.register).decode(words)
+
+
+def test_a_calibrated_number_is_judged_by_the_range() -> None:
+    value = Value.model_validate(VALUE | {"scale": 0.1, "range": [0, 10]})
+    assert decoded(value, 99) == 9.9
+    assert decoded(value.calibrated(1.1, 0.0), 90) == 9.9
+    assert decoded(value.calibrated(1.1, 0.0), 99).message == "level 10.89 m is outside 0..10 m"
+    assert decoded(value.calibrated(1.0, -1.0), 9).code is FaultCode.OUT_OF_RANGE
+    assert decoded(value.calibrated(1.0, -1.0), 105) == 9.5
+
+
+@pytest.mark.parametrize("names", [{"name": "wind_speed"}, {"name": "gust", "device_class": "wind_speed"}])
+def test_a_wind_speed_of_nothing_stays_nothing(names: dict[str, str]) -> None:
+    speed = Value.model_validate(VALUE | {"scale": 0.1} | names).calibrated(1.0, 0.5)
+    assert (decoded(speed, 0), decoded(speed, 1)) == (0.0, 0.6)
+    assert decoded(Value.model_validate(VALUE | {"scale": 0.1}).calibrated(1.0, 0.5), 0) == 0.5
+
+
+def test_a_number_that_its_calibration_makes_infinite_is_none() -> None:
+    cell = replace(Value.model_validate(VALUE | {"scale": 0.5}).cell(1), calibration=Calibration(1e308, 0.0))
+    fault = cell.decode((0xFFFF,))
+    assert fault == Fault(FaultCode.NOT_FINITE, "level is infinite with its calibration")
