@@ -249,10 +249,14 @@ class LogConfig(Section):
 
 
 class HomeassistantConfig(Section):
-    """Home Assistant discovery. Without effect yet."""
+    """Home Assistant's MQTT discovery."""
 
-    discovery: Annotated[bool, Flag()] = Field(default=False, description="Announce devices to Home Assistant.")
-    prefix: Annotated[str, BaseTopic()] = Field("homeassistant", description="Its discovery prefix.")
+    discovery: Annotated[bool, Flag()] = Field(
+        default=False, description="Announce the line and its devices to Home Assistant; false takes it back."
+    )
+    prefix: Annotated[str, BaseTopic()] = Field(
+        "homeassistant", description="The discovery prefix set in Home Assistant's MQTT integration."
+    )
 
 
 class WindConfig(Section):
@@ -261,7 +265,7 @@ class WindConfig(Section):
     every: Annotated[float, Duration(1, HOUR)] = Field(10.0, description="Time between two statistics.")
 
 
-LATER_SECTIONS = ("homeassistant", "wind")
+LATER_SECTIONS = ("wind",)
 """Accepted and checked, but without effect yet."""
 
 CommandChoice: TypeAlias = Annotated[CommandClass, Choice(("polling", "sensors", "registers"))]
@@ -281,7 +285,7 @@ class Config(Section):
         description="Classes of requests that are accepted: polling (what is polled and how), sensors (changes and "
         "scans of the line), registers (raw access); [] for none.",
     )
-    homeassistant: HomeassistantConfig = Field(HomeassistantConfig(), description="Home Assistant (later).")
+    homeassistant: HomeassistantConfig = Field(HomeassistantConfig(), description="Home Assistant.")
     wind: WindConfig = Field(WindConfig(), description="Wind statistics (later).")
     store: StoreConfig = Field(StoreConfig(), description="The backlog on disk while the broker is unreachable.")
     log: LogConfig = Field(LogConfig(), description="What is logged.")

@@ -7,6 +7,7 @@ import logging
 from lfs10d.config.effective import Effective
 from lfs10d.config.live_config import News
 from lfs10d.config.reload import ReloadPlan
+from lfs10d.daemon.discovery import discovery_payloads
 from lfs10d.daemon.parts import Parts
 from lfs10d.daemon.settings import (
     broker_settings,
@@ -48,6 +49,7 @@ class ConfigChanges:
             conflicts = {name: why for name, why in now.conflicts.items() if name not in before.conflicts}
             parts.publisher.on_readings(conflict_readings(conflicts, parts.clock.now().mono))
         parts.dispatcher.allow(frozenset(config.commands))
+        parts.uplink.discovery.configure(config.homeassistant.prefix, discovery_payloads(config, now.loaded.profiles))
         parts.storage.look()
         parts.publisher.introduce(config_hash=config_hash(config), changes=now.changes.count, features=features(config))
         parts.access.on_config(before.config, config)

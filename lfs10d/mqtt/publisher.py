@@ -99,7 +99,7 @@ class Publisher:
     def republish(self) -> int:
         """Publish every retained topic once more; return how many."""
         self._uplink.republish()
-        return len(self._station.topics()) + 1
+        return len(self._station.topics()) + 1 + self._uplink.discovery.republish()
 
     # -- what is asked
 

@@ -75,7 +75,12 @@ class Topics:
         return tuple(self.full(publication.device_topic("+", leaf)) for leaf in OWNED_LEAVES)
 
     def full(self, relative: str) -> str:
-        """Return the topic as the broker knows it: `state` under `lfs10d/line0` is `lfs10d/line0/state`."""
+        """Return the topic as the broker knows it: `state` under `lfs10d/line0` is `lfs10d/line0/state`.
+
+        After `ELSEWHERE` stands a full topic that is not under `B`.
+        """
+        if relative.startswith(publication.ELSEWHERE):
+            return relative.removeprefix(publication.ELSEWHERE)
         return f"{self.base}/{relative}"
 
     def relative(self, topic: str) -> str | None:

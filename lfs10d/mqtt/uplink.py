@@ -16,6 +16,7 @@ from functools import partial
 from lfs10d.mqtt.broker_client import BrokerClient
 from lfs10d.mqtt.cleanup import Cleanup
 from lfs10d.mqtt.connection import Connection
+from lfs10d.mqtt.discovery import Discovery
 from lfs10d.mqtt.farewell import Farewell
 from lfs10d.mqtt.messages import Accepted, Filter, Incoming, Will
 from lfs10d.mqtt.reasons import REFUSED_FROM, Disconnect, reason_in_words
@@ -63,7 +64,7 @@ class Uplink:
         self._on_request: OnRequest  # given at the start
         self._cleanup: Cleanup  # built at the start
         self._retained_requests = RetainedRequests(self._ask_for_retained_requests)
-        self._announcing = False
+        self._announcing = self._leaving = self._drop_told = False
         self._client = BrokerClient(
             settings,
             self,
@@ -72,20 +73,17 @@ class Uplink:
             connect=connect,
         )
         self._outbox = Outbox(detection=2.0 * settings.keepalive)
-        line = base.rpartition("/")[2]
+        self.discovery = Discovery(self._topics, self.publish, is_out=lambda: self._outbox.retained_out)
         self._sender = Sender(
             self._outbox,
             self._topics,
-            line,
+            base.rpartition("/")[2],
             epoch_ms=epoch_ms,
-            stuck=lambda: self._client.drop("no acknowledgement for 60 s"),
+            stuck=self._on_stuck,
         )
         self._subscription: int | None = None
-        self._leaving = False
         self._farewell = Farewell(self._client, self._outbox, self._sender.wake)
-        self._drop_told = False
-        self._epoch_ms = epoch_ms
-        self._store = store
+        self._epoch_ms, self._store = epoch_ms, store
         self._spooler: Spooler | None = None
         self._retained_reader: RetainedReader | None = None
         self.requests_denied = False
@@ -253,6 +251,7 @@ class Uplink:
         if self._retained_reader is not None:
             self._retained_reader.lost()
         self._cleanup.lost()
+        self.discovery.lost()
         self._retained_requests.lost()
         self._drop_told = False
         self._farewell.on_progress()
@@ -268,6 +267,7 @@ class Uplink:
             if self._announcing:
                 self._announcing = False
                 self._events.on_announced()
+                self.discovery.begin(self._client.standing)
             self._clear_if_out()
         self._farewell.on_progress()
 
@@ -275,6 +275,7 @@ class Uplink:
         """Report a refused subscription."""
         if self._retained_reader is not None:
             self._retained_reader.subscribed(mid, reasons)
+        self.discovery.subscribed(mid, reasons)
         if mid == self._subscription:
             self.requests_denied = bool(reasons) and reasons[0] >= REFUSED_FROM
             for topic, reason in zip((self._topics.requests, self._topics.availability), reasons, strict=False):
@@ -290,7 +291,7 @@ class Uplink:
             return
         if self._retained_reader is not None:
             self._retained_reader.arrived(message)
-        if self._cleanup.on_message(message):
+        if self._cleanup.on_message(message) or self.discovery.on_message(message):
             return
         request = self._topics.command(message)
         if request is not None:

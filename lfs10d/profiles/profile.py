@@ -126,6 +126,8 @@ class Profile(Facts):
 
     name: Annotated[str, Name()] = Field(description="What to call it, of a-z 0-9 _ -.")
     title: Sentence = Field(description="What it is, for people.")
+    manufacturer: Sentence | None = Field(None, description="Who makes it, for Home Assistant.")
+    model: Sentence | None = Field(None, description="Its model, for Home Assistant; the title where it is not given.")
     sources: Annotated[tuple[Sentence, ...], Field(strict=False)] = Field((), description="The maker's documents.")
     ids: Annotated[tuple[SlaveId, SlaveId], Field(strict=False), AfterValidator(_ids)] = Field(
         (1, 247), description="First and last slave id it can have."

@@ -37,6 +37,9 @@ WIND = "wind"
 TELEMETRY = "telemetry"
 HISTORY = "history"
 
+ELSEWHERE = "/"
+"""Before a full topic that is not under `B`: what is published for Home Assistant."""
+
 
 def device_topic(device: str, leaf: str) -> str:
     """Return the topic under `B` of one thing about a device: `device/mast-top/state`."""
@@ -127,7 +130,7 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class Publication:
-    """One message for the broker; `topic` is under `B`.
+    """One message for the broker; `topic` is under `B`, or a full one after `ELSEWHERE`.
 
     `payload` is an object or an array to be written as JSON, a bare word, or None to clear a retained topic.
     `sample` is set for kind SAMPLE alone, whose topic is `device/<name>/telemetry`. `refresh`: only newer figures of a

@@ -29,9 +29,14 @@ def test_filters_of_what_may_be_left_over() -> None:
     )
 
 
-@given(st.text())
+@given(st.text().filter(lambda text: not text.startswith("/")))
 def test_full_and_relative_are_inverse(relative: str) -> None:
+    """No topic under `B` begins with a slash: after one stands a topic that is not under it (contract, section 7)."""
     assert B.relative(B.full(relative)) == relative
+
+
+def test_what_is_elsewhere_is_named_in_full() -> None:
+    assert B.full("/homeassistant/device/x/config") == "homeassistant/device/x/config"
 
 
 @pytest.mark.parametrize("topic", ["site/roof/line00/x", "site/roof/line0", "other/line0/x", ""])

@@ -1,0 +1,73 @@
+"""What a daemon announced before, as the broker retains it: found again after a connect. Pure; time is an argument."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+from pydantic_core import from_json
+
+from lfs10d.telemetry.homeassistant.discovery import Platforms, platforms
+from lfs10d.telemetry.homeassistant.gateway import config_topic, is_about, object_id
+
+QUIET: Final = 0.5
+"""Seconds without a retained message after which the broker has sent them all."""
+LONGEST: Final = 30.0
+"""Seconds after which a search ends in any case."""
+LARGEST: Final = 262_144
+"""Bytes of a payload that is looked at; ours have some 10 KB."""
+
+
+@dataclass(slots=True)
+class DiscoverySearch:
+    """Collects what is announced under `prefix` for the daemon at `base`, from `begun` on (monotonic seconds).
+
+    `wide`: all of it; else the line alone, whose payload is cleared last: where it is not, nothing is.
+    """
+
+    prefix: str
+    base: str
+    begun: float
+    wide: bool
+    found: dict[str, Platforms] = field(default_factory=dict)
+    """The components of each payload by its full topic."""
+    _last_at: float = 0.0
+    _refused: bool = False
+
+    def __post_init__(self) -> None:
+        self._last_at = self.begun
+
+    @property
+    def filter(self) -> str:
+        """What to subscribe to."""
+        return config_topic(self.prefix, "+" if self.wide else object_id(self.base))
+
+    def refused(self) -> None:
+        """Note that the broker lets us see nothing."""
+        self._refused = True
+
+    def on_message(self, topic: str, payload: bytes, now: float) -> bool:
+        """Take one retained message; return False if it is not about a device of Home Assistant's."""
+        parts = topic.removeprefix(f"{self.prefix}/").split("/")
+        match parts:
+            case ["device", identifier, "config"]:
+                self._last_at = now
+            case _:
+                return False
+        if identifier.startswith(object_id(self.base)) and 0 < len(payload) <= LARGEST:
+            self._take(topic, payload)
+        return True
+
+    def _take(self, topic: str, payload: bytes) -> None:
+        try:
+            announced = from_json(payload, allow_inf_nan=False)
+        except ValueError:
+            return
+        if isinstance(announced, Mapping) and is_about(announced, f"{self.base}/availability"):
+            self.found[topic] = platforms(announced)
+
+    @property
+    def due(self) -> float:
+        """When it is over."""
+        return self.begun if self._refused else min(self._last_at + QUIET, self.begun + LONGEST)
