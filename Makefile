@@ -25,9 +25,12 @@ $(VENV)/.dev: $(VENV)/.demo
 demo: $(VENV)/.demo ## Show it at work: simulated line, broker, daemon; no hardware needed
 	@$(BIN)/lfs10d demo
 
-# Most tests wait for brokers, pseudo terminals and daemons: three workers share the machine.
+# Many tests wait for brokers, pseudo terminals and daemons: WORKERS share two cores. The long ones begin first.
+# Each of the hundreds of processes finds the modules compiled, also where PYTHONDONTWRITEBYTECODE is set.
+WORKERS ?= 4
+test test-oldest: export PYTHONDONTWRITEBYTECODE :=
 test: $(VENV)/.dev ## Run all tests
-	$(BIN)/python -m pytest -n 3 --dist loadfile
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadgroup --no-loadscope-reorder
 
 # The ranges of pyproject.toml begin with versions that work: the lowest of each, in an environment of its own.
 OLDEST := $(VENV)/oldest

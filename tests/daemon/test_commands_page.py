@@ -17,6 +17,8 @@ from lfs10d.telemetry.contract import check
 from tests.support.brokers import Mosquitto
 from tests.support.sites import Site, View, eventually, good, tell
 
+pytestmark = pytest.mark.long
+
 BASE = "lfs10d/line0"
 QUICK = [number for number, step in enumerate(WALK) if not step.slow]
 ANSWERED_WITHIN = 120.0

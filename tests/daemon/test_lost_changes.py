@@ -16,6 +16,8 @@ from tests.support.sites import Run, Site, View, eventually, good, tell
 
 pytestmark = pytest.mark.needs("mosquitto")
 
+pytestmark = pytest.mark.long
+
 B = "lfs10d/line0"
 
 

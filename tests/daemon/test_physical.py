@@ -22,6 +22,8 @@ from lfs10d.simulator.wire import Format
 from tests.support.brokers import Mosquitto
 from tests.support.sites import Site, View, eventually, good, tell
 
+pytestmark = pytest.mark.long
+
 BASE = "lfs10d/line0"
 
 

@@ -15,6 +15,8 @@ from tests.support.brokers import Mosquitto
 from tests.support.shells import BASE, Shell, typed
 from tests.support.sites import Run, Site, eventually, tell
 
+pytestmark = pytest.mark.long
+
 REPEAT = ("line/adopt", "--repeat")
 FIRST = "Plug in a sensor. Ctrl-C when all are adopted.\n"
 ADOPTED_WITHIN = 60.0
