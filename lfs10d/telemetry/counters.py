@@ -176,13 +176,25 @@ class LineCounters:
 class DeviceCounters:
     """The figures of one device; `response_timeout` in s, None until it is known, `request_gap` in s."""
 
-    __slots__ = ("_last_poll", "_rtts", "errors", "good", "last_good_ts", "polls", "request_gap", "response_timeout")
+    __slots__ = (
+        "_last_poll",
+        "_rtts",
+        "errors",
+        "good",
+        "last_good_ts",
+        "partial",
+        "polls",
+        "request_gap",
+        "response_timeout",
+    )
 
     def __init__(self, response_timeout: float | None, request_gap: float = 0.0) -> None:
         self.response_timeout = response_timeout
         self.request_gap = request_gap
         self.polls = 0
         self.good = 0
+        """Polls that brought a value, the `partial` ones too."""
+        self.partial = 0
         self.errors: Counter[str] = Counter()
         self.last_good_ts: int | None = None
         self._rtts: deque[float] = deque(maxlen=RECENT_RTTS)
@@ -201,6 +213,8 @@ class DeviceCounters:
         if fault is None:
             self.good += 1
             self.last_good_ts = ts
+            if reading.value_errors:
+                self.partial += 1
             if reading.rtt is not None:
                 self._rtts.append(reading.rtt)
         elif not fault.busy:
@@ -220,6 +234,7 @@ class DeviceCounters:
             "ts": ts,
             "polls": self.polls,
             "good": self.good,
+            "partial": self.partial,
             "errors": dict(self.errors),
             "rtt_ms": {
                 "p50": scaled(percentile(self._rtts, 50), 1e3, 1),

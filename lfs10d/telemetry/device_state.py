@@ -4,9 +4,11 @@ Rules
 -----
 1. Every reading is one sample, numbered from 1 without gaps; `seq` goes on even when the device is removed and
    added again.
-2. A number is published only with a good reading, and availability is `online` while one is shown: it goes
-   before a good state and after a bad one.
-3. The state shows the newest sample at most every `state_every`, but a change of quality or error at once.
+2. A value is published only with a good or partial reading, and availability is `online` while one is shown: it goes
+   before the state of such a reading and after a bad one. A partial reading clears the device's error as a good one
+   does.
+3. The state shows the newest sample at most every `state_every`, but a change of quality or error at once, and of
+   `errors`: another value that is missing, or another reason.
 4. Before its first sample a device's state has no value and the error `starting` (a disabled one `disabled`), which
    is never in its error topic.
 5. A disabled device has one sample that says so, and then none but those of polls that a request wants; of these
@@ -182,6 +184,7 @@ class DeviceState:
     def snapshot(self, now: Instant) -> dict[str, object]:
         """Return what a live view shows of this device; `age_s` is the age of the last good reading."""
         info, sample, last_good = self.info, self._sample, self._last_good
+        values = sample.values or NOTHING
         return {
             "name": info.name,
             "slave": info.slave,
@@ -192,10 +195,12 @@ class DeviceState:
             "online": self.online,
             "seq": sample.seq,
             "ts": sample.ts,
-            "values": dict.fromkeys(sample.names) if sample.values is None else dict(sample.values),
+            "values": {name: values.get(name) for name in sample.names},
             "units": dict(sample.units),
             "quality": sample.quality,
             "error": sample.error,
+            "errors": dict(sample.errors),
+            "ages": dict(sample.ages),
             "rtt_ms": sample.rtt_ms,
             "age_s": None if last_good is None else round(max(0.0, now.mono - last_good), 1),
             "alarm": self._alarm.payload(),

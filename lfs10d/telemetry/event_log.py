@@ -1,18 +1,26 @@
 """Log entries for events of the line: each change of state once. Pure.
 
 A device is logged when its error rises or changes its code, and when it answers again. The loss of the port is one
-entry for the line, none for its devices.
+entry for the line, none for its devices. A value that is missing while others go on is logged once for each reason.
 """
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
-from lfs10d.reading import Event, Exchanged, PortChanged, Reading
+from lfs10d.reading import Event, Exchanged, FaultCode, PortChanged, Reading
 from lfs10d.schema.quantities import duration_text
 from lfs10d.telemetry.publication import ERROR, Publication, device_of
+
+_MISSING: Final[Mapping[FaultCode, str]] = {
+    FaultCode.UNAVAILABLE: "the device says that it has none now",
+    FaultCode.NOT_FINITE: "it is NaN or infinite",
+    FaultCode.OUT_OF_RANGE: "the number is impossible",
+    FaultCode.EXCEPTION: "the device refuses it",
+}
+"""Why a value is not there."""
 
 
 class LogEntry(NamedTuple):
@@ -30,6 +38,8 @@ class EventLog:
         """Error code logged last, by device."""
         self._rested: set[str] = set()
         """Devices whose learned rest was reported."""
+        self._missing: set[tuple[str, str, FaultCode]] = set()
+        """Device, value and reason of those missing values that were reported."""
 
     def on_event(self, event: Event, *, port: str, notices: Sequence[str], frames: bool) -> list[LogEntry]:
         """Return the log entries of one event of the line thread; exchanges only where `frames` are wanted.
@@ -45,24 +55,44 @@ class EventLog:
                 LogEntry(logging.INFO, f"{port}: the port is open"),
                 *(LogEntry(logging.WARNING, notice) for notice in notices),
             ]
-        if isinstance(event, Reading) and event.gap_learned and event.device not in self._rested:
-            self._rested.add(event.device)
-            gap = duration_text(event.request_gap)
-            text = f"{event.device}: ignores a request right behind another, and is now given {gap} of rest before each"
-            why = f"more if that is too short, see device/{event.device}/config"
-            return [LogEntry(logging.WARNING, f"{text} ({why}): set request_gap for it in the configuration")]
+        if isinstance(event, Reading) and (event.gap_learned or event.value_errors):
+            return [*self._learned_rest(event), *self._missing_values(event)]
         if frames and isinstance(event, Exchanged):
             heard = event.heard.hex(" ") or "nothing"
             fault = f": {event.fault}" if event.fault else ""
             return [LogEntry(logging.DEBUG, f"slave {event.slave}: sent {event.sent.hex(' ')}, heard {heard}{fault}")]
         return []
 
+    def _learned_rest(self, reading: Reading) -> list[LogEntry]:
+        if not reading.gap_learned or reading.device in self._rested:
+            return []
+        self._rested.add(reading.device)
+        gap = duration_text(reading.request_gap)
+        text = f"{reading.device}: ignores a request right behind another, and is now given {gap} of rest before each"
+        why = f"more if that is too short, see device/{reading.device}/config"
+        return [LogEntry(logging.WARNING, f"{text} ({why}): set request_gap for it in the configuration")]
+
+    def _missing_values(self, reading: Reading) -> list[LogEntry]:
+        """Return what is to be said of values that are not there while others are: of each and each reason once."""
+        if reading.values is None:
+            return []
+        entries = []
+        for name, code in reading.value_errors.items():
+            missing = (reading.device, name, code)
+            if missing not in self._missing:
+                self._missing.add(missing)
+                text = (
+                    f"{reading.device}: {name} has no value, the others go on: {code}, {_MISSING[code]} (logged once)"
+                )
+                entries.append(LogEntry(logging.INFO, text))
+        return entries
+
     def on_publications(self, publications: Iterable[Publication]) -> list[LogEntry]:
         """Return the log entries of the publications that one event caused."""
         entries: list[LogEntry] = []
         good: set[str] = set()
         for publication in publications:
-            if publication.sample is not None and publication.sample.quality == "good":
+            if publication.sample is not None and publication.sample.quality != "bad":
                 good.add(publication.sample.device)
             device = device_of(publication.topic, ERROR)
             if device is None:

@@ -224,6 +224,7 @@ class DeviceStats(Payload):
     ts: Milliseconds
     polls: Count
     good: Count
+    partial: int = Field(ge=0, description="those among `good` that lacked values, since boot")
     errors: Errors
     rtt_ms: RoundTrip = Field(description="of its last 100 answers")
     response_timeout_ms: float | None = Field(description="as set or learned")

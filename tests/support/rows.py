@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from lfs10d.outbox.store.database import Limits
 from lfs10d.outbox.store.sample_file import StoreEntry
-from lfs10d.reading import Number
+from lfs10d.reading import Value
 from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry.publication import Sample
 
@@ -21,14 +21,14 @@ def sample(
     device: str = "a",
     *,
     boot: str = BOOT,
-    values: Mapping[str, Number] | None = None,
+    values: Mapping[str, Value] | None = None,
     error: str | None = None,
     clock: ClockState = "synced",
     ts: int | None = None,
 ) -> Sample:
     """Return a sample, one a second; a good one of `seq / 8` unless told otherwise."""
     good = error is None
-    measured = {"wind_speed": seq / 8} if values is None else values
+    measured: Mapping[str, Value] = {"wind_speed": seq / 8} if values is None else values
     return Sample(
         device=device,
         boot=boot,

@@ -236,6 +236,7 @@ def test_a_device_never_polled_has_nulls() -> None:
         "ts": 7,
         "polls": 0,
         "good": 0,
+        "partial": 0,
         "errors": {},
         "rtt_ms": {"p50": None, "p95": None},
         "response_timeout_ms": None,
@@ -266,6 +267,7 @@ def test_a_device_s_polls_values_errors_and_times_are_told() -> None:
         "ts": 7,
         "polls": 102,
         "good": 100,
+        "partial": 0,
         "errors": {"overrun": 2, "timeout": 1},
         "rtt_ms": {"p50": 59.1, "p95": 104.1},
         "response_timeout_ms": 200.0,
@@ -278,6 +280,15 @@ def test_a_good_reading_without_a_time_of_answer_spoils_no_percentile() -> None:
     counters = DeviceCounters(None)
     counters.polled(reading(START, rtt=None), 1)
     assert (counters.payload(7)["good"], counters.payload(7)["rtt_ms"]) == (1, {"p50": None, "p95": None})
+
+
+def test_a_partial_reading_counts_as_good_and_is_no_error() -> None:
+    counters = DeviceCounters(None)
+    counters.polled(reading(START), 1)
+    counters.polled(replace(reading(START + 1), value_errors={"rain": FaultCode.EXCEPTION}), 2)
+    payload = counters.payload(7)
+    assert (payload["polls"], payload["good"], payload["partial"], payload["errors"]) == (2, 2, 1, {})
+    assert payload["last_good_ts"] == 2
 
 
 def test_the_time_between_two_polls_is_told() -> None:

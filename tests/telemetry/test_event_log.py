@@ -12,6 +12,7 @@ from lfs10d.telemetry.event_log import EventLog
 from lfs10d.telemetry.publication import Publication, PublicationKind, Sample, device_topic, retained
 
 PORT = "/dev/ttyUSB0"
+NONE_NOW = "the device says that it has none now"
 
 
 def a_sample(*, good: bool, device: str = "mast") -> Publication:
@@ -27,6 +28,15 @@ def a_sample(*, good: bool, device: str = "mast") -> Publication:
 def an_error(code: str | None, device: str = "mast") -> Publication:
     payload = {"active": code is not None, "code": code, "message": "no answer in 200 ms"}
     return retained(device_topic(device, "error"), payload)
+
+
+def test_a_partial_sample_is_a_recovery_too() -> None:
+    log = EventLog()
+    log.on_publications([an_error("timeout")])
+    publication = a_sample(good=True)
+    assert publication.sample is not None
+    partly = replace(publication, sample=replace(publication.sample, quality="partial"))
+    assert log.on_publications([partly, an_error(None)]) == [(logging.INFO, "mast: answers well again after timeout")]
 
 
 def test_a_failing_device_is_told_once_and_its_recovery_too() -> None:
@@ -118,3 +128,27 @@ def test_a_learned_rest_is_told_once_with_what_to_set() -> None:
     )
     assert not told(replace(rested, request_gap=0.8))
     assert told(replace(rested, device="other"))
+
+
+def test_a_value_that_is_missing_is_told_once_for_each_reason() -> None:
+    log = EventLog()
+    errors = {"rain": FaultCode.EXCEPTION, "humidity": FaultCode.UNAVAILABLE}
+    usual = Reading("mast", 1.0, {"wind": 1.0, "rain": None, "humidity": None}, None, 0.02, True, 0.2)  # noqa: FBT003 - online
+    partial = replace(usual, value_errors=errors)
+
+    def told(reading: Reading) -> list[tuple[int, str]]:
+        return [*log.on_event(reading, port=PORT, notices=(), frames=False)]
+
+    assert told(partial) == [
+        (logging.INFO, "mast: rain has no value, the others go on: exception, the device refuses it (logged once)"),
+        (logging.INFO, f"mast: humidity has no value, the others go on: unavailable, {NONE_NOW} (logged once)"),
+    ]
+    assert not told(partial)
+    assert not told(usual)
+    again = told(replace(partial, value_errors={"rain": FaultCode.OUT_OF_RANGE}))
+    assert [text.partition("go on: ")[2] for _, text in again] == [
+        "out_of_range, the number is impossible (logged once)"
+    ]
+    other = told(replace(partial, device="other", value_errors={"rain": FaultCode.NOT_FINITE}))
+    assert [text.partition("go on: ")[2] for _, text in other] == ["not_finite, it is NaN or infinite (logged once)"]
+    assert not told(replace(partial, device="third", values=None, fault=Fault(FaultCode.UNAVAILABLE, "none")))

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lfs10d.reading import FaultCode
 from lfs10d.telemetry.publication import (
     Publication,
     PublicationKind,
@@ -58,6 +59,23 @@ def test_several_values_have_units_by_name_and_no_unit() -> None:
     assert payload["units"] == {"current": "A", "voltage": "V"}
     assert "unit" not in payload
     assert (payload["current"], payload["voltage"]) == (1.5, 230)
+
+
+def test_a_partial_sample_says_why_and_how_old_and_keeps_the_profile_s_order() -> None:
+    partial = replace(
+        SAMPLE,
+        values={"weather": "rain", "current": 1.5},
+        names=("current", "voltage", "weather"),
+        quality="partial",
+        errors={"voltage": FaultCode.UNAVAILABLE},
+        ages={"weather": 34.2},
+    )
+    text = json.dumps(partial.payload("line0", historical=True), separators=(",", ":"))
+    assert '"current":1.5,"voltage":null,"weather":"rain","units":' in text
+    assert text.endswith(
+        '"quality":"partial","error":null,"rtt_ms":18.2,"errors":{"voltage":"unavailable"},"ages":{"weather":34.2},'
+        '"historical":true}'
+    )
 
 
 def test_one_value_without_a_unit_has_unit_null() -> None:

@@ -25,7 +25,11 @@ APPLICATION_ID = 0x4C465364
 """`LFSd` in the header says that a file is ours (https://www.sqlite.org/fileformat.html#application_id)."""
 
 SCHEMA = 1
-"""`user_version` of the header. Higher ones were written by a later lfs10d."""
+"""`user_version` of the header of a file whose samples have numbers alone, as it begins."""
+
+WIDE_SCHEMA = 2
+"""The same tables, in which a sample may be partial and a value text, a boolean, or have an age: an lfs10d that does
+not know them leaves such a file alone. Higher ones were written by a later lfs10d."""
 
 PAGE = 4096
 """Bytes of a page of the file."""
@@ -114,8 +118,8 @@ def _prepare(db: sqlite3.Connection) -> None:
     tables = number(db, "SELECT count(*) FROM sqlite_schema")
     if kind != APPLICATION_ID and (kind or schema or tables):
         raise ForeignError("is a database of another program", later=False)
-    if schema > SCHEMA:
-        raise ForeignError(f"was written by a later lfs10d (schema {schema}, ours is {SCHEMA})", later=True)
+    if schema > WIDE_SCHEMA:
+        raise ForeignError(f"was written by a later lfs10d (schema {schema}, ours is {WIDE_SCHEMA})", later=True)
     db.execute(f"PRAGMA page_size = {PAGE}")
     db.execute("PRAGMA auto_vacuum = INCREMENTAL")
     db.execute("PRAGMA journal_mode = WAL")
@@ -144,6 +148,16 @@ def limit(db: sqlite3.Connection, limits: Limits) -> None:
     """Bound the write-ahead log."""
     db.execute(f"PRAGMA wal_autocheckpoint = {limits.log_pages}")
     db.execute(f"PRAGMA journal_size_limit = {limits.log_pages * PAGE}")
+
+
+def is_wide(db: sqlite3.Connection) -> bool:
+    """Whether samples may have more than numbers."""
+    return number(db, "PRAGMA user_version") >= WIDE_SCHEMA
+
+
+def widen(db: sqlite3.Connection) -> None:
+    """Let samples have more than numbers from now on."""
+    db.execute(f"PRAGMA user_version = {WIDE_SCHEMA}")
 
 
 def number(db: sqlite3.Connection, question: str) -> int:

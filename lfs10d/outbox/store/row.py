@@ -1,8 +1,17 @@
-"""How a sample lies in the store: numbers as cells of SQLite, and a check over each row. Pure.
+"""How a sample lies in the store: values as cells of SQLite, and a check over each row. Pure.
 
-A float32 is kept as its four bytes and comes back as the same shortest decimal; what is no float32 (a scaled
-number) is kept whole. A page of the file that was cut or has rotted may still read as a row: the check, which
-SQLite does not have, tells.
+====================  ==================================================================================
+a value               its cell
+====================  ==================================================================================
+integer               an integer; beyond 64 bits its decimal digits
+float                 the four bytes of the float32 that has this shortest decimal; else the float whole
+true, false           one byte, 0 or 1
+text                  JSON text: in quotes
+one with an age       JSON text: `[age in ms, value]`
+none                  one byte that says why: `_ERRORS`
+====================  ==================================================================================
+
+A page of the file that was cut or has rotted may still read as a row: the check, which SQLite does not have, tells.
 """
 
 from __future__ import annotations
@@ -10,20 +19,34 @@ from __future__ import annotations
 import json
 import struct
 import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TypeAlias, cast
+from typing import TypeAlias
 
 from lfs10d.profiles.registers import shortest
-from lfs10d.reading import Number
+from lfs10d.reading import NOTHING, FaultCode, Value
 from lfs10d.telemetry.publication import Quality, Sample
 
 Cell: TypeAlias = int | float | bytes | str | None
-"""A number as SQLite keeps it; None where there is none."""
+"""A value as SQLite keeps it; None where there is none."""
 
 _FLOAT32 = struct.Struct("<f")
 _BITS = struct.Struct("<I")
 _INTEGERS = range(-(2**63), 2**63)
 """What SQLite keeps as an integer (https://www.sqlite.org/datatype3.html)."""
+_BOOLEANS = {False: b"\0", True: b"\1"}
+_ERRORS = {
+    FaultCode.UNAVAILABLE: b"\2",
+    FaultCode.NOT_FINITE: b"\3",
+    FaultCode.OUT_OF_RANGE: b"\4",
+    FaultCode.EXCEPTION: b"\5",
+}
+"""Why one value among others is not there."""
+_MEANT: Mapping[bytes, tuple[bool | None, FaultCode | None, None]] = {
+    **{cell: (value, None, None) for value, cell in _BOOLEANS.items()},
+    **{cell: (None, error, None) for error, cell in _ERRORS.items()},
+}
+_NO_VALUE = "a value that is none"
 _TENTHS = 10
 _CHECKS = 1 << 16
 
@@ -32,29 +55,57 @@ class DamagedError(Exception):
     """The store's file says what no store of ours ever said; it must be put aside."""
 
 
-def pack(number: Number) -> Cell:
-    """Return the smallest cell from which `unpack` makes the same number of the same type."""
-    if isinstance(number, int):
-        return number if number in _INTEGERS else str(number)
+def pack(value: Value) -> Cell:
+    """Return the smallest cell from which `unpack` makes the same value of the same type."""
+    if isinstance(value, bool):
+        return _BOOLEANS[value]
+    if isinstance(value, str):
+        return json.dumps(value)
+    if isinstance(value, int):
+        return value if value in _INTEGERS else str(value)
     try:
-        four = _FLOAT32.pack(number)
+        four = _FLOAT32.pack(value)
     except OverflowError:
-        return number
+        return value
     same = shortest(_BITS.unpack(four)[0])
-    return four if same == number else number
+    return four if same == value else value
 
 
-def unpack(cell: Cell) -> Number | None:
-    """Return the number that was packed; raises DamagedError."""
+def pack_aged(value: Value, age: float) -> Cell:
+    """Return the cell of a value and its age, which is given in s and kept in ms."""
+    return json.dumps([round(age * 1000), value], separators=(",", ":"))
+
+
+def unpack(cell: Cell) -> tuple[Value | None, FaultCode | None, float | None]:
+    """Return what was packed: a value, or why there is none, and its age if it has one; raises DamagedError."""
     match cell:
         case None | int() | float():
-            return cell
+            return cell, None, None
         case bytes() if len(cell) == _FLOAT32.size:
-            return shortest(_BITS.unpack(cell)[0])
-        case str() if cell.removeprefix("-").isdecimal():
-            return int(cell)
+            return shortest(_BITS.unpack(cell)[0]), None, None
+        case bytes() if cell in _MEANT:
+            return _MEANT[cell]
+        case str():
+            return _unpack_text(cell)
         case _:
-            raise DamagedError("a number that is none")
+            raise DamagedError(_NO_VALUE)
+
+
+def _refuse(word: str) -> None:
+    raise ValueError(word)  # NaN and the infinities are no JSON
+
+
+def _unpack_text(cell: str) -> tuple[Value, None, float | None]:
+    """Return what JSON says: a text, a large integer, or an age with a value."""
+    try:
+        match json.loads(cell, parse_constant=_refuse):
+            case str() | int() as value if pack(value) == cell:
+                return value, None, None
+            case [int(age), str() | int() | float() as value] if pack_aged(value, age / 1000) == cell:
+                return value, None, age / 1000
+    except (ValueError, OverflowError, RecursionError):
+        pass
+    raise DamagedError(_NO_VALUE)
 
 
 def pack_rtt(rtt_ms: float | None) -> Cell:
@@ -123,13 +174,52 @@ def values_of(sample: Sample) -> tuple[Cell, ...]:
     """Return the cells of a sample's values in order of its names; () for a bad one."""
     if sample.values is None:
         return ()
-    values = sample.values
-    return tuple(pack(cast("Number", values[name])) if name in values else None for name in sample.names)
+    values, errors, ages = sample.values, sample.errors, sample.ages
+    cells: list[Cell] = []
+    for name in sample.names:
+        value = values.get(name)
+        if value is None:
+            error = errors.get(name)
+            cells.append(None if error is None else _ERRORS[error])
+        else:
+            cells.append(pack_aged(value, ages[name]) if name in ages else pack(value))
+    return tuple(cells)
 
 
-def values_from(series: Series, cells: tuple[Cell, ...]) -> dict[str, Number] | None:
-    """Return a sample's values; raises DamagedError."""
+@dataclass(frozen=True, slots=True)
+class Content:
+    """What a sample says of its values, as in `Sample`."""
+
+    values: Mapping[str, Value | None] | None
+    errors: Mapping[str, FaultCode]
+    ages: Mapping[str, float]
+
+
+_EMPTY = Content(None, NOTHING, NOTHING)
+
+
+def content_of(series: Series, cells: tuple[Cell, ...]) -> Content:
+    """Return what the cells of a sample say; raises DamagedError."""
     if series.quality == "bad":
-        return None
-    named = zip(series.names, map(unpack, cells), strict=False)
-    return cast("dict[str, Number]", {name: value for name, value in named if value is not None})
+        return _EMPTY
+    values: dict[str, Value | None] = {}
+    errors: dict[str, FaultCode] = {}
+    ages: dict[str, float] = {}
+    for name, cell in zip(series.names, cells, strict=False):
+        value, error, age = unpack(cell)
+        if error is not None:
+            errors[name] = error
+        elif value is None:
+            continue
+        if age is not None:
+            ages[name] = age
+        values[name] = value
+    return Content(values, errors or NOTHING, ages or NOTHING)
+
+
+def beyond_first_schema(cells: tuple[Cell, ...]) -> bool:
+    """Tell whether a cell is of a kind that files of schema 1 do not have: anything but a number without an age."""
+    return any(
+        cell in _MEANT if isinstance(cell, bytes) else isinstance(cell, str) and not cell.lstrip("-").isdecimal()
+        for cell in cells
+    )

@@ -15,7 +15,16 @@ from lfs10d.outbox.losses import Loss, joined
 from lfs10d.outbox.store import database
 from lfs10d.outbox.store.catalogue import Catalogue
 from lfs10d.outbox.store.database import PAGE, Limits, number, transaction
-from lfs10d.outbox.store.row import Cell, DamagedError, check, pack_rtt, unpack_rtt, values_from, values_of
+from lfs10d.outbox.store.row import (
+    Cell,
+    DamagedError,
+    beyond_first_schema,
+    check,
+    content_of,
+    pack_rtt,
+    unpack_rtt,
+    values_of,
+)
 from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry.publication import Sample
 
@@ -68,6 +77,7 @@ class SampleFile:
         self._db = database.connect(path, boot=boot, limits=limits)
         try:
             self._catalogue = Catalogue(self._db, boot=boot)
+            self._wide = database.is_wide(self._db)
             self.losses = tuple(
                 Loss(*each) for each in self._db.execute("SELECT device, boot, from_seq, to_seq, count FROM loss")
             )
@@ -122,7 +132,11 @@ class SampleFile:
         sample = entry.sample
         series_id, series, base = self._catalogue.place(sample, entry.shift, repeated=entry.repeated)
         key, at, rtt = self.next, sample.ts - base, pack_rtt(sample.rtt_ms)
-        first, *others = values_of(sample) or (None,)
+        cells = values_of(sample)
+        if not self._wide and beyond_first_schema(cells):
+            database.widen(self._db)
+            self._wide = True
+        first, *others = cells or (None,)
         checked = check(series.text, sample.seq, at, rtt, first, *others)
         self._db.execute(
             "INSERT INTO sample VALUES (?, ?, ?, ?, ?, ?, ?)", (key, series_id, sample.seq, at, rtt, first, checked)
@@ -162,18 +176,21 @@ class SampleFile:
         era, series = self._catalogue.find(series_id)
         if check(series.text, seq, at, rtt, value, *others) != checked:
             raise DamagedError("a sample is not what was written")
+        content = content_of(series, (value, *others))
         sample = Sample(
             device=series.device,
             boot=series.boot,
             seq=seq,
             ts=era.base + at,
             clock=era.clock,
-            values=values_from(series, (value, *others)),
+            values=content.values,
             units=dict(series.units),
             names=series.names,
             quality=series.quality,
             error=series.error,
             rtt_ms=unpack_rtt(rtt),
+            errors=content.errors,
+            ages=content.ages,
         )
         return StoredRow(key, sample, era.shift if era.boot == self._boot else None, series.repeated)
 

@@ -9,7 +9,17 @@ from pathlib import Path
 
 import pytest
 
-from lfs10d.outbox.store.database import APPLICATION_ID, PAGE, SCHEMA, ForeignError, connect, number, transaction
+from lfs10d.outbox.store.database import (
+    APPLICATION_ID,
+    PAGE,
+    SCHEMA,
+    ForeignError,
+    connect,
+    is_wide,
+    number,
+    transaction,
+    widen,
+)
 from lfs10d.outbox.store.row import DamagedError
 from tests.support.rows import BOOT, ROOMY
 
@@ -53,10 +63,19 @@ def test_file_and_log_share_the_limit(size: int, log: int) -> None:
 def test_a_later_schema_is_refused(path: Path) -> None:
     connect(path, boot=BOOT, limits=ROOMY).close()
     with closing(sqlite3.connect(path)) as db:
-        db.execute("PRAGMA user_version = 2")
-    with pytest.raises(ForeignError, match="schema 2, ours is 1") as refused:
+        db.execute("PRAGMA user_version = 3")
+    with pytest.raises(ForeignError, match="schema 3, ours is 2") as refused:
         connect(path, boot=BOOT, limits=ROOMY)
     assert refused.value.later
+
+
+def test_a_file_of_wide_samples_is_ours_and_stays_wide(path: Path) -> None:
+    with closing(connect(path, boot=BOOT, limits=ROOMY)) as db:
+        assert not is_wide(db)
+        widen(db)
+        assert is_wide(db)
+    with closing(connect(path, boot=BOOT, limits=ROOMY)) as db:
+        assert is_wide(db)
 
 
 @pytest.mark.parametrize("statement", ["PRAGMA application_id = 7", "CREATE TABLE t (x)", "PRAGMA user_version = 3"])
