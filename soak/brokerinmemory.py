@@ -18,14 +18,15 @@ class BrokerInMemory:
         self.loop = loop
         self.up = True
         self.published: list[tuple[str, bytes]] = []
-        self.connection: ConnectionInMemory | None = None
+        self.connections: dict[str, ConnectionInMemory] = {}
+        """By client id."""
 
     def go(self) -> None:
         """Be away from now on; what was not acknowledged was taken all the same."""
         self.up = False
-        if self.connection is not None:
-            self.connection.tell("ended", Disconnect(DisconnectReason.LOST, "the broker is away"))
-            self.connection = None
+        for connection in self.connections.values():
+            connection.tell("ended", Disconnect(DisconnectReason.LOST, "the broker is away"))
+        self.connections.clear()
 
     def come(self) -> None:
         """Be back."""
@@ -47,11 +48,12 @@ class ConnectionInMemory(Connection):
     home: BrokerInMemory
 
     def __init__(self, settings: BrokerSettings, version: Version, events: Events, *, will: Will | None = None) -> None:
-        del settings, will
+        del will
+        self._client_id = settings.client_id
         self._told: Events | None = events
         self._last = 0
         if self.home.up:
-            self.home.connection = self
+            self.home.connections[settings.client_id] = self
             self.tell("accepted", Accepted(version))
         else:
             self.tell("ended", Disconnect(DisconnectReason.UNREACHABLE, "the broker is away"))
@@ -77,7 +79,7 @@ class ConnectionInMemory(Connection):
     ) -> int | None:
         """Take one message."""
         del qos, retain, response_topic, correlation
-        if self.home.connection is not self:
+        if self.home.connections.get(self._client_id) is not self:
             return None
         self.home.published.append((topic, payload))
         self._last += 1

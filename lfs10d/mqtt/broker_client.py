@@ -9,6 +9,7 @@ import asyncio
 import logging
 import random
 from collections.abc import Callable
+from dataclasses import replace
 
 from lfs10d.errors import BrokerError
 from lfs10d.mqtt.connection import Connection
@@ -23,8 +24,9 @@ log = logging.getLogger(__name__)
 class BrokerClient:
     """`events.accepted` and `events.ended` come in turn, once for each connection that stood.
 
-    `explained()` tells whether a message of ours may be why the broker ends the connection that stands. `connect`
-    begins a connection; in virtual time it is one to a broker in memory.
+    `explained()` tells whether a message of ours may be why the broker ends the connection that stands;
+    `has_second()` whether there is one made by `beside`, for which the broker may do so. `connect` begins a
+    connection; in virtual time it is one to a broker in memory.
     """
 
     def __init__(
@@ -35,6 +37,7 @@ class BrokerClient:
         will: Will | None = None,
         chance: Callable[[], float] = random.random,
         explained: Callable[[], bool] = lambda: False,
+        has_second: Callable[[], bool] = lambda: False,
         connect: type[Connection] = Connection,
     ) -> None:
         self._settings = settings
@@ -43,6 +46,7 @@ class BrokerClient:
         self._will = will
         self._chance = chance
         self._explained = explained
+        self._has_second = has_second
         self._connect = connect
         self._reconnect = Reconnect(settings.version, chance, len(self._nodes))
         self._connection: Connection | None = None
@@ -131,6 +135,11 @@ class BrokerClient:
         """Note that the broker had published our will before we came back."""
         self._reconnect.missed()
 
+    def beside(self, events: Events, suffix: str) -> Connection:
+        """Begin a second connection to the same node, without a will; its client id is ours with the suffix."""
+        settings = replace(self.settings, client_id=f"{self.settings.client_id}{suffix}")
+        return self._connect(settings, self._reconnect.version, events)
+
     def renew(self, settings: BrokerSettings) -> None:
         """Begin anew with other settings, after `leave`."""
         self._settings = settings
@@ -169,7 +178,12 @@ class BrokerClient:
         self._connection = None
         self._over.set()
         now, place = self._now(), self.settings.place
-        self._reconnect.ended(ended, now, explained=stood and ended.by_message and self._explained())
+        second = stood and self._has_second()
+        explained = stood and ended.by_message and (second or self._explained())
+        if second and ended.ending is DisconnectReason.TAKEN_OVER:  # by ourselves
+            self._reconnect.ended(replace(ended, ending=DisconnectReason.LOST), now, explained=True)
+        else:
+            self._reconnect.ended(ended, now, explained=explained)
         if self._wanted:
             self._log_end(ended, place, self._reconnect.due - now)
             self._timer = asyncio.get_running_loop().call_at(self._reconnect.due, self._try)

@@ -1,22 +1,36 @@
-"""Retained topics of devices that are gone: looked for at the broker, and cleared. A shell around `OrphanSearch`."""
+"""Retained topics of devices that are gone: looked for at the broker, and cleared. A shell around `OrphanSearch`.
+
+They are read over a second connection with a client id of its own: there may be tens of thousands, and the broker's
+acknowledgements of samples would wait behind them. Where the broker does not permit that, they are read over the
+first. A broker that gives all connections of a user one client id (mosquitto: `use_username_as_clientid`) ends the
+first connection for the second: then no second one is made again until other settings are read.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from collections.abc import Set as AbstractSet
 
 from lfs10d.mqtt.connection import Connection
-from lfs10d.mqtt.messages import Filter, Incoming
+from lfs10d.mqtt.messages import Accepted, Events, Filter, Incoming
 from lfs10d.mqtt.orphans import OrphanSearch
+from lfs10d.mqtt.reasons import Disconnect, DisconnectReason
 from lfs10d.mqtt.topics import Topics
 
 log = logging.getLogger(__name__)
 
 
+SECOND_CLIENT = "-retained"
+"""Ends the client id of the second connection."""
+
+
 class Cleanup:
-    """`owned()` returns the retained topics that are ours; `clear` is given the others."""
+    """`owned()` returns the retained topics that are ours; `clear` is given the others.
+
+    `connect` begins the second connection, whose client id ends as it is told.
+    """
 
     def __init__(
         self,
@@ -24,28 +38,52 @@ class Cleanup:
         *,
         owned: Callable[[], AbstractSet[str]],
         clear: Callable[[Iterable[str]], None],
+        connect: Callable[[Events, str], Connection],
     ) -> None:
         self.wanted = False
         """To be begun as soon as what we clear ourselves has gone out: else the broker would show it as left over."""
+        self.single = False
+        """The broker does not permit a second connection."""
         self._topics = topics
         self._owned = owned
         self._clear = clear
+        self._connect = connect
         self._standing: Connection | None = None
+        self._second: _SecondConnection | None = None
         self._search: OrphanSearch | None = None
+        self._subscription: int | None = None
 
     @property
     def under_way(self) -> bool:
-        """The broker is sending what it retains."""
-        return self._search is not None
+        """The broker is asked what it retains, or is sending it."""
+        return self._standing is not None
+
+    @property
+    def has_second(self) -> bool:
+        """The second connection is begun, and not over."""
+        return self._second is not None
 
     def begin(self, standing: Connection | None) -> None:
         """Have the broker send what it retains, unless that is under way or it is away."""
         self.wanted = False
-        if standing is None or self._search is not None:
+        if standing is None or self.under_way:
             return
+        self._standing = standing
+        if self.single:
+            self._search_over(standing)
+        else:
+            self._second = _SecondConnection(
+                lambda events: self._connect(events, SECOND_CLIENT),
+                search=self._search_over,
+                on_end=self._on_second_end,
+                to=self,
+            )
+
+    def _search_over(self, connection: Connection) -> None:
         loop = asyncio.get_running_loop()
-        self._standing, self._search = standing, OrphanSearch(self._topics, loop.time())
-        standing.subscribe(
+        self._search = OrphanSearch(self._topics, loop.time())
+        # Without retain_as_published the flag tells what was retained before, and nothing else.
+        self._subscription = connection.subscribe(
             [
                 Filter(topic, qos=0, retain_as_published=False, no_local=True)
                 for topic in self._topics.retained_of_devices
@@ -53,9 +91,20 @@ class Cleanup:
         )
         loop.call_at(self._search.due, self._end, self._search)
 
-    def lost(self) -> None:
-        """Abandon it: the connection is gone."""
-        self._standing = self._search = None
+    def lost(self, ended: Disconnect) -> None:
+        """Abandon it: the first connection is gone."""
+        if self._second is not None:
+            self.single = ended.ending is DisconnectReason.TAKEN_OVER or ended.by_message
+            if self.single:
+                log.info("the broker may permit one connection only: no second one is made from now on")
+            self._second.abandon()
+        self._standing = self._second = self._search = None
+
+    def subscribed(self, mid: int) -> None:
+        """Take the broker's answer to a subscription: from now on it is silent when it has sent everything."""
+        if self._search is not None and mid == self._subscription:
+            self._search.subscribed(asyncio.get_running_loop().time())
+            asyncio.get_running_loop().call_at(self._search.due, self._end, self._search)
 
     def on_message(self, message: Incoming) -> bool:
         """Take a message; return whether it was one of those looked for."""
@@ -63,17 +112,83 @@ class Cleanup:
             return False
         return self._search.on_message(message.topic, message.payload, asyncio.get_running_loop().time())
 
+    def _on_second_end(self, ended: Disconnect) -> None:
+        self._second = None
+        if self._standing is not None:
+            log.info("%s, for a second connection; retained topics are read over the first", ended.message)
+            self._search_over(self._standing)
+
     def _end(self, search: OrphanSearch) -> None:
-        standing = self._standing
+        standing, second = self._standing, self._second
         if standing is None or search is not self._search:
             return
         loop = asyncio.get_running_loop()
         if loop.time() < search.due:
             loop.call_at(search.due, self._end, search)
             return
-        self._standing = self._search = None
-        standing.unsubscribe(self._topics.retained_of_devices)
-        orphans = search.orphans(self._owned())
-        if orphans:
-            log.info("clearing %d retained topics of devices that are no longer configured", len(orphans))
-            self._clear(orphans)
+        self._standing = self._second = self._search = None
+        if second is None:
+            standing.unsubscribe(self._topics.retained_of_devices)
+        else:
+            second.leave()
+        self._clear_some(search.orphans(self._owned), 0)
+
+    def _clear_some(self, orphans: Iterator[tuple[str, ...]], cleared: int) -> None:
+        some = next(orphans, None)
+        if some is not None:
+            self._clear(some)
+            asyncio.get_running_loop().call_soon(self._clear_some, orphans, cleared + len(some))
+        elif cleared:
+            log.info("clearing %d retained topics of devices that are no longer configured", cleared)
+
+
+class _SecondConnection:
+    """The events of the second connection, until it is left or abandoned."""
+
+    def __init__(
+        self,
+        connect: Callable[[Events], Connection],
+        *,
+        search: Callable[[Connection], None],
+        on_end: Callable[[Disconnect], None],
+        to: Cleanup,
+    ) -> None:
+        self._search = search
+        self._on_end = on_end
+        self._to = to
+        self._over = False
+        self._connection = connect(self)
+
+    def leave(self) -> None:
+        """Disconnect in order; nothing of it counts any more."""
+        self._over = True
+        self._connection.leave()
+
+    def abandon(self) -> None:
+        """End it at once."""
+        self._over = True
+        self._connection.abandon()
+
+    def accepted(self, accepted: Accepted) -> None:
+        """Subscribe."""
+        del accepted
+        self._search(self._connection)
+
+    def ended(self, ended: Disconnect) -> None:
+        """Report an end that we did not make."""
+        if not self._over:
+            self._on_end(ended)
+
+    def acknowledged(self, mid: int, reason: int) -> None:
+        """Do nothing: nothing is published here."""
+
+    def subscribed(self, mid: int, reasons: tuple[int, ...]) -> None:
+        """Pass it on."""
+        del reasons
+        if not self._over:
+            self._to.subscribed(mid)
+
+    def arrived(self, message: Incoming) -> None:
+        """Pass it on."""
+        if not self._over:
+            self._to.on_message(message)

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field
+from itertools import islice
 
 from lfs10d.mqtt.topics import Topics
 
 QUIET = 0.5
-"""Seconds without a retained message after which the broker has sent them all."""
+"""Seconds without a retained message, once the broker has answered, after which the broker has sent them all."""
 
 LONGEST = 120.0
 """Seconds after which a search ends in any case; a slow gateway takes 30 s for 60 000 messages, which come anyway."""
+
+
+AT_ONCE = 64
+"""Topics that are cleared in one go of the loop, about 10 us each."""
 
 
 @dataclass(slots=True)
@@ -20,11 +26,12 @@ class OrphanSearch:
 
     topics: Topics
     begun: float
-    _found: set[str] = field(default_factory=set)
-    _last_at: float = 0.0
+    _found: dict[str, None] = field(default_factory=dict)
+    _last_at: float | None = None
 
-    def __post_init__(self) -> None:
-        self._last_at = self.begun
+    def subscribed(self, now: float) -> None:
+        """Take the broker's answer to the subscription; some send it before what they retain, some after."""
+        self._last_at = now
 
     def on_message(self, topic: str, payload: bytes, now: float) -> bool:
         """Take one retained message; return False if it is not one of a device's topics."""
@@ -33,14 +40,21 @@ class OrphanSearch:
             return False
         self._last_at = now
         if payload:
-            self._found.add(relative)
+            self._found[relative] = None
         return True
 
     @property
     def due(self) -> float:
-        """When it is over."""
-        return min(self._last_at + QUIET, self.begun + LONGEST)
+        """When it is over if nothing more comes; a broker that has not answered yet may be slow."""
+        latest = self.begun + LONGEST
+        return latest if self._last_at is None else min(self._last_at + QUIET, latest)
 
-    def orphans(self, owned: AbstractSet[str]) -> tuple[str, ...]:
-        """Return the topics under `B` to be cleared, in order."""
-        return tuple(sorted(self._found - owned))
+    def orphans(self, owned: Callable[[], AbstractSet[str]]) -> Iterator[tuple[str, ...]]:
+        """Yield the topics under `B` to be cleared, at most `AT_ONCE` each time, as they were found.
+
+        A topic that is owned when its turn comes is none.
+        """
+        found = iter(self._found)
+        while some := tuple(islice(found, AT_ONCE)):
+            ours = owned()
+            yield tuple(topic for topic in some if topic not in ours)

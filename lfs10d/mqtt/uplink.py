@@ -1,8 +1,9 @@
 """The daemon at the broker: its will, its bursts, its requests, and what is left over from before.
 
-After a connect: subscribe to requests and to our own availability; every retained topic; when the broker has
-them all, availability `online`; then live samples; then clear the retained topics of devices that are no longer
-configured; 10 s later the backlog. Nothing here blocks. `Outbox`, `Reconnect` and `OrphanSearch` decide.
+After a connect: subscribe to requests and to our own availability; every retained topic; when the broker has them
+all, availability `online`; then live samples; then clear the retained topics of devices that are no longer
+configured, which are read over a second connection; 10 s later the backlog. Nothing here blocks. `Outbox`,
+`Reconnect` and `OrphanSearch` decide.
 """
 
 from __future__ import annotations
@@ -70,17 +71,13 @@ class Uplink:
             self,
             will=Will(self._topics.availability, OFFLINE.encode()),
             explained=lambda: self._sender.explains_end,
+            has_second=lambda: self._cleanup.has_second,
             connect=connect,
         )
         self._outbox = Outbox(detection=2.0 * settings.keepalive)
         self.discovery = Discovery(self._topics, self.publish, is_out=lambda: self._outbox.retained_out)
-        self._sender = Sender(
-            self._outbox,
-            self._topics,
-            base.rpartition("/")[2],
-            epoch_ms=epoch_ms,
-            stuck=self._on_stuck,
-        )
+        line = base.rpartition("/")[2]
+        self._sender = Sender(self._outbox, self._topics, line, epoch_ms=epoch_ms, stuck=self._on_stuck)
         self._subscription: int | None = None
         self._farewell = Farewell(self._client, self._outbox, self._sender.wake)
         self._epoch_ms, self._store = epoch_ms, store
@@ -117,7 +114,8 @@ class Uplink:
     async def start(self, events: UplinkEvents, *, on_request: OnRequest, on_spool_trouble: OnSpoolTrouble) -> None:
         """Begin to connect; what is published before waits."""
         self._events, self._on_request = events, on_request
-        self._cleanup = Cleanup(self._topics, owned=events.topics, clear=self._clear_orphans)
+        connect, clear = self._client.beside, self._clear_orphans
+        self._cleanup = Cleanup(self._topics, owned=events.topics, clear=clear, connect=connect)
         if self._store is not None:
             self._spooler = Spooler(
                 self._outbox,
@@ -183,6 +181,7 @@ class Uplink:
             self._leaving = True
             await self._farewell.part(_OFFLINE)
             self._leaving = False
+            self._cleanup.single = False
             self._client.renew(settings)
             return
         self._cleanup.wanted = True
@@ -250,7 +249,7 @@ class Uplink:
         self._sender.lost(ended)
         if self._retained_reader is not None:
             self._retained_reader.lost()
-        self._cleanup.lost()
+        self._cleanup.lost(ended)
         self.discovery.lost()
         self._retained_requests.lost()
         self._drop_told = False
@@ -276,6 +275,7 @@ class Uplink:
         if self._retained_reader is not None:
             self._retained_reader.subscribed(mid, reasons)
         self.discovery.subscribed(mid, reasons)
+        self._cleanup.subscribed(mid)
         if mid == self._subscription:
             self.requests_denied = bool(reasons) and reasons[0] >= REFUSED_FROM
             for topic, reason in zip((self._topics.requests, self._topics.availability), reasons, strict=False):

@@ -396,6 +396,38 @@ def with_password(broker: Mosquitto, program: Callable[[str], str], folder: Path
     broker.start()
 
 
+@pytest.mark.parametrize("said", [b"\xe0\x02\x8e\x00", b""])
+def test_a_broker_that_ends_the_first_connection_for_our_second_has_shown_no_other_client(
+    serving: Serving, said: bytes
+) -> None:
+    """As mosquitto does with `use_username_as_clientid`."""
+    writers: list[asyncio.StreamWriter] = []
+
+    async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await reader.read(1000)
+        for before in writers:
+            before.write(said)
+            before.close()
+        writers[:] = [writer]
+        writer.write(b"\x20\x03\x00\x00\x00")
+        await reader.read(1000)
+
+    async def scenario() -> None:
+        async with serving(answer) as port:
+            witness, beside = Witness(), Witness()
+            client = BrokerClient(settings_of(port), witness, chance=lambda: 1.0, has_second=lambda: True)
+            client.start()
+            await client.opened(PATIENCE)
+            second = client.beside(beside, "-retained")
+            await witness.until(lambda: "ended" in witness.told)
+            second.abandon()
+            assert not client.duplicate
+            await client.opened(3.0)
+            await client.leave(1.0)
+
+    asyncio.run(scenario())
+
+
 def test_the_password_is_read_at_each_connect(
     mosquitto: Mosquitto, program: Callable[[str], str], tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
