@@ -33,6 +33,7 @@ VERBS = {
     "profiles": "Show the device profiles.",
     "simulate": "Run a simulated line on a pseudo terminal.",
     "demo": "Show it at work: simulated line, broker, daemon, live view.",
+    "service": "Install, print or remove the systemd unit.",
 }
 """Each has a module of its name with `command` in it; the short help stands here so that --help imports none."""
 
