@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-oldest coverage check format docs bench soak clean
+.PHONY: help demo test test-oldest coverage check format docs bench soak deb clean
 
 help: ## Print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -70,5 +70,8 @@ bench: $(VENV)/.dev ## Measure against a master in C on a paced line (20 minutes
 soak: $(VENV)/.dev ## Account for every sample under faults: FOR=12h SEED=7
 	$(BIN)/python -m soak --for $(or $(FOR),5m) --exchanges $(or $(EXCHANGES),1000000) $(if $(SEED),--seed $(SEED))
 
+deb: $(VENV)/.demo ## Build the Debian package into dist/: SUITE=trixie or SUITE=bookworm
+	packaging/build-deb $(or $(SUITE),trixie)
+
 clean: ## Remove .venv and built files
-	rm -rf $(VENV) bench/build
+	rm -rf $(VENV) bench/build build dist
