@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import datetime
 import os
 import re
 import sys
 from collections.abc import Iterator
+from datetime import UTC, date, datetime
 
 import click
 
@@ -20,7 +20,7 @@ def escaped(text: str) -> str:
     return re.sub(r"^([.'])", r"\\&\1", text, flags=re.MULTILINE)
 
 
-def page(built: datetime.date) -> Iterator[str]:
+def page(built: date) -> Iterator[str]:
     """Yield the lines of lfs10d(1)."""
     yield f'.TH LFS10D 1 {built} "lfs10d {__version__}" "User Commands"'
     yield ".SH NAME"
@@ -67,4 +67,4 @@ def help_of(command: click.Command, program: str, words: list[str]) -> Iterator[
 
 if __name__ == "__main__":
     seconds = int(os.environ.get("SOURCE_DATE_EPOCH", "0"))
-    sys.stdout.write("\n".join(page(datetime.datetime.fromtimestamp(seconds, datetime.UTC).date())) + "\n")
+    sys.stdout.write("\n".join(page(datetime.fromtimestamp(seconds, UTC).date())) + "\n")
