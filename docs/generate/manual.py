@@ -41,7 +41,8 @@ def page(built: date) -> Iterator[str]:
         yield f".TP\n.I {escaped(file)}\n{escaped(meaning)}"
     yield ".SH EXIT STATUS"
     yield escaped(
-        "0 done; 1 the thing asked for failed; 2 usage; 69 broker or port not reachable or busy; 78 configuration error."
+        "0 done; 1 the thing asked for failed; 2 usage; 69 broker or port not reachable, or busy; "
+        "78 configuration error."
     )
     yield ".SH SEE ALSO"
     yield ".I /usr/share/doc/lfs10d"
