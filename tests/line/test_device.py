@@ -60,6 +60,10 @@ def test_the_p99_of_100_answers_leaves_one_out() -> None:
     for _ in range(100):
         response_times.learn(0.02)
     assert response_times.p99 == 0.02
+    assert response_times.count_near(0.025, 0.0051) == len(response_times) == 100
+    assert response_times.count_near(0.03, 0.009) == 0
+    response_times.forget()
+    assert response_times.count_near(0.02, 0.001) == 0
 
 
 def test_after_a_change_of_rate_learning_begins_anew() -> None:
