@@ -14,7 +14,7 @@ from typing import Annotated, Literal, TypeAlias
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from lfs10d.config.short_forms import SLAVE_ID, OrBareId, items, slave_mapping
-from lfs10d.schema.addresses import BaseTopic, Hosts, node_text, split_node
+from lfs10d.schema.addresses import BaseTopic, Hosts, TopicPrefix, node_text, split_node
 from lfs10d.schema.fields import (
     Choice,
     Duration,
@@ -254,7 +254,7 @@ class HomeassistantConfig(Section):
     discovery: Annotated[bool, Flag()] = Field(
         default=False, description="Announce the line and its devices to Home Assistant; false takes it back."
     )
-    prefix: Annotated[str, BaseTopic()] = Field(
+    prefix: Annotated[str, TopicPrefix()] = Field(
         "homeassistant", description="The discovery prefix set in Home Assistant's MQTT integration."
     )
 
