@@ -88,7 +88,11 @@ class DeviceSpec:
     def begins_anew(self, before: DeviceSpec) -> bool:
         """Whether nothing that was learned of the device as it was `before` holds for it now."""
         reborn = self.enabled and not before.enabled
-        return reborn or (self.slave, self.profile, self.codec) != (before.slave, before.profile, before.codec)
+        return reborn or (self.slave, self.profile.plain, self.codec) != (
+            before.slave,
+            before.profile.plain,
+            before.codec,
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -211,6 +211,11 @@ class Value(Registered):
         return self.register + self.words
 
     @property
+    def is_text(self) -> bool:
+        """Whether it is published as text or as a boolean, not as a number."""
+        return False
+
+    @property
     def is_wind_speed(self) -> bool:
         """Whether it is a wind speed: by its name, or by its device class."""
         return WIND_SPEED in (self.name, self.device_class)

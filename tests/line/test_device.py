@@ -237,6 +237,14 @@ def test_what_was_learned_holds_until_another_slave_is_meant(changed: dict[str, 
     assert replace(spec, **changed).begins_anew(spec) is anew  # type: ignore[arg-type]  # names and values go together
 
 
+def test_a_calibration_changes_nothing_that_was_learned() -> None:
+    spec = a_device().spec
+    calibrated = replace(spec, profile=spec.profile.calibrated({"wind_speed": (1.013, 0.06)}))
+    assert calibrated.profile != spec.profile
+    assert not calibrated.begins_anew(spec)
+    assert not spec.begins_anew(calibrated)
+
+
 def test_one_that_is_enabled_again_begins_anew() -> None:
     spec = a_device().spec
     assert spec.begins_anew(replace(spec, enabled=False))
