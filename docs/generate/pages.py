@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from docs.generate import architecture, commands, configuration, mqtt, simulate
+from docs.generate import architecture, commands, configuration, mqtt, profiles, simulate
 
 FOLDER = Path(__file__).resolve().parent.parent
 TEMPLATES = Path(__file__).resolve().parent / "templates"
@@ -33,6 +33,7 @@ PAGES: Mapping[str, Callable[[], str]] = {
     "commands.md": _page("commands.md", commands.parts),
     "configuration.md": _page("configuration.md", configuration.parts),
     "mqtt.md": _page("mqtt.md", mqtt.parts),
+    "profiles.md": _page("profiles.md", profiles.parts),
     "simulate.md": _page("simulate.md", simulate.parts),
 }
 """What makes each page, by its file below docs/."""

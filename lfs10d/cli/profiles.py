@@ -14,10 +14,12 @@ import click
 from lfs10d.cli import json_option
 from lfs10d.cli.options import profile_names
 from lfs10d.cli.render.table import columns
+from lfs10d.profiles.facts import Fact
 from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.profiles.registers import span
-from lfs10d.profiles.values import Fact, Setting, Value
+from lfs10d.profiles.settings import Setting
+from lfs10d.profiles.values import Value
 
 Row: TypeAlias = tuple[str, ...]
 

@@ -17,7 +17,7 @@ from lfs10d.cli.options import DurationType, profile_names
 from lfs10d.profiles.library import load_profile
 from lfs10d.schema.quantities import BAUDRATES
 from lfs10d.simulator.builder import LinePlan, build, slave_ids
-from lfs10d.simulator.fault_file import FaultFile, load_faults
+from lfs10d.simulator.fault_file import FaultFile, load_faults, profiles_of
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.registers import LFS10, blueprint_of
@@ -130,9 +130,11 @@ def command(**values: Any) -> None:  # noqa: ANN401  # sixteen options; `Simulat
     options = SimulateOptions(**values)
     plan = options.plan
     faults = FaultFile() if options.faults is None else load_faults(options.faults, plan.slaves)
+    folder = Path() if options.faults is None else options.faults.parent
+    blueprints = {slave: blueprint_of(each) for slave, each in profiles_of(faults, folder).items()}
     latency = faults.line.latency if options.latency is None else options.latency
     port = PtyLine(
-        build(plan, faults),
+        build(plan, faults, blueprints),
         link=options.link,
         echo=options.echo or faults.line.echo,
         latency=latency,

@@ -28,12 +28,12 @@ When the port is back every device is UNHEARD.
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
 from collections import deque
 from dataclasses import dataclass, field
 from enum import StrEnum
 from math import ceil
 
+from lfs10d.line.read_plan import ReadPlan
 from lfs10d.line.request_gap import RequestGap
 from lfs10d.modbus.frames import Codec
 from lfs10d.profiles.profile import Profile
@@ -88,11 +88,7 @@ class DeviceSpec:
     def begins_anew(self, before: DeviceSpec) -> bool:
         """Whether nothing that was learned of the device as it was `before` holds for it now."""
         reborn = self.enabled and not before.enabled
-        return reborn or (self.slave, self.profile.plain, self.codec) != (
-            before.slave,
-            before.profile.plain,
-            before.codec,
-        )
+        return reborn or (self.slave, self.profile, self.codec) != (before.slave, before.profile, before.codec)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,12 +101,12 @@ class PollRules:
 
 
 class ResponseTimes:
-    """The response times in s (last bit of the request to first byte of the answer) of the last answers."""
+    """The last answers' response_times in s (last bit of the request to first byte of the answer), p99, least, most."""
 
     def __init__(self) -> None:
         self._last: deque[float] = deque(maxlen=LEARNED_FROM)
-        self._ordered: list[float] = []
         self.p99: float | None = None
+        self.least = self.most = 0.0
 
     def __len__(self) -> int:
         return len(self._last)
@@ -118,17 +114,13 @@ class ResponseTimes:
     def learn(self, turnaround: float) -> None:
         """Take one more answer's turnaround in s."""
         self._last.append(turnaround)
-        self._ordered = ordered = sorted(self._last)
+        ordered = sorted(self._last)
         self.p99 = ordered[ceil(0.99 * len(ordered)) - 1]
-
-    def count_near(self, turnaround: float, margin: float) -> int:
-        """Return how many of the last answers took as long as `turnaround` s, give or take `margin` s."""
-        return bisect_right(self._ordered, turnaround + margin) - bisect_left(self._ordered, turnaround - margin)
+        self.least, self.most = ordered[0], ordered[-1]
 
     def forget(self) -> None:
         """Begin anew, as after a change of rate."""
         self._last.clear()
-        self._ordered = []
         self.p99 = None
 
 
@@ -163,6 +155,11 @@ class Device:
     start_polls: int = START_POLLS
     again_at: float = 0.0
     hurried: bool = False
+    reads: ReadPlan = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Plan its reads by its profile."""
+        self.reads = ReadPlan(self.spec.profile)
 
     @property
     def name(self) -> str:
@@ -251,6 +248,7 @@ class Device:
         if self.failures >= self.rules.offline_after:
             self.health = Health.OFFLINE
             self.gap.offline()
+            self.reads.forget()
             self.probe_interval = min(PROBE_INTERVAL_LEAST, self.rules.probe_interval_max)
         self.next_probe = now + self.probe_interval
 
@@ -260,6 +258,7 @@ class Device:
         self.silent = True
         self.start_polls = 0
         self.polling = False
+        self.reads.forget()
 
     def reconnected(self) -> None:
         """Note that the port is open again: nothing is known of the device yet."""

@@ -37,6 +37,8 @@ class Devices(dict[str, Device]):
                     device.gap = known.gap
             elif device.spec.interval != spec.interval:
                 fresh.append(device)
+            if device.spec.profile is not spec.profile:
+                device.reads.follow(spec.profile)
             device.spec, device.rules = spec, rules
             device.gap.configured = spec.request_gap
             self[spec.name] = device

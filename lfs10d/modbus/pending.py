@@ -100,7 +100,7 @@ class PendingRequests:
         if until is not None:
             return until
         confusable = isinstance(request, ReadRegisters) and self.confusable(request, codec)
-        if barrier is not None and (barrier_first or confusable):
+        if barrier is not None and (barrier_first or confusable) and self._tells(barrier, request, codec):
             return barrier
         if confusable:
             self.leave_alone(slave, timeout)
@@ -109,6 +109,14 @@ class PendingRequests:
                 return until
         until = self.lingering_until(request, codec, now)
         return request if until is None else until
+
+    def _tells(self, barrier: ReadRegisters, request: Request, codec: Codec) -> bool:
+        """Whether the answer to the barrier can be told from those to `request` and to what else is pending of ours."""
+        shape = codec.shapes(barrier)[0]
+        others = [each for each in self._pending.get(request.slave, ()) if each.ours and each.request != barrier]
+        return shape != codec.shapes(request)[0] and all(
+            each in self._over or shape != each.codec.shapes(each.request)[0] for each in others
+        )
 
     def confusable(self, request: Request, codec: Codec) -> bool:
         """Whether an answer to an older request could pass for that to `request`, unless a barrier goes first."""

@@ -5,55 +5,89 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from lfs10d.profiles.registers import Cell
+from lfs10d.profiles.cells import Cell
+from lfs10d.profiles.contents import BIT_FUNCTIONS
 from lfs10d.profiles.values import ReadFunction, Value
-from lfs10d.reading import Fault, FaultCode, Number
+from lfs10d.reading import Fault, FaultCode
+from lfs10d.reading import Value as Published
+
+MOST_BITS = 2000
+"""Bits of one read (Modbus Application Protocol V1.1b3, sections 6.1 and 6.2)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """One read: `count` registers from `address`, and the values that lie in them."""
+    """One read: `count` registers (or bits) from `address`, and the values that lie in them.
+
+    `answer` is how many registers its answer brings; bits come in whole bytes.
+    """
 
     function: ReadFunction
     address: int
     count: int
     values: tuple[Value, ...]
     cells: tuple[Cell, ...] = field(repr=False)
+    answer: int = field(repr=False)
 
     @classmethod
     def of(cls, values: tuple[Value, ...]) -> Block:
-        """Span `values`, which are of one function and leave no register between them."""
+        """Span `values`, which are of one function, the first of them lowest."""
         first = values[0]
         count = max(value.end for value in values) - first.register
         cells = tuple(value.cell(first.register) for value in values)
-        return cls(first.function, first.register, count, values, cells)
+        answer = -(-count // 8) * 8 if first.function in BIT_FUNCTIONS else count
+        return cls(first.function, first.register, count, values, cells, answer)
 
-    def decode(self, registers: tuple[int, ...]) -> dict[str, Number] | Fault:
-        """Return every value by name, or the first fault: a sample is good as a whole or not at all."""
-        if len(registers) != self.count:
-            return Fault(FaultCode.MALFORMED, f"{len(registers)} registers came, {self.count} were asked")
-        numbers: dict[str, Number] = {}
+    def take(
+        self, registers: tuple[int, ...], values: dict[str, Published | None], faults: dict[str, Fault]
+    ) -> Fault | None:
+        """Put every value into `values` by name; None where it has none, and into `faults` why.
+
+        Return a fault, and take nothing, where the answer has another length than asked for.
+        """
+        if len(registers) != self.answer:
+            return Fault(FaultCode.MALFORMED, f"{len(registers)} registers came, {self.answer} were asked")
         for cell in self.cells:
-            number = cell.decode(registers)
-            if isinstance(number, Fault):
-                return number
-            numbers[cell.name] = number
-        return numbers
+            value = cell.decode(registers)
+            if isinstance(value, Fault):
+                values[cell.name] = None
+                faults[cell.name] = value
+            else:
+                values[cell.name] = value
+        return None
+
+    def decode(self, registers: tuple[int, ...]) -> dict[str, Published] | Fault:
+        """Return every value by name that is available, or the first fault but `unavailable`.
+
+        So a device is recognised. Where no value is available, that is the fault.
+        """
+        values: dict[str, Published | None] = {}
+        faults: dict[str, Fault] = {}
+        fault = self.take(registers, values, faults)
+        if fault is not None:
+            return fault
+        there = {name: value for name, value in values.items() if value is not None}
+        wrong = [fault for fault in faults.values() if fault.code is not FaultCode.UNAVAILABLE]
+        if not there:
+            wrong += faults.values()
+        return wrong[0] if wrong else there
 
 
-def batch(values: Iterable[Value], most_words: int) -> tuple[Block, ...]:
-    """Put values that touch or overlap into one read of at most `most_words`; read no register between.
+def batch(values: Iterable[Value], most_words: int, may_skip: int = 0) -> tuple[Block, ...]:
+    """Put values that touch or overlap into one read of at most `most_words`.
 
-    Each value fits `most_words` by itself. Blocks come in order of function and address.
+    At most `may_skip` registers between two values are read that no value names. Each value fits `most_words` by
+    itself. Values of one read have one interval. Blocks come in order of function and address.
     """
     blocks: list[Block] = []
     together: list[Value] = []
     end = 0
-    for value in sorted(values, key=lambda value: (value.function, value.register, value.words)):
+    for value in sorted(values, key=_order):
         if together:
             first = together[0]
-            touches = value.function == first.function and value.register <= end
-            if not touches or max(end, value.end) - first.register > most_words:
+            touches = _alike(value, first) and value.register <= end + may_skip
+            most = MOST_BITS if value.function in BIT_FUNCTIONS else most_words
+            if not touches or max(end, value.end) - first.register > most:
                 blocks.append(Block.of(tuple(together)))
                 together.clear()
         end = max(end, value.end) if together else value.end
@@ -61,3 +95,11 @@ def batch(values: Iterable[Value], most_words: int) -> tuple[Block, ...]:
     if together:
         blocks.append(Block.of(tuple(together)))
     return tuple(blocks)
+
+
+def _order(value: Value) -> tuple[float, ...]:
+    return value.function, value.interval or 0, value.register, value.words
+
+
+def _alike(value: Value, other: Value) -> bool:
+    return (value.function, value.interval) == (other.function, other.interval)

@@ -8,89 +8,27 @@ plausible wrong number.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, Literal, TypeAlias, get_args
+from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_validator
 
 from lfs10d.profiles.blocks import Block, batch
-from lfs10d.profiles.values import (
-    Fact,
-    Facts,
-    Place,
-    ReadFunction,
-    Register,
-    Registered,
-    Sentence,
-    Setting,
-    Value,
-    refuse,
-)
+from lfs10d.profiles.contents import BIT_FUNCTIONS
+from lfs10d.profiles.device_facts import MOST_WORDS, Barrier, Factory, Identity, IdRegister, RateRegister, SlaveId
+from lfs10d.profiles.facts import Facts, Place, Register, Sentence, refuse
+from lfs10d.profiles.settings import Setting
+from lfs10d.profiles.values import Value
 from lfs10d.reading import Fault, Number
+from lfs10d.reading import Value as Published
 from lfs10d.schema.fields import Duration, Name, Whole
 
 FramingName: TypeAlias = Literal["rtu", "ascii"]
 ChecksumName: TypeAlias = Literal["crc", "sum"]
-SlaveId: TypeAlias = Annotated[int, Whole(1, 255)]
-Rate: TypeAlias = Literal[1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200]
-
-MOST_WORDS = 125
-"""Registers of one read (Modbus Application Protocol V1.1b3, section 6.3)."""
-
 BUSY_EXCEPTIONS = (6,)
 """Server device busy (Modbus Application Protocol V1.1b3, section 7; EH600: the maker's fuller manual)."""
 
 BYTE_COUNT = 1
 """Byte before the registers of an answer; it counts as data (Fuling DZB manual, appendix B)."""
-
-
-class Barrier(Registered):
-    """A read whose answer has another shape than any poll's, so that a late answer cannot pass for it."""
-
-    function: ReadFunction = Field(3, description="3 reads holding registers, 4 input registers.")
-    count: Annotated[int, Whole(1, MOST_WORDS)] = Field(description="Registers that it asks for.")
-
-
-class IdRegister(Registered):
-    """Where the slave id is set; `locked_by` is what overrules it (`DIP switch`)."""
-
-    locked_by: Sentence | None = Field(None, description="What overrules it, such as a DIP switch.")
-
-
-class RateRegister(Registered):
-    """Where the baud rate is set."""
-
-    codes: dict[int, Register] = Field(description="The register's content for each rate: {9600: 1, 19200: 2}.")
-    locked_by: Sentence | None = Field(None, description="What overrules it, such as a DIP switch.")
-
-    @field_validator("codes", mode="before")
-    @classmethod
-    def _are_of_rates(cls, codes: object) -> object:
-        rates: tuple[int, ...] = get_args(Rate)
-        wanted = " ".join(map(str, rates))
-        keys = codes if isinstance(codes, dict) else {}
-        refuse([((key,), f"is no baud rate; write one of {wanted}") for key in keys if key not in rates])
-        return codes
-
-    @field_validator("codes", mode="after")
-    @classmethod
-    def _differ(cls, codes: dict[int, int]) -> dict[int, int]:
-        problems: list[tuple[Place, str]] = []
-        if not codes:
-            problems.append(((), "names no rate"))
-        rates: dict[int, int] = {}
-        for rate, code in codes.items():
-            first = rates.setdefault(code, rate)
-            if first != rate:
-                problems.append(((rate,), f"{code} is the code of {first} already"))
-        refuse(problems)
-        return codes
-
-
-class Factory(Fact):
-    """How a new device comes: its slave id and baud rate. `line/adopt` looks for it there."""
-
-    id: SlaveId = Field(description="Its slave id.")
-    baudrate: Rate = Field(description="Its baud rate; it need not be among the rates that can be set.")
 
 
 def _ids(ids: tuple[int, int]) -> tuple[int, int]:
@@ -149,12 +87,21 @@ class Profile(Facts):
     request_gap: Annotated[float, Duration(0, 60)] = Field(
         0.0, description="Rest that it needs between the end of one exchange and its next request, whatever it is for."
     )
+    may_skip: Annotated[int, Whole(0, MOST_WORDS - 2)] = Field(
+        0, description="Registers without a name that one read may span between two values."
+    )
+    write_function: Literal[6, 16] = Field(
+        6, description="6, or 16 for a device that knows no other: settings, slave id and baud rate are written by it."
+    )
     busy_exceptions: Annotated[tuple[Annotated[int, Whole(1, 255)], ...], Field(strict=False)] = Field(
         BUSY_EXCEPTIONS, description="Exception codes that mean: ask again later."
     )
     factory: Factory | None = Field(None, description="How a new one comes; `line/adopt` needs it.")
     slave_id: IdRegister | None = Field(None, description="Where its slave id is set.")
     baudrate: RateRegister | None = Field(None, description="Where its baud rate is set.")
+    identify: Annotated[tuple[Identity, ...], Field(strict=False)] = Field(
+        (), description="Registers that tell it from other devices; a scan reads them."
+    )
     values: Annotated[tuple[Value, ...], Field(strict=False)] = Field(
         description="What it measures, the most important first."
     )
@@ -198,7 +145,7 @@ class Profile(Facts):
             problems.append(((), "names no value"))
         most = _words_per_read(info.data)
         for index, value in enumerate(values):
-            if value.words > most:
+            if value.words > most and value.function not in BIT_FUNCTIONS:
                 wanted = f"needs {value.words} registers, one read of this device brings {most} at most"
                 problems.append(((index, "type"), f"{value.type} {wanted}"))
         refuse(problems)
@@ -225,7 +172,7 @@ class Profile(Facts):
             most = _words_per_read(info.data)
             if barrier.count > most:
                 refuse([(("count",), f"one read of this device brings {most} registers at most")])
-            shapes = {(block.function, block.count) for block in batch(values, most)}
+            shapes = {(block.function, block.count) for block in batch(values, most, info.data.get("may_skip", 0))}
             if (barrier.function, barrier.count) in shapes:
                 refuse(
                     [
@@ -253,7 +200,7 @@ class Profile(Facts):
 
     def model_post_init(self, _context: Any, /) -> None:  # noqa: ANN401 - pydantic's signature
         """Batch the values once; reads and decoding are on the path of every poll."""
-        self._blocks = batch(self.values, self.most_words)
+        self._blocks = batch(self.values, self.most_words, self.may_skip)
 
     def calibrated(self, calibration: Mapping[str, tuple[Number, Number]]) -> Profile:
         """Return the profile of a device with certificates: scale and offset by value name; itself where there is none.
@@ -266,7 +213,7 @@ class Profile(Facts):
             value.calibrated(*calibration[value.name]) if value.name in calibration else value for value in self.values
         )
         profile = self.model_copy(update={"values": values})
-        profile._blocks = batch(profile.values, profile.most_words)  # noqa: SLF001 - its own copy
+        profile._blocks = batch(profile.values, profile.most_words, profile.may_skip)  # noqa: SLF001 - its own copy
         profile._plain = self.plain  # noqa: SLF001 - its own copy
         return profile
 
@@ -303,8 +250,12 @@ class Profile(Facts):
         """Return the reads of one poll, neighbouring values together; the same objects every time."""
         return self._blocks
 
-    def decode(self, block: Block, registers: tuple[int, ...]) -> dict[str, Number] | Fault:
-        """Return the values of `block` by name, or the first fault: `not_finite` or `out_of_range`."""
+    def batched(self, values: Iterable[Value]) -> tuple[Block, ...]:
+        """Return the reads that bring some of its values."""
+        return batch(values, self.most_words, self.may_skip)
+
+    def decode(self, block: Block, registers: tuple[int, ...]) -> dict[str, Published] | Fault:
+        """Return the values of `block` that are available, or the first fault: `not_finite` or `out_of_range`."""
         return block.decode(registers)
 
 

@@ -1,209 +1,221 @@
-"""One fact of a profile: a value to be read, a setting, and the words both are written in."""
+"""A value of a profile: where it lies, how it becomes a number, a word or a boolean, and what is believed of it."""
 
 from __future__ import annotations
 
-import re
-from dataclasses import dataclass
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Field,
-    PrivateAttr,
-    ValidationError,
-    ValidationInfo,
-    field_validator,
-)
-from pydantic_core import InitErrorDetails
+from pydantic import Field, PrivateAttr, ValidationInfo, field_validator
 
 from lfs10d.profiles.calibration import Calibration
-from lfs10d.profiles.registers import WORDS, ByteOrder, Cell, Linear, RegisterType, WordOrder, span, spell
-from lfs10d.reading import Number
-from lfs10d.schema.fields import FieldError, FieldKind, Text, Whole, plain_error
-
-Place: TypeAlias = tuple[str | int, ...]
-ReadFunction: TypeAlias = Literal[3, 4]
-
-RESERVED_NAMES = frozenset(
-    {
-        "v",
-        "line",
-        "device",
-        "boot",
-        "seq",
-        "ts",
-        "time",
-        "clock",
-        "unit",
-        "units",
-        "quality",
-        "error",
-        "rtt_ms",
-        "errors",
-        "ages",
-    }
-    | {"historical"}
+from lfs10d.profiles.cells import Cell
+from lfs10d.profiles.contents import (
+    BIT_FUNCTIONS,
+    WORD_BITS,
+    RegisterContent,
+    bits_of,
+    no_content,
+    part_of,
+    part_problems,
+    says_text,
+    width_of,
+    words_of,
 )
-"""Keys of a sample; value names stand flat beside them."""
+from lfs10d.profiles.facts import LAST_REGISTER, Offset, Range, Registered, Scale, UnitText, Word, refuse
+from lfs10d.profiles.facts import RESERVED_NAMES as RESERVED
+from lfs10d.profiles.registers import (
+    INTEGERS,
+    SIGNED,
+    WORDS,
+    ByteOrder,
+    Linear,
+    RegisterType,
+    WordOrder,
+)
+from lfs10d.reading import Number
+from lfs10d.schema.fields import Duration, Text, Whole
 
+ReadFunction: TypeAlias = Literal[1, 2, 3, 4]
+
+TYPES_OF_NUMBERS = "int16, uint16, int32, uint32, int64, uint64, float32, float64, bcd or string"
 WIND_SPEED = "wind_speed"
 """The name of a wind speed, and its device class."""
-
-LAST_REGISTER = 0xFFFF
-"""Register addresses have 16 bits (Modbus Application Protocol V1.1b3, section 4.4)."""
-
-LARGEST_FACTOR = 1e12
-"""Bound of scale and offset, and of 1 / scale: every result of a 32-bit value stays finite."""
+LONGEST = {"bcd": 4, "string": 60}
+"""Registers that a value of these types may fill; of the others the type says how many."""
 
 
-def refuse(problems: list[tuple[Place, str]]) -> None:
-    """Raise pydantic's ValidationError with each problem at its own place, if there are any."""
-    if problems:
-        raise ValidationError.from_exception_data(
-            "profile",
-            [
-                InitErrorDetails(
-                    type=plain_error(message),
-                    loc=place,
-                    input=None,
-                )
-                for place, message in problems
-            ],
-        )
-
-
-@dataclass(frozen=True)
-class Word(FieldKind):
-    """A name in snake_case that is not among the `reserved` ones."""
-
-    reserved: frozenset[str] = frozenset()
-    pattern = re.compile(r"[a-z][a-z0-9_]{0,47}")
-
-    @property
-    def words(self) -> str:
-        """Its characters."""
-        return "a name of 1 to 48 of the characters a-z 0-9 _ that begins with a letter"
-
-    def accept(self, value: object) -> str:
-        """Take text that fits."""
-        if not isinstance(value, str) or self.pattern.fullmatch(value) is None:
-            raise self.refusal(value)
-        if value in self.reserved:
-            raise FieldError(f"is a key of every sample already; choose another, such as raw_{value}")
-        return value
-
-
-@dataclass(frozen=True)
-class Factor(FieldKind):
-    """A scale: not zero, and of a size that keeps every result finite."""
-
-    @property
-    def words(self) -> str:
-        """Its range."""
-        return "a number from 1e-12 to 1e12, or the same negative"
-
-    def accept(self, value: object) -> float:
-        """Take numbers only."""
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.refusal(value)
-        if not 1 / LARGEST_FACTOR <= abs(value) <= LARGEST_FACTOR:
-            raise self.refusal(value)
-        return float(value)
-
-
-Sentence: TypeAlias = Annotated[str, Text(500)]
-UnitText: TypeAlias = Annotated[str, Text(16, what="a unit ('1' for a bare number)")]
-Register: TypeAlias = Annotated[int, Whole(0, LAST_REGISTER)]
-Scale: TypeAlias = Annotated[float, Factor()]
-Offset: TypeAlias = Annotated[float, Field(ge=-LARGEST_FACTOR, le=LARGEST_FACTOR)]
-
-
-def _ordered(bounds: tuple[float, float]) -> tuple[float, float]:
-    if not bounds[0] < bounds[1]:
-        refuse([((), "the first number of a range must be less than the second")])
-    return bounds
-
-
-Range: TypeAlias = Annotated[tuple[float, float], Field(strict=False), AfterValidator(_ordered)]
-
-
-class Facts(BaseModel):
-    """Strict and frozen: no guessing of types, no unknown keys, no NaN, no change after loading."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Fact(Facts):
-    """Something the maker states: `source` is where, `unverified` that nobody has seen it on hardware."""
-
-    source: Sentence | None = Field(None, description="Where the maker says so.")
-    unverified: bool = Field(default=False, description="Nobody has seen it on hardware or in the source documents.")
-    notes: Sentence | None = Field(None, description="What else a person should know.")
-
-
-class Registered(Fact):
-    """A fact about one place; in the file its key is `register`.
-
-    pydantic's metaclass, an ABCMeta, has a method `register`: a field of that name inherits it as its default.
-    """
-
-    address: Register = Field(alias="register", description="The (first) register's address on the wire, 0 to 0xFFFF.")
-
-    @property
-    def register(self) -> int:
-        """The (first) register's address on the wire."""
-        return self.address
+Contents: TypeAlias = Annotated[tuple[Annotated[int | float, RegisterContent()], ...], Field(strict=False)]
+Bits: TypeAlias = Annotated[tuple[Annotated[int, Whole(0, 63)], Annotated[int, Whole(0, 63)]], Field(strict=False)]
+MappedWord: TypeAlias = Annotated[str, Text(64)]
 
 
 class Value(Registered):
     """A measured value: where it lies, how it becomes a number, and which numbers are believed.
 
-    `number = register * scale + offset` in `unit`; a number outside `range` is published as `out_of_range`.
+    `number = content * scale + offset` in `unit`, wrapped to `modulo`; a number outside `range` is `out_of_range`, one
+    of the contents of `unavailable` is no value. With `map` the content becomes a word, by function 1 or 2 a boolean.
     `precision` (decimals) and `device_class` (Home Assistant's word) are for displays and change no value.
     """
 
-    name: Annotated[str, Word(RESERVED_NAMES)] = Field(description="The key under which samples carry it.")
-    function: ReadFunction = Field(3, description="3 reads holding registers, 4 input registers.")
-    type: RegisterType = Field(description="int16, uint16, int32, uint32 or float32.")
+    name: Annotated[str, Word(RESERVED)] = Field(description="The key under which samples carry it.")
+    function: ReadFunction = Field(
+        3, description="3 reads holding registers, 4 input registers, 1 coils, 2 discrete inputs (both are booleans)."
+    )
+    type: RegisterType = Field(
+        None, validate_default=True, description=f"{TYPES_OF_NUMBERS}. Required, but left out with function 1 or 2."
+    )
+    length: Annotated[int, Whole(1, 60)] | None = Field(
+        None, validate_default=True, description="Registers that a string fills, or a bcd of more than one."
+    )
     word_order: WordOrder | None = Field(
         None,
         validate_default=True,
-        description="high_first or low_first: which of two registers holds the high half; 32 bits only.",
+        description="high_first or low_first: which of several registers holds the high part.",
     )
     byte_order: ByteOrder = Field("big", description="big, or little: the bytes within each register swapped.")
+    bits: Bits | None = Field(None, description="First and last bit of a whole number that are meant; 0 is the lowest.")
+    mask: Annotated[int, Whole(1, (1 << 64) - 1)] | None = Field(
+        None, description="The same by a mask: 0x0FF0 means bits 4 to 11."
+    )
+    byte: Literal["high", "low"] | None = Field(None, description="high or low: the byte of a register that is meant.")
+    map: dict[int, MappedWord] | None = Field(
+        None, description="The word for each content, published in its place: {0: dry, 1: rain}."
+    )
+    unavailable: Contents = Field((), description="Contents that mean that there is no value: [0xFFFF, 0x8000].")
+    optional: bool = Field(default=False, description="The device may lack it: exception 02 is no error of the poll.")
     scale: Scale = Field(1.0, description="What the register's content is multiplied by.")
     offset: Offset = Field(0.0, description="What is added after the scale.")
-    unit: UnitText = Field(description="The unit of the number; '1' for a bare one.")
+    modulo: Annotated[float, Field(gt=0, le=1e12)] | None = Field(
+        None, description="Numbers wrap around here: 360 for a direction. After scale, offset and calibration."
+    )
+    unit: UnitText = Field(
+        None,
+        validate_default=True,
+        description="The unit of the number ('1' for a bare one); required, but left out for text and booleans.",
+    )
     range: Range | None = Field(None, description="Least and greatest number that is believed.")
     precision: Annotated[int, Whole(0, 9)] | None = Field(None, description="Decimals on a display.")
     device_class: Annotated[str, Word()] | None = Field(None, description="Home Assistant's word for its kind.")
+    interval: Annotated[float, Duration(0.02, 86400)] | None = Field(
+        None, description="How often it is asked, where that is more rarely than the device."
+    )
+
     _calibration: Calibration | None = PrivateAttr(None)
 
     # A field's validator sees those fields above it that have no error, so that each problem is found at once.
 
+    @field_validator("type", mode="before")
+    @classmethod
+    def _has_a_type_unless_it_is_a_bit(cls, kind: object, info: ValidationInfo) -> object:
+        if info.data.get("function") in BIT_FUNCTIONS:
+            if kind is not None:
+                refuse([((), "function 1 and 2 read booleans; leave the type out")])
+            return "bool"
+        if kind is None:
+            refuse([((), f"is missing; write here: {TYPES_OF_NUMBERS}")])
+        if kind == "bool":
+            refuse([((), "registers hold no booleans; write uint16 with bits and map, or function 1 or 2")])
+        return kind
+
     @field_validator("type", mode="after")
     @classmethod
     def _ends_within_the_registers(cls, kind: RegisterType, info: ValidationInfo) -> RegisterType:
-        if info.data.get("address", 0) + WORDS[kind] > LAST_REGISTER + 1:
-            refuse([((), f"{kind} fills two registers, and 0xFFFF is the last")])
+        words = WORDS.get(kind, 1)
+        if info.data.get("address", 0) + words > LAST_REGISTER + 1:
+            count = {2: "two", 4: "four"}[words]
+            refuse([((), f"{kind} fills {count} registers, and 0xFFFF is the last")])
         return kind
+
+    @field_validator("length", mode="after")
+    @classmethod
+    def _has_a_length_if_itis_text(cls, length: int | None, info: ValidationInfo) -> int | None:
+        kind: RegisterType | None = info.data.get("type")
+        if kind is None:
+            return length
+        most = LONGEST.get(kind)
+        if most is None and length is not None:
+            refuse([((), f"{kind} has its own length; leave it out")])
+        if kind == "string" and length is None:
+            refuse([((), "is missing; write how many registers the text fills")])
+        if most is not None and length is not None:
+            if length > most:
+                refuse([((), f"must be a whole number from 1 to {most} for {kind}, not {length}")])
+            if info.data.get("address", 0) + length > LAST_REGISTER + 1:
+                refuse([((), f"{length} registers from there, and 0xFFFF is the last")])
+        return length
 
     @field_validator("word_order", mode="after")
     @classmethod
     def _has_a_word_order_if_it_has_words(cls, order: WordOrder | None, info: ValidationInfo) -> WordOrder | None:
         kind: RegisterType | None = info.data.get("type")
-        if kind and WORDS[kind] == 1 and order is not None:
+        words = words_of(kind, info.data.get("length")) if kind else 1
+        if kind == "string":
+            if order is not None:
+                refuse([((), "text begins in its first register; leave the word order out")])
+        elif kind and words == 1 and order is not None:
             refuse([((), f"{kind} fills one register; leave the word order out")])
-        if kind and WORDS[kind] > 1 and order is None:
+        elif kind and words > 1 and order is None:
             refuse([((), "is missing; write high_first or low_first: which of two registers holds the high half")])
         return order
 
+    @field_validator("byte_order", "bits", "mask", "byte", mode="after")
+    @classmethod
+    def _is_a_part_of_a_whole_number(cls, part: object, info: ValidationInfo) -> object:
+        kind: RegisterType | None = info.data.get("type")
+        if part is None or kind is None or part == "big":
+            return part
+        if info.field_name == "byte_order":
+            if kind == "bool":
+                refuse([((), "a boolean has no bytes; leave the byte order out")])
+            return part
+        if kind not in INTEGERS:
+            refuse([((), f"is a part of a whole number, and the type is {kind}")])
+        others = [key for key in ("bits", "mask") if info.data.get(key) is not None]
+        if others:
+            refuse([((), f"{others[0]} says already which part is meant")])
+        refuse([((), problem) for problem in part_problems(part, WORD_BITS * WORDS[kind])])
+        return part
+
+    @field_validator("map", mode="after")
+    @classmethod
+    def _names_contents(cls, words: dict[int, str] | None, info: ValidationInfo) -> dict[int, str] | None:
+        kind: RegisterType | None = info.data.get("type")
+        if words is not None and kind is not None:
+            if kind not in {*INTEGERS, "bool"}:
+                refuse([((), f"words stand for whole numbers, and the type is {kind}")])
+            if not words:
+                refuse([((), "names no content")])
+        return words
+
+    @field_validator("unavailable", mode="after")
+    @classmethod
+    def _are_contents(cls, contents: tuple[int | float, ...], info: ValidationInfo) -> tuple[int | float, ...]:
+        kind: RegisterType | None = info.data.get("type")
+        if kind is not None:
+            width = width_of(kind, info.data.get("length"))
+            refuse([((place,), why) for place, each in enumerate(contents) if (why := no_content(each, kind, width))])
+        return contents
+
+    @field_validator("scale", "offset", "modulo", "range", "precision", mode="after")
+    @classmethod
+    def _is_of_a_number(cls, wanted: Any, info: ValidationInfo) -> Any:  # noqa: ANN401 - a field's value
+        usual = {"scale": 1.0, "offset": 0.0}.get(str(info.field_name))
+        if wanted != usual and says_text(info.data):
+            refuse([((), "is of numbers, and this value is text or a boolean; leave it out")])
+        return wanted
+
+    @field_validator("unit", mode="before")
+    @classmethod
+    def _has_a_unit_unless_itis_text(cls, unit: object, info: ValidationInfo) -> object:
+        if unit is not None:
+            return unit
+        if not says_text(info.data):
+            refuse([((), "is missing; write here: the unit of the number, '1' for a bare one")])
+        return "1"
+
     @property
     def words(self) -> int:
-        """Registers it fills."""
-        return WORDS[self.type]
+        """Registers (or bits, by function 1 or 2) it fills."""
+        return words_of(self.type, self.length)
 
     @property
     def end(self) -> int:
@@ -213,7 +225,7 @@ class Value(Registered):
     @property
     def is_text(self) -> bool:
         """Whether it is published as text or as a boolean, not as a number."""
-        return False
+        return says_text(self.__dict__)
 
     @property
     def is_wind_speed(self) -> bool:
@@ -229,6 +241,8 @@ class Value(Registered):
     def cell(self, address: int) -> Cell:
         """Return where it lies in a read that begins at register `address`."""
         low, high = self.range or (None, None)
+        width = width_of(self.type, self.length)
+        part = part_of(self.bits, self.mask, self.byte, width)
         return Cell(
             name=self.name,
             unit=self.unit,
@@ -239,63 +253,11 @@ class Value(Registered):
             linear=Linear.of(self.scale, self.offset),
             low=low,
             high=high,
+            words=self.words,
+            part=part,
+            signed_from=1 << (part.width if part else width) - 1 if self.type in SIGNED else 0,
+            texts=self.map,
+            unavailable=frozenset(bits_of(each, self.type, width) for each in self.unavailable),
+            modulo=self.modulo,
             calibration=self._calibration,
         )
-
-
-class Setting(Registered):
-    """A register that configures the device; written by request only, and only if marked `writable`.
-
-    `range` is in `unit`, after `scale`; `values` tells what each register content that is allowed means.
-    """
-
-    name: Annotated[str, Word()] = Field(description="What to call it.")
-    type: Literal["int16", "uint16"] = Field("uint16", description="int16 or uint16.")
-    scale: Scale = Field(1.0, description="What the register's content is multiplied by.")
-    unit: UnitText = Field("1", description="The unit of the number; '1' for a bare one.")
-    range: Range | None = Field(None, description="Least and greatest number that may be written, in the unit.")
-    values: dict[int, Sentence] | None = Field(
-        None, description="What each register content that may be written means; instead of a range."
-    )
-    writable: bool = Field(default=False, description="A request may write it, within its range or values.")
-
-    @field_validator("values", mode="before")
-    @classmethod
-    def _are_of_contents(cls, values: object) -> object:
-        keys = values if isinstance(values, dict) else {}
-        content = Whole(0, LAST_REGISTER)
-        wrong = [key for key in keys if not isinstance(key, int) or not content.first <= key <= content.last]
-        refuse([((key,), f"is no register content; write {content.words}") for key in wrong])
-        return values
-
-    @field_validator("values", mode="after")
-    @classmethod
-    def _is_an_alternative(cls, values: dict[int, str] | None, info: ValidationInfo) -> dict[int, str] | None:
-        if values == {}:
-            refuse([((), "names no value")])
-        if values is not None and info.data.get("range") is not None:
-            refuse([((), "a setting has either a range or values")])
-        return values
-
-    @field_validator("writable", mode="after")
-    @classmethod
-    def _is_bounded_if_writable(cls, writable: bool, info: ValidationInfo) -> bool:  # noqa: FBT001 - pydantic's call
-        known = "range" in info.data and "values" in info.data
-        if writable and known and info.data["range"] is None and info.data["values"] is None:
-            refuse([((), "a setting is writable only with a range or values")])
-        return writable
-
-    def refusal(self, word: int) -> str | None:
-        """Return why the register content `word` (0..65535) must not be written; None if it may be."""
-        if not self.writable:
-            return f"{self.name} is not marked writable by the profile"
-        if self.values is not None and word not in self.values:
-            allowed = ", ".join(f"{code} ({meaning})" for code, meaning in self.values.items())
-            return f"{self.name} takes {allowed}, not {word}"
-        if self.range is not None:
-            low, high = self.range
-            number = Linear.of(self.scale, 0).of_integer(word - (word >> 15 << 16) if self.type == "int16" else word)
-            if not low <= number <= high:
-                content = f"register content {word} is {spell(number, self.unit)}"
-                return f"{self.name} takes {span(low, high, self.unit)}; {content}"
-        return None

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from lfs10d.simulator.fault_file import FaultFile, SlaveEntry
 from lfs10d.simulator.faults import window
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.line_faults import babble, second_master, stray
-from lfs10d.simulator.registers import LFS10, READ_HOLDING, Blueprint
+from lfs10d.simulator.registers import LFS10, Blueprint
 from lfs10d.simulator.sensor import Sensor
+from lfs10d.simulator.signals import READ_HOLDING
 from lfs10d.simulator.wind import Wind
 from lfs10d.simulator.wire import Format, Framing
 
@@ -32,17 +33,26 @@ class LinePlan:
     """Values unique in the run, in place of moving wind."""
 
 
-def build(plan: LinePlan, faults: FaultFile | None = None, *, keep_log: bool = False) -> SimulatedLine:
+def build(
+    plan: LinePlan,
+    faults: FaultFile | None = None,
+    blueprints: Mapping[int, Blueprint] | None = None,
+    *,
+    keep_log: bool = False,
+) -> SimulatedLine:
     """Return the line with its sensors and everything that ails them and it, but for echo and latency.
 
-    Those are the adapter's: hand `faults.line.echo` and `.latency` to the port or the `PtyLine`.
+    `blueprints` has the devices of single slave ids, where they differ from the plan's. Echo and latency are the
+    adapter's: hand `faults.line.echo` and `.latency` to the port or the `PtyLine`.
     """
     faults = faults or FaultFile()
     line = SimulatedLine(format=plan.format, framing=plan.framing, seed=plan.seed, keep_log=keep_log)
     for slave in plan.slaves:
         entry = faults.slaves.get(slave, SlaveEntry())
         for copy in range(entry.copies):
-            sensor = line.add(_sensor(plan, slave, entry, plan.seed + copy))
+            sensor = line.add(
+                _sensor(plan, slave, entry, plan.seed + copy, (blueprints or {}).get(slave, plan.blueprint))
+            )
             sensor.faults += [fault.sensor_fault for fault in (*faults.all, *entry.faults)]
     for spell in faults.line.babble:
         babble(line, spell.after, spell.last, spell.every)
@@ -56,11 +66,11 @@ def build(plan: LinePlan, faults: FaultFile | None = None, *, keep_log: bool = F
     return line
 
 
-def _sensor(plan: LinePlan, slave: int, entry: SlaveEntry, seed: int) -> Sensor:
+def _sensor(plan: LinePlan, slave: int, entry: SlaveEntry, seed: int, blueprint: Blueprint) -> Sensor:
     shape = plan.format if entry.baudrate is None else replace(plan.format, baudrate=entry.baudrate)
     return Sensor(
         slave,
-        blueprint=plan.blueprint,
+        blueprint=blueprint,
         format=shape,
         framing=plan.framing,
         turnaround=plan.turnaround if entry.turnaround is None else entry.turnaround,

@@ -26,8 +26,10 @@ from typing import Annotated, Literal, TypeAlias
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from lfs10d.errors import ConfigError, Problem
-from lfs10d.schema.document import decode, parse
-from lfs10d.schema.fields import Choice, Duration, Flag, Whole
+from lfs10d.profiles.library import load_profile
+from lfs10d.profiles.profile import Profile
+from lfs10d.schema.document import Document, decode, parse
+from lfs10d.schema.fields import Choice, Duration, Flag, Text, Whole
 from lfs10d.schema.quantities import BAUDRATES
 from lfs10d.simulator.faults import FaultKind, SensorFault, sensor_fault
 
@@ -76,6 +78,9 @@ class FaultEntry(WindowEntry):
     bytes: Length | None = Field(None, description="For garbage, truncated, leading_noise and trailing_noise.")
     answer: Literal["echo", "exception"] = Field("echo", description="For dip_locked: how it answers a write.")
     reads: Literal["old", "new"] = Field("old", description="For dip_locked: what its id register holds then.")
+    values: Annotated[tuple[str, ...], Field(strict=False)] = Field(
+        (), description="Which values of its profile: for unavailable, absent, stuck, nan and the like; none means all."
+    )
 
     @property
     def sensor_fault(self) -> SensorFault:
@@ -92,6 +97,7 @@ class FaultEntry(WindowEntry):
             length=self.bytes,
             answer=self.answer,
             reads=self.reads,
+            values=self.values,
         )
 
 
@@ -109,6 +115,9 @@ Faults: TypeAlias = Annotated[
 class SlaveEntry(_Entry):
     """One sensor's faults, and where it differs from the others."""
 
+    profile: Annotated[str, Text(4096)] | None = Field(
+        None, description="What device it is: a profile's name, or its file relative to this one."
+    )
     faults: Faults = Field((), description="Its faults.")
     turnaround: Time | None = Field(None, description="From a request's last bit to its answer's first.")
     jitter: Time | None = Field(None, description="Random additional time, up to this.")
@@ -171,6 +180,8 @@ def parse_faults(text: str, file: str, slaves: Collection[int]) -> FaultFile:
         faults = FaultFile.model_validate(document.data)
     except ValidationError as error:
         problems += document.problems_of(error, FaultFile)
+    if not problems:
+        problems += _unknown(faults, document)
     problems += tuple(
         document.problem(("slaves", slave), "is not on this line; see --slaves", key=True)
         for slave in faults.slaves
@@ -179,6 +190,35 @@ def parse_faults(text: str, file: str, slaves: Collection[int]) -> FaultFile:
     if problems:
         raise ConfigError(tuple(sorted(problems)))
     return faults
+
+
+def profiles_of(faults: FaultFile, folder: Path) -> dict[int, Profile]:
+    """Return the profiles of slaves that have one of their own; raises ConfigError for one that cannot be read."""
+    entries = faults.slaves.items()
+    return {slave: load_profile(entry.profile, relative_to=folder) for slave, entry in entries if entry.profile}
+
+
+def _unknown(faults: FaultFile, document: Document) -> tuple[Problem, ...]:
+    """Return profiles that cannot be read, and names of values that their profiles do not have."""
+    problems: list[Problem] = []
+    for slave, entry in faults.slaves.items():
+        if entry.profile is None:
+            continue
+        try:
+            profile = load_profile(entry.profile, relative_to=Path(document.file).parent)
+        except ConfigError as error:
+            first = error.problems[0]
+            place = "" if first.line == first.column == 1 else f"{first.file}:{first.line}:{first.column}: "
+            problems.append(document.problem(("slaves", slave, "profile"), f"{place}{first.message}"))
+            continue
+        known = ", ".join(profile.value_names)
+        problems += [
+            document.problem(("slaves", slave, "faults"), f"{name} is no value of {profile.name}; it has {known}")
+            for fault in entry.faults
+            for name in fault.values
+            if name not in profile.value_names
+        ]
+    return tuple(problems)
 
 
 def load_faults(path: Path, slaves: Collection[int]) -> FaultFile:

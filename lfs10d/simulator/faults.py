@@ -61,6 +61,10 @@ class FaultKind(StrEnum):
     """The value is a float32 close to zero, as integers read as float32 are."""
     STUCK = "stuck"
     """The value never changes."""
+    UNAVAILABLE = "unavailable"
+    """The registers hold what means that there is no value: the profile's `unavailable`, or all ones."""
+    ABSENT = "absent"
+    """There are no such registers: a read that touches them is refused with exception 2."""
     TWIN = "twin"
     """A second sensor with this id answers reads too, `delay` (37 ms) after the end of the answer."""
     REPEATED = "repeated"
@@ -144,6 +148,8 @@ class SensorFault:
     """How a DIP-locked sensor answers a write of its id."""
     reads: Literal["old", "new"] = "old"
     """What its id register holds afterwards."""
+    values: tuple[str, ...] = ()
+    """The names of the values that have it; none means all."""
 
     def strikes(self, now: int, random: Random) -> bool:
         """Draw whether it shows in the answer to the request heard at `now`."""
@@ -174,9 +180,9 @@ def sensor_fault(
     first: float = 0.0,
     last: float | None = None,
     every: float | None = None,
-    **particulars: int | str | None,
+    **particulars: int | str | tuple[str, ...] | None,
 ) -> SensorFault:
-    """Return a fault with times in seconds; `particulars` are code, value, length, answer and reads.
+    """Return a fault with times in seconds; `particulars` are code, value, length, answer, reads and values.
 
     Raises ValueError for an unknown kind, TypeError for an unknown particular.
     """

@@ -7,7 +7,8 @@ from random import Random
 from typing import Final
 
 from lfs10d.simulator.faults import STRIKES_ANSWERS, STRIKES_FRAMES, ActiveFaults, FaultKind
-from lfs10d.simulator.registers import READ_HOLDING, READ_INPUT, WRITE_SINGLE
+from lfs10d.simulator.registers import READ_INPUT, WRITES
+from lfs10d.simulator.signals import READ_HOLDING
 from lfs10d.simulator.wire import Framing
 
 SPOIL: Final = (STRIKES_ANSWERS | STRIKES_FRAMES) - {FaultKind.LEADING_NOISE, FaultKind.TRAILING_NOISE}
@@ -25,9 +26,11 @@ _BROKEN_FLOATS: Final[Mapping[FaultKind, int]] = {
 }
 
 
-def broken_float(active: ActiveFaults) -> int | None:
-    """Return the bits of a float32 that stand in place of the value, None where it is right."""
-    return next((_BROKEN_FLOATS[kind] for kind in sorted(active) if kind in _BROKEN_FLOATS), None)
+def broken_float(active: ActiveFaults, name: str = "") -> int | None:
+    """Return the bits of a float32 that stand in place of the value of this name, None where it is right."""
+    kinds = [kind for kind in sorted(active) if kind in _BROKEN_FLOATS]
+    broken = [_BROKEN_FLOATS[kind] for kind in kinds if not active[kind].values or name in active[kind].values]
+    return broken[0] if broken else None
 
 
 def distorted(body: bytes, active: ActiveFaults) -> bytes:
@@ -37,7 +40,7 @@ def distorted(body: bytes, active: ActiveFaults) -> bytes:
         body = bytes(((body[0] + 1) % 256 if wrong is None else wrong,)) + body[1:]
     if FaultKind.WRONG_COUNT in active and body[1] in (READ_HOLDING, READ_INPUT):
         body = body[:2] + bytes((body[_COUNT_AT] + 2,)) + body[3:] + body[-2:]
-    if FaultKind.WRONG_ECHO in active and body[1] == WRITE_SINGLE:
+    if FaultKind.WRONG_ECHO in active and body[1] in WRITES:
         body = body[:-1] + bytes((body[-1] ^ 1,))
     if FaultKind.WRONG_FUNCTION in active:
         body = body[:1] + bytes((body[1] ^ 0x07,)) + body[2:]

@@ -13,6 +13,7 @@ from random import Random
 
 from lfs10d.simulator.burst import MASTER, Burst, Receiver, Speaker, collide
 from lfs10d.simulator.judge import Hearing, Judge, JudgeReport
+from lfs10d.simulator.memory import Measured, numbers
 from lfs10d.simulator.sensor import Reply, Sensor
 from lfs10d.simulator.wind import Unique
 from lfs10d.simulator.wire import Format, Framing, nanoseconds, unseal
@@ -23,12 +24,17 @@ class SensorAnswer:
     """What a sensor sent in answer to a request."""
 
     sensor: Sensor
-    values: tuple[float, ...]
-    """The measured values in it."""
+    measured: Measured
+    """The values in it by name; None where they were broken."""
     burst: Burst
     whole: bool
     second: bool = False
     """Another answer of the sensor to the same request came before it."""
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """The measured numbers in it, but for broken ones."""
+        return numbers(self.measured)
 
     @property
     def believable(self) -> bool:
@@ -262,4 +268,4 @@ class SimulatedLine:
     def _answer(self, request: HeardRequest, reply: Reply) -> None:
         self.answered += 1
         answer = self.speak(reply.sensor, reply.data, reply.start, reply.format, reply.pause)
-        request.answers.append(SensorAnswer(reply.sensor, reply.values, answer, reply.whole, reply.second))
+        request.answers.append(SensorAnswer(reply.sensor, reply.measured, answer, reply.whole, reply.second))

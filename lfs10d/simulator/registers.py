@@ -2,72 +2,21 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
-from typing import Final, Literal, TypeAlias
+from typing import Final
 
 from lfs10d.profiles.profile import Profile
-from lfs10d.profiles.values import Setting
+from lfs10d.profiles.settings import Setting
+from lfs10d.simulator.signals import READ_HOLDING, Signal, signal_of
 from lfs10d.simulator.wire import Check, Framing
 
-Type: TypeAlias = Literal["float32", "uint16", "int16", "uint32", "int32"]
-
-READ_HOLDING: Final = 3
 READ_INPUT: Final = 4
 WRITE_SINGLE: Final = 6
-
-_CODES: Final[Mapping[Type, str]] = {
-    "float32": ">f",
-    "uint16": ">H",
-    "int16": ">h",
-    "uint32": ">I",
-    "int32": ">i",
-}
+WRITE_COILS: Final = 15
+WRITE_SEVERAL: Final = 16
+WRITES: Final = frozenset({WRITE_SINGLE, WRITE_COILS, WRITE_SEVERAL})
 _WORD: Final = 2
-
-
-@dataclass(frozen=True, slots=True)
-class Signal:
-    """A measured value in one or two registers: register content x scale + offset = value."""
-
-    address: int
-    type: Type = "float32"
-    low_word_first: bool = False
-    swapped: bool = False
-    """The bytes within each register are swapped."""
-    scale: float = 1.0
-    offset: float = 0.0
-
-    @property
-    def count(self) -> int:
-        """How many registers it occupies."""
-        return struct.calcsize(_CODES[self.type]) // _WORD
-
-    def words(self, value: float) -> tuple[int, ...]:
-        """Return the registers that hold this value; what does not fit is bent to the nearest that does."""
-        if self.type == "float32":
-            return self._ordered(struct.pack(">f", (value - self.offset) / self.scale))
-        return self._ordered(struct.pack(_CODES[self.type], self._content(value)))
-
-    def settled(self, value: float) -> float:
-        """Return the value as its registers tell it; of a float32 the decimal itself."""
-        return value if self.type == "float32" else round(self._content(value) * self.scale + self.offset, 9)
-
-    def _content(self, value: float) -> int:
-        bits = 8 * _WORD * self.count
-        low = 0 if self.type.startswith("u") else -(1 << bits - 1)
-        return min(max(round((value - self.offset) / self.scale), low), low + (1 << bits) - 1)
-
-    def broken(self, float_bits: int) -> tuple[int, ...]:
-        """Return these bits of a float32, or all ones in a register that holds whole numbers."""
-        if self.type == "float32":
-            return self._ordered(float_bits.to_bytes(2 * _WORD, "big"))
-        return (0xFFFF,) * self.count
-
-    def _ordered(self, data: bytes) -> tuple[int, ...]:
-        words = struct.unpack(f"{'<' if self.swapped else '>'}{len(data) // _WORD}H", data)
-        return words[::-1] if self.low_word_first else words
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +29,8 @@ class Blueprint:
     """Other registers and what they hold at first."""
     writable: Mapping[int, Container[int]] = field(default_factory=dict)
     """What may be written where; another value is exception 03, another register exception 02."""
+    coils: Container[int] = frozenset()
+    """Coils that may be written by function 15."""
     functions: frozenset[int] = frozenset({READ_HOLDING, WRITE_SINGLE})
     max_words: int = 125
     ascii_max_data: int | None = None
@@ -99,7 +50,7 @@ class Blueprint:
 
 LFS10: Final = Blueprint(
     name="lfs10",
-    signals=(Signal(0x0001),),
+    signals=(Signal(0x0001, name="wind_speed", low=0, high=100),),
     words={0x0004: 1, 0x0005: 1},
     writable={0x0004: range(1, 3), 0x0005: range(1, 256)},
     id_register=0x0005,
@@ -122,18 +73,8 @@ class Allowed:
 
 def blueprint_of(profile: Profile) -> Blueprint:
     """Return the device that a profile describes; registers it does not name do not exist."""
-    signals = tuple(
-        Signal(
-            value.register,
-            value.type,
-            low_word_first=value.word_order == "low_first",
-            swapped=value.byte_order == "little",
-            scale=value.scale,
-            offset=value.offset,
-        )
-        for value in profile.values
-    )
-    functions = {value.function for value in profile.values}
+    signals = tuple(signal_of(value) for value in profile.values)
+    functions: set[int] = {value.function for value in profile.values}
     words: dict[int, int] = {}
     writable: dict[int, Container[int]] = {}
     for setting in profile.settings:
@@ -146,6 +87,9 @@ def blueprint_of(profile: Profile) -> Blueprint:
     if profile.slave_id is not None:
         words[profile.slave_id.register] = profile.ids[0]
         writable[profile.slave_id.register] = range(profile.ids[0], profile.ids[1] + 1)
+    for identity in profile.identify:
+        functions.add(identity.function)
+        words[identity.register] = identity.holds[0]
     if profile.baudrate is not None:
         codes = profile.baudrate.codes
         words[profile.baudrate.register] = next(iter(codes.values()))
@@ -161,7 +105,7 @@ def blueprint_of(profile: Profile) -> Blueprint:
         signals=signals,
         words=words,
         writable=writable,
-        functions=frozenset(functions | ({WRITE_SINGLE} if writable else set())),
+        functions=frozenset(functions | ({profile.write_function} if writable else set())),
         max_words=profile.max_words,
         ascii_max_data=profile.ascii_max_data,
         check=profile.checksum,

@@ -27,21 +27,27 @@ from lfs10d.simulator.faults import (
     SensorFault,
     sensor_fault,
 )
-from lfs10d.simulator.frame_faults import SPOIL, broken_float, distorted, spoilt
-from lfs10d.simulator.registers import LFS10, READ_HOLDING, READ_INPUT, WRITE_SINGLE, Blueprint, Signal
+from lfs10d.simulator.frame_faults import SPOIL, distorted, spoilt
+from lfs10d.simulator.memory import (
+    EXCEPTION_BIT,
+    ILLEGAL_ADDRESS,
+    ILLEGAL_FUNCTION,
+    READS,
+    REQUEST_BODY,
+    Measured,
+    Memory,
+    is_whole,
+    numbers,
+    refusal,
+    written,
+)
+from lfs10d.simulator.registers import LFS10, WRITE_COILS, WRITES, Blueprint
 from lfs10d.simulator.wind import Unique, WindSource
 from lfs10d.simulator.wire import Format, Framing, nanoseconds, seal
 
 BROADCAST: Final = 0
 WILDCARD_ID: Final = 255
-EXCEPTION_BIT: Final = 0x80
-ILLEGAL_FUNCTION: Final = 1
-ILLEGAL_ADDRESS: Final = 2
-ILLEGAL_VALUE: Final = 3
 SILENT_TARGET: Final = 11
-REQUEST_BODY: Final = 6
-"""Bytes of the requests 03, 04 and 06 without their check: id, function, two words."""
-
 DAYS: Final = nanoseconds(1e6)
 """Before anything happened on the line, in ns."""
 _FOLLOWED: Final = frozenset({FaultKind.TWIN, FaultKind.REPEATED, FaultKind.GATEWAY})
@@ -57,14 +63,19 @@ class Reply:
     data: bytes
     format: Format
     pause: int
-    values: tuple[float, ...]
-    """The measured values in it; empty if none, or if they were broken."""
+    measured: Measured
+    """The values in it by name; None where they were broken."""
     whole: bool
     """A master that hears every byte may believe it."""
     second: bool = False
     """Another answer of this sensor to the same request came before it."""
     following: tuple[Reply, ...] = ()
     """What comes after it, to the same request."""
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """The measured numbers in it; empty if none, or if they were broken."""
+        return numbers(self.measured)
 
     @property
     def ends(self) -> int:
@@ -101,21 +112,18 @@ class Sensor:
         """Seconds from the request's last bit to the answer's first; up to `jitter` more, drawn each time."""
         self.jitter = jitter
         self.source: WindSource = source or Unique()
-        self.words = dict(blueprint.words)
+        self.memory = Memory(blueprint)
+        self.words = self.memory.words
         if blueprint.id_register is not None:
             self.words[blueprint.id_register] = slave
         if blueprint.rate_register is not None and self.format.baudrate in blueprint.rate_codes:
             self.words[blueprint.rate_register] = blueprint.rate_codes[self.format.baudrate]
-        for signal in blueprint.signals:
-            for n in range(signal.count):
-                self.words.setdefault(signal.address + n, 0)
         self.faults: list[SensorFault] = []
         self.powered = True
         self.hung = False
         self.deaf_until = 0
         self._last_answer = -DAYS
         self._last_request = -DAYS
-        self._last: float | None = None
         self._cuts = 0
         self.random = Random(f"{seed}/{slave}")  # noqa: S311  # repeatable faults, no secret
 
@@ -123,7 +131,9 @@ class Sensor:
         """Return slave id and rate."""
         return f"<Sensor {self.slave} at {self.format.baudrate}>"
 
-    def add_fault(self, kind: FaultKind | str, rate: float = 1.0, **particulars: float | str | None) -> SensorFault:
+    def add_fault(
+        self, kind: FaultKind | str, rate: float = 1.0, **particulars: float | str | tuple[str, ...] | None
+    ) -> SensorFault:
         """Add a fault with times in seconds (see `faults.sensor_fault`) and return it."""
         added = sensor_fault(kind, rate, **particulars)  # type: ignore[arg-type]  # passed on as they are
         self.faults.append(added)
@@ -178,17 +188,17 @@ class Sensor:
         """
         if body[0] not in (self.slave, BROADCAST) and not self._wild(body[0], ended):
             return None
-        if not self.powered or self.hung or ended < self.deaf_until or len(body) != REQUEST_BODY:
+        if not self.powered or self.hung or ended < self.deaf_until or not is_whole(body):
             return None
         active = self._active(ended) if self.faults else _NOTHING
         gone = FaultKind.SILENT in active or FaultKind.POWER_CUT in active
         if gone or (after_dead and FaultKind.SHY in active) or self._unfit(active, ended):
             return None
         format_before = self.format
-        answer, values = self._obey(body, ended, active)
+        answer, measured = self._obey(body, ended, active)
         if answer[1] & EXCEPTION_BIT and FaultKind.HANGS in active:
             self.hung = True
-        if body[0] == BROADCAST or (FaultKind.ECHO_LOSING in active and answer[1] == WRITE_SINGLE):
+        if body[0] == BROADCAST or (FaultKind.ECHO_LOSING in active and answer[1] in WRITES):
             return None
         shape = self.format if FaultKind.AT_ONCE in active else format_before
         delay = nanoseconds(self.turnaround)
@@ -196,13 +206,13 @@ class Sensor:
             delay += nanoseconds(self.jitter * self.random.random())
         if not active:
             frame = seal(answer, self.framing, self.blueprint.check)
-            return self._reply(Reply(self, ended + delay, frame, shape, 0, values, whole=True))
+            return self._reply(Reply(self, ended + delay, frame, shape, 0, measured, whole=True))
         if FaultKind.LATE in active:
             delay += active[FaultKind.LATE].delay
         frame = seal(distorted(answer, active), self.framing, self.blueprint.check)
         pause = active[FaultKind.SLOW_BYTES].delay if FaultKind.SLOW_BYTES in active else 0
         sent, whole = spoilt(frame, active, self.random, self.framing), SPOIL.isdisjoint(active)
-        reply = self._reply(Reply(self, ended + delay, sent, shape, pause, values, whole=whole))
+        reply = self._reply(Reply(self, ended + delay, sent, shape, pause, measured, whole=whole))
         return self._followed(reply, body, ended, active) if _FOLLOWED.intersection(active) else reply
 
     def _followed(self, reply: Reply, body: bytes, ended: int, active: ActiveFaults) -> Reply:
@@ -211,17 +221,17 @@ class Sensor:
         if FaultKind.GATEWAY in active:
             gateway = active[FaultKind.GATEWAY]
             code = SILENT_TARGET if gateway.code is None else gateway.code
-            refusal = seal(self._refuse(body, code)[0], self.framing, self.blueprint.check)
-            late, reply = reply, replace(reply, data=refusal, pause=0, values=())
+            refused = seal(refusal(body, code), self.framing, self.blueprint.check)
+            late, reply = reply, replace(reply, data=refused, pause=0, measured=())
             following.append(replace(late, start=reply.ends + gateway.delay))
         if FaultKind.REPEATED in active:
             start = reply.ends + active[FaultKind.REPEATED].delay
-            following.append(replace(reply, start=start, values=(), second=True))
-        if FaultKind.TWIN in active and body[1] in (READ_HOLDING, READ_INPUT):
-            answer, values = self._obey(body, ended, _NOTHING)
+            following.append(replace(reply, start=start, measured=(), second=True))
+        if FaultKind.TWIN in active and body[1] in READS:
+            answer, measured = self._obey(body, ended, _NOTHING)
             frame = seal(answer, self.framing, self.blueprint.check)
             start = reply.ends + active[FaultKind.TWIN].delay
-            following.append(Reply(self, start, frame, reply.format, 0, values, whole=True, second=True))
+            following.append(Reply(self, start, frame, reply.format, 0, measured, whole=True, second=True))
         return replace(reply, following=tuple(following))
 
     def _reply(self, reply: Reply) -> Reply:
@@ -244,63 +254,36 @@ class Sensor:
     def _active(self, now: int) -> ActiveFaults:
         return {one.kind: one for one in self.faults if one.strikes(now, self.random)}
 
-    def _obey(self, body: bytes, now: int, active: ActiveFaults) -> tuple[bytes, tuple[float, ...]]:
+    def _obey(self, body: bytes, now: int, active: ActiveFaults) -> tuple[bytes, Measured]:
         function = body[1]
         if FaultKind.EXCEPTION in active:
-            return self._refuse(body, active[FaultKind.EXCEPTION].code or ILLEGAL_ADDRESS)
+            return refusal(body, active[FaultKind.EXCEPTION].code or ILLEGAL_ADDRESS), ()
         if function not in self.blueprint.functions:
-            return self._refuse(body, ILLEGAL_FUNCTION)
-        address, word = int.from_bytes(body[2:4], "big"), int.from_bytes(body[4:6], "big")
-        if function in (READ_HOLDING, READ_INPUT):
-            return self._read(body, address, word, now, active)
-        return self._write(body, address, word, now, active), ()
+            return refusal(body, ILLEGAL_FUNCTION), ()
+        if function in READS:
+            return self.memory.read(body, self.framing, self.source, now, active)
+        code = self.memory.refuses(body)
+        if code is not None:
+            return refusal(body, code), ()
+        if function == WRITE_COILS:
+            self.memory.write_coils(body)
+            return body[:REQUEST_BODY], ()
+        return self._write(body, now, active), ()
 
-    @staticmethod
-    def _refuse(body: bytes, code: int) -> tuple[bytes, tuple[float, ...]]:
-        return bytes((body[0], body[1] | EXCEPTION_BIT, code)), ()
-
-    def _read(
-        self, body: bytes, address: int, count: int, now: int, active: ActiveFaults
-    ) -> tuple[bytes, tuple[float, ...]]:
-        if not 1 <= count <= self.blueprint.most_words(self.framing):
-            return self._refuse(body, ILLEGAL_VALUE)
-        values: list[float] = []
-        for signal in self.blueprint.signals:
-            if signal.address < address + count and address < signal.address + signal.count:
-                values += self._measure(signal, now, active)
-        try:
-            words = [self.words[register] for register in range(address, address + count)]
-        except KeyError:
-            return self._refuse(body, ILLEGAL_ADDRESS)
-        data = b"".join([word.to_bytes(2, "big") for word in words])
-        return body[:2] + bytes((len(data),)) + data, tuple(values)
-
-    def _measure(self, signal: Signal, now: int, active: ActiveFaults) -> tuple[float, ...]:
-        """Put the signal's value into its registers; return it, or nothing if it is a broken one."""
-        value = self._last if FaultKind.STUCK in active and self._last is not None else self.source(now)
-        self._last = value
-        bits = broken_float(active)
-        words = signal.words(value) if bits is None else signal.broken(bits)
-        for n, word in enumerate(words):
-            self.words[signal.address + n] = word
-        return (signal.settled(value),) if bits is None else ()
-
-    def _write(self, body: bytes, address: int, value: int, now: int, active: ActiveFaults) -> bytes:
-        allowed = self.blueprint.writable.get(address)
-        if allowed is None:
-            return self._refuse(body, ILLEGAL_ADDRESS)[0]
-        if value not in allowed:
-            return self._refuse(body, ILLEGAL_VALUE)[0]
-        if address == self.blueprint.id_register and FaultKind.DIP_LOCKED in active:
-            switch = active[FaultKind.DIP_LOCKED]
-            if switch.reads == "new":
-                self.words[address] = value
-            return body if switch.answer == "echo" else self._refuse(body, switch.code or ILLEGAL_ADDRESS)[0]
-        if self.words[address] != value and FaultKind.SLOW_FLASH in active:
-            self.deaf_until = now + active[FaultKind.SLOW_FLASH].delay
-        self.words[address] = value
-        if {FaultKind.STORES_BUT_IGNORES, FaultKind.POWER_CYCLE}.isdisjoint(active):
-            self._take_place(address)
+    def _write(self, body: bytes, now: int, active: ActiveFaults) -> bytes:
+        for address, value in written(body).items():
+            if address == self.blueprint.id_register and FaultKind.DIP_LOCKED in active:
+                switch = active[FaultKind.DIP_LOCKED]
+                if switch.reads == "new":
+                    self.words[address] = value
+                locked = switch.answer != "echo"
+                return refusal(body, switch.code or ILLEGAL_ADDRESS) if locked else body[:REQUEST_BODY]
+            if self.words[address] != value and FaultKind.SLOW_FLASH in active:
+                self.deaf_until = now + active[FaultKind.SLOW_FLASH].delay
+            self.words[address] = value
+            if {FaultKind.STORES_BUT_IGNORES, FaultKind.POWER_CYCLE}.isdisjoint(active):
+                self._take_place(address)
+        body = body[:REQUEST_BODY]
         return bytes((self.slave,)) + body[1:] if FaultKind.AT_ONCE in active and body[0] else body
 
     def _take_place(self, register: int | None = None) -> None:

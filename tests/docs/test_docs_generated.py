@@ -45,7 +45,14 @@ def test_no_page_is_stale() -> None:
 
 def test_a_page_that_differs_or_is_missing_is_stale(tmp_path: Path) -> None:
     (tmp_path / "mqtt.md").write_text(PAGES["mqtt.md"]() + "\n", encoding="utf-8")
-    assert stale(tmp_path) == ["architecture.md", "commands.md", "configuration.md", "mqtt.md", "simulate.md"]
+    assert stale(tmp_path) == [
+        "architecture.md",
+        "commands.md",
+        "configuration.md",
+        "mqtt.md",
+        "profiles.md",
+        "simulate.md",
+    ]
 
 
 def test_the_generator_writes_what_is_stale_and_only_names_it_with_check() -> None:

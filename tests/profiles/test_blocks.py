@@ -88,7 +88,7 @@ def test_a_block_decodes_what_each_value_alone_would_be(
     values: tuple[Value, ...], most: int, data: st.DataObject
 ) -> None:
     memory = {function: data.draw(st.binary(min_size=46, max_size=46)) for function in (3, 4)}
-    numbers: dict[str, int | float] = {}
+    numbers: dict[str, object] = {}
     for block in batch(values, most):
         words = struct.unpack_from(f">{block.count}H", memory[block.function], 2 * block.address)
         decoded = block.decode(words)

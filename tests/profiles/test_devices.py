@@ -36,9 +36,9 @@ SPOKEN = [
 ]
 
 
-def polled(profile: Profile, codec: Codec, answers: list[bytes]) -> dict[str, Number]:
+def polled(profile: Profile, codec: Codec, answers: list[bytes]) -> dict[str, object]:
     """Return the values of one poll from the frames that answered it."""
-    numbers: dict[str, Number] = {}
+    numbers: dict[str, object] = {}
     for block, answer in zip(profile.reads(), answers, strict=True):
         body = codec.unwrap(answer)
         assert body is not None

@@ -5,14 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from pydantic import BaseModel
-from pydantic.fields import FieldInfo
 
 from lfs10d.errors import ConfigError
 from lfs10d.profiles import library
 from lfs10d.profiles.library import builtin_names, load_profile, parse_profile
-from lfs10d.profiles.profile import Barrier, Factory, IdRegister, Profile, RateRegister
-from lfs10d.profiles.values import Fact, Setting, Value
+from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Fault
 from lfs10d.simulator.registers import blueprint_of
 
@@ -93,9 +90,9 @@ def reads(profile: Profile) -> list[tuple[int, int, int]]:
     return [(block.function, block.address, block.count) for block in profile.reads()]
 
 
-def decoded(profile: Profile, *answers: str) -> dict[str, float]:
+def decoded(profile: Profile, *answers: str) -> dict[str, object]:
     """Return the values of one poll whose answers carry these register bytes, in hex."""
-    numbers: dict[str, float] = {}
+    numbers: dict[str, object] = {}
     for block, answer in zip(profile.reads(), answers, strict=True):
         content = bytes.fromhex(answer)
         registers = tuple(int.from_bytes(content[at : at + 2], "big") for at in range(0, len(content), 2))
@@ -281,46 +278,3 @@ def test_the_wind_vane_of_the_page_is_a_profile_that_a_simulated_vane_plays() ->
 
 def test_the_page_shows_the_wind_vane_as_it_is() -> None:
     assert f"```yaml\n{WIND_VANE.read_text()}```\n" in PAGE.read_text()
-
-
-def test_the_page_lists_every_key() -> None:
-    assert reference() in PAGE.read_text(), f"stale: its tables must be\n\n{reference()}"
-
-
-def reference() -> str:
-    """Return the tables of keys that belong into the page."""
-    models: dict[str, type[BaseModel]] = {
-        "A profile": Profile,
-        "`values`: a list of": Value,
-        "`settings`: a list of": Setting,
-        "`barrier`": Barrier,
-        "`slave_id`": IdRegister,
-        "`baudrate`": RateRegister,
-        "`factory`": Factory,
-        "What each of these may have besides": Fact,
-    }
-    tables = []
-    for title, model in models.items():
-        fields = model.model_fields.items()
-        common = () if model is Fact else Fact.model_fields
-        rows = [
-            f"| `{field.alias or name}` | {field.description} | {default(field)} |"
-            for name, field in fields
-            if model is Profile or name not in common
-        ]
-        tables.append("\n".join([f"### {title}", "", "| key | meaning | default |", "| --- | --- | --- |", *rows]))
-    return "\n\n".join(tables) + "\n"
-
-
-def default(field: FieldInfo) -> str:
-    if field.is_required():
-        return "required"
-    match field.default:
-        case None | () | {}:
-            return "none"
-        case bool(flag):
-            return "true" if flag else "false"
-        case tuple(items):
-            return f"[{', '.join(map(str, items))}]"
-        case number_or_text:
-            return f"{number_or_text:g}" if isinstance(number_or_text, float) else str(number_or_text)

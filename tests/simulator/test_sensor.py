@@ -10,8 +10,9 @@ from itertools import pairwise
 import pytest
 
 from lfs10d.simulator.faults import FaultKind
-from lfs10d.simulator.registers import Blueprint, Signal
+from lfs10d.simulator.registers import Blueprint
 from lfs10d.simulator.sensor import Sensor
+from lfs10d.simulator.signals import Signal
 from lfs10d.simulator.wire import Format, unseal
 from tests.support.simulated import Bench
 

@@ -27,7 +27,7 @@ from lfs10d.line.jobs.register_access import Access, End
 from lfs10d.modbus.request import READ_COUNT_MAX, ReadRegisters, WriteRegister
 from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.profiles.profile import Profile
-from lfs10d.profiles.values import Setting
+from lfs10d.profiles.settings import Setting
 from lfs10d.reading import FaultCode
 from lfs10d.schema.fields import Name, Whole
 
@@ -79,7 +79,7 @@ async def read(parameters: SomeRegisters, context: Context, _: Command) -> Resul
 
 
 async def write(parameters: OneRegister, context: Context, command: Command) -> Result:
-    """Write one register with function 06 and read it back; only settings that the device's profile marks."""
+    """Write one register with the profile's write function and read it back; only settings that the profile marks."""
     now = context.config.now
     address, value = parameters.address, parameters.value
     try:
@@ -93,7 +93,8 @@ async def write(parameters: OneRegister, context: Context, command: Command) -> 
             raise refuse("busy", f"slave id {slave} {reserved}; write when that is over")
     except RefusedError as error:
         return error.result
-    access = await context.line.access(WriteRegister(slave, address, value), device)
+    function = 6 if device is None else now.loaded.profiles[device.profile].write_function
+    access = await context.line.access(WriteRegister(slave, address, value, function), device)
     place = {"device": device and device.name, "slave": slave, "address": address}
     if access.end is End.DONE:
         context.publisher.applied("register/write", command, **place, **{"from": access.before, "to": value})

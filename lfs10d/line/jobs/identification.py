@@ -23,7 +23,7 @@ from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.request import READ_HOLDING_REGISTERS, ReadRegisters
 from lfs10d.profiles.blocks import Block
 from lfs10d.profiles.profile import Profile
-from lfs10d.reading import Fault, FaultCode, Number
+from lfs10d.reading import Fault, FaultCode, Value
 
 TRIES = 5
 """How often a read is asked once something spoilt it."""
@@ -56,7 +56,7 @@ class FoundDevice:
     answers: bool = False
     rtt: float | None = None
     profile: Profile | None = None
-    values: Mapping[str, Number] = field(default_factory=dict)
+    values: Mapping[str, Value] = field(default_factory=dict)
     id_register: int | None = None
     exception: int | None = None
     spoilt: int = 0
@@ -158,7 +158,7 @@ class Identification:
             sure = number == self._slave
         block = profile.reads()[0]
         outcome = yield from self._hear(_read_of(block, self._slave))
-        values: Mapping[str, Number] | Fault = {}
+        values: Mapping[str, Value] | Fault = {}
         if outcome is not None and outcome.answer is not None:
             values = profile.decode(block, outcome.answer)
         elif outcome is not None or not (sure and self._found.duplicate):

@@ -8,7 +8,10 @@ Rules
 2. A fault of the line is tried again, `retries` times, as a later exchange. A right frame is not: an exception or
    a value out of range would only be said twice.
 3. One poll, one outcome, whatever it took.
-4. A device that sleeps (`lfs10d.line.request_gap`) may lose the first request after a pause: it is asked again at once,
+4. What is read is decided when it begins (`lfs10d.line.read_plan`); where the device refuses registers that are
+   optional, the others are read in the same poll. A value that is there by itself is none where its registers say so;
+   the poll fails only where no value is there, with the fault of the first.
+5. A device that sleeps (`lfs10d.line.request_gap`) may lose the first request after a pause: it is asked again at once,
    and where that has helped before the silence is no failed attempt. It is woken by its barrier, where it has one,
    so that the value can be asked right after it.
 """
@@ -27,7 +30,7 @@ from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.pending import PendingRequests
 from lfs10d.modbus.request import ReadRegisters
 from lfs10d.profiles.blocks import Block
-from lfs10d.reading import ALIVE_CODES, Fault, FaultCode, Number, Purpose, Reading
+from lfs10d.reading import ALIVE_CODES, NOTHING, Fault, FaultCode, Purpose, Reading, Value
 
 WAKES = 3
 """So often within one poll a silence after a pause is taken for sleep."""
@@ -48,7 +51,8 @@ def _read(slave: int, address: int, count: int, function: int) -> ReadRegisters:
 class Poll:
     """One poll of `device`; `due` orders it among the others. `request` is the number of the request that wants it.
 
-    When it is over `values` or `fault` is set, `at` says when, `rtt` how long the last exchange took.
+    When it is over `values` or `fault` is set, `at` says when, `rtt` how long the last exchange took. `faults` say why
+    single values are None, `ages` (s) which are old.
     """
 
     share = 1.0
@@ -61,13 +65,15 @@ class Poll:
         self.purpose = purpose
         self.request = request
         self.due = due
-        self.values: dict[str, Number] = {}
+        self.values: dict[str, Value | None] = {}
+        self.faults: dict[str, Fault] = {}
+        self.ages: Mapping[str, float] = NOTHING
         self.fault: Fault | None = None
         self.rtt: float | None = None
         self.at = due
         self.failed_attempts: list[FaultCode] = []
         self._pending = pending
-        self._blocks = device.spec.profile.reads()
+        self._blocks: tuple[Block, ...] = ()
         self._block = 0
         self._retries = device.retries if purpose is not Purpose.PROBE else 0
         self._barrier_due = purpose is Purpose.PROBE
@@ -82,7 +88,7 @@ class Poll:
         return self._begun
 
     @property
-    def good(self) -> Mapping[str, Number] | None:
+    def good(self) -> Mapping[str, Value | None] | None:
         """The values; None where the poll failed."""
         return self.values if self.fault is None else None
 
@@ -90,6 +96,9 @@ class Poll:
         """Decide what to put on the line now."""
         device = self.device
         codec, profile = device.spec.codec, device.spec.profile
+        if not self._blocks:
+            everything = self.purpose is Purpose.REQUEST
+            self._blocks = device.reads.reads(now, device.spec.interval, everything=everything)
         self._waking = self._wakes < WAKES and device.gap.may_sleep(now)
         block, barrier, usual = self._blocks[self._block], profile.barrier, device.timeout
         value = _read(device.slave, block.address, block.count, block.function)
@@ -132,26 +141,48 @@ class Poll:
                 self._barrier_due = False
                 return Requeue(self.due)
         elif fault is None and outcome.answer is not None:
-            fault = self._take(self._blocks[self._block], outcome.answer, outcome.heard)
+            fault = self._blocks[self._block].take(outcome.answer, self.values, self.faults)
             if fault is None:
                 self.rtt = outcome.rtt
-                return Requeue(self.due) if self._block < len(self._blocks) else Done()
+                self._block += 1
+                return self._go_on(outcome.heard)
+            fault = replace(fault, heard=outcome.heard[-FAULT_HEARD:])
+        elif fault is not None and not outcome.ambiguous and self._reads_otherwise(fault, now):
+            return self._go_on(outcome.heard)
         if fault is not None and fault.code not in ALIVE_CODES and self._retries > 0:
             self._retries -= 1
             self.failed_attempts.append(fault.code)
             self.due = now
             return Requeue(now)
-        self.fault = None if fault is None else marked_busy(fault, device.spec.profile.busy_exceptions)
-        self.values = {}
+        self._fail(None if fault is None else marked_busy(fault, device.spec.profile.busy_exceptions))
         return Done()
 
-    def _take(self, block: Block, registers: tuple[int, ...], heard: bytes) -> Fault | None:
-        decoded = self.device.spec.profile.decode(block, registers)
-        if isinstance(decoded, Fault):
-            return replace(decoded, heard=heard[-FAULT_HEARD:])
-        self.values.update(decoded)
-        self._block += 1
-        return None
+    def _reads_otherwise(self, fault: Fault, now: float) -> bool:
+        """Whether the read was refused for registers that are optional: then others take its place."""
+        place = self._block
+        instead = self.device.reads.refused(self._blocks[place], fault, now)
+        if instead is None:
+            return False
+        self._blocks = (*self._blocks[:place], *instead, *self._blocks[place + 1 :])
+        return True
+
+    def _go_on(self, heard: bytes) -> Next:
+        """Read the next block; where there is none, see what became of the values."""
+        if self._block < len(self._blocks):
+            return Requeue(self.due)
+        device, names = self.device, self.device.spec.profile.value_names
+        if not device.reads.simple:
+            self.ages = device.reads.complete(self.values, self.faults, self.at, device.spec.interval)
+        if self.faults and all(self.values[name] is None for name in names):
+            fault = next(self.faults[name] for name in names if name in self.faults)
+            self._fail(replace(fault, heard=fault.heard or heard[-FAULT_HEARD:]))
+        elif len(names) > 1:
+            self.values = {name: self.values[name] for name in names}
+        return Done()
+
+    def _fail(self, fault: Fault | None) -> None:
+        self.fault = fault
+        self.values, self.faults, self.ages, self.rtt = {}, {}, NOTHING, None
 
     def cut_off(self, now: float) -> None:
         """Learn that the port is lost."""
@@ -182,6 +213,8 @@ def _reading(device: Device, at: float, fault: Fault | None, requests: tuple[int
         failed_attempts=tuple(poll.failed_attempts) if poll else (),
         overruns=overruns,
         requests=requests,
+        value_errors={name: each.code for name, each in poll.faults.items()} if poll and poll.faults else NOTHING,
+        ages=poll.ages if poll else NOTHING,
         request_gap=device.gap.seconds,
         gap_learned=device.gap.learned > device.gap.configured,
     )

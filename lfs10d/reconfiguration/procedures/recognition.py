@@ -137,7 +137,7 @@ def look_for_twins(endpoint: Endpoint, silent: Endpoint, query: IdentityQuery) -
 
 
 def _read_and_listen(endpoint: Endpoint, silent: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, Look]:
-    value = query.profile.values[0]
+    value = next((each for each in query.profile.values if not each.is_text), query.profile.values[0])
     block = next(block for block in query.profile.reads() if value in block.values)
     numbers: list[float] = []
     for window in LISTENING:
@@ -191,7 +191,8 @@ def _measured(
             values = block.decode(reply.words)
             if isinstance(values, Fault):
                 return Look(twins=f"its values are impossible: {values.message}")
-            return float(values[value.name])
+            number = values.get(value.name, 0.0)  # an unavailable one jumps nowhere
+            return 0.0 if isinstance(number, str) else float(number)
         exception = reply.exception
     return Look(answers=False, exception=exception)
 

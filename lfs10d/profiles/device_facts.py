@@ -1,0 +1,82 @@
+"""Facts about a device itself: how it is found and recognised, where its id and rate are set."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, TypeAlias, get_args
+
+from pydantic import Field, field_validator
+
+from lfs10d.profiles.facts import LAST_REGISTER, Fact, Place, Register, Registered, Sentence, refuse
+from lfs10d.schema.fields import Whole
+
+SlaveId: TypeAlias = Annotated[int, Whole(1, 255)]
+Rate: TypeAlias = Literal[1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200]
+
+MOST_WORDS = 125
+"""Registers of one read (Modbus Application Protocol V1.1b3, section 6.3)."""
+
+
+class Barrier(Registered):
+    """A read whose answer has another shape than any poll's, so that a late answer cannot pass for it."""
+
+    function: Literal[3, 4] = Field(3, description="3 reads holding registers, 4 input registers.")
+    count: Annotated[int, Whole(1, MOST_WORDS)] = Field(description="Registers that it asks for.")
+
+
+class IdRegister(Registered):
+    """Where the slave id is set; `locked_by` is what overrules it (`DIP switch`)."""
+
+    locked_by: Sentence | None = Field(None, description="What overrules it, such as a DIP switch.")
+
+
+class Identity(Registered):
+    """A register by whose content a device of this profile is told from others; `holds` are the possible contents."""
+
+    function: Literal[3, 4] = Field(3, description="3 reads holding registers, 4 input registers.")
+    holds: Annotated[tuple[Annotated[int, Whole(0, LAST_REGISTER)], ...], Field(strict=False)] = Field(
+        description="What it may hold, a list: [0x0090]."
+    )
+
+    @field_validator("holds", mode="after")
+    @classmethod
+    def _names_a_content(cls, holds: tuple[int, ...]) -> tuple[int, ...]:
+        if not holds:
+            refuse([((), "names no content")])
+        return holds
+
+
+class RateRegister(Registered):
+    """Where the baud rate is set."""
+
+    codes: dict[int, Register] = Field(description="The register's content for each rate: {9600: 1, 19200: 2}.")
+    locked_by: Sentence | None = Field(None, description="What overrules it, such as a DIP switch.")
+
+    @field_validator("codes", mode="before")
+    @classmethod
+    def _are_of_rates(cls, codes: object) -> object:
+        rates: tuple[int, ...] = get_args(Rate)
+        wanted = " ".join(map(str, rates))
+        keys = codes if isinstance(codes, dict) else {}
+        refuse([((key,), f"is no baud rate; write one of {wanted}") for key in keys if key not in rates])
+        return codes
+
+    @field_validator("codes", mode="after")
+    @classmethod
+    def _differ(cls, codes: dict[int, int]) -> dict[int, int]:
+        problems: list[tuple[Place, str]] = []
+        if not codes:
+            problems.append(((), "names no rate"))
+        rates: dict[int, int] = {}
+        for rate, code in codes.items():
+            first = rates.setdefault(code, rate)
+            if first != rate:
+                problems.append(((rate,), f"{code} is the code of {first} already"))
+        refuse(problems)
+        return codes
+
+
+class Factory(Fact):
+    """How a new device comes: its slave id and baud rate. `line/adopt` looks for it there."""
+
+    id: SlaveId = Field(description="Its slave id.")
+    baudrate: Rate = Field(description="Its baud rate; it need not be among the rates that can be set.")

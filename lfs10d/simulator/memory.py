@@ -1,0 +1,161 @@
+"""The registers and bits of a simulated device: measured when they are read, written where that is allowed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final, TypeAlias
+
+from lfs10d.simulator.faults import ActiveFaults, FaultKind, SensorFault
+from lfs10d.simulator.frame_faults import broken_float
+from lfs10d.simulator.registers import (
+    READ_INPUT,
+    WRITE_COILS,
+    WRITE_SEVERAL,
+    WRITE_SINGLE,
+    Blueprint,
+)
+from lfs10d.simulator.signals import READ_HOLDING, Published, Signal
+from lfs10d.simulator.wind import WindSource
+from lfs10d.simulator.wire import Framing
+
+EXCEPTION_BIT: Final = 0x80
+ILLEGAL_FUNCTION: Final = 1
+ILLEGAL_ADDRESS: Final = 2
+ILLEGAL_VALUE: Final = 3
+READS: Final = frozenset({1, 2, READ_HOLDING, READ_INPUT})
+REQUEST_BODY: Final = 6
+"""Bytes of the requests 01 to 04 and 06 without their check: id, function, two words; 15 and 16 have more."""
+_MOST_BITS: Final = 2000
+_COUNT_AT: Final = 6
+
+Measured: TypeAlias = tuple[tuple[str, Published | None], ...]
+"""The values in an answer by name; None where it is a broken one."""
+
+
+def numbers(measured: Measured) -> tuple[float, ...]:
+    """Return the numbers among what was measured."""
+    return tuple(value for _, value in measured if isinstance(value, int | float) and not isinstance(value, bool))
+
+
+def refusal(body: bytes, code: int) -> bytes:
+    """Return the exception answer to a request."""
+    return bytes((body[0], body[1] | EXCEPTION_BIT, code))
+
+
+def is_whole(body: bytes) -> bool:
+    """Whether a request has the length that its function has."""
+    if body[1] in (WRITE_COILS, WRITE_SEVERAL):
+        return len(body) > _COUNT_AT and len(body) == _COUNT_AT + 1 + body[_COUNT_AT]
+    return len(body) == REQUEST_BODY
+
+
+class Memory:
+    """What one device holds. `words` are its registers by address, `inputs` those that only function 4 reads."""
+
+    def __init__(self, blueprint: Blueprint) -> None:
+        self.blueprint = blueprint
+        self.words = dict(blueprint.words)
+        self.inputs: dict[int, int] = {}
+        self.bits: dict[tuple[int, int], int] = {}
+        self._last: dict[Signal, float] = {}
+        for signal in blueprint.signals:
+            for n in range(signal.count):
+                if signal.is_bit:
+                    self.bits[signal.function, signal.address + n] = 0
+                else:
+                    self._space(signal).setdefault(signal.address + n, 0)
+
+    def _space(self, signal: Signal) -> dict[int, int]:
+        return self.inputs if signal.function == READ_INPUT else self.words
+
+    def read(
+        self, body: bytes, framing: Framing, source: WindSource, now: int, active: ActiveFaults
+    ) -> tuple[bytes, Measured]:
+        """Return the answer to a read, and what was measured for it."""
+        function = body[1]
+        address, count = int.from_bytes(body[2:4], "big"), int.from_bytes(body[4:6], "big")
+        bits = function not in (READ_HOLDING, READ_INPUT)
+        most = _MOST_BITS if bits else self.blueprint.most_words(framing)
+        if not 1 <= count <= most:
+            return refusal(body, ILLEGAL_VALUE), ()
+        measured: list[tuple[str, Published | None]] = []
+        for signal in self.blueprint.signals:
+            overlaps = signal.address < address + count and address < signal.address + signal.count
+            if overlaps and self._answers(signal, function):
+                if _strikes(active, FaultKind.ABSENT, signal):
+                    return refusal(body, ILLEGAL_ADDRESS), ()
+                measured.append((signal.name, self._measure(signal, source, now, active)))
+        try:
+            if bits:
+                data = _packed([self.bits[function, place] for place in range(address, address + count)])
+            else:
+                words = {**self.words, **self.inputs} if function == READ_INPUT and self.inputs else self.words
+                data = b"".join([words[place].to_bytes(2, "big") for place in range(address, address + count)])
+        except KeyError:
+            return refusal(body, ILLEGAL_ADDRESS), ()
+        return body[:2] + bytes((len(data),)) + data, tuple(measured)
+
+    def _answers(self, signal: Signal, function: int) -> bool:
+        """Whether a read by this function brings this signal; holding registers are read by function 4 too."""
+        return signal.function == function or (signal.function == READ_HOLDING and function == READ_INPUT)
+
+    def _measure(self, signal: Signal, source: WindSource, now: int, active: ActiveFaults) -> Published | None:
+        """Put the signal's value into its registers; return it, or None if it is a broken one."""
+        last = self._last.get(signal)
+        stuck = last is not None and _strikes(active, FaultKind.STUCK, signal)
+        value = last if stuck and last is not None else signal.fitted(source(now))
+        self._last[signal] = value
+        if signal.is_bit:
+            self.bits[signal.function, signal.address] = int(bool(signal.settled(value)))
+            return signal.settled(value)
+        broken = broken_float(active, signal.name)
+        empty = _strikes(active, FaultKind.UNAVAILABLE, signal)
+        words = signal.empty() if empty else signal.words(value) if broken is None else signal.broken(broken)
+        space, mask = self._space(signal), signal.mask
+        for n, word in enumerate(words):
+            place = signal.address + n
+            space[place] = space[place] & ~mask | word & mask
+        return None if empty or broken is not None else signal.settled(value)
+
+    def refuses(self, body: bytes) -> int | None:
+        """Return the exception to a write that is not allowed; None for one that is."""
+        if body[1] == WRITE_COILS:
+            address, count = int.from_bytes(body[2:4], "big"), int.from_bytes(body[4:6], "big")
+            coils = all(place in self.blueprint.coils for place in range(address, address + count))
+            return None if coils else ILLEGAL_ADDRESS
+        for address, value in written(body).items():
+            allowed = self.blueprint.writable.get(address)
+            if allowed is None:
+                return ILLEGAL_ADDRESS
+            if value not in allowed:
+                return ILLEGAL_VALUE
+        return None
+
+    def write_coils(self, body: bytes) -> None:
+        """Take the coils that a request of function 15 writes."""
+        address, count = int.from_bytes(body[2:4], "big"), int.from_bytes(body[4:6], "big")
+        data = body[_COUNT_AT + 1 :]
+        for n in range(count):
+            self.bits[1, address + n] = data[n // 8] >> n % 8 & 1
+
+
+def written(body: bytes) -> Mapping[int, int]:
+    """Return the registers that a request of function 6 or 16 writes, and what."""
+    address = int.from_bytes(body[2:4], "big")
+    if body[1] == WRITE_SINGLE:
+        return {address: int.from_bytes(body[4:6], "big")}
+    data = body[_COUNT_AT + 1 :]
+    return {address + n: int.from_bytes(data[2 * n : 2 * n + 2], "big") for n in range(len(data) // 2)}
+
+
+def _strikes(active: ActiveFaults, kind: FaultKind, signal: Signal) -> bool:
+    fault: SensorFault | None = active.get(kind)
+    return fault is not None and (not fault.values or signal.name in fault.values)
+
+
+def _packed(bits: list[int]) -> bytes:
+    """Return bits as bytes, the first one lowest in the first."""
+    data = bytearray(-(-len(bits) // 8))
+    for n, bit in enumerate(bits):
+        data[n // 8] |= bit << n % 8
+    return bytes(data)
