@@ -88,6 +88,7 @@ class CommandClient:
         try:
             await self._link.opened(within)
         except BrokerError as error:
+            self.ended_by = str(error)  # it goes on trying, and subscribes then
             if self._missing_password and any(word in str(error) for word in PASSWORD_REFUSALS):
                 raise BrokerError(f"{error}; {self._missing_password}") from None
             raise

@@ -190,6 +190,24 @@ class LiveState:
 
     # -- what is shown
 
+    @property
+    def ahead(self) -> float:
+        """Seconds our clock is ahead of the daemon's."""
+        return self._ahead
+
+    @staticmethod
+    def first_value(sample: Mapping[str, Any]) -> float | None:
+        """Return the first value of a sample or of a device in the status file; None where it has none."""
+        given = sample.get("values")
+        values = given.items() if isinstance(given, dict) else sample.items()
+        numbers = (_number(value) for name, value in values if name not in BESIDES)
+        return next((number for number in numbers if number is not None), None)
+
+    def mark(self, name: str) -> tuple[str, int]:
+        """Return boot and number of the device's last sample, which differ once it has a newer one."""
+        device = self._by_name.get(name)
+        return ("", -1) if device is None else (device.boot, device.seq)
+
     def age(self, device: ShownDevice, wall: float) -> float | None:
         """Return how many s ago it gave its last good value; None: never as far as we know."""
         if device.good_ts is None:
@@ -225,7 +243,7 @@ def _sample(
     device: ShownDevice, sample: Mapping[str, Any], values: Mapping[str, Any], units: Mapping[str, Any]
 ) -> None:
     error = sample.get("error")
-    device.good = sample.get("quality") == "good"
+    device.good = sample.get("quality") in ("good", "partial")  # of a partial one the values that are there are good
     device.error = error if isinstance(error, str) else None
     device.rtt_ms = _number(sample.get("rtt_ms"))
     device.values = {str(name): value for name, value in values.items() if _number(value) is not None}
