@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from types import FrameType
 from typing import NoReturn
 
-LASTING = frozenset({"run", "watch", "trace", "simulate", "demo"})
+LASTING = frozenset({"run", "watch", "trace", "simulate", "demo", "web"})
 """Verbs that run until a signal ends them, which is success then; `read --watch` is one more."""
 
 ENDING = (signal.SIGINT, signal.SIGTERM)

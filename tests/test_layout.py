@@ -9,14 +9,14 @@ from pathlib import Path
 PACKAGE = Path(__file__).parents[1] / "lfs10d"
 PACKAGES = {
     "cli", "daemon", "commands", "reconfiguration", "line", "mqtt", "simulator", "outbox", "config", "profiles",
-    "modbus", "telemetry", "schema", "system",
+    "modbus", "telemetry", "schema", "system", "web",
 }  # fmt: skip
 MODULES = {"__init__", "__main__", "errors", "reading", "command"}
 LONGEST_MODULE = 320
 """Lines."""
 
 
-def test_the_listing_shows_fourteen_packages_and_five_files() -> None:
+def test_the_listing_shows_fifteen_packages_and_five_files() -> None:
     folders = {each.name for each in PACKAGE.iterdir() if each.is_dir() and each.name != "__pycache__"}
     assert folders == PACKAGES
     assert {each.stem for each in PACKAGE.glob("*.py")} == MODULES

@@ -33,9 +33,14 @@ VERBS = {
     "profiles": "Show the device profiles.",
     "simulate": "Run a simulated line on a pseudo terminal.",
     "demo": "Show it at work: simulated line, broker, daemon, live view.",
+    "web": "Serve the live page and /metrics of one or more lines.",
+    "metrics": "Print the figures for Prometheus once.",
     "service": "Install, print or remove the systemd unit.",
 }
 """Each has a module of its name with `command` in it; the short help stands here so that --help imports none."""
+
+PLACES = {"web": "lfs10d.web.serve", "metrics": "lfs10d.web.print_metrics"}
+"""Modules of verbs that are built on top of the others."""
 
 EXAMPLES = """\b
 Examples:
@@ -46,19 +51,23 @@ Examples:
 """
 
 
+def _module(verb: str) -> str:
+    return PLACES.get(verb, f"{__name__}.{verb}")
+
+
 class Verbs(click.Group):
     """Looks a verb's module up when it is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the verbs in the order of first use."""
         del ctx
-        return [verb for verb in VERBS if importlib.util.find_spec(f"{__name__}.{verb}")]
+        return [verb for verb in VERBS if importlib.util.find_spec(_module(verb))]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import the verb's module and return its command."""
         if cmd_name not in self.list_commands(ctx):
             return None
-        command = importlib.import_module(f"{__name__}.{cmd_name}").command
+        command = importlib.import_module(_module(cmd_name)).command
         startup.done()
         return command if isinstance(command, click.Command) else None
 

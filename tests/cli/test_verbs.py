@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from lfs10d import __version__
-from lfs10d.cli import VERBS
+from lfs10d.cli import PLACES, VERBS
 from lfs10d.cli import lfs10d as group
 from tests.support.verbs import Lfs10d
 
@@ -34,7 +34,7 @@ def test_every_verb_has_help_with_examples(verb: str) -> None:
 
 @pytest.mark.parametrize("verb", BUILT)
 def test_every_module_of_a_verb_holds_its_command(verb: str) -> None:
-    assert importlib.import_module(f"lfs10d.cli.{verb}").command.name == verb
+    assert importlib.import_module(PLACES.get(verb, f"lfs10d.cli.{verb}")).command.name == verb
 
 
 def test_help_shows_every_verb_and_examples() -> None:

@@ -182,7 +182,7 @@ def analysed(program: Callable[[str], str], *arguments: str) -> str:
 
 
 @pytest.mark.needs("systemd-analyze")
-@pytest.mark.parametrize("unit", ["lfs10d.service", "lfs10d@.service"])
+@pytest.mark.parametrize("unit", ["lfs10d.service", "lfs10d@.service", "lfs10d-web.service"])
 def test_a_unit_is_sandboxed(unit: str, program: Callable[[str], str]) -> None:
     told = analysed(program, "security", "--offline=true", f"--threshold={LARGEST_EXPOSURE}", str(UNITS / unit))
 
@@ -190,7 +190,7 @@ def test_a_unit_is_sandboxed(unit: str, program: Callable[[str], str]) -> None:
 
 
 @pytest.mark.needs("systemd-analyze")
-@pytest.mark.parametrize("unit", ["lfs10d.service", "lfs10d@roof.service"])
+@pytest.mark.parametrize("unit", ["lfs10d.service", "lfs10d@roof.service", "lfs10d-web.service"])
 def test_a_unit_is_understood_without_a_complaint(unit: str, tmp_path: Path, program: Callable[[str], str]) -> None:
     text = (UNITS / unit.replace("roof", "")).read_text()
     # It looks whether the program is there; on the machine of the test it is not.
@@ -227,10 +227,24 @@ def test_the_documentation_that_a_unit_names_comes_with_the_wheel() -> None:
     named = {
         line for unit in UNITS.glob("*.service") for line in unit.read_text().splitlines() if "Documentation" in line
     }
-    (url,) = named
-    place = url.removeprefix("Documentation=file:///opt/lfs10d/")
     sources = {target: source for source, target in wheel["shared-data"].items()}
-    assert (UNITS.parent / sources[place]).is_file()
+    assert len(named) == 2, "that of the daemon and that of the page"
+    for url in named:
+        assert (UNITS.parent / sources[url.removeprefix("Documentation=file:///opt/lfs10d/")]).is_file()
+
+
+def test_the_page_has_the_daemons_sandbox_and_no_device() -> None:
+    daemon, page = (
+        {line for line in (UNITS / name).read_text().splitlines() if line and not line.startswith("#")}
+        for name in ("lfs10d.service", "lfs10d-web.service")
+    )
+    lacking = {line.partition("=")[0] for line in daemon - page}
+    assert lacking <= {
+        "Description", "Documentation", "After", "Wants", "Type", "NotifyAccess", "ExecStart", "ExecReload",
+        "RestartPreventExitStatus", "TimeoutStartSec", "WatchdogSec", "SupplementaryGroups", "StateDirectory", "StateDirectoryMode",
+        "RuntimeDirectory", "RuntimeDirectoryMode", "ConfigurationDirectory", "DeviceAllow",
+    }  # fmt: skip
+    assert {"PrivateDevices=yes", "DevicePolicy=closed", "DynamicUser=yes"} <= page
 
 
 def test_the_units_differ_in_nothing_but_their_instance() -> None:

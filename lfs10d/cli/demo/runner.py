@@ -14,6 +14,7 @@ import click
 
 from lfs10d.cli.demo import texts
 from lfs10d.cli.demo.broker import Broker, start_broker
+from lfs10d.cli.demo.page import Page, start_page
 from lfs10d.cli.demo.processes import PYTHON, Children, temporary_folder
 from lfs10d.cli.demo.scenario import BAUDRATE, LINE, configuration, faults, slaves
 from lfs10d.cli.login import log_in
@@ -30,8 +31,8 @@ STANDARD_OUTPUT: Final = 1
 class DemoView:
     """The live view with the demo's remarks; each time it is drawn, the demo's processes must still run."""
 
-    def __init__(self, broker: Broker, children: Children) -> None:
-        self._view = live_view(remarks=texts.remarks(broker))
+    def __init__(self, broker: Broker, page: Page | None, children: Children) -> None:
+        self._view = live_view(remarks=texts.remarks(broker, page))
         self._children = children
 
     def __enter__(self) -> None:
@@ -65,9 +66,9 @@ async def show(*, duration: float | None, wanted: str) -> None:
         async def play() -> None:
             nonlocal last
             async with spinning("starting the simulated line, the broker and the daemon ..."):
-                watch, broker = await _start(children, wanted)
+                watch, broker, page = await _start(children, wanted)
             last = watch.live
-            await _show(watch, DemoView(broker, children), duration)
+            await _show(watch, DemoView(broker, page, children), duration)
 
         try:
             await _until(over, play())
@@ -100,8 +101,8 @@ async def _show(watch: Watch, view: LiveView, duration: float | None) -> None:
         await watch.disconnect()
 
 
-async def _start(children: Children, wanted: str) -> tuple[Watch, Broker]:
-    """Start line, broker and daemon; return the broker and what watches the daemon there, connected."""
+async def _start(children: Children, wanted: str) -> tuple[Watch, Broker, Page | None]:
+    """Start line, broker, page and daemon; return what watches the daemon, connected, the broker and the page."""
     link, faults_file, configuration_file = (children.folder / name for name in ("line", "faults.yaml", "lfs10d.yaml"))
     ours = (*PYTHON, "-m", "lfs10d")
     faults_file.write_text(faults())
@@ -114,13 +115,14 @@ async def _start(children: Children, wanted: str) -> tuple[Watch, Broker]:
     if not await children.ready(simulator, link.is_symlink):
         raise FailedError(f"the demo's simulated line does not start: {simulator.last_words()}")
     configuration_file.write_text(configuration(link, broker.port, broker.speaks))
+    page = await start_page(children, configuration_file)
     daemon = children.start("daemon", *ours, "run", "-c", str(configuration_file), "--state-dir", str(children.folder))
     watch = Watch(log_in(configuration_file, "demo", username=None, password_file=None))
     await watch.connect()
     if not await children.ready(daemon, lambda: watch.online):
         await watch.disconnect()
         raise FailedError(f"the demo's daemon does not start: {daemon.last_words()}")
-    return watch, broker
+    return watch, broker, page
 
 
 def _is_writable() -> bool:

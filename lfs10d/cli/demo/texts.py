@@ -5,18 +5,23 @@ from __future__ import annotations
 from typing import Final
 
 from lfs10d.cli.demo.broker import Broker
+from lfs10d.cli.demo.page import Page
 from lfs10d.cli.demo.scenario import BASE_TOPIC, BAUDRATE, SENSORS
 from lfs10d.cli.render.live_state import LiveState
 
 SUBJECT: Final = f"lfs10d demo: eight LFS10 wind sensors on a simulated RS485 line, {BAUDRATE} baud"
 
 
-def remarks(broker: Broker) -> tuple[str, ...]:
-    """Return what stands below the table: what is shown, which sensors are faulty, how to subscribe."""
+def remarks(broker: Broker, page: Page | None) -> tuple[str, ...]:
+    """Return what stands below the table: what is shown, which sensors are faulty, the page, how to subscribe."""
+    seen = ("The page in a browser needs the extra: pip install 'lfs10d[web]'",)
+    if page is not None:
+        seen = (f"In a browser: {page.address} (token for its controls: {page.token})",)
     return (
         SUBJECT,
         f"simulated line > lfs10d > {broker.name} (MQTT {broker.speaks}, 127.0.0.1:{broker.port}) > this view",
         *(f"{sensor.name} {sensor.remark}" for sensor in SENSORS if sensor.remark is not None),
+        *seen,
         f"Subscribe too: mosquitto_sub -h 127.0.0.1 -p {broker.port} -t '{BASE_TOPIC}/#' -v",
         "Ctrl-C ends the demo and leaves nothing behind.",
     )

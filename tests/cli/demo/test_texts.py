@@ -5,21 +5,29 @@ from __future__ import annotations
 import json
 
 from lfs10d.cli.demo.broker import Broker
+from lfs10d.cli.demo.page import Page
 from lfs10d.cli.demo.texts import remarks, summary
 from lfs10d.cli.render.live_state import LiveState
 
+PAGE = Page("http://127.0.0.1:65535/", "0123456789abcdef")
+
 
 def test_the_remarks_name_the_faulty_sensors_and_how_to_subscribe() -> None:
-    text = "\n".join(remarks(Broker("mosquitto", "5", 18830)))
+    text = "\n".join(remarks(Broker("mosquitto", "5", 18830), PAGE))
     assert "mosquitto (MQTT 5, 127.0.0.1:18830)" in text
     assert "crane is silent" in text
     assert "bridge is noisy" in text
     assert "mosquitto_sub -h 127.0.0.1 -p 18830 -t 'lfs10d/#' -v" in text
+    assert "http://127.0.0.1:65535/ (token for its controls: 0123456789abcdef)" in text
     assert "Ctrl-C" in text
 
 
+def test_without_its_extra_the_page_is_named_with_what_to_do() -> None:
+    assert "needs the extra: pip install 'lfs10d[web]'" in "\n".join(remarks(Broker("mosquitto", "5", 1), None))
+
+
 def test_no_remark_is_wider_than_a_terminal() -> None:
-    assert max(map(len, remarks(Broker("mosquitto", "3.1.1", 65535)))) <= 80
+    assert max(map(len, remarks(Broker("mosquitto", "3.1.1", 65535), PAGE))) <= 80
 
 
 def test_the_summary_counts_samples_and_sensors() -> None:

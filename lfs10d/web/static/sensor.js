@@ -1,0 +1,54 @@
+// What is said of a sensor: its state in words, its value and its age. Old is never shown as live.
+
+import { ageText, timeText } from "./dom.js";
+import { live, now } from "./stream.js";
+import { shown } from "./units.js";
+
+const WAY = 1; // s from the sensor to the eye, beyond three intervals
+
+export function age(device) {
+  return device.good_at === null || device.good_at === undefined ? null : Math.max(0, (now() - device.good_at) / 1000);
+}
+
+export function old(line, device) {
+  const seconds = age(device);
+  const interval = Math.max(device.interval ?? 1, device.interval === 0 ? line.line?.cycle_s ?? 1 : 0);
+  return seconds === null || seconds > 3 * interval + WAY || !live();
+}
+
+export function main(device) {
+  const name = Object.keys(device.values ?? {})[0];
+  return name === undefined ? [null, Object.values(device.units ?? {})[0] ?? "m/s"] : [device.values[name], device.units[name]];
+}
+
+// [class, words] of a sensor's state.
+export function state(line, device) {
+  if (device.enabled === false) return ["", "disabled"];
+  if (line.line?.activity === "paused") return ["", "the line is paused"];
+  if (device.fault) return ["bad", `${device.online ? "" : "offline: "}${device.fault.meaning} since ${timeText(device.fault.since, now())}`];
+  if (device.error && device.error !== "starting") return ["bad", device.error_words];
+  if (old(line, device)) return ["", age(device) === null ? "no value yet" : "no new value"];
+  const partly = device.errors ? Object.keys(device.errors) : [];
+  return partly.length ? ["", `partly good: no ${partly.join(", ").replaceAll("_", " ")}`] : ["good", "good"];
+}
+
+export function ageWords(line, device) {
+  if (!old(line, device) || device.enabled === false) return "";
+  const seconds = age(device);
+  return seconds === null ? "" : `last value ${ageText(seconds)} ago`;
+}
+
+// Gust, mean and direction, as far as the daemon publishes them.
+export function windWords(device) {
+  const wind = device.wind, words = [];
+  if (wind) {
+    for (const [name, key] of [["gust", "gust_10m"], ["mean", "mean_10m"]]) {
+      if (typeof wind[key] === "number") words.push(`${name} ${shown(wind[key], wind.unit ?? "m/s").join(" ")}`);
+    }
+    if (typeof wind.direction_2m === "number") words.push(`from ${Math.round(wind.direction_2m)}°`);
+  }
+  for (const [name, value] of Object.entries(device.values ?? {}).slice(1)) {
+    words.push(`${name.replaceAll("_", " ")} ${shown(value, device.units[name]).join(" ")}`);
+  }
+  return words.join(" · ");
+}

@@ -1,0 +1,129 @@
+"""The viewers' one stream: the changes of all lines twice a second, each written once and sent to everybody."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import secrets
+import time
+from collections.abc import AsyncIterator, Sequence
+from typing import Any, Final
+
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response, StreamingResponse
+
+from lfs10d.web.actions import LineActions
+from lfs10d.web.feed import Feed
+from lfs10d.web.line_model import LineModel
+from lfs10d.web.site_model import SiteModel, Stream, event_bytes
+
+EVERY: Final = 0.5
+"""s between two events: fast enough to follow a cup that is turned by hand."""
+AT_LEAST_EVERY: Final = 2.0
+"""s: a viewer who hears nothing for longer shows that it is not live."""
+MOST_VIEWERS: Final = 64
+BEHIND: Final = 60
+"""Events that wait for a viewer before its stream is ended; it comes back and resumes."""
+RETRY: Final = b"retry: 2000\n\n"
+
+
+class Viewers:
+    """What is shown to all: the lines, their requests, and the open streams."""
+
+    def __init__(self, site: SiteModel, feeds: Sequence[Feed]) -> None:
+        self.site = site
+        self._feeds = feeds
+        self._actions: dict[str, LineActions] = {}
+        self._stream = Stream(secrets.token_hex(4))
+        self._queues: set[asyncio.Queue[bytes | None]] = set()
+        self._sent_at = 0.0
+        self._looked_at = 0.0
+
+    def figures(self) -> dict[str, int]:
+        """Return how many lines are shown, and to how many viewers."""
+        return {"lines": len(self.site.lines), "viewers": len(self._queues)}
+
+    def look(self) -> None:
+        """Take what connections and status files say, at most once in half a second."""
+        now = time.monotonic()
+        if now - self._looked_at >= EVERY:
+            self._looked_at = now
+            for feed in self._feeds:
+                feed.look()
+
+    def actions(self, key: str) -> LineActions | None:
+        """Return the requests of a line; None where there is no such line."""
+        line = self.site.lines.get(key)
+        if line is None:
+            return None
+        if key not in self._actions:
+            self._actions[key] = LineActions(lambda: self._login(line))
+        return self._actions[key]
+
+    def _login(self, line: LineModel) -> Any:  # noqa: ANN401 - a login, or None
+        logins = (feed.request_login(line) for feed in self._feeds)
+        return next((login for login in logins if login is not None), None)
+
+    def _more(self, line: LineModel) -> dict[str, Any]:
+        actions = self._actions.get(line.key)
+        return {"requests": [], "mounting": None} if actions is None else actions.shown()
+
+    def whole(self) -> str:
+        """Return everything as JSON; viewers get what changed before it."""
+        self.look()
+        self._publish()
+        return json.dumps(self.site.whole(time.time(), self._more), separators=(",", ":"))
+
+    async def run(self) -> None:
+        """Feed the viewers until cancelled."""
+        try:
+            while True:
+                await asyncio.sleep(EVERY)
+                self.look()
+                if self._queues:
+                    self._publish()
+        finally:
+            for queue in self._queues:
+                queue.put_nowait(None)
+
+    async def close(self) -> None:
+        """End all requests."""
+        for actions in self._actions.values():
+            await actions.close()
+
+    def _publish(self) -> None:
+        wall, now = time.time(), time.monotonic()
+        changed = self.site.changes(wall, self._more)
+        if not changed and now - self._sent_at < AT_LEAST_EVERY:
+            return
+        self._sent_at = now
+        data = json.dumps({"now": round(wall * 1000), "lines": changed}, separators=(",", ":"))
+        event = self._stream.add(data)
+        for queue in list(self._queues):
+            if queue.qsize() >= BEHIND:
+                self._queues.discard(queue)
+                queue.put_nowait(None)
+            else:
+                queue.put_nowait(event)
+
+    async def events(self, request: Request) -> Response:
+        """Return the stream, from where the viewer lost it, or from the whole."""
+        if len(self._queues) >= MOST_VIEWERS:
+            return PlainTextResponse("Too many viewers.\n", 503, headers={"retry-after": "10"})
+        last = request.headers.get("last-event-id") or request.query_params.get("after")
+        headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
+        return StreamingResponse(self._events(last), media_type="text/event-stream", headers=headers)
+
+    async def _events(self, last: str | None) -> AsyncIterator[bytes]:
+        queue: asyncio.Queue[bytes | None] = asyncio.Queue()
+        missed = self._stream.since(last)
+        whole = self.whole() if missed is None else ""
+        if missed is None:
+            missed = [event_bytes("state", whole, self._stream.last_id)]
+        self._queues.add(queue)
+        try:
+            yield RETRY + b"".join(missed)
+            while (event := await queue.get()) is not None:
+                yield event
+        finally:
+            self._queues.discard(queue)
