@@ -14,12 +14,12 @@ $(VENV)/.demo: pyproject.toml
 	@echo 'Setting up $(VENV), once: this needs a package index (PyPI, or the one pip is configured for) and takes a minute.'
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "needs Python 3.11 or newer: make PYTHON=python3.12 demo")'
 	@$(PYTHON) -m venv $(VENV)
-	@$(BIN)/pip install --editable '.[demo]' || { echo 'Setting up failed; see above. Is a package index within reach?' >&2; exit 1; }
+	@$(BIN)/pip install --editable '.[demo,web]' || { echo 'Setting up failed; see above. Is a package index within reach?' >&2; exit 1; }
 	@touch $@
 
 $(VENV)/.dev: $(VENV)/.demo
 	@echo 'Installing the tools for tests and checks into $(VENV), once.'
-	@$(BIN)/pip install --editable '.[demo,dev]'
+	@$(BIN)/pip install --editable '.[demo,web,dev]'
 	@touch $@
 
 demo: $(VENV)/.demo ## Show it at work: simulated line, broker, daemon; no hardware needed
