@@ -241,7 +241,8 @@ def test_the_page_has_the_daemons_sandbox_and_no_device() -> None:
     lacking = {line.partition("=")[0] for line in daemon - page}
     assert lacking <= {
         "Description", "Documentation", "After", "Wants", "Type", "NotifyAccess", "ExecStart", "ExecReload",
-        "RestartPreventExitStatus", "TimeoutStartSec", "WatchdogSec", "SupplementaryGroups", "StateDirectory", "StateDirectoryMode",
+        "RestartPreventExitStatus", "TimeoutStartSec", "WatchdogSec", "SupplementaryGroups", "StateDirectory",
+        "StateDirectoryMode",
         "RuntimeDirectory", "RuntimeDirectoryMode", "ConfigurationDirectory", "DeviceAllow",
     }  # fmt: skip
     assert {"PrivateDevices=yes", "DevicePolicy=closed", "DynamicUser=yes"} <= page
