@@ -251,8 +251,9 @@ class SimulatedLine:
         bodies: dict[str, bytes | None] = {}
         replies: list[Reply] = []
         for sensor in self.sensors:
-            sensor.restore(now)
-            if sensor.format != shape or sensor.framing != self.framing:
+            if sensor.faults:
+                sensor.restore(now)
+            if (sensor.format is not shape and sensor.format != shape) or sensor.framing != self.framing:
                 continue
             check = sensor.blueprint.check
             if check not in bodies:

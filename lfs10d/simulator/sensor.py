@@ -186,7 +186,8 @@ class Sensor:
 
         `after_dead`: the request before this one went to another sensor and had no answer.
         """
-        if body[0] not in (self.slave, BROADCAST) and not self._wild(body[0], ended):
+        slave = body[0]
+        if slave not in (self.slave, BROADCAST) and not (slave == WILDCARD_ID and self._wild(ended)):
             return None
         if not self.powered or self.hung or ended < self.deaf_until or not is_whole(body):
             return None
@@ -246,10 +247,8 @@ class Sensor:
             FaultKind.NEEDS_REST in active and ended - self._last_answer < active[FaultKind.NEEDS_REST].delay
         )
 
-    def _wild(self, slave: int, now: int) -> bool:
-        return slave == WILDCARD_ID and any(
-            one.kind is FaultKind.WILDCARD and one.strikes(now, self.random) for one in self.faults
-        )
+    def _wild(self, now: int) -> bool:
+        return any(one.kind is FaultKind.WILDCARD and one.strikes(now, self.random) for one in self.faults)
 
     def _active(self, now: int) -> ActiveFaults:
         return {one.kind: one for one in self.faults if one.strikes(now, self.random)}

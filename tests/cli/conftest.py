@@ -9,7 +9,6 @@ import pty
 import signal
 import struct
 import subprocess
-import sys
 import termios
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,6 +17,7 @@ import pytest
 
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
+from tests.support import forked
 from tests.support.verbs import AtTerminal, Lfs10d
 
 
@@ -26,15 +26,7 @@ def lfs10d(tmp_path: Path) -> Lfs10d:
     """Return the program, to be called."""
 
     def call(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [sys.executable, "-m", "lfs10d", *arguments],
-            cwd=tmp_path,
-            env={"PATH": "/usr/bin:/bin", "HOME": str(tmp_path), **environment},
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=60,
-        )
+        return forked.run(arguments, cwd=tmp_path, env={"PATH": "/usr/bin:/bin", "HOME": str(tmp_path), **environment})
 
     return call
 
@@ -55,25 +47,17 @@ def at_terminal(tmp_path: Path) -> AtTerminal:
         master, slave = pty.openpty()
         fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 40, columns, 0, 0))
         environment = {"PATH": "/usr/bin:/bin", "HOME": str(tmp_path), "TERM": "xterm-256color", "LANG": "C.UTF-8"}
-        with subprocess.Popen(
-            [sys.executable, "-m", "lfs10d", *arguments],
-            cwd=tmp_path,
-            env=environment,
-            stdin=slave,
-            stdout=slave,
-            stderr=slave,
-        ) as process:
-            os.close(slave)
-            seen = b""
-            with contextlib.suppress(OSError):  # EIO: the program has closed its end
-                while piece := os.read(master, 65536):
-                    seen += piece
-                    if until is not None and until.encode() in seen:
-                        until = None
-                        process.send_signal(signal.SIGINT)
-            os.close(master)
-            code = process.wait(timeout=60)
-        return code, seen.decode()
+        process = forked.start(arguments, cwd=tmp_path, env=environment, stdin=slave, stdout=slave, stderr=slave)
+        os.close(slave)
+        seen = b""
+        with contextlib.suppress(OSError):  # EIO: the program has closed its end
+            while piece := os.read(master, 65536):
+                seen += piece
+                if until is not None and until.encode() in seen:
+                    until = None
+                    process.send_signal(signal.SIGINT)
+        os.close(master)
+        return process.wait(timeout=60), seen.decode()
 
     return call
 

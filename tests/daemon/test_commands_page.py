@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 from typing import Any
 
 import pytest
@@ -14,6 +13,7 @@ from lfs10d.commands.handlers.registry import HANDLERS
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from lfs10d.telemetry.contract import check
+from tests.support import forked
 from tests.support.brokers import Mosquitto
 from tests.support.sites import Site, View, eventually, good, tell
 
@@ -109,8 +109,7 @@ def test_on_the_command_line_every_request_is_typed_as_the_page_shows(
     begun(site, view)
     for number in QUICK:
         step = WALK[number]
-        command = [sys.executable, "-m", "lfs10d", "request", *step.arguments, "--json", "-c", str(site.file)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+        done = forked.run(["request", *step.arguments, "--json", "-c", str(site.file)])
         response = json.loads(done.stdout)
         assert done.returncode == (0 if response["status"] == "ok" else 1)
         hold(step, number, response)

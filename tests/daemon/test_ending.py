@@ -124,7 +124,7 @@ def test_asked_to_end_twice_it_ends_once_in_order(site: Site, view: View) -> Non
 
 def test_asked_to_end_before_it_began_it_ends_with_0(site: Site) -> None:
     site.write()
-    run = site.run()
+    run = site.run(program=("-m", "lfs10d"))
     # Its handlers stand as soon as SIGHUP is ignored, which /proc tells, or caught, if nobody looked in between.
     status = Path(f"/proc/{run.process.pid}/status")
 

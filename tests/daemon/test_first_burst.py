@@ -64,7 +64,8 @@ def test_samples_follow_without_a_gap_each_as_the_sensor_sent_it(site: Site, vie
     assert [one["seq"] for one in samples] == list(range(1, len(samples) + 1))
     assert all(set(one) == SAMPLE for one in samples)
     assert run.ends(signal.SIGTERM) == 0
-    sent = [answer.values[0] for each in served.line.log for answer in each.answers if answer.sensor.slave == 1]
+    answers = [answer for each in served.line.log for answer in each.answers if answer.sensor.slave == 1]
+    sent = [answer.values[0] for answer in answers if answer.values]  # a busy machine makes one late: its id is read
     assert [one["wind_speed"] for one in samples if good(one)] == sent[: len(samples)]
 
 

@@ -6,7 +6,6 @@ import json
 import random
 import re
 import subprocess
-import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -19,6 +18,7 @@ from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
+from tests.support import forked
 from tests.support.brokers import Mosquitto
 from tests.support.sites import Site, View, eventually, good, tell
 
@@ -54,8 +54,7 @@ def publish(mosquitto: Mosquitto, topic: str, payload: dict[str, Any]) -> None:
 
 def asked(site: Site, name: str, *parameters: str) -> subprocess.CompletedProcess[str]:
     """Send a request as a person does."""
-    command = [sys.executable, "-m", "lfs10d", "request", name, *parameters, "-c", str(site.file)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    return forked.run(["request", name, *parameters, "-c", str(site.file)])
 
 
 def published(view: View, mosquitto: Mosquitto, name: str, payload: dict[str, Any]) -> dict[str, Any]:
@@ -111,7 +110,7 @@ def test_the_intent_is_on_the_disk_before_the_first_byte_of_the_write(
     site.line((1, 2))
     site.write()
     trace = site.folder / "trace"
-    run = site.run(program=("-m", "lfs10d"))
+    run = site.run()
     view.wait("device/slave-2/state", good)
     tracer = subprocess.Popen(
         [

@@ -12,6 +12,7 @@ import pytest
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from lfs10d.telemetry.contract import check
+from tests.support import forked
 from tests.support.brokers import Mosquitto
 from tests.support.sites import Site, View, eventually, good, tell
 
@@ -50,8 +51,7 @@ def response(view: View, name: str, before: int = 0) -> dict[str, Any]:
 
 def asked(site: Site, name: str, *parameters: str) -> subprocess.CompletedProcess[str]:
     """Send a request as a person does."""
-    command = [sys.executable, "-m", "lfs10d", "request", name, *parameters, "-c", str(site.file)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    return forked.run(["request", name, *parameters, "-c", str(site.file)])
 
 
 def events(view: View, kind: str) -> list[dict[str, Any]]:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.support import forked
 from tests.support.brokers import eventually
 
 PAGE = (Path(__file__).parents[2] / "docs" / "profiles.md").read_text()
@@ -21,10 +22,7 @@ COMMANDS = re.findall(r"^    \$ lfs10d (.+)$", PAGE, re.MULTILINE)
 
 def lfs10d(folder: Path, *arguments: str) -> str:
     """Return what the program prints; it must succeed."""
-    done = subprocess.run(
-        [sys.executable, "-m", "lfs10d", *arguments],
-        cwd=folder, capture_output=True, text=True, check=False, timeout=60,
-    )  # fmt: skip
+    done = forked.run(arguments, cwd=folder)
     assert done.returncode == 0, done.stderr
     return done.stdout
 

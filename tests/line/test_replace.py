@@ -170,8 +170,8 @@ def test_changes_at_any_moment_wedge_nothing(
     change(rigs, rig, "heal", 0)
     changed = rig.clock.now
     rig.poller.replace([rigs.spec(2, 0.25), rigs.spec(4, 0.0)], RULES)
-    rig.run(changed + 25.0)
     settled = changed + 17.0  # the longest pause between probes, and a probe
+    rig.run(settled + 2.0)
     assert {exchange.slave for exchange in rig.exchanges if exchange.at > changed + 1.2} == {2, 4}
-    assert len(rig.good(2, since=settled)) >= 31
-    assert len(rig.good(4, since=settled)) >= 200
+    assert len(rig.good(2, since=settled)) >= 7
+    assert len(rig.good(4, since=settled)) >= 50

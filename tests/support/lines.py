@@ -119,9 +119,10 @@ class Rig:
 
 def _nearest(requests: dict[int, HeardRequest], when: float) -> HeardRequest:
     begun = round(when * 1e9)
-    for shift in range(-2000, 2001):  # floats of a long run
-        if begun + shift in requests:
-            return requests[begun + shift]
+    for shift in range(2001):  # floats of a long run
+        for near in (begun - shift, begun + shift):
+            if near in requests:
+                return requests[near]
     raise AssertionError(f"no request was begun at {when}")
 
 

@@ -21,6 +21,7 @@ from lfs10d.simulator.registers import blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wind import Unique
 from lfs10d.simulator.wire import Check, Format, Framing, unseal
+from tests.support import forked
 from tests.support.brokers import Mosquitto
 from tests.support.sites import Site, View, good, tell
 
@@ -148,10 +149,7 @@ class Recording:
 
     def lfs10d(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         """Call a verb at the free port."""
-        return subprocess.run(
-            [sys.executable, "-m", "lfs10d", *arguments],
-            cwd=self.site.folder, capture_output=True, text=True, check=False, timeout=60,
-        )  # fmt: skip
+        return forked.run(arguments, cwd=self.site.folder)
 
     @property
     def line_options(self) -> list[str]:

@@ -9,20 +9,21 @@ import re
 import select
 import struct
 import subprocess
-import sys
 import termios
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from tests.support import forked
+from tests.support.forked import Process
 from tests.support.sites import ENDS_WITHIN, PATIENCE, Run, Site, eventually
 
 BASE = "lfs10d/line0"
 
 
-def command(site: Site, verb: str, *arguments: str) -> list[str]:
-    return [sys.executable, "-m", "lfs10d", verb, "-c", str(site.file), *arguments]
+def words(site: Site, verb: str, *arguments: str) -> list[str]:
+    return [verb, "-c", str(site.file), *arguments]
 
 
 def environment(runtime: Path | None = None, **more: str) -> dict[str, str]:
@@ -33,21 +34,14 @@ def environment(runtime: Path | None = None, **more: str) -> dict[str, str]:
 
 def typed(site: Site, verb: str, *arguments: str, runtime: Path | None = None) -> subprocess.CompletedProcess[str]:
     """Call a verb that ends by itself, in a pipe."""
-    return subprocess.run(
-        command(site, verb, *arguments),
-        env=environment(runtime),
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-    )
+    return forked.run(words(site, verb, *arguments), env=environment(runtime))
 
 
 @dataclass
 class Running:
     """A verb that goes on until it is told to end, with what it printed so far; `master` is that of its terminal."""
 
-    process: subprocess.Popen[bytes]
+    process: Process
     source: int
     raw: bytes = b""
 
@@ -88,7 +82,7 @@ class Running:
             assert time.monotonic() - begun < ENDS_WITHIN
         while self.read(0.0) and select.select([self.source], [], [], 0)[0]:
             pass
-        return self.process.returncode
+        return self.process.wait()
 
 
 @dataclass
@@ -100,9 +94,8 @@ class Shell:
 
     def pipe(self, verb: str, *arguments: str, runtime: Path | None = None) -> Running:
         source, sink = os.pipe()
-        process = subprocess.Popen(
-            command(self.site, verb, *arguments),
-            stdin=subprocess.DEVNULL,
+        process = forked.start(
+            words(self.site, verb, *arguments),
             stdout=sink,
             stderr=sink,
             env=environment(runtime, PYTHONUNBUFFERED="1"),
@@ -115,8 +108,8 @@ class Shell:
     ) -> Running:
         master, slave = pty.openpty()
         fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", lines, columns, 0, 0))
-        process = subprocess.Popen(
-            command(self.site, verb, *arguments),
+        process = forked.start(
+            words(self.site, verb, *arguments),
             stdin=slave,
             stdout=slave,
             stderr=slave,

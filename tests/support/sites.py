@@ -19,7 +19,9 @@ from lfs10d.simulator.builder import LinePlan, build
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.wire import Format
+from tests.support import forked
 from tests.support.brokers import Heard, Listener
+from tests.support.forked import Process
 
 PATIENCE = 20.0
 """Seconds after which something awaited counts as not happening; no test waits this long when all is well."""
@@ -69,7 +71,7 @@ class Manager:
 class Run:
     """One daemon. `process` may be ended by the test; what is left is killed."""
 
-    process: subprocess.Popen[bytes]
+    process: Process
     errors: Path
     manager: Manager
     status: Path
@@ -228,10 +230,10 @@ class Site:
         self,
         *arguments: str,
         environment: Mapping[str, str] | None = None,
-        program: Sequence[str] = ("-m", "lfs10d"),
+        program: Sequence[str] | None = None,
         watchdog: float | None = None,
     ) -> Run:
-        """Start a daemon."""
+        """Start a daemon; with `program`, Python with these arguments before those of `run`."""
         number = len(self.runs)
         errors, runtime = self.folder / f"errors-{number}", self.folder / f"run-{number}"
         runtime.mkdir()
@@ -243,11 +245,14 @@ class Site:
             **({} if watchdog is None else {"WATCHDOG_USEC": str(round(watchdog * 1e6))}),
             **(environment or {}),
         }
-        command = [sys.executable, *program, "run", "-c", str(self.file), "--state-dir", str(self.folder / "state")]
+        verb = ["run", "-c", str(self.file), "--state-dir", str(self.folder / "state"), *arguments]
         with errors.open("wb") as log:
-            process = subprocess.Popen(
-                [*command, *arguments], stdin=subprocess.DEVNULL, stdout=log, stderr=log, env=variables
-            )
+            process: Process
+            if program is None:
+                process = forked.start(verb, stdout=log.fileno(), stderr=log.fileno(), env=variables)
+            else:
+                command = [sys.executable, *program, *verb]
+                process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, env=variables)
         run = Run(process, errors, manager, runtime / "status.json")
         self.runs.append(run)
         return run
