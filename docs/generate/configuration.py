@@ -40,10 +40,11 @@ def parts() -> Mapping[str, str]:
 def _keys(owner: Model, path: str, field: FieldInfo) -> Iterator[str]:
     """Yield the entry of one key, or those of all keys below it."""
     model = model_in(field.annotation)
-    if model is None or _nullable(field.annotation) or _listed(field.annotation):
+    if model is None or _nullable(field.annotation) or _listed(field.annotation) or _named(field.annotation):
         yield _entry(owner, path, field)
     if model is not None:
         below = f"{path}[]" if _listed(field.annotation) else path
+        below += ".NAME" if _named(field.annotation) else ""
         for name, inner in model.model_fields.items():
             yield from _keys(model, f"{below}.{name}", inner)
 
@@ -78,11 +79,16 @@ def _value(field: FieldInfo) -> str:
     if kind is not None:
         return kind.words.partition(_HOW_TO_WRITE)[0]
     model = model_in(field.annotation)
+    if model is None and field.annotation is float:
+        low, high = (next(getattr(each, key) for each in field.metadata if hasattr(each, key)) for key in ("ge", "le"))
+        return f"a number from {low:.10g} to {high:.10g}"
     if model is None:
         inner = next(iter(kinds_within(field.annotation)))
         return f"a list of any of {inner.words.replace(' or ', ', ')}; `[]` for none"
     if _listed(field.annotation):
         return "a list; each item a slave id, or a mapping of the keys below"
+    if _named(field.annotation):
+        return "a mapping of names to mappings of the keys below; `{}` for none"
     return "`null`, or a mapping of the keys below"
 
 
@@ -120,6 +126,10 @@ def kinds_within(annotation: Any) -> Iterator[FieldKind]:  # noqa: ANN401 - an a
 
 def _nullable(annotation: Any) -> bool:  # noqa: ANN401 - an annotation is of any type
     return get_origin(annotation) in {Union, UnionType} and type(None) in get_args(annotation)
+
+
+def _named(annotation: Any) -> bool:  # noqa: ANN401 - an annotation is of any type
+    return get_origin(annotation) is dict
 
 
 def _listed(annotation: Any) -> bool:  # noqa: ANN401 - an annotation is of any type

@@ -10,6 +10,7 @@ from lfs10d.config.loader import LoadedConfig
 from lfs10d.config.models import LATER_SECTIONS, default_line_name
 from lfs10d.errors import ConfigError, Problem
 from lfs10d.line.budget import ASSUMED_TURNAROUND, Budget
+from lfs10d.profiles.registers import spell
 from lfs10d.schema.fields import quoted
 from lfs10d.schema.messages import KeyPath
 from lfs10d.schema.quantities import duration_text
@@ -25,6 +26,7 @@ def advice(loaded: LoadedConfig, budget: Budget, host: str) -> tuple[Problem, ..
         *_login(loaded),
         *_files(loaded),
         *_names(loaded, host),
+        *_calibration(loaded),
         *_unused(loaded),
     )
     return tuple(sorted(loaded.document.problem(path, f"warning: {message}") for path, message in warnings))
@@ -144,6 +146,23 @@ def _names(loaded: LoadedConfig, host: str) -> Iterator[tuple[KeyPath, str]]:
                     "two clients of one id throw each other out: set mqtt.client_id or the host's name"
                 ),
             )
+
+
+def _calibration(loaded: LoadedConfig) -> Iterator[tuple[KeyPath, str]]:
+    """Small values with a negative offset fall below a range that begins at 0."""
+    for index, slave in enumerate(loaded.config.slaves):
+        values = {value.name: value for value in loaded.profiles[slave.profile].values}
+        for name, entry in slave.calibration.items():
+            value = values[name]
+            if entry.offset < 0 and value.range is not None and value.range[0] == 0:
+                least = f"{-entry.offset / entry.scale:.3g}"
+                yield (
+                    ("slaves", index, "calibration", name, "offset"),
+                    (
+                        f"{name} below {spell(float(least), value.unit)} becomes negative by it, which is out_of_range "
+                        f"for profile {slave.profile}"
+                    ),
+                )
 
 
 def _unused(loaded: LoadedConfig) -> Iterator[tuple[KeyPath, str]]:

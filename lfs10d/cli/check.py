@@ -69,6 +69,10 @@ def _problem_json(problem: Problem) -> dict[str, Any]:
 
 
 def _report(loaded: LoadedConfig, found: Budget, warnings: tuple[Problem, ...]) -> dict[str, Any]:
+    certificates = {
+        slave.name: {name: entry.model_dump() for name, entry in slave.calibration.items()}
+        for slave in loaded.config.slaves
+    }
     return {
         "valid": True,
         "warnings": [_problem_json(warning) for warning in warnings],
@@ -88,6 +92,7 @@ def _report(loaded: LoadedConfig, found: Budget, warnings: tuple[Problem, ...]) 
                     "wire_ms": round(share.wire * 1e3, 3),
                     "rest_ms": round(share.rest * 1e3, 3),
                     "load_pct": None if share.load is None else round(share.load * 100, 3),
+                    "calibration": certificates[share.device],
                 }
                 for share in found.shares
             ],
@@ -125,6 +130,14 @@ def _lines(loaded: LoadedConfig, found: Budget) -> Iterator[str]:
         right=(1, 3, 4, 5, 6),
     )
     yield ""
+    calibrated = [
+        (slave.name, name, f"value * {entry.scale:.10g} {'-' if entry.offset < 0 else '+'} {abs(entry.offset):.10g}")
+        for slave in loaded.config.slaves
+        for name, entry in slave.calibration.items()
+    ]
+    if calibrated:
+        yield from columns(("device", "value", "calibration"), calibrated)
+        yield ""
     yield (
         f"load             {found.load:.1%} of the line without turnaround, "
         f"{found.load_with_turnaround:.1%} if each answer takes 5 ms to begin"

@@ -159,6 +159,8 @@ def _written(config: Config, path: tuple[str | int, ...], value: object) -> str:
         return duration_text(value)
     if isinstance(kind, Size) and isinstance(value, int):
         return size_text(value)
+    if isinstance(value, dict):
+        return json_text({name: entry.model_dump() for name, entry in value.items()})
     return json_text(value) if isinstance(value, bool | tuple) else escape(str(value))
 
 

@@ -234,6 +234,8 @@ def in_words(values: Values) -> dict[str, Any]:
 def _word(key: str, value: object) -> object:
     if key == "response_timeout" and value is None:
         return "auto"
+    if key == "calibration" and isinstance(value, dict):
+        return {name: entry.model_dump(exclude_unset=True) for name, entry in value.items()}
     if isinstance(value, float):
         return duration_text(value) if value else 0
     return value

@@ -97,7 +97,7 @@ def load(
     profiles, more = _profiles(document, config, folder, wrong)
     problems += more
     problems += (
-        document.problem(found.path, found.message)
+        document.problem(found.path, found.message, key=found.key)
         for found in contradictions(config, profiles)
         if not any(_concerns(key, wrong) for key in found.on)
     )

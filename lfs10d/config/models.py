@@ -14,7 +14,7 @@ from typing import Annotated, Literal, TypeAlias
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from lfs10d.config.short_forms import SLAVE_ID, OrBareId, items, slave_mapping
-from lfs10d.schema.addresses import BaseTopic, Hosts, node_text, split_node
+from lfs10d.schema.addresses import BaseTopic, Hosts, TopicPrefix, node_text, split_node
 from lfs10d.schema.fields import (
     Choice,
     Duration,
@@ -132,6 +132,15 @@ class PollConfig(Section):
     )
 
 
+class CalibrationConfig(Section):
+    """What a calibration certificate says of one value: `value * scale + offset`."""
+
+    scale: Annotated[float, Field(ge=0.001, le=1000)] = Field(1.0, description="What the value is multiplied by.")
+    offset: Annotated[float, Field(ge=-1e6, le=1e6)] = Field(
+        0.0, description="What is then added, in the unit of the value."
+    )
+
+
 class SlaveConfig(Section):
     """One device on the line."""
 
@@ -158,6 +167,16 @@ class SlaveConfig(Section):
         description="Rest before each request to it, counted from the end of the exchange with it before; "
         "the longer of this and the profile's.",
     )
+    calibration: dict[str, CalibrationConfig] = Field(
+        {},
+        description="By value name what its calibration certificate says, {wind_speed: {scale: 1.013, offset: 0.06}}: "
+        "value * scale + offset, before the profile's range is judged. A wind_speed of 0 stays 0.",
+    )
+
+    @property
+    def certificates(self) -> dict[str, tuple[float, float]]:
+        """Scale and offset by value name, as `Profile.calibrated` takes them."""
+        return {name: (entry.scale, entry.offset) for name, entry in self.calibration.items()}
 
 
 class TlsConfig(Section):
@@ -254,7 +273,7 @@ class HomeassistantConfig(Section):
     discovery: Annotated[bool, Flag()] = Field(
         default=False, description="Announce the line and its devices to Home Assistant; false takes it back."
     )
-    prefix: Annotated[str, BaseTopic()] = Field(
+    prefix: Annotated[str, TopicPrefix()] = Field(
         "homeassistant", description="The discovery prefix set in Home Assistant's MQTT integration."
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 
 from lfs10d.config.models import Config, SlaveConfig, device_name
 from lfs10d.profiles.profile import Profile
@@ -13,11 +14,15 @@ from lfs10d.schema.quantities import duration_text
 
 @dataclass(frozen=True, slots=True)
 class Contradiction:
-    """A problem at `path`; it rests on the keys `on`, and means nothing where one of them is wrong itself."""
+    """A problem at `path`; it rests on the keys `on`, and means nothing where one of them is wrong itself.
+
+    `key`: it is the key that is wrong, not its value.
+    """
 
     path: KeyPath
     message: str
     on: tuple[KeyPath, ...]
+    key: bool = False
 
 
 def contradictions(config: Config, profiles: Mapping[str, Profile]) -> Iterator[Contradiction]:
@@ -94,3 +99,19 @@ def _against_profile(config: Config, index: int, slave: SlaveConfig, profile: Pr
     if 0 < given < profile.min_interval:
         message = f"must be at least {duration_text(profile.min_interval)} for profile {profile.name}, or 0"
         yield Contradiction(path, message, (path, of, ("poll", "interval")))
+    known = {value.name: value for value in profile.values}
+    for name in slave.calibration:
+        path = ("slaves", index, "calibration", name)
+        if name not in known:
+            yield Contradiction(path, unknown_value(name, profile), (path, of), key=True)
+        elif known[name].is_text:
+            yield Contradiction(
+                path, "is published as text or true and false; only a number can be calibrated", (path, of)
+            )
+
+
+def unknown_value(name: str, profile: Profile) -> str:
+    """Return what to say of a name that none of the profile's values has."""
+    near = get_close_matches(name, profile.value_names, n=1, cutoff=0.6)
+    what = f"is no value of profile {profile.name}; "
+    return what + (f"did you mean {near[0]}?" if near else f"its values: {', '.join(profile.value_names)}")

@@ -81,6 +81,7 @@ def device_infos(config: Config, profiles: Mapping[str, Profile]) -> tuple[Devic
             value_names=profiles[slave.profile].value_names,
             units=profiles[slave.profile].units,
             offline_after=config.poll.offline_after,
+            calibration={name: entry.model_dump() for name, entry in slave.calibration.items()},
             state_every=config.mqtt.state_every,
         )
         for slave in config.slaves

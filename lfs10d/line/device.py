@@ -28,6 +28,7 @@ When the port is back every device is UNHEARD.
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections import deque
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -88,7 +89,11 @@ class DeviceSpec:
     def begins_anew(self, before: DeviceSpec) -> bool:
         """Whether nothing that was learned of the device as it was `before` holds for it now."""
         reborn = self.enabled and not before.enabled
-        return reborn or (self.slave, self.profile, self.codec) != (before.slave, before.profile, before.codec)
+        return reborn or (self.slave, self.profile.plain, self.codec) != (
+            before.slave,
+            before.profile.plain,
+            before.codec,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,12 +106,12 @@ class PollRules:
 
 
 class ResponseTimes:
-    """The last answers' response_times in s (last bit of the request to first byte of the answer), p99, least, most."""
+    """The response times in s (last bit of the request to first byte of the answer) of the last answers."""
 
     def __init__(self) -> None:
         self._last: deque[float] = deque(maxlen=LEARNED_FROM)
+        self._ordered: list[float] = []
         self.p99: float | None = None
-        self.least = self.most = 0.0
 
     def __len__(self) -> int:
         return len(self._last)
@@ -114,13 +119,17 @@ class ResponseTimes:
     def learn(self, turnaround: float) -> None:
         """Take one more answer's turnaround in s."""
         self._last.append(turnaround)
-        ordered = sorted(self._last)
+        self._ordered = ordered = sorted(self._last)
         self.p99 = ordered[ceil(0.99 * len(ordered)) - 1]
-        self.least, self.most = ordered[0], ordered[-1]
+
+    def count_near(self, turnaround: float, margin: float) -> int:
+        """Return how many of the last answers took as long as `turnaround` s, give or take `margin` s."""
+        return bisect_right(self._ordered, turnaround + margin) - bisect_left(self._ordered, turnaround - margin)
 
     def forget(self) -> None:
         """Begin anew, as after a change of rate."""
         self._last.clear()
+        self._ordered = []
         self.p99 = None
 
 

@@ -6,11 +6,14 @@ Rules
 -----
 1. After an exchange in which bytes came that are no right frame the slave is left alone for `WATCHED`: what was asked
    then may be answered twice as well.
-2. An answer to a request that came sooner than `WATCHED` after the slave's exchange before is *doubtful* if it took
-   clearly less or more time than any of the last answers, or if other bytes came with it. It counts as not given: the
-   slave is left alone for `WATCHED` (its time-out where that is longer), and asked again.
-3. Where leaving it alone showed nothing, its noise is trusted for `TRUST`, doubled each time up to `TRUST_MOST`: some
-   lines make noise before each answer, some lose 2 of 100. Broken answers are trusted only `APART` from each other.
+2. An answer to a request that came sooner than `WATCHED` after the slave's exchange before is *doubtful* if hardly any
+   of the last answers took as long, or if other bytes came with it. It counts as not given: the slave is left alone for
+   `WATCHED` (its time-out where that is longer), and asked again. A doubtful answer teaches no usual time.
+3. Where leaving it alone showed nothing `VAIN` times in a row, its noise is trusted for `TRUST`, doubled each time up
+   to `TRUST_MOST`: some lines make noise before each answer, some lose 2 of 100. Broken answers are trusted only
+   `APART` from each other.
+4. Any other answer to such a request is *proved* when the slave's own would have come, by the usual times, after
+   `WATCHED` at the latest. Until then a second frame of the slave shows that nobody knows which of the two it was.
 """
 
 from __future__ import annotations
@@ -24,9 +27,13 @@ from lfs10d.modbus.duplicates import WATCHED, Duplicates
 from lfs10d.modbus.outcome import Outcome
 
 LEAST_MARGIN = 0.002
-"""By so much, or half its own length if that is more, an answer must differ from all before to be out of the usual."""
+"""In s: answers that differ by no more than this, or half their length if that is more, took as long."""
 APART = 0.15
 """Broken answers nearer to each other than this, in s, are never trusted."""
+ALIKE = 2
+"""So many of the last answers must have taken as long; one of the first `CONFIDENT_FROM`."""
+VAIN = 3
+"""So many doubts in vain, one after the other, and noise is trusted."""
 TRUST = 10.0
 """How long noise raises no doubt after one in vain, in s; doubled after each."""
 TRUST_MOST = 600.0
@@ -38,8 +45,12 @@ class _SlaveTrust:
     ended: float = -inf
     """When bytes came last in an exchange with it."""
     broken_at: float = -inf
+    proved_at: float = -inf
+    """Until when the slave's own answer may still follow the last one."""
     doubted_at: int | None = None
     """How many extra answers were known when noise raised a doubt that is not settled yet."""
+    vain: int = 0
+    """How many doubts in a row were in vain."""
     trust: float = TRUST
     trusted_until: float = -inf
 
@@ -58,6 +69,7 @@ class DoubtfulAnswers:
             return False
         state = self._slaves.setdefault(slave, _SlaveTrust())
         before, state.ended = state.ended, outcome.ended
+        state.proved_at = -inf
         self._settle(slave, state, outcome.ended)
         if outcome.answer is None:
             if spoilt(outcome):
@@ -67,10 +79,16 @@ class DoubtfulAnswers:
             return False
         noisy = spoilt(outcome) and outcome.ended >= state.trusted_until
         if not noisy and not _unusual(outcome, usual):
+            state.proved_at = _proved_at(outcome, usual)
             return False
         state.doubted_at = self._duplicates.extras(slave) if noisy else None
         self._duplicates.rest(slave, outcome.ended + max(WATCHED, timeout))
         return True
+
+    def proved_at(self, slave: int) -> float:
+        """Return when the slave's last answer is proved (rule 4); -inf where it is so by its own time."""
+        state = self._slaves.get(slave)
+        return -inf if state is None else state.proved_at
 
     def _broken(self, slave: int, state: _SlaveTrust, outcome: Outcome) -> None:
         near = outcome.asked - state.broken_at < APART
@@ -82,14 +100,30 @@ class DoubtfulAnswers:
     def _settle(self, slave: int, state: _SlaveTrust, now: float) -> None:
         """Trust the slave's noise if the doubt was in vain."""
         known, state.doubted_at = state.doubted_at, None
-        if known is not None and self._duplicates.extras(slave) == known:
+        if known is None:
+            return
+        if self._duplicates.extras(slave) != known:
+            state.vain = 0
+            return
+        state.vain += 1
+        if state.vain >= VAIN:
             state.trusted_until = now + state.trust
             state.trust = min(2 * state.trust, TRUST_MOST)
 
 
 def _unusual(outcome: Outcome, usual: ResponseTimes) -> bool:
-    if len(usual) < CONFIDENT_FROM or outcome.turnaround is None or outcome.sent_end is None:
+    if not usual or outcome.turnaround is None or outcome.sent_end is None:
         return False
     length = outcome.ended - outcome.sent_end - outcome.turnaround
     margin = max(LEAST_MARGIN, length / 2)
-    return not usual.least - margin <= outcome.turnaround <= usual.most + margin
+    alike = ALIKE if len(usual) >= CONFIDENT_FROM else 1
+    return usual.count_near(outcome.turnaround, margin) < alike
+
+
+def _proved_at(outcome: Outcome, usual: ResponseTimes) -> float:
+    """Return when an answer to the same request would be over that takes as long as the slowest."""
+    if usual.p99 is None or outcome.turnaround is None or outcome.sent_end is None:
+        return -inf
+    length = outcome.ended - outcome.sent_end - outcome.turnaround
+    latest = outcome.sent_end + usual.p99 + LEAST_MARGIN
+    return min(latest + length, outcome.ended + WATCHED) if latest >= outcome.ended else -inf

@@ -74,7 +74,11 @@ class Poller:
     def replace(self, specs: Iterable[DeviceSpec], rules: PollRules) -> None:
         """Poll these devices from now on."""
         devices = tuple(specs)
-        self.post(lambda now: self.scheduler.replace(devices, rules, now))
+        self.post(lambda now: self._replace(devices, rules, now))
+
+    def _replace(self, devices: tuple[DeviceSpec, ...], rules: PollRules, now: float) -> None:
+        self._events += self.scheduler.second_answers.held.released()
+        self.scheduler.replace(devices, rules, now)
 
     def reconfigure(self, settings: PortSettings, rules: LineRules) -> None:
         """Speak by other settings from now on; another path closes the port and opens that one."""
@@ -146,7 +150,9 @@ class Poller:
                 return step
             if self.scheduler.second_answers.quiet_until < quiet_until:
                 return None
-            return Wait(resting.until, listen=True)
+            held = self.scheduler.second_answers.held
+            self._events += held.released(now)
+            return Wait(min(resting.until, held.next_at), listen=True)
         self._settled(step)
         self._count(self._clock())
         return None
@@ -186,11 +192,12 @@ class Poller:
                 late=sum(late.ours for late in outcome.late),
             )
         )
-        self._events += readings
+        self._events += self.scheduler.second_answers.prove(outcome, readings)
         self._events += self.scheduler.second_answers.on_answer(outcome)
         self._events += told
         if outcome.answer is None and outcome.strays:
             self._events += self.scheduler.second_answers.on_strays(outcome.strays, outcome)
+        self._events += self.scheduler.second_answers.held.released(outcome.ended)
 
     def _port_changed(self, changed: PortChanged) -> None:
         self._events.append(changed)
@@ -199,6 +206,7 @@ class Poller:
             self._count_at = changed.at
             self.scheduler.on_port_opened(changed.at)
         else:
+            self._events += self.scheduler.second_answers.held.released()
             self._events += self.scheduler.on_port_lost(changed.fault, changed.at)
 
     def _count(self, now: float) -> None:

@@ -6,13 +6,14 @@ from collections.abc import Iterable, Mapping
 
 from lfs10d.line.device import Device
 from lfs10d.line.doubtful_answers import DoubtfulAnswers
+from lfs10d.line.held_readings import HeldReadings
 from lfs10d.line.quiet_watch import QuietWatch
 from lfs10d.modbus import diagnosis
 from lfs10d.modbus.frames import EXCEPTION_FLAG
 from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.overhearing import Overhearing
 from lfs10d.modbus.pending import PendingRequests
-from lfs10d.reading import AnsweredTwice, Fault, FaultCode
+from lfs10d.reading import AnsweredTwice, Fault, FaultCode, Reading
 
 EXPLAINED = 1.0
 """So long after another master was heard what is spoilt is its doing, in s."""
@@ -28,6 +29,7 @@ class SecondAnswers:
         self._asked_by_another: dict[int, float] = {}
         self._quiet = QuietWatch(pending.duplicates, 0.0)
         self._doubts = DoubtfulAnswers(pending.duplicates)
+        self.held = HeldReadings()
 
     @property
     def quiet_until(self) -> float:
@@ -67,6 +69,18 @@ class SecondAnswers:
         self._quiet.answered(device.slave, outcome.ended)
         return [AnsweredTwice(outcome.ended, device.name, device.slave, None)] if ended else []
 
+    def prove(self, outcome: Outcome, readings: list[Reading]) -> list[Reading]:
+        """Take the readings of an outcome; return those that are to be published, and hold back the others."""
+        proved: list[Reading] = []
+        until = self._doubts.proved_at(outcome.request.slave)
+        for reading in readings:
+            proved += self.held.released(device=reading.device)
+            if reading.values is None or until <= outcome.ended:
+                proved.append(reading)
+            else:
+                self.held.hold([reading], until)
+        return proved
+
     def on_strays(self, strays: Iterable[tuple[bytes, float]], outcome: Outcome | None = None) -> list[AnsweredTwice]:
         """Take what was heard and belongs to no exchange, or is left over by `outcome`, with the times of its pieces.
 
@@ -87,6 +101,9 @@ class SecondAnswers:
                 continue
             twice = self._pending.duplicates.second(frame.slave, frame.at, misplaced=owing is not None)
             self._quiet.second(frame.slave, frame.at)
+            self.held.spoil(
+                device.name, frame.at, Fault(FaultCode.COLLISION, diagnosis.UNDECIDED, heard=codec.wrap(frame.body))
+            )
             if twice is not None:
                 fault = Fault(FaultCode.DUPLICATE_ID, diagnosis.twice(twice), heard=codec.wrap(frame.body))
                 events.append(AnsweredTwice(frame.at, device.name, frame.slave, fault))

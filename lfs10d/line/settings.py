@@ -64,7 +64,7 @@ def _device_spec(slave: SlaveConfig, line: LineConfig, profile: Profile) -> Devi
     return DeviceSpec(
         name=slave.name,
         slave=slave.id,
-        profile=profile,
+        profile=profile.calibrated(slave.certificates),
         codec=Codec(Framing(line.framing), Checksum(slave.checksum or profile.checksum)),
         interval=max(slave.interval, profile.min_interval),  # 0 is as fast as the line allows, and the device
         enabled=slave.enabled,

@@ -103,6 +103,9 @@ def twice(found: Twice) -> str:
     )
 
 
+UNDECIDED = "two answers came to one request: a second sensor with this id, or a repeater; none tells which is whose"
+
+
 def refusal(code: int, request: Request) -> Diagnosis:
     """Judge an exception answer; the message names the registers that were asked."""
     name = EXCEPTION_NAMES.get(code, "of the device's own")

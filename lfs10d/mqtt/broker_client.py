@@ -54,6 +54,8 @@ class BrokerClient:
         self._timer: asyncio.TimerHandle | None = None
         self._wanted = False
         self._logged: dict[str, str] = {}
+        self._beside: tuple[int, ...] = ()
+        """The nodes that are tried together with the first, until one answers."""
         self._warned_version = False
         self._waiters: list[asyncio.Future[Accepted]] = []
         self._over: asyncio.Event = asyncio.Event()
@@ -153,14 +155,34 @@ class BrokerClient:
 
     def _try(self) -> None:
         self._timer = None
-        self._reconnect.begun(self._now())
-        self._connection = self._connect(self.settings, self._reconnect.version, self, will=self._will)
+        now = self._now()
+        self._reconnect.begun(now)
+        beside = self._reconnect.beside(now)
+        self._beside = tuple(number for number, _ in beside)
+        others = tuple((node.host, node.port) for node in map(self._nodes.__getitem__, self._beside))
+        settings = replace(self.settings, others=others, waits=tuple(wait for _, wait in beside))
+        self._connection = self._connect(settings, self._reconnect.version, self, will=self._will)
+
+    def _learn_node(self) -> tuple[str, ...]:
+        """Learn which of the nodes that were tried together answered; return those that failed with the first."""
+        beside, self._beside = self._beside, ()
+        race = None if self._connection is None or not beside else self._connection.race
+        if race is None:
+            return ()
+        if race.node is None:
+            self._reconnect.unreached(beside, self._now())
+            return tuple(self._nodes[each].place for each in beside)
+        self._reconnect.opened(self._nodes.index(race.node))
+        for place, message in race.failures:
+            self._log_once(place, message, f"{message}; {race.node.place} is next")
+        return ()
 
     # Events of the connection
 
     def accepted(self, accepted: Accepted) -> None:
         """Report that it stands."""
         self._accepted = accepted
+        self._learn_node()
         self._reconnect.accepted(self._now())
         place = self.settings.place
         if accepted.version is not self._settings.version and not self._warned_version:
@@ -175,6 +197,7 @@ class BrokerClient:
     def ended(self, ended: Disconnect) -> None:
         """Report that it is over, and try again when `Reconnect` says."""
         stood, self._accepted = self._accepted is not None, None
+        beside = self._learn_node()
         self._connection = None
         self._over.set()
         now, place = self._now(), self.settings.place
@@ -185,26 +208,30 @@ class BrokerClient:
         else:
             self._reconnect.ended(ended, now, explained=explained)
         if self._wanted:
-            self._log_end(ended, place, self._reconnect.due - now)
+            self._log_end(ended, place, self._reconnect.due - now, beside=beside)
             self._timer = asyncio.get_running_loop().call_at(self._reconnect.due, self._try)
         if stood:
             self._events.ended(ended)
 
-    def _log_end(self, ended: Disconnect, place: str, delay: float) -> None:
+    def _log_end(self, ended: Disconnect, place: str, delay: float, *, beside: tuple[str, ...]) -> None:
         if self._reconnect.version is not self._settings.version:
             log.debug("%s; trying MQTT %s", ended.message, self._reconnect.version)
             return
-        level = logging.DEBUG if ended.message == self._logged.get(place) else logging.WARNING
-        self._logged[place] = ended.message
+        others = "trying again until it works"
         if self._reconnect.duplicate:
-            log.log(level, "%s; is another client using our id %s? trying again in %.0f s",
-                    ended.message, self._settings.client_id, delay)  # fmt: skip
-        else:
-            others = f"{self.settings.place} is next" if self.settings.place != place else "trying again until it works"
-            log.log(level, "%s; %s", ended.message, others)
+            others = f"is another client using our id {self._settings.client_id}? trying again in {delay:.0f} s"
+        elif self.settings.place != place and not beside:
+            others = f"{self.settings.place} is next"
+        self._log_once(place, ended.message, f"{ended.message}; {others}")
+        self._logged.update(dict.fromkeys(beside, ended.message))
         if len(self._logged) < len(self._nodes):
             return  # the others have not been tried
         self._answer_waiters(BrokerError(ended.message))
+
+    def _log_once(self, place: str, message: str, words: str) -> None:
+        """Log this of a node as a warning, unless it is as it was before."""
+        log.log(logging.DEBUG if message == self._logged.get(place) else logging.WARNING, "%s", words)
+        self._logged[place] = message
 
     def _answer_waiters(self, answer: Accepted | BrokerError) -> None:
         for waiter in self._waiters:

@@ -24,6 +24,7 @@ from paho.mqtt.properties import Properties
 from paho.mqtt.reasoncodes import ReasonCode
 
 from lfs10d.mqtt.messages import RECEIVE_MAXIMUM_UNSAID, Accepted, Events, Filter, Incoming, Will
+from lfs10d.mqtt.node_race import NodeRace
 from lfs10d.mqtt.paho_client import BoundedClient, build_client, properties_of, subscriptions
 from lfs10d.mqtt.pump import Pump
 from lfs10d.mqtt.reasons import (
@@ -44,7 +45,9 @@ CONNACK_TIMEOUT = 5.0
 
 
 class Connection:
-    """One connection, begun when it is built, inside a running loop."""
+    """One connection, begun when it is built, inside a running loop; to the first of the nodes that answers."""
+
+    race: NodeRace | None = None  # which of several nodes answered
 
     def __init__(self, settings: BrokerSettings, version: Version, events: Events, *, will: Will | None = None) -> None:
         self._settings = settings
@@ -70,6 +73,7 @@ class Connection:
         client.on_publish = self._on_publish
         client.on_subscribe = self._on_subscribe
         client.on_message = self._on_message
+        client.dial = self._dial if self._settings.others else None
         return client
 
     # From the loop
@@ -159,6 +163,11 @@ class Connection:
             self._post(self._failed, caught)
         else:
             self._post(self._watch)
+
+    def _dial(self) -> tuple[str, int, socket.socket]:
+        self.race = NodeRace(self._settings.nodes, self._settings.waits)
+        self._settings, opened = self.race.run()
+        return self._settings.host, self._settings.port, opened
 
     def _on_socket_open(self, _client: Client, _userdata: object, opened: object) -> None:
         if self._abandoned and isinstance(opened, socket.socket):

@@ -7,7 +7,8 @@ table, for it calls that packet malformed; and it says only in its log what went
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+import socket
+from collections.abc import Callable, Mapping, Sequence
 
 from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode, MQTTProtocolVersion
@@ -93,6 +94,15 @@ class BoundedClient(Client):
     def trouble(self) -> BaseException | str | None:
         """What went wrong last; None: nothing, so that the broker closed the connection."""
         return self._trouble.last
+
+    dial: Callable[[], tuple[str, int, socket.socket]] | None = None
+    """Opens the connection to one of several nodes, and names host and port; None: to the one of the settings."""
+
+    def _create_socket_connection(self) -> socket.socket:
+        if self.dial is None:
+            return super()._create_socket_connection()
+        self._host, self._port, opened = self.dial()  # TLS checks the name of the host that answered
+        return opened
 
     def _sock_recv(self, bufsize: int) -> bytes:
         # paho asks for all that is missing of a packet at once.

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import socket
 import ssl
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from lfs10d.errors import Lfs10dError
+from lfs10d.errors import BrokerError, Lfs10dError
 from lfs10d.mqtt.settings import BrokerSettings
 
 NO_MATCHING_SUBSCRIBERS = 0x10
@@ -56,6 +57,14 @@ _REASONS = {
     0x9F: "the broker limits how often a client may connect",
 }
 """What a reason code means for the person who must act (MQTT 5.0, section 2.4)."""
+
+
+class NoNodeError(BrokerError):
+    """None of several nodes can be reached; `failures` are the nodes with their errors, in turn."""
+
+    def __init__(self, failures: Sequence[tuple[BrokerSettings, Exception]]) -> None:
+        super().__init__("no node can be reached")
+        self.failures = tuple(failures)
 
 
 class DisconnectReason(StrEnum):
@@ -136,7 +145,10 @@ def _words_of_loss(cause: BaseException | str | None) -> str:
 
 
 def failed(error: BaseException, settings: BrokerSettings) -> Disconnect:
-    """Return why no connection could be made."""
+    """Return why no connection could be made: to none of the nodes, where there are several."""
+    if isinstance(error, NoNodeError):
+        each = sorted(failed(caught, node).message for node, caught in error.failures)  # alike whoever is first in turn
+        return Disconnect(DisconnectReason.UNREACHABLE, "; ".join(each))
     return Disconnect(_ending(error), f"{settings.place}: {_words(error, settings)}")
 
 

@@ -4,8 +4,9 @@
   answer, port closed) is tried every second, shortened by chance by up to a quarter, so that a hundred gateways do
   not come back in step: when it returns we are back. A node that refuses us, or drops us before a connection has
   held, is tried after 1, 2, 4 ... 30 s, shortened likewise.
-- Where there are several nodes, each has its own time. After a failure the next in turn whose time has come is tried
-  at once; the one that accepts us is kept.
+- Where there are several nodes, each has its own time. They are tried together, in turn, each when its time has
+  come (`node_race`): the first that answers is taken, and kept if it accepts us. After a failure the next whose time
+  has come is tried at once.
 - Each round begins with the configured version. A broker that refuses 5, or does not answer, is asked in
   3.1.1 at once: some old brokers say nothing. A refusal is not remembered, because a broker may be replaced by a
   better one. But one that has spoken 5 and says nothing now is stalled, or still starting behind a forwarder: it is
@@ -21,7 +22,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 from lfs10d.mqtt.reasons import Disconnect, DisconnectReason
@@ -29,6 +30,9 @@ from lfs10d.mqtt.settings import Version
 
 AWAY_EVERY = 1.0
 """Seconds from the beginning of one attempt to the next where a node is not there."""
+
+ATTEMPT_MOST = 5.0
+"""Seconds that a node may take to answer."""
 
 FIRST_DELAY = 1.0
 LONGEST_DELAY = 30.0
@@ -102,6 +106,28 @@ class Reconnect:
     def begun(self, now: float) -> None:
         """Note that an attempt begins."""
         self._begun = now
+
+    def beside(self, now: float) -> tuple[tuple[int, float], ...]:
+        """Return the nodes that are tried together with `node`, in turn, each with the seconds until its time comes.
+
+        None while `node` is asked in 3.1.1 instead; none whose time comes only when this attempt is over.
+        """
+        if self.version is not self.configured:
+            return ()
+        in_turn = [(self.node + step) % self.nodes for step in range(1, self.nodes)]
+        waits = [(each, max(0.0, self._all[each].due - now)) for each in in_turn]
+        return tuple(sorted((each for each in waits if each[1] < ATTEMPT_MOST), key=lambda each: each[1]))
+
+    def opened(self, node: int) -> None:
+        """Note that of the nodes tried this one answers."""
+        self.node = node
+
+    def unreached(self, nodes: Iterable[int], now: float) -> None:
+        """Note that these nodes, tried together with `node`, did not answer either; `ended` follows."""
+        for each in nodes:
+            self._all[each].delay = FIRST_DELAY
+            self._all[each].silent_since = None
+            self._all[each].due = max(now, self._begun + AWAY_EVERY * self._shortened())
 
     def accepted(self, now: float) -> None:
         """Note that the connection stands."""

@@ -37,7 +37,8 @@ def no_password() -> Secret | None:
 class BrokerSettings:
     """`password` is asked at each connect, in a thread that may block; its errors are the connect's.
 
-    Where `others` are given, hosts and ports, they are tried in turn after `host` and `port`.
+    Where `others` are given, hosts and ports, they are tried in turn after `host` and `port`, each after the seconds in
+    `waits` at the earliest.
 
     `keepalive` is in whole seconds (MQTT 5.0, section 3.1.2.10).
     """
@@ -51,6 +52,7 @@ class BrokerSettings:
     tls: Tls | None = None
     keepalive: int = 20
     others: tuple[tuple[str, int], ...] = ()
+    waits: tuple[float, ...] = ()
 
     @classmethod
     def of(cls, config: MqttConfig, *, client_id: str, password: Callable[[], Secret | None]) -> BrokerSettings:
@@ -78,4 +80,4 @@ class BrokerSettings:
     def nodes(self) -> tuple[BrokerSettings, ...]:
         """The settings of each node, in turn."""
         hosts = ((self.host, self.port), *self.others)
-        return tuple(replace(self, host=host, port=port, others=()) for host, port in hosts)
+        return tuple(replace(self, host=host, port=port, others=(), waits=()) for host, port in hosts)

@@ -143,3 +143,16 @@ class BaseTopic(FieldKind):
     def json_schema(self) -> dict[str, Any]:
         """Return text of levels joined by slashes."""
         return {"type": "string", "maxLength": self.longest, "pattern": r"^(?!\$)[^+#/]+(/[^+#/]+)*$"}
+
+
+@dataclass(frozen=True)
+class TopicPrefix(BaseTopic):
+    """The first levels of topics that others publish on too; `%H` means nothing here."""
+
+    @property
+    def words(self) -> str:
+        """Its form."""
+        return (
+            f"1 to {self.longest} characters as levels joined by /, such as homeassistant: "
+            "no + or #, no empty level, not beginning with $"
+        )

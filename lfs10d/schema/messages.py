@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from typing import TypeAlias, get_args
+from typing import TypeAlias, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
@@ -38,16 +38,15 @@ def keys_at(model: type[BaseModel], path: KeyPath) -> tuple[str, ...]:
 
 def _models_at(model: type[BaseModel], path: KeyPath) -> list[type[BaseModel]]:
     """Return the models whose keys may stand in the mapping at this path."""
-    models = [model]
+    models, named = [model], False
     for step in path:
-        if isinstance(step, str):
-            models = [
-                inner
-                for outer in models
-                if step in outer.model_fields
-                for inner in models_in(outer.model_fields[step].annotation)
-            ]
-    return models
+        if named:
+            named = False  # a name that a person chose, in a mapping of models
+        elif isinstance(step, str):
+            fields = [outer.model_fields[step].annotation for outer in models if step in outer.model_fields]
+            models = [inner for annotation in fields for inner in models_in(annotation)]
+            named = any(get_origin(annotation) is dict for annotation in fields)
+    return [] if named else models
 
 
 def models_in(annotation: object) -> list[type[BaseModel]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from lfs10d.reading import NOTHING
 from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry.publication import VERSION
 
@@ -86,6 +87,8 @@ class DeviceInfo:
     units: Mapping[str, str]
     offline_after: int
     request_gap: float = 0.0
+    calibration: Mapping[str, Mapping[str, float]] = field(default_factory=lambda: NOTHING)
+    """By value name what its certificate says: `scale` and `offset`."""
     state_every: float = 1.0
     """Seconds from one state of the same quality and error to the next, at least."""
 
@@ -111,4 +114,5 @@ class DeviceInfo:
             "enabled": self.enabled,
             "response_timeout": "auto" if self.response_timeout is None else self.response_timeout,
             "request_gap": max(self.request_gap, learned_gap),
+            "calibration": {name: dict(entry) for name, entry in self.calibration.items()},
         }

@@ -197,6 +197,13 @@ class LineStats(Payload):
     store: StoreStats = Field(description="samples waiting for the broker")
 
 
+class Calibrated(Payload):
+    """A value's calibration: `value * scale + offset`."""
+
+    scale: float
+    offset: float = Field(description="in the value's unit")
+
+
 class DeviceConfig(Payload):
     """How a device is polled."""
 
@@ -208,6 +215,7 @@ class DeviceConfig(Payload):
     enabled: bool
     response_timeout: float | Literal["auto"] = Field(description="in s; auto: learned")
     request_gap: float = Field(ge=0, description="rest before each request to it in s, as set or learned")
+    calibration: dict[str, Calibrated] = Field(description="by value name what its certificate says; {}: none")
 
 
 class RoundTrip(Payload):

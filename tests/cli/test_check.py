@@ -47,6 +47,19 @@ def test_a_valid_file_is_answered_with_the_time_budget_as_a_table() -> None:
     assert "slowest cycle    2.05 s" in out
 
 
+def test_calibrations_are_shown() -> None:
+    calibrated = GOOD.replace("id: 3,", "id: 3, calibration: {wind_speed: {scale: 1.013, offset: -0.06}},")
+    code, out, err = check(calibrated)
+    assert code == 0
+    assert "device   value       calibration\nslave-3  wind_speed  value * 1.013 - 0.06\n" in out
+    assert err.startswith(
+        "lfs10d.yaml:2:70: slaves[1].calibration.wind_speed.offset: warning: wind_speed below 0.0592 m/s"
+    )
+    _, out, _ = check(calibrated, "--json")
+    slaves = json.loads(out)["budget"]["slaves"]
+    assert [each["calibration"] for each in slaves] == [{}, {"wind_speed": {"scale": 1.013, "offset": -0.06}}]
+
+
 def test_without_slaves_there_is_no_table_but_a_warning_and_exit_code_0() -> None:
     code, out, err = check("line: {port: /dev/x}\nslaves: []\n")
     assert code == 0

@@ -176,3 +176,11 @@ def test_the_schema_is_printed_whatever_file_there_is() -> None:
     result = CliRunner().invoke(command, ["--schema", "-c", "missing.yaml", "--merged"], catch_exceptions=False)
     assert result.exit_code == 0
     assert json.loads(result.stdout) == json_schema()
+
+
+def test_a_calibration_is_one_value_as_json_has_it() -> None:
+    text = "line: {port: /dev/x}\nslaves: [{id: 2, calibration: {wind_speed: {scale: 1.013}}}]\n"
+    rows = {line.split()[0]: line for line in config(text=text).splitlines()}
+    told = rows["slaves[0].calibration"]
+    assert told.split(maxsplit=1)[1] == '{"wind_speed": {"scale": 1.013, "offset": 0.0}}  lfs10d.yaml:2'
+    assert "calibration:" in config("--merged", text=text)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from lfs10d.config.changes import OPTIONS, Changes, DeviceChange, Place, Rate, Verified
 from lfs10d.config.changes_file import ASIDE, FILE_NAME, ChangesFile, FoundChanges, in_words, understood, written
+from lfs10d.config.models import SlaveConfig
 from lfs10d.errors import ConfigError, StateError
 from lfs10d.system.disk import Disk, SystemFiles
 from tests.support.volatile_disk import ForgetfulFiles, PowerCutError
@@ -282,3 +283,10 @@ def test_values_are_told_as_one_writes_them() -> None:
     values = {"interval": 0.25, "enabled": True, "label": None, "response_timeout": None}
     assert tuple(values) == OPTIONS
     assert in_words(values) == {"interval": "250ms", "enabled": True, "label": None, "response_timeout": "auto"}
+
+
+def test_a_removed_device_keeps_its_calibration() -> None:
+    entry = SlaveConfig.model_validate({"id": 4, "calibration": {"wind_speed": {"scale": 1.013, "offset": 0.06}}})
+    changes = Changes({"old": DeviceChange(removed={"id": 4, "calibration": entry.calibration})})
+    assert b"scale: 1.013" in written(changes)
+    assert understood(written(changes), "changes.yaml") == changes

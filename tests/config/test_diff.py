@@ -85,3 +85,10 @@ def test_a_restart_alone_is_a_difference_too() -> None:
     found = difference(config(), config(mqtt={"base_topic": "site"}))
     assert found
     assert found.applied == ()
+
+
+def test_another_calibration_is_a_change_of_its_device() -> None:
+    old = config(slaves=[{"id": 2, "name": "a"}])
+    new = config(slaves=[{"id": 2, "name": "a", "calibration": {"wind_speed": {"scale": 1.1}}}])
+    assert [change.key for change in difference(old, new).changed] == ["slaves.a.calibration"]
+    assert not difference(new, new)

@@ -49,6 +49,7 @@ LINE = "line: {port: /dev/ttyUSB0}\n"
     "more",
     [
         "slaves: [1, 2, {id: 3, name: mast, interval: 250ms, checksum: null}]",
+        "slaves: [{id: 3, calibration: {wind_speed: {scale: 1.013, offset: -1}, humidity: {}}}]",
         "poll: {interval: 0, response_timeout: auto}",
         "poll: {interval: 1.5s, response_timeout: 0.2}",
         'mqtt: {host: [a, "b:8884"], version: 5, base_topic: site/%H, tls: {}}',

@@ -423,3 +423,35 @@ def test_nodes_have_the_port_of_the_section_where_they_have_none_of_their_own() 
     mqtt = loaded(SMALL.replace("localhost", '[a, b:1884, "[::1]"], tls: {}')).config.mqtt
     assert mqtt.nodes == (("a", 8883), ("b", 1884), ("::1", 8883))
     assert mqtt.broker == "a:8883, b:1884, [::1]:8883"
+
+
+@pytest.mark.parametrize(
+    ("calibration", "problem"),
+    [
+        (
+            "{wind_sped: {scale: 1.1}}",
+            "3:27: slaves[0].calibration.wind_sped: is no value of profile lfs10; did you mean",
+        ),
+        (
+            "{wind_speed: {skale: 1.1}}",
+            "3:40: slaves[0].calibration.wind_speed.skale: is not a known key; did you mean",
+        ),
+        ("{wind_speed: {offset: x}}", '3:48: slaves[0].calibration.wind_speed.offset: must be a number, not text "x"'),
+        ("{wind_speed: {scale: true}}", "3:47: slaves[0].calibration.wind_speed.scale: must be a number, not true"),
+        ("{wind_speed: {scale: 0}}", "3:47: slaves[0].calibration.wind_speed.scale: must be at least 0.001, not 0"),
+        ("{wind_speed: 1.1}", "3:39: slaves[0].calibration.wind_speed: must be a mapping of keys to values, not 1.1"),
+        ("[1]", "3:26: slaves[0].calibration: must be a mapping of keys to values, not a list"),
+    ],
+)
+def test_a_wrong_calibration_is_told_with_its_place(calibration: str, problem: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        loaded(f"line: {{port: /dev/x}}\nslaves:\n  - {{id: 1, calibration: {calibration}}}\n")
+    (found,) = caught.value.problems
+    assert str(found).partition(":")[2].startswith(problem)
+
+
+def test_a_calibration_has_what_a_certificate_says() -> None:
+    config = loaded(
+        "line: {port: /dev/x}\nslaves: [{id: 1, calibration: {wind_speed: {scale: 1.013, offset: -1}}}, 2]"
+    ).config
+    assert [slave.certificates for slave in config.slaves] == [{"wind_speed": (1.013, -1.0)}, {}]

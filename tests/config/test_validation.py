@@ -11,6 +11,7 @@ from lfs10d.config.models import Config
 from lfs10d.config.validation import contradictions
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
+from lfs10d.profiles.values import Value
 from lfs10d.schema.document import path_text
 
 
@@ -110,4 +111,25 @@ def test_a_contradiction_rests_on_every_key_it_compares() -> None:
     assert [set(each.on) for each in contradictions(config, PROFILES)] == [
         {("line", "databits"), ("line", "framing")},
         {("slaves", 0, "id"), ("slaves", 1, "id")},
+    ]
+
+
+def calibrated(*names: str) -> list[dict[str, object]]:
+    return [{"id": 2, "calibration": {name: {"scale": 1.013} for name in names}}]
+
+
+def test_what_is_calibrated_is_a_value_of_the_profile() -> None:
+    assert found(slaves=calibrated("wind_speed")) == []
+    assert found(slaves=calibrated("wind_sped", "rain")) == [
+        "slaves[0].calibration.wind_sped: is no value of profile lfs10; did you mean wind_speed?",
+        "slaves[0].calibration.rain: is no value of profile lfs10; its values: wind_speed",
+    ]
+    (wrong,) = contradictions(Config.model_validate({"line": {"port": "x"}, "slaves": calibrated("rain")}), PROFILES)
+    assert wrong.key
+
+
+def test_only_a_number_is_calibrated(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Value, "is_text", property(lambda _: True))
+    assert found(slaves=calibrated("wind_speed")) == [
+        "slaves[0].calibration.wind_speed: is published as text or true and false; only a number can be calibrated"
     ]

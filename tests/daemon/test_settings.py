@@ -54,6 +54,14 @@ def test_a_device_is_described_with_the_rest_that_its_profile_gives_it(tmp_path:
     assert device_infos(config.config, config.profiles)[0].request_gap == 0.3
 
 
+def test_a_device_is_described_with_its_calibration(tmp_path: Path) -> None:
+    file = tmp_path / "lfs10d.yaml"
+    file.write_text("line: {port: tty}\nslaves: [{id: 3, calibration: {wind_speed: {scale: 1.1}}}, 4]\n")
+    config = load(file)
+    told = [info.payload()["calibration"] for info in device_infos(config.config, config.profiles)]
+    assert told == [{"wind_speed": {"scale": 1.1, "offset": 0.0}}, {}]
+
+
 def test_the_hash_tells_configurations_apart(loaded: LoadedConfig, tmp_path: Path) -> None:
     same, other = tmp_path / "same" / "lfs10d.yaml", tmp_path / "other" / "lfs10d.yaml"
     for file, text in ((same, FILE + "# a comment\n"), (other, FILE.replace("250ms", "251ms"))):

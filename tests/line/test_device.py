@@ -60,6 +60,10 @@ def test_the_p99_of_100_answers_leaves_one_out() -> None:
     for _ in range(100):
         response_times.learn(0.02)
     assert response_times.p99 == 0.02
+    assert response_times.count_near(0.025, 0.0051) == len(response_times) == 100
+    assert response_times.count_near(0.03, 0.009) == 0
+    response_times.forget()
+    assert response_times.count_near(0.02, 0.001) == 0
 
 
 def test_after_a_change_of_rate_learning_begins_anew() -> None:
@@ -231,6 +235,14 @@ def test_a_probe_of_one_that_answers_slowly_waits_as_long_as_was_learned() -> No
 def test_what_was_learned_holds_until_another_slave_is_meant(changed: dict[str, object], *, anew: bool) -> None:
     spec = a_device().spec
     assert replace(spec, **changed).begins_anew(spec) is anew  # type: ignore[arg-type]  # names and values go together
+
+
+def test_a_calibration_changes_nothing_that_was_learned() -> None:
+    spec = a_device().spec
+    calibrated = replace(spec, profile=spec.profile.calibrated({"wind_speed": (1.013, 0.06)}))
+    assert calibrated.profile != spec.profile
+    assert not calibrated.begins_anew(spec)
+    assert not spec.begins_anew(calibrated)
 
 
 def test_one_that_is_enabled_again_begins_anew() -> None:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import itertools
+from math import inf
 
 import pytest
 
 from lfs10d.line.device import CONFIDENT_FROM, ResponseTimes
-from lfs10d.line.doubtful_answers import TRUST, TRUST_MOST, DoubtfulAnswers
+from lfs10d.line.doubtful_answers import LEAST_MARGIN, TRUST, TRUST_MOST, VAIN, DoubtfulAnswers
 from lfs10d.modbus.duplicates import WATCHED, Duplicates
 from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.request import ReadRegisters
@@ -65,13 +66,55 @@ def test_right_behind_another_an_answer_out_of_the_usual_time_is_doubtful(turnar
     assert (line.alone_until(1.1) is not None) is doubtful
 
 
-def test_well_after_the_exchange_before_none_is_nor_while_the_usual_time_is_not_known() -> None:
+def test_well_after_the_exchange_before_none_is_nor_while_no_usual_time_is_known() -> None:
     line = Line()
     assert not line.ask(1.0, 0.001)
     assert not line.ask(1.0 + 0.019 + WATCHED + 0.001, 0.001)
-    young = Line(CONFIDENT_FROM - 1)
+    young = Line(0)
     assert not young.ask(1.0)
     assert not young.ask(1.05, 0.001)
+
+
+@pytest.mark.parametrize(
+    ("learned", "outliers", "doubtful"), [(1, 0, True), (8, 1, False), (10, 1, True), (10, 2, False)]
+)
+def test_of_many_answers_two_must_have_taken_as_long_of_few_one(learned: int, outliers: int, doubtful: bool) -> None:  # noqa: FBT001
+    line = Line(learned)
+    for _ in range(outliers):
+        line.usual.learn(0.06)
+    assert not line.ask(1.0)
+    assert line.ask(1.05, 0.06) is doubtful
+
+
+def proved_after(usual: list[float], turnaround: float, began: float = 1.05) -> float:
+    """Return how long after its end an answer of 10 ms is proved."""
+    line = Line(0)
+    for each in usual:
+        line.usual.learn(each)
+    line.ask(1.0)
+    assert not line.ask(began, turnaround)
+    return line.doubts.proved_at(1) - (began + 0.018 + turnaround)
+
+
+def test_an_answer_is_proved_when_the_slaves_own_would_have_come() -> None:
+    """The own answer would begin behind it, at the usual time at the latest, and be as long."""
+    late = [0.02] * 50 + [0.04] * 50
+    assert proved_after(late, 0.02) == pytest.approx(0.04 + LEAST_MARGIN - 0.02)
+    assert proved_after([0.02, 0.02, 0.5], 0.02) == pytest.approx(WATCHED)
+
+
+@pytest.mark.parametrize(
+    ("usual", "turnaround", "began"),
+    [([0.02] * 100, 0.02, 1.05), ([0.02, 0.04] * 50, 0.04, 1.05), ([0.02, 0.04] * 50, 0.02, 1.3), ([], 0.02, 1.05)],
+)
+def test_it_is_so_at_once_where_none_could_follow_it_or_nothing_was_asked_before(
+    usual: list[float], turnaround: float, began: float
+) -> None:
+    assert proved_after(usual, turnaround, began) == -inf
+
+
+def test_of_one_that_never_answered_nothing_is_to_be_proved() -> None:
+    assert Line().doubts.proved_at(7) == -inf
 
 
 def test_it_is_left_alone_for_as_long_as_a_second_answer_may_take_or_its_own() -> None:
@@ -111,8 +154,9 @@ def test_noise_raises_a_doubt_and_is_trusted_ever_longer_where_that_was_in_vain(
         if line.alone_until(at) is None and line.ask(at, unsolicited=2):
             doubts.append(at)
     pauses = [later - earlier for earlier, later in itertools.pairwise(doubts)]
-    assert pauses[0] == pytest.approx(TRUST, abs=0.5)
-    assert pauses[1] == pytest.approx(2 * TRUST, abs=0.5)
+    assert max(pauses[: VAIN - 1]) < 1.0  # in vain once proves nothing: a second answer may come now and then only
+    assert pauses[VAIN - 1] == pytest.approx(TRUST, abs=0.5)
+    assert pauses[VAIN] == pytest.approx(2 * TRUST, abs=0.5)
     assert max(pauses) == pytest.approx(TRUST_MOST, abs=0.5)
 
 
@@ -127,12 +171,13 @@ def test_where_a_second_answer_came_noise_is_not_trusted() -> None:
     assert line.ask(1.45, unsolicited=2)
 
 
-def test_where_broken_answers_are_rare_they_are_trusted_once_one_was_in_vain() -> None:
+def test_where_broken_answers_are_rare_they_are_trusted_once_some_were_in_vain() -> None:
     line = Line()
-    line.ask(1.0, code=FaultCode.CRC)
-    assert line.alone_until(1.1) is not None
-    line.ask(1.3)
-    line.ask(2.0, code=FaultCode.CRC)
-    assert line.alone_until(2.05) is None
-    line.ask(2.1, code=FaultCode.CRC)  # so soon again
-    assert line.alone_until(2.15) is not None
+    for n in range(VAIN):
+        line.ask(1.0 + n, code=FaultCode.CRC)
+        assert line.alone_until(1.1 + n) is not None
+        line.ask(1.3 + n)
+    line.ask(5.0, code=FaultCode.CRC)
+    assert line.alone_until(5.05) is None
+    line.ask(5.1, code=FaultCode.CRC)  # so soon again
+    assert line.alone_until(5.15) is not None

@@ -6,6 +6,7 @@ import itertools
 
 import pytest
 
+from lfs10d.line.device import PollRules
 from lfs10d.reading import AnsweredTwice, FaultCode
 from lfs10d.simulator.line_faults import second_master
 from tests.support.lines import Rig, Rigs
@@ -37,6 +38,33 @@ def test_a_late_twin_or_a_repeater_is_told_and_yields_no_value(
     for earlier, later in itertools.pairwise(asked):
         assert later.began is not None
         assert later.began - earlier.at > delay
+
+
+def await_requests(rig: Rig, count: int) -> None:
+    """Let the line carry so many more requests."""
+    wanted = rig.sent + count
+    while rig.sent < wanted:
+        rig.run(rig.clock.now + 0.05)
+
+
+@pytest.mark.parametrize(("kind", "delay"), [("twin", 0.037), ("repeated", 0.037), ("twin", 0.045)])
+@pytest.mark.parametrize("seed", [0, 5, 9, 18])
+def test_not_even_the_first_second_answer_is_believed_that_comes_when_the_next_answer_is_due(
+    rigs: Rigs, kind: str, delay: float, seed: int
+) -> None:
+    """Four sensors are asked every 40 ms, which answer after 5 to 8 ms; the time alone tells nothing."""
+    rules = PollRules(retries=0, offline_after=100)
+    rig = rigs(4, rules=rules, baudrate=115200, jitter=0.003, seed=seed, in_turn=True)
+    await_requests(rig, 100)
+    for slave in (2, 3):
+        rig.line.sensor(slave).add_fault(kind, 0.3, delay=delay)
+    await_requests(rig, 120)
+    rig.prove()
+    assert {event.slave for event in told(rig)} <= {2, 3}
+    assert all(len(rig.good(slave)) > 20 for slave in (1, 2, 3, 4))
+    for slave in (1, 2, 3, 4):
+        readings = rig.of(slave)
+        assert all(earlier.at <= later.at for earlier, later in itertools.pairwise(readings))
 
 
 @pytest.mark.parametrize("kind", ["twin", "repeated"])

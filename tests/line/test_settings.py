@@ -71,6 +71,16 @@ def test_devices_are_polled_as_configured(loaded: LoadedConfig) -> None:
     assert (rules.retries, rules.offline_after, rules.probe_interval_max) == (2, 5, 30.0)
 
 
+def test_a_device_is_read_with_its_calibration(tmp_path: Path) -> None:
+    file = tmp_path / "lfs10d.yaml"
+    file.write_text("line: {port: tty}\nslaves: [{id: 3, calibration: {wind_speed: {scale: 1.1, offset: 1}}}, 4]\n")
+    config = load(file)
+    calibrated, plain = device_specs(config.config, config.profiles)
+    registers = (0x4120, 0x0000)
+    assert calibrated.profile.decode(calibrated.profile.reads()[0], registers) == {"wind_speed": 12.0}
+    assert plain.profile.decode(plain.profile.reads()[0], registers) == {"wind_speed": 10.0}
+
+
 @pytest.mark.parametrize(("asked", "polled"), [(0, 2.0), (2, 2.0), (3, 3.0)])
 def test_as_fast_as_the_line_allows_is_no_faster_than_the_device_does(
     tmp_path: Path, asked: float, polled: float

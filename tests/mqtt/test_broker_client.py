@@ -583,6 +583,28 @@ def test_a_host_that_swallows_everything_holds_up_neither_the_loop_nor_the_end()
         assert asyncio.run(scenario(port)) < 1.5
 
 
+def test_two_nodes_that_swallow_everything_do_not_keep_us_from_the_third(
+    mosquitto: Mosquitto,
+) -> None:
+    async def scenario(holes: list[tuple[str, int]]) -> None:
+        (host, port), *others = *holes, ("127.0.0.1", mosquitto.port)
+        async with connecting(settings_of(port, host=host, others=tuple(others))) as (client, witness):
+            await client.opened(PATIENCE)
+            assert client.settings.port == mosquitto.port
+            mosquitto.kill()
+            await witness.until(lambda: len(witness.endings) == 1)
+            mosquitto.start()
+            returned = time.monotonic()
+            await witness.until(lambda: len(witness.acceptances) == 2)
+            assert time.monotonic() - returned < BACK_WITHIN
+
+    with black_hole() as first, black_hole() as second:
+        began = time.monotonic()
+        asyncio.run(scenario([("127.0.0.1", first), ("127.0.0.1", second)]))
+    assert mosquitto.log.count("as tester") == 2, "one session at a time"
+    assert time.monotonic() - began < 2 * 5.0, "nobody waited for both"
+
+
 def test_what_is_given_up_before_it_was_open_never_speaks_to_the_broker(mosquitto: Mosquitto) -> None:
     given_up = threading.Event()
 

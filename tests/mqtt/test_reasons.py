@@ -9,7 +9,7 @@ import ssl
 import pytest
 
 from lfs10d.errors import BrokerError
-from lfs10d.mqtt.reasons import NOT_FOR_A_MESSAGE, DisconnectReason, failed, gone, reason_in_words
+from lfs10d.mqtt.reasons import NOT_FOR_A_MESSAGE, DisconnectReason, NoNodeError, failed, gone, reason_in_words
 from lfs10d.mqtt.settings import BrokerSettings, Tls
 
 SETTINGS = BrokerSettings("gate.example", 8883, "me", tls=Tls())
@@ -146,3 +146,15 @@ def test_an_end_before_the_answer_and_one_of_our_own_will() -> None:
     assert garbage.message == f"{words} (Received malformed packet: x)"
     ours = gone("broker b:1", left=True, accepted=True)
     assert (ours.ending, ours.by_message) == (DisconnectReason.LEFT, False)
+
+
+def test_where_no_node_answers_each_is_named_in_the_same_order_whoever_was_first() -> None:
+    nodes = BrokerSettings("b", 1, "me", others=(("a", 2),)).nodes
+    failures = [(nodes[0], ConnectionRefusedError()), (nodes[1], TimeoutError())]
+    told = {failed(NoNodeError(each), nodes[0]) for each in (failures, failures[::-1])}
+    (ended,) = told
+    assert ended.ending is DisconnectReason.UNREACHABLE
+    assert ended.message == (
+        "broker a:2: no answer: check mqtt.host, the network and the firewall; "
+        "broker b:1: connection refused: is the broker running, and mqtt.port right?"
+    )

@@ -199,6 +199,40 @@ def test_the_node_that_accepts_us_is_kept_and_left_only_when_it_is_gone() -> Non
     assert (policy.node, policy.due) == (0, 200.0)
 
 
+def test_nodes_whose_time_has_come_are_tried_together_and_the_one_that_answers_is_kept() -> None:
+    policy = fresh(nodes=4)
+    policy.begun(0.0)
+    assert policy.beside(0.0) == ((1, 0.0), (2, 0.0), (3, 0.0))
+    policy.opened(2)
+    policy.ended(REFUSED, 0.0)
+    assert (policy.node, policy.due, policy.beside(0.0)) == (3, 0.0, ((0, 0.0), (1, 0.0), (2, 1.0)))
+    policy.begun(0.0)
+    policy.unreached((0, 1, 2), 0.2)
+    policy.ended(UNREACHABLE, 0.2)
+    assert policy.due == AWAY_EVERY
+    assert policy.beside(AWAY_EVERY) == ((1, 0.0), (2, 0.0), (3, 0.0))
+    policy.opened(1)
+    live(policy, 10.0, HELD)
+    assert (policy.node, policy.due) == (1, 10.0 + HELD)
+
+
+def test_a_node_that_refuses_us_is_left_out_when_its_time_is_far() -> None:
+    policy = fresh(nodes=2)
+    for _ in range(4):
+        policy.node = 1
+        policy.ended(REFUSED, 0.0)
+    assert (policy.node, policy.beside(0.0)) == (0, ())
+    assert policy.beside(4.0) == ((1, 4.0),)
+
+
+def test_a_node_that_is_asked_in_3_1_1_is_asked_alone() -> None:
+    policy = fresh(nodes=2)
+    policy.begun(0.0)
+    policy.opened(1)
+    policy.ended(WRONG_VERSION, 0.0)
+    assert (policy.version, policy.node, policy.beside(0.0)) == (Version.V311, 1, ())
+
+
 def test_a_node_that_refuses_us_does_not_delay_the_others() -> None:
     policy = fresh(nodes=2)
     at: dict[int, list[float]] = {0: [], 1: []}

@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import BaseModel, ValidationError
 
-from lfs10d.schema.addresses import BaseTopic, Host, Hosts, Node, node_text, split_node
+from lfs10d.schema.addresses import BaseTopic, Host, Hosts, Node, TopicPrefix, node_text, split_node
 from lfs10d.schema.fields import FieldError, FieldKind
 
-KINDS: tuple[FieldKind, ...] = (Host(), Hosts(), Node(), BaseTopic())
+KINDS: tuple[FieldKind, ...] = (Host(), Hosts(), Node(), BaseTopic(), TopicPrefix())
 
 
 @pytest.mark.parametrize(

@@ -28,6 +28,7 @@ class Tree(BaseModel):
 
     one: Leaf | None = None
     many: list[Leaf] = []
+    named: dict[str, Leaf] = {}
 
 
 @pytest.mark.parametrize(
@@ -45,7 +46,10 @@ def test_an_unknown_key_is_answered_with_the_nearest_or_with_all(key: str, known
 @pytest.mark.parametrize(
     ("path", "keys"),
     [
-        ((), ("one", "many")),
+        ((), ("one", "many", "named")),
+        (("named",), ()),
+        (("named", "bare"), ("register", "bare", "word", "number")),
+        (("named", "any", "bare"), ()),
         (("one",), ("register", "bare", "word", "number")),
         (("many", 0), ("register", "bare", "word", "number")),
         (("many", 0, "bare"), ()),

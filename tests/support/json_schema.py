@@ -73,5 +73,7 @@ class Validator:
             for key in schema["properties"].keys() & value.keys():
                 yield from self._within(value[key], schema["properties"][key], f"{path}.{key}".lstrip("."))
         elif keyword == "additionalProperties" and isinstance(value, dict):
-            unknown = sorted(value.keys() - schema["properties"].keys())
-            yield from (f"{path}.{key}: {keyword}".lstrip(".") for key in unknown)
+            form = schema["additionalProperties"]
+            for key in sorted(value.keys() - schema.get("properties", {}).keys()):
+                place = f"{path}.{key}".lstrip(".")
+                yield from [f"{place}: {keyword}"] if form is False else self._within(value[key], form, place)

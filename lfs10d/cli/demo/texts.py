@@ -10,6 +10,8 @@ from lfs10d.cli.demo.scenario import BASE_TOPIC, BAUDRATE, SENSORS
 from lfs10d.cli.render.live_state import LiveState
 
 SUBJECT: Final = f"lfs10d demo: eight LFS10 wind sensors on a simulated RS485 line, {BAUDRATE} baud"
+NEWEST: Final = "5"
+"""The newest version of MQTT."""
 
 
 def remarks(broker: Broker, page: Page | None) -> tuple[str, ...]:
@@ -20,6 +22,11 @@ def remarks(broker: Broker, page: Page | None) -> tuple[str, ...]:
     return (
         SUBJECT,
         f"simulated line > lfs10d > {broker.name} (MQTT {broker.speaks}, 127.0.0.1:{broker.port}) > this view",
+        *(
+            ()
+            if broker.speaks == NEWEST
+            else (f"{broker.name} knows no newer MQTT; with mosquitto installed this is MQTT {NEWEST}.",)
+        ),
         *(f"{sensor.name} {sensor.remark}" for sensor in SENSORS if sensor.remark is not None),
         *seen,
         f"Subscribe too: mosquitto_sub -h 127.0.0.1 -p {broker.port} -t '{BASE_TOPIC}/#' -v",

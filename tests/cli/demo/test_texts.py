@@ -15,6 +15,7 @@ PAGE = Page("http://127.0.0.1:65535/", "0123456789abcdef")
 def test_the_remarks_name_the_faulty_sensors_and_how_to_subscribe() -> None:
     text = "\n".join(remarks(Broker("mosquitto", "5", 18830), PAGE))
     assert "mosquitto (MQTT 5, 127.0.0.1:18830)" in text
+    assert "newer MQTT" not in text
     assert "crane is silent" in text
     assert "bridge is noisy" in text
     assert "mosquitto_sub -h 127.0.0.1 -p 18830 -t 'lfs10d/#' -v" in text
@@ -24,6 +25,12 @@ def test_the_remarks_name_the_faulty_sensors_and_how_to_subscribe() -> None:
 
 def test_without_its_extra_the_page_is_named_with_what_to_do() -> None:
     assert "needs the extra: pip install 'lfs10d[web]'" in "\n".join(remarks(Broker("mosquitto", "5", 1), None))
+
+
+def test_a_broker_of_mqtt_3_1_1_is_named_with_what_shows_mqtt_5() -> None:
+    text = "\n".join(remarks(Broker("amqtt", "3.1.1", 18830), PAGE))
+    assert "amqtt (MQTT 3.1.1, 127.0.0.1:18830)" in text
+    assert "amqtt knows no newer MQTT; with mosquitto installed this is MQTT 5." in text
 
 
 def test_no_remark_is_wider_than_a_terminal() -> None:
