@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from lfs10d import __version__
-from lfs10d.config.models import Config
+from lfs10d.config.models import Config, SlaveConfig
 from lfs10d.profiles.profile import Profile
 from lfs10d.profiles.values import Value
 from lfs10d.telemetry.homeassistant.discovery import Announced, announcements
@@ -27,18 +27,20 @@ def discovery_payloads(config: Config, profiles: Mapping[str, Profile]) -> dict[
         state_every=config.mqtt.state_every,
         wind_every=config.wind.every,
     )
-    devices = (
-        DiscoveredDevice(
-            name=slave.name,
-            label=slave.label,
-            manufacturer=profiles[slave.profile].manufacturer,
-            model=profiles[slave.profile].model or profiles[slave.profile].title,
-            interval=slave.interval,
-            values=tuple(_value(value) for value in profiles[slave.profile].values),
-        )
-        for slave in config.slaves
+    return announcements(gateway, (_device(slave, profiles[slave.profile]) for slave in config.slaves))
+
+
+def _device(slave: SlaveConfig, profile: Profile) -> DiscoveredDevice:
+    values = tuple(_value(value) for value in profile.values)
+    return DiscoveredDevice(
+        name=slave.name,
+        label=slave.label,
+        manufacturer=profile.manufacturer,
+        model=profile.model or profile.title,
+        interval=slave.interval,
+        values=values,
+        wind=next((value for value in values if value.device_class == "wind_speed" and value.unit == "m/s"), None),
     )
-    return announcements(gateway, devices)
 
 
 def _value(value: Value) -> DiscoveredValue:

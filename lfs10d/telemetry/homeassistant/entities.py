@@ -166,7 +166,7 @@ def _values(owner: _Owner, device: DiscoveredDevice) -> Iterator[tuple[str, Comp
 
 
 def _wind(owner: _Owner, device: DiscoveredDevice) -> Iterator[tuple[str, Component]]:
-    speed = device.wind_value
+    speed = device.wind
     if speed is None:
         return
     topic, expires = owner.gateway.topic(device_topic(device.name, WIND)), _expires(owner.gateway.wind_every)

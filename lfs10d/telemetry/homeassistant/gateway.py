@@ -34,7 +34,7 @@ class DiscoveredValue:
 
 @dataclass(frozen=True, slots=True)
 class DiscoveredDevice:
-    """A device as configured; `interval` in s."""
+    """A device as configured; `interval` in s, `wind` is the speed that topic `wind` is about, if it has one."""
 
     name: str
     label: str | None
@@ -42,11 +42,7 @@ class DiscoveredDevice:
     model: str
     interval: float
     values: tuple[DiscoveredValue, ...]
-
-    @property
-    def wind_value(self) -> DiscoveredValue | None:
-        """The value that topic `wind` is about: the first wind speed."""
-        return next((value for value in self.values if value.device_class == "wind_speed"), None)
+    wind: DiscoveredValue | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,10 +18,9 @@ GOLDEN = Path(__file__).parent / "golden.json"
 LINE = "homeassistant/device/lfs10d_lfs10d_line0/config"
 MAST = "homeassistant/device/lfs10d_lfs10d_line0_mast-top/config"
 STATION = "homeassistant/device/lfs10d_lfs10d_line0_station/config"
+SPEED = DiscoveredValue("wind_speed", "m/s", 2, "wind_speed")
 DEVICES = (
-    DiscoveredDevice(
-        "mast-top", 'Mast, "10 m"', None, "LFS10", 0.25, (DiscoveredValue("wind_speed", "m/s", 2, "wind_speed"),)
-    ),
+    DiscoveredDevice("mast-top", 'Mast, "10 m"', None, "LFS10", 0.25, (SPEED,), SPEED),
     DiscoveredDevice(
         "station",
         None,
@@ -140,5 +139,5 @@ VALUES = st.builds(
 
 @given(st.lists(VALUES, min_size=1, max_size=5, unique_by=lambda value: value.name), st.none() | TEXTS)
 def test_whatever_a_profile_says_home_assistant_takes_it(values: list[DiscoveredValue], label: str | None) -> None:
-    for payload in announced(DiscoveredDevice("a", label, None, "b", 1.0, tuple(values))).values():
+    for payload in announced(DiscoveredDevice("a", label, None, "b", 1.0, tuple(values), values[0])).values():
         assert list(complaints(json.loads(json.dumps(payload)))) == []

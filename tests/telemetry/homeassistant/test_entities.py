@@ -20,7 +20,7 @@ def gateway(commands: frozenset[str] = EVERYTHING, *, state_every: float = 1.0, 
 
 
 def device(*values: DiscoveredValue, interval: float = 1.0, label: str | None = None) -> DiscoveredDevice:
-    return DiscoveredDevice("mast-top", label, None, "LFS10", interval, values or (SPEED,))
+    return DiscoveredDevice("mast-top", label, None, "LFS10", interval, values or (SPEED,), None if values else SPEED)
 
 
 def components(*values: DiscoveredValue, **changes: Any) -> dict[str, Any]:  # noqa: ANN401 - as `device`

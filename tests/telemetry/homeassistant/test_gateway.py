@@ -9,8 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lfs10d.telemetry.homeassistant.gateway import (
-    DiscoveredDevice,
-    DiscoveredValue,
     Gateway,
     config_topic,
     entity_id,
@@ -63,10 +61,3 @@ def test_the_topics_of_a_gateway() -> None:
     gateway = Gateway("lfs10d/line0", "homeassistant", "1.0", frozenset(), 1.0, 10.0)
     assert gateway.topic("line/stats") == "lfs10d/line0/line/stats"
     assert config_topic(gateway.prefix, "x") == "homeassistant/device/x/config"
-
-
-def test_the_wind_of_a_device_is_its_first_wind_speed() -> None:
-    first, second = (DiscoveredValue(name, "m/s", device_class="wind_speed") for name in ("speed", "other"))
-    device = DiscoveredDevice("a", None, None, "b", 1.0, (DiscoveredValue("heat"), first, second))
-    assert device.wind_value == first
-    assert DiscoveredDevice("a", None, None, "b", 1.0, (DiscoveredValue("heat"),)).wind_value is None
