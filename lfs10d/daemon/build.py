@@ -19,7 +19,7 @@ from lfs10d.config.changes_file import ChangesFile
 from lfs10d.config.live_config import LiveConfig
 from lfs10d.config.loader import LoadedConfig
 from lfs10d.daemon.boot import Boot
-from lfs10d.daemon.discovery import discovery_payloads
+from lfs10d.daemon.discovery import AnnouncedPrefixes, discovery_payloads
 from lfs10d.daemon.parts import Parts
 from lfs10d.daemon.settings import broker_settings, daemon_info, device_infos, line_info, store_limits
 from lfs10d.daemon.shutdown import Shutdown
@@ -59,6 +59,8 @@ def build(file: LoadedConfig, boot: Boot, state_directory: Path, notifier: Notif
         store=Store(state_directory, boot=boot.id, limits=store_limits(now.store)),
     )
     uplink.send_samples(telemetry=now.mqtt.telemetry)
+    prefixes = AnnouncedPrefixes(state_directory, Disk())
+    uplink.discovery.remember(prefixes.load(), prefixes.save)
     uplink.discovery.configure(now.homeassistant.prefix, discovery_payloads(now, loaded.profiles))
     publisher = Publisher(station, info, uplink, clock)
     storage = Storage(state_directory, boot, publisher.set_line_error)

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
+from pathlib import Path
 
 from lfs10d import __version__
 from lfs10d.config.models import Config, SlaveConfig
 from lfs10d.profiles.profile import Profile
 from lfs10d.profiles.values import Value
+from lfs10d.schema.addresses import TopicPrefix
+from lfs10d.schema.fields import FieldError
+from lfs10d.system.disk import Disk
 from lfs10d.telemetry.homeassistant.discovery import Announced, announcements
 from lfs10d.telemetry.homeassistant.gateway import DiscoveredDevice, DiscoveredValue, Gateway
+
+FILE_NAME = "homeassistant"
+"""In the state directory: the prefixes under which something may be announced, one a line."""
 
 BARE_NUMBER = "1"
 """Unit in a profile of a number without one."""
@@ -44,5 +52,38 @@ def _device(slave: SlaveConfig, profile: Profile) -> DiscoveredDevice:
 
 
 def _value(value: Value) -> DiscoveredValue:
+    if value.map is not None:
+        return DiscoveredValue(value.name, kind="text", options=tuple(dict.fromkeys(value.map.values())))
+    if value.is_text:
+        return DiscoveredValue(value.name, kind="boolean" if value.type == "bool" else "text")
     unit = None if value.unit == BARE_NUMBER else value.unit
     return DiscoveredValue(value.name, unit, value.precision, value.device_class)
+
+
+class AnnouncedPrefixes:
+    """What the next life is to know of what this one announced; best effort, where the disk is of no use."""
+
+    def __init__(self, directory: Path, disk: Disk) -> None:
+        self._path = directory / FILE_NAME
+        self._disk = disk
+
+    def load(self) -> frozenset[str]:
+        """Return the prefixes under which earlier lives announced something."""
+        try:
+            lines = self._disk.read(self._path).decode().splitlines()
+        except (OSError, UnicodeError):
+            return frozenset()
+        kind = TopicPrefix()
+        found = set()
+        for line in lines:
+            with contextlib.suppress(FieldError):
+                found.add(kind.accept(line))
+        return frozenset(found)
+
+    def save(self, prefixes: frozenset[str]) -> None:
+        """Put the prefixes on the disk; no file is none."""
+        with contextlib.suppress(OSError):
+            if prefixes:
+                self._disk.replace(self._path, "".join(f"{each}\n" for each in sorted(prefixes)).encode())
+            else:
+                self._disk.remove(self._path)

@@ -1,7 +1,8 @@
 """Home Assistant's discovery at the broker: announced after each connect, at each change and at its birth message.
 
-After a connect the broker is first asked what we announced before, so that what is no longer there is taken back. What
-to publish is decided in `lfs10d.telemetry.homeassistant`.
+After a connect the broker is first asked what we announced before, so that what is no longer there is taken back: under
+every prefix where something may be left, and nowhere else. What to publish is decided in
+`lfs10d.telemetry.homeassistant`.
 """
 
 from __future__ import annotations
@@ -44,12 +45,19 @@ class Discovery:
         self._is_out = is_out
         self._chance = chance
         self._prefix = ""
+        self._prefixes: frozenset[str] = frozenset()
+        self._on_prefixes: Callable[[frozenset[str]], None] = lambda _: None
         self._wanted: Mapping[str, Announced] = {}
         self._then: dict[str, Announced] = {}
         self._known: dict[str, Platforms] | None = None
         """What was announced, by full topic; None while that is not known."""
         self._connection: Connection | None = None
         self._search: DiscoverySearch | None = None
+        self._to_search: list[tuple[str, bool]] = []
+        """Prefixes, and whether to look for all devices or for the line alone."""
+        self._found: dict[str, Platforms] = {}
+        self._searched: set[str] = set()
+        """Prefixes under which the broker let us look and had nothing of ours."""
         self._subscription: int | None = None
         self._birth: asyncio.TimerHandle | None = None
         self._taken_in: asyncio.TimerHandle | None = None
@@ -58,11 +66,20 @@ class Discovery:
     def _status(self) -> str:
         return f"{self._prefix}/status"
 
+    def remember(self, prefixes: frozenset[str], on_change: Callable[[frozenset[str]], None]) -> None:
+        """Take under which prefixes earlier lives announced something; `on_change` is told what later ones are to know.
+
+        Before `configure`.
+        """
+        self._prefixes, self._on_prefixes = prefixes, on_change
+
     def configure(self, prefix: str, wanted: Mapping[str, Announced]) -> None:
         """Take the payloads by full topic, none where discovery is off; publish what is another."""
         before, self._wanted = self._wanted, wanted
         moved = prefix != self._prefix or bool(wanted) is not bool(before)
         left, self._prefix = self._status, prefix
+        if wanted:
+            self._know(self._prefixes | {prefix})
         known = {topic: platforms(each) for topic, each in before.items()} if self._known is None else self._known
         gone = {topic: known[topic] for topic in known if topic not in wanted}
         if self._known is None or moved:
@@ -86,15 +103,18 @@ class Discovery:
     def begin(self, connection: Connection | None) -> None:
         """Ask over this connection what was announced before, then announce what is wanted."""
         self.lost()
-        if connection is None or not self._prefix:
+        if connection is None:
             return
         self._connection = connection
-        self._ask(connection, wide=bool(self._wanted))
+        announced = {self._prefix} if self._wanted else set()
+        others = sorted(self._prefixes - announced)
+        self._to_search = [(self._prefix, True)] * len(announced) + [(each, False) for each in others]
+        self._ask_next(connection)
 
     def lost(self) -> None:
         """Note that the connection is gone: at the next everything begins anew."""
         self._connection = self._search = self._subscription = self._known = None
-        self._then = {}
+        self._then, self._found, self._searched = {}, {}, set()
         for timer in (self._birth, self._taken_in):
             if timer is not None:
                 timer.cancel()
@@ -123,11 +143,22 @@ class Discovery:
 
     # -- what follows
 
-    def _ask(self, connection: Connection, *, wide: bool) -> None:
-        search = self._search = DiscoverySearch(self._prefix, self._topics.base, self._loop.time(), wide)
+    def _ask_next(self, connection: Connection) -> None:
+        """Ask the broker for what is left to be looked for; announce what is wanted once nothing is."""
+        if not self._to_search:
+            self._search, self._known = None, {}
+            gone = self._found.keys() - self._wanted.keys()
+            if gone:
+                log.info("clearing %d devices from Home Assistant", len(gone))
+            announced = {self._prefix} if self._wanted else set()
+            self._know(self._prefixes - (self._searched - announced))
+            self._perform(transition(self._found, self._wanted))
+            return
+        prefix, wide = self._to_search.pop(0)
+        search = self._search = DiscoverySearch(prefix, self._topics.base, self._loop.time(), wide)
         # Without retain_as_published the flag tells what was retained before, and nothing else.
         filters = [Filter(search.filter, qos=0, retain_as_published=False, no_local=True)]
-        if self._wanted:
+        if self._wanted and prefix == self._prefix:
             filters.append(Filter(self._status))
         self._subscription = connection.subscribe(filters)
         self._loop.call_at(search.due, self._end, search)
@@ -140,14 +171,18 @@ class Discovery:
             self._loop.call_at(search.due, self._end, search)
             return
         connection.unsubscribe([search.filter])
+        self._found.update(search.found)
         if search.found and not search.wide:
-            self._ask(connection, wide=True)
-            return
-        self._search = None
-        self._known = {}
-        self._perform(transition(search.found, self._wanted))
-        if search.found.keys() - self._wanted.keys():
-            log.info("clearing %d devices from Home Assistant", len(search.found.keys() - self._wanted.keys()))
+            self._to_search.insert(0, (search.prefix, True))
+        elif not (search.found or search.is_refused):
+            self._searched.add(search.prefix)
+        self._ask_next(connection)
+
+    def _know(self, prefixes: frozenset[str]) -> None:
+        """Keep under which prefixes something of ours may be retained."""
+        if prefixes != self._prefixes:
+            self._prefixes = prefixes
+            self._on_prefixes(prefixes)
 
     def _perform(self, steps: Transition) -> None:
         for topic in steps.first:

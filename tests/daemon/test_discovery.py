@@ -9,8 +9,9 @@ from typing import Any
 import pytest
 
 from lfs10d.config.loader import load
-from lfs10d.daemon.discovery import discovery_payloads
+from lfs10d.daemon.discovery import AnnouncedPrefixes, discovery_payloads
 from lfs10d.profiles.library import builtin_names
+from lfs10d.system.disk import Disk
 from tests.support.brokers import Mosquitto
 from tests.support.homeassistant_keys import complaints
 from tests.support.sites import Site, View, eventually
@@ -53,6 +54,37 @@ def test_a_bare_number_has_no_unit_and_the_profile_names_the_maker(tmp_path: Pat
     device = found["ha/x/device/lfs10d_lfs10d_line0_a/config"]
     assert (device["device"]["manufacturer"], device["device"]["model"]) == ("Fuling", "DZB")
     assert "1" not in {each.get("unit_of_measurement") for each in device["components"].values()}
+
+
+def test_words_texts_and_booleans_are_announced_as_such(tmp_path: Path) -> None:
+    (tmp_path / "station.yaml").write_text(
+        "name: station\ntitle: Station\nvalues:\n"
+        "- {name: weather, register: 1, type: uint16, map: {0: dry, 1: rain, 2: rain}}\n"
+        "- {name: serial, register: 2, type: string, length: 4}\n"
+        "- {name: heating, register: 9, function: 2}\n"
+    )
+    found = payloads(
+        tmp_path, "slaves: [{id: 2, name: a, profile: station.yaml}]\nhomeassistant: {discovery: true}\n"
+    )[topic("a")]
+    shown = found["components"]
+    assert (shown["weather"]["device_class"], shown["weather"]["options"]) == ("enum", ["dry", "rain"])
+    assert (shown["serial"]["platform"], shown["heating"]["platform"]) == ("sensor", "binary_sensor")
+    assert list(complaints(found)) == []
+
+
+def test_prefixes_are_kept_and_a_damaged_file_is_none(tmp_path: Path) -> None:
+    prefixes, file = AnnouncedPrefixes(tmp_path, Disk()), tmp_path / "homeassistant"
+    assert prefixes.load() == set()
+    prefixes.save(frozenset({"b/c", "a"}))
+    assert prefixes.load() == {"a", "b/c"}
+    assert file.read_text() == "a\nb/c\n"
+    file.write_bytes(b"a\n+/#\n\n")
+    assert prefixes.load() == {"a"}
+    file.write_bytes(b"\xff")
+    assert prefixes.load() == set()
+    prefixes.save(frozenset())
+    assert not file.exists()
+    AnnouncedPrefixes(tmp_path / "missing", Disk()).save(frozenset("a"))  # the disk is of no use
 
 
 def test_it_is_announced_taken_back_and_follows_every_change(site: Site, mosquitto: Mosquitto, view: View) -> None:

@@ -42,7 +42,12 @@ class Site:
         self.subscribed: list[str] = []
         self.unsubscribed: list[str] = []
         self.out = True
+        self.kept: list[set[str]] = []
         self.discovery = Discovery(Topics("lfs10d/a"), self._publish, is_out=lambda: self.out, chance=lambda: 0.5)
+
+    def remember(self, *prefixes: str) -> None:
+        """Take up the life of a daemon that announced something under these prefixes."""
+        self.discovery.remember(frozenset(prefixes), lambda kept: self.kept.append(set(kept)))
 
     def _publish(self, publications: Iterable[Publication]) -> None:
         for each in publications:
@@ -173,6 +178,7 @@ def test_what_an_earlier_life_left_is_taken_back(site: Site) -> None:
 
 
 def test_switched_off_while_it_was_down_all_is_cleared_the_line_last(site: Site) -> None:
+    site.remember("homeassistant")
     site.configure({})
     site.connect((LINE, payload("load")))
     assert site.subscribed == [LINE, ALL]  # only where the line is still there the others are looked for
@@ -182,13 +188,58 @@ def test_switched_off_while_it_was_down_all_is_cleared_the_line_last(site: Site)
     site.wait(QUIET)
     assert site.news() == [(MAST, None), (LINE, None)]
     assert site.unsubscribed == [LINE, ALL]
+    assert site.kept == []
+
+    site.do(site.discovery.lost)
+    site.connect()
+    assert site.kept == [set()]  # nothing is left: the next connect does not ask
+    site.do(site.discovery.lost)
+    site.subscribed.clear()
+    site.connect()
+    assert (site.subscribed, site.news()) == ([], [])
 
 
 def test_nothing_is_read_or_published_where_it_was_never_on(site: Site) -> None:
+    """A broker may end the connection for a subscription that it does not permit."""
+    site.remember()
     site.configure({})
     site.connect()
-    assert (site.subscribed, site.unsubscribed, site.news()) == ([LINE], [LINE], [])
+    assert (site.subscribed, site.unsubscribed, site.news(), site.kept) == ([], [], [], [])
     assert site.discovery.republish() == 0
+
+
+def test_another_prefix_while_it_was_down_clears_what_is_left_under_the_old(site: Site) -> None:
+    site.remember("ha", "homeassistant")
+    site.configure({LINE: payload("load")})
+    old = "ha/device/lfs10d_lfs10d_a/config"
+    site.connect()
+    assert site.subscribed == [ALL, STATUS, old]
+    site.arrive(old, json.dumps(payload("load")).encode(), retained=True)
+    site.wait(QUIET)
+    assert site.subscribed[-1] == "ha/device/+/config"
+    site.arrive(old, json.dumps(payload("load")).encode(), retained=True)
+    site.wait(QUIET)
+    assert site.news() == [(old, None), (LINE, payload("load"))]
+    assert site.kept == []
+    site.do(site.discovery.lost)
+    site.connect()
+    site.wait(QUIET)
+    assert site.kept == [{"homeassistant"}]
+
+
+def test_what_the_broker_does_not_show_is_not_forgotten(site: Site) -> None:
+    site.remember("homeassistant")
+    site.configure({})
+    site.do(lambda: site.discovery.begin(cast("Connection", site)))
+    site.do(lambda: site.discovery.subscribed(1, (0x87,)))
+    site.wait(100)
+    assert site.kept == []
+
+
+def test_what_is_announced_is_kept_before_it_is_published(site: Site) -> None:
+    site.remember()
+    site.configure({LINE: payload("load")})
+    assert (site.kept, site.news()) == ([{"homeassistant"}], [])
 
 
 def test_switched_off_and_on_while_connected(site: Site) -> None:
@@ -213,6 +264,8 @@ def test_another_prefix_moves_all(site: Site) -> None:
     assert site.news() == [(LINE, None)]
     assert site.unsubscribed[-1] == STATUS
     assert site.subscribed[-2:] == ["ha/device/+/config", "ha/status"]
+    site.wait(QUIET)
+    assert site.subscribed[-1] == LINE  # is nothing left there?
     site.wait(QUIET)
     assert site.news() == [("ha/device/lfs10d_lfs10d_a/config", payload("load"))]
 

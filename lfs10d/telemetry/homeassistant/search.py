@@ -32,8 +32,9 @@ class DiscoverySearch:
     wide: bool
     found: dict[str, Platforms] = field(default_factory=dict)
     """The components of each payload by its full topic."""
+    is_refused: bool = False
+    """The broker lets us see nothing."""
     _last_at: float = 0.0
-    _refused: bool = False
 
     def __post_init__(self) -> None:
         self._last_at = self.begun
@@ -45,7 +46,7 @@ class DiscoverySearch:
 
     def refused(self) -> None:
         """Note that the broker lets us see nothing."""
-        self._refused = True
+        self.is_refused = True
 
     def on_message(self, topic: str, payload: bytes, now: float) -> bool:
         """Take one retained message; return False if it is not about a device of Home Assistant's."""
@@ -70,4 +71,4 @@ class DiscoverySearch:
     @property
     def due(self) -> float:
         """When it is over."""
-        return self.begun if self._refused else min(self._last_at + QUIET, self.begun + LONGEST)
+        return self.begun if self.is_refused else min(self._last_at + QUIET, self.begun + LONGEST)
