@@ -63,9 +63,9 @@ def test_words_texts_and_booleans_are_announced_as_such(tmp_path: Path) -> None:
         "- {name: serial, register: 2, type: string, length: 4}\n"
         "- {name: heating, register: 9, function: 2}\n"
     )
-    found = payloads(
-        tmp_path, "slaves: [{id: 2, name: a, profile: station.yaml}]\nhomeassistant: {discovery: true}\n"
-    )[topic("a")]
+    found = payloads(tmp_path, "slaves: [{id: 2, name: a, profile: station.yaml}]\nhomeassistant: {discovery: true}\n")[
+        topic("a")
+    ]
     shown = found["components"]
     assert (shown["weather"]["device_class"], shown["weather"]["options"]) == ("enum", ["dry", "rain"])
     assert (shown["serial"]["platform"], shown["heating"]["platform"]) == ("sensor", "binary_sensor")
