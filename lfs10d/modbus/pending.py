@@ -20,6 +20,7 @@ Rules
 6. After an exception that does not end it (05, 0A, 0B: a gateway's target may answer later) a request stays pending as
    after silence, and what is older too.
 7. Another master's request that was heard is pending too, until its answer is heard: the slave owes it.
+   Where it asks in a rhythm ours waits for the pause (`lfs10d.modbus.other_master`).
 8. A slave that is answered for twice is left alone until the second answer has come (`lfs10d.modbus.duplicates`).
 """
 
@@ -30,6 +31,7 @@ from dataclasses import dataclass
 
 from lfs10d.modbus.duplicates import Duplicates
 from lfs10d.modbus.frames import Codec
+from lfs10d.modbus.other_master import OtherMaster
 from lfs10d.modbus.outcome import LateAnswer, Outcome
 from lfs10d.modbus.request import ReadRegisters, Request
 from lfs10d.reading import FaultCode
@@ -66,6 +68,7 @@ class PendingRequests:
         self._quiet_until: dict[int, float] = {}
         self._tardy: set[int] = set()
         self.duplicates = Duplicates()
+        self.other_master = OtherMaster()
 
     @property
     def by_slave(self) -> Mapping[int, tuple[Pending, ...]]:
@@ -145,12 +148,13 @@ class PendingRequests:
                 self._forget(each)
             del self._quiet_until[slave]
             until = None
-        rests = self.duplicates.rests_until(slave, now)
-        return rests if until is None else max(until, rests or until)
+        rests = (until, self.duplicates.rests_until(slave, now), self.other_master.busy_until(slave, now))
+        return max((each for each in rests if each is not None), default=None)
 
     def asked_by_another(self, request: Request, codec: Codec, now: float) -> None:
         """Note that another master's request was heard, whole at `now`."""
         self._remember(Pending(request, codec, now, ours=False), lingers=None)
+        self.other_master.asked(request.slave, now)
 
     def overheard(self, slave: int, frame: int, *, exception: bool, now: float) -> bool:
         """Note a right answer of `slave`, of `frame` characters, which is none to us; whether it owed one.
@@ -162,6 +166,7 @@ class PendingRequests:
             fits = each.codec.shapes(each.request)[exception].size == frame
             if fits and not each.ours:
                 self._drop(slave, [each], now)
+                self.other_master.answered(slave, now)
                 return True
             owed = owed or fits or not each.ours
         return owed
