@@ -35,6 +35,7 @@ VERBS = {
     "demo": "Show it at work: simulated line, broker, daemon, live view.",
     "web": "Serve the live page and /metrics of one or more lines.",
     "metrics": "Print the figures for Prometheus once.",
+    "doctor": "Look at everything from sensor to dashboard; say what to do.",
     "service": "Install, print or remove the systemd unit.",
 }
 """Each has a module of its name with `command` in it; the short help stands here so that --help imports none."""

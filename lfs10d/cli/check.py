@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 import socket
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import click
 
-from lfs10d.cli import EXIT_CONFIG, config_option, json_option
+from lfs10d.cli import EXIT_CONFIG, EXIT_UNAVAILABLE, config_option, event_loop, json_option
 from lfs10d.cli.advice import advice
+from lfs10d.cli.doctor.finding import Finding, lines
 from lfs10d.cli.render.table import columns
 from lfs10d.config.loader import LoadedConfig, load
 from lfs10d.errors import ConfigError, Problem
@@ -24,17 +26,19 @@ Examples:
   lfs10d check                      the file of the service
   lfs10d check -c site.yaml         another one
   lfs10d check -c site.yaml --json  for programs
+  lfs10d check --online             also look at port and broker
 """
 
 
 @click.command("check", epilog=EXAMPLES)
 @config_option
+@click.option("--online", is_flag=True, help="Also look at the port and the broker.")
 @json_option
-def command(config: Path, *, as_json: bool) -> int:
+def command(config: Path, *, online: bool, as_json: bool) -> int:
     """Validate the configuration; print the line's time budget.
 
     Every problem is one line FILE:LINE:COLUMN: key: what is wrong, on standard error. Exit code 78 with problems,
-    0 without; warnings change nothing.
+    0 without; warnings change nothing. With --online it is 69 if port or broker cannot be used now.
     """
     try:
         loaded = load(config)
@@ -48,14 +52,25 @@ def command(config: Path, *, as_json: bool) -> int:
         return EXIT_CONFIG
     found = budget(loaded.config, loaded.profiles)
     warnings = advice(loaded, found, socket.gethostname())
+    seen = _look(config, loaded) if online else []
     if as_json:
-        click.echo(json.dumps(_report(loaded, found, warnings), indent=2, allow_nan=False))
+        report = _report(loaded, found, warnings) | ({"online": [asdict(each) for each in seen]} if online else {})
+        click.echo(json.dumps(report, indent=2, allow_nan=False))
     else:
         for text in _lines(loaded, found):
             click.echo(escape(text))
+        for text in lines(seen):
+            click.echo(text)
     for warning in warnings:
         click.echo(escape(str(warning)), err=True)
-    return 0
+    return EXIT_UNAVAILABLE if any(each.level == "fail" for each in seen) else 0
+
+
+def _look(config: Path, loaded: LoadedConfig) -> list[Finding]:
+    """Return what is to be said of the port and the broker now."""
+    from lfs10d.cli.doctor import rounds  # noqa: PLC0415  # the broker's client takes a third of a second
+
+    return event_loop.run(rounds.port_and_broker(config, loaded))
 
 
 def _problem_json(problem: Problem) -> dict[str, Any]:

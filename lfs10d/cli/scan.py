@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +17,7 @@ from lfs10d.cli.options import PORT, LineOptions, baudrate_of, line_options, tak
 from lfs10d.cli.port_holder import instead
 from lfs10d.cli.render import scan_findings, troubleshooting
 from lfs10d.cli.render.scan_progress import view
-from lfs10d.errors import PortBusyError, PortError
+from lfs10d.errors import FailedError, PortBusyError, PortError
 from lfs10d.line.jobs.scan import Scan
 from lfs10d.line.jobs.scan_plan import FIRST_TIMEOUT, ScanPlan, ids_of
 from lfs10d.modbus.frames import Checksum, Codec, Framing
@@ -31,6 +32,7 @@ Examples:
   lfs10d scan /dev/ttyUSB0                  all ids at both rates, a minute
   lfs10d scan /dev/ttyUSB0 --ids 1-20       twenty ids, a few seconds
   lfs10d scan /dev/ttyUSB0 --baudrate 9600  one rate
+  lfs10d scan /dev/ttyUSB0 --write site.yaml    keep what was found
 """
 
 
@@ -44,6 +46,12 @@ def _ids(context: click.Context, parameter: click.Parameter, value: str) -> tupl
 def _rates(context: click.Context, parameter: click.Parameter, value: str) -> tuple[int, ...]:
     del context, parameter
     return tuple(dict.fromkeys(baudrate_of(part) for part in value.split(",")))
+
+
+def _new_file(context: click.Context, parameter: click.Parameter, value: Path | None) -> Path | None:
+    if value is not None and value.exists():
+        raise click.BadParameter(f"{value} exists already, and is not overwritten: name another", context, parameter)
+    return value
 
 
 @click.command("scan", epilog=EXAMPLES)
@@ -62,9 +70,22 @@ def _rates(context: click.Context, parameter: click.Parameter, value: str) -> tu
 @click.option(
     "--checksum", type=click.Choice(["crc", "sum"]), default="crc", show_default=True, help="Of the rtu frames sent."
 )
+@click.option(
+    "--write",
+    type=click.Path(path_type=Path, dir_okay=False),
+    callback=_new_file,
+    metavar="FILE",
+    help="Write a configuration for what was found; no file is overwritten.",
+)
 @line_options
 @json_option
-def command(ids: tuple[int, ...], rates: tuple[int, ...], profiles: tuple[str, ...], **options: Any) -> int:  # noqa: ANN401  # `take` types them
+def command(
+    ids: tuple[int, ...],
+    rates: tuple[int, ...],
+    profiles: tuple[str, ...],
+    write: Path | None,
+    **options: Any,  # noqa: ANN401  # `take` types them
+) -> int:
     """Find the devices on the line at PORT.
 
     Polls every id at every rate; nothing is ever written to a device. A device set to the other checksum does not
@@ -93,8 +114,20 @@ def command(ids: tuple[int, ...], rates: tuple[int, ...], profiles: tuple[str, .
     if as_json:
         click.echo(json.dumps(result.report(), indent=2, allow_nan=False))
     else:
-        result.show()
+        result.show(written=write is not None)
+    if write is not None and result.scan.found:
+        _write(write, result)
     return code
+
+
+def _write(file: Path, result: _Result) -> None:
+    text = "\n".join(scan_findings.snippet(result.scan.found, result.line, asked=result.asked))
+    try:
+        with file.open("x", encoding="utf-8") as new:
+            new.write(f"# What lfs10d scan found.\n{text}\n")
+    except OSError as error:
+        raise FailedError(f"{file} cannot be written: {error.strerror}") from None
+    click.echo(f"{file} written. Look at it, then: lfs10d check -c {shlex.quote(str(file))}", err=True)
 
 
 @dataclass(slots=True)
@@ -119,11 +152,12 @@ class _Result:
             "framing_errors": self.framing_errors,
         }
 
-    def show(self) -> None:
-        """Print what was found, or what it means that nothing was."""
+    def show(self, *, written: bool = False) -> None:
+        """Print what was found, or what it means that nothing was; the configuration unless it is `written`."""
         found = self.scan.found
         if found:
             scan_findings.show([scan_findings.row(finding) for finding in found])
+        if found and not written:
             click.echo()
             click.echo("# To poll them, save this as lfs10d.yaml, then: lfs10d run -c lfs10d.yaml")
             for text in scan_findings.snippet(found, self.line, asked=self.asked):

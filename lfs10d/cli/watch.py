@@ -147,11 +147,11 @@ class Watch:
         with view:
             while True:
                 self._read()
-                live, source = self._best()
+                live, source = self.best()
                 view.draw(live, source, now=time.monotonic(), wall=time.time())
                 await asyncio.sleep(EVERY)
 
-    def _best(self) -> tuple[LiveState, DataSource]:
+    def best(self) -> tuple[LiveState, DataSource]:
         """Return the better source: the broker where the daemon is online there, else a file that is being written."""
         client, status = self._client, self._status
         if self.online:

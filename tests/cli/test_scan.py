@@ -221,3 +221,16 @@ def test_what_cannot_be_meant_is_a_usage_error(arguments: list[str], complaint: 
 @pytest.mark.parametrize(("seconds", "text"), [(0.2, "1 s"), (59.4, "59 s"), (60, "1 min"), (95, "1 min 35 s")])
 def test_durations_are_told_as_people_do(seconds: float, text: str) -> None:
     assert span(seconds) == text
+
+
+def test_what_was_found_is_written_to_a_new_file_that_is_valid(
+    lfs10d: Lfs10d, sensors: PtyLine, tmp_path: Path
+) -> None:
+    sensors.line.add(Sensor(2))
+    done = lfs10d("scan", sensors.path, "--ids", "1-3", "--baudrate", "9600", "--write", "site.yaml")
+    assert done.returncode == 0
+    assert "site.yaml written. Look at it, then: lfs10d check -c site.yaml" in done.stderr
+    assert f"port: {sensors.path}" in (tmp_path / "site.yaml").read_text()
+    assert lfs10d("check", "-c", "site.yaml").returncode == 0
+    again = lfs10d("scan", sensors.path, "--ids", "1-3", "--baudrate", "9600", "--write", "site.yaml")
+    assert (again.returncode, "exists already" in again.stderr) == (2, True)

@@ -1,0 +1,56 @@
+"""One thing that the doctor looked at: how it is, and what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Final, Literal, TypeAlias
+
+import click
+
+from lfs10d.system.logs import escape
+
+Level: TypeAlias = Literal["ok", "warn", "fail"]
+
+COLOURS: Final[dict[Level, str]] = {"ok": "green", "warn": "yellow", "fail": "red"}
+AREA_WIDTH: Final = 13
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """How one thing is; `advice` says what to do, and is empty where all is well."""
+
+    area: str
+    level: Level
+    text: str
+    advice: str = ""
+
+
+def ok(area: str, text: str) -> Finding:
+    """Return that a thing is as it should be."""
+    return Finding(area, "ok", text)
+
+
+def warn(area: str, text: str, advice: str) -> Finding:
+    """Return what may become a fault, or is one that lfs10d lives with."""
+    return Finding(area, "warn", text, advice)
+
+
+def fail(area: str, text: str, advice: str) -> Finding:
+    """Return a fault: no wind speed gets from the sensor to the dashboard, or not all of it."""
+    return Finding(area, "fail", text, advice)
+
+
+def lines(findings: Iterable[Finding]) -> Iterator[str]:
+    """Yield the findings for a person, each with its advice below it."""
+    for each in findings:
+        level = click.style(f"{each.level:<4}", fg=COLOURS[each.level])
+        yield f"{level}  {each.area:<{AREA_WIDTH}} {escape(each.text)}"
+        if each.advice:
+            yield f"{'':<{AREA_WIDTH + 7}}-> {escape(each.advice)}"
+
+
+def summary(findings: Iterable[Finding]) -> str:
+    """Return how many of each level there are, in words."""
+    levels = [each.level for each in findings]
+    return f"{levels.count('fail')} to mend, {levels.count('warn')} to look at, {levels.count('ok')} well"

@@ -1,0 +1,195 @@
+"""The machine: its clock, the disk of the state directory, the service and other daemons."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import statistics
+import subprocess
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from lfs10d.cli.doctor.finding import Finding, fail, ok, warn
+from lfs10d.cli.doctor.port import Root
+from lfs10d.system.clock_step import ClockState
+
+SLOW_SYNC: Final = 0.2
+"""s for one write with fsync: from here on a change takes noticeably long."""
+STUCK_SYNC: Final = 2.0
+WRITES: Final = 5
+MUCH_WRITTEN: Final = 20e9
+"""Bytes a day from which a usual SD card of 32 GB does not live for many years."""
+SECTOR: Final = 512
+LONG_ENOUGH: Final = 3600.0
+"""s since the boot, before which a rate of writing says little."""
+CLOCK_SLACK: Final = 86400.0
+
+
+@dataclass(frozen=True, slots=True)
+class DiskState:
+    """The disk of the state directory; `sync` in s, `written` in bytes a day, None where not known."""
+
+    folder: Path
+    device: str
+    exists: bool
+    writable: bool
+    free: int
+    wanted: int
+    sync: float | None = None
+    written: float | None = None
+
+
+def clock(state: ClockState, now: float, installed: float) -> Iterator[Finding]:
+    """Yield what is to be said of the wall clock; `now` and `installed` in s since the epoch."""
+    if now < installed - CLOCK_SLACK:
+        yield fail(
+            "clock",
+            f"it says {time.strftime('%Y-%m-%d %H:%M', time.gmtime(now))} UTC, before this version was installed",
+            "give the machine the time: timedatectl, a network with NTP, or a real-time clock",
+        )
+    elif state == "synced":
+        yield ok("clock", "synchronised")
+    elif state == "unsynced":
+        yield warn(
+            "clock", "not synchronised: samples are marked unsynced", "timedatectl; sudo timedatectl set-ntp true"
+        )
+    else:
+        yield warn("clock", "nobody knows whether it is synchronised", "install systemd-timesyncd or chrony")
+
+
+def look_at_disk(folder: Path, wanted: int, root: Root | None = None) -> DiskState:
+    """Return how the state directory's disk is; writes and removes a small file there if it may."""
+    root = root or Root()
+    existing = next(each for each in (folder, *folder.parents) if each.exists())
+    writable = folder.is_dir() and os.access(folder, os.W_OK)
+    device = _device(existing)
+    return DiskState(
+        folder=folder,
+        device=device,
+        exists=folder.is_dir(),
+        writable=writable,
+        free=shutil.disk_usage(existing).free,
+        wanted=wanted,
+        sync=_sync_time(folder) if writable else None,
+        written=_written_a_day(device, root),
+    )
+
+
+def _device(path: Path) -> str:
+    """Return the name of the block device that holds a path, such as mmcblk0p2; "" where it is none."""
+    number = path.stat().st_dev
+    link = Path(f"/sys/dev/block/{os.major(number)}:{os.minor(number)}")
+    return link.resolve().name if link.exists() else ""
+
+
+def _sync_time(folder: Path) -> float | None:
+    probe = folder / f".doctor-{os.getpid()}"
+    took = []
+    try:
+        for _ in range(WRITES):
+            began = time.monotonic()
+            descriptor = os.open(probe, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o600)
+            try:
+                os.write(descriptor, bytes(4096))
+                os.fsync(descriptor)
+            finally:
+                os.close(descriptor)
+                probe.unlink()
+            took.append(time.monotonic() - began)
+    except OSError:
+        return None
+    return statistics.median(took)
+
+
+def _written_a_day(device: str, root: Root) -> float | None:
+    uptime = root.read("proc/uptime").partition(" ")[0]
+    for line in root.read("proc/diskstats").splitlines():
+        words = line.split()
+        if device and len(words) > 9 and words[2] == device and uptime:  # noqa: PLR2004  # iostats.txt: sectors written
+            seconds = float(uptime)
+            return int(words[9]) * SECTOR * 86400 / seconds if seconds > LONG_ENOUGH else None
+    return None
+
+
+def disk(state: DiskState) -> Iterator[Finding]:
+    """Yield what is to be said of the disk."""
+    where = str(state.folder)
+    if state.sync is not None and state.sync >= STUCK_SYNC:
+        yield fail("disk", f"{where}: a write takes {state.sync:.1f} s", "the disk or SD card is failing: replace it")
+    elif state.sync is not None and state.sync >= SLOW_SYNC:
+        yield warn("disk", f"{where}: a write takes {state.sync:.1f} s", "is the SD card worn, or the disk busy?")
+    elif state.writable:
+        speed = "" if state.sync is None else f", a write takes {state.sync * 1e3:.0f} ms"
+        yield ok("disk", f"{where} can be written{speed}")
+    elif not state.exists:
+        yield ok("disk", f"{where} is not there yet: the daemon makes it")
+    else:
+        yield warn("disk", f"{where} cannot be written by you", "the service can: to look closer call it as root")
+    if state.free < state.wanted:
+        yield warn(
+            "disk",
+            f"{state.free / 1e6:.0f} MB are free, and the backlog may take {state.wanted / 1e6:.0f} MB",
+            "make room, or set store.max_size lower",
+        )
+    if state.written is not None and state.device.startswith("mmcblk") and state.written > MUCH_WRITTEN:
+        yield warn(
+            "disk",
+            f"{state.written / 1e9:.0f} GB a day are written to the SD card",
+            "which program? sudo iotop -ao; journal in memory: Storage=volatile in journald.conf",
+        )
+
+
+# The service
+
+
+def unit_state(unit: str) -> dict[str, str] | None:
+    """Return what systemd says of a unit; None where there is no systemd."""
+    keys = "LoadState,UnitFileState,ActiveState,SubState,NRestarts,Result,ExecMainStatus,WatchdogUSec,MainPID"
+    try:
+        done = subprocess.run(  # noqa: S603  # the unit's name is ours
+            ["systemctl", "show", unit, f"--property={keys}"],  # noqa: S607  # the system's own
+            capture_output=True, text=True, timeout=10, check=True,
+        )  # fmt: skip
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return dict(line.split("=", 1) for line in done.stdout.splitlines() if "=" in line)
+
+
+def service(unit: str, state: Mapping[str, str] | None) -> Iterator[Finding]:
+    """Yield what is to be said of a unit."""
+    if state is None:
+        yield warn("service", "there is no systemd here", "see docs/installation.md, or start lfs10d run yourself")
+        return
+    if state.get("LoadState") != "loaded":
+        yield warn("service", f"{unit} is not installed", "sudo lfs10d service install, or the Debian package")
+        return
+    active, result = state.get("ActiveState"), state.get("Result", "")
+    if active == "active":
+        yield ok("service", f"{unit} runs (process {state.get('MainPID')})")
+    elif state.get("ExecMainStatus") == "78":
+        yield fail("service", f"{unit} has ended: the configuration is wrong", "lfs10d check, then systemctl restart")
+    elif active == "failed" or result not in {"", "success"}:
+        yield fail("service", f"{unit} is {active} ({result})", f"why: journalctl -u {unit} -n 30")
+    else:
+        yield fail("service", f"{unit} does not run", f"sudo systemctl start {unit}")
+    if state.get("UnitFileState") not in {"enabled", "enabled-runtime"}:
+        yield warn("service", f"{unit} is not started at boot", f"sudo systemctl enable {unit}")
+    restarts = state.get("NRestarts", "0")
+    if restarts != "0":
+        yield warn("service", f"{unit} was restarted {restarts} times ({result})", f"why: journalctl -u {unit}")
+    if state.get("WatchdogUSec", "infinity") in {"0", "infinity"}:
+        yield warn("service", f"{unit} has no watchdog", "take WatchdogSec= from the unit of this version")
+
+
+def daemons(same: tuple[int, ...]) -> Iterator[Finding]:
+    """Yield what is to be said where several daemons run for one configuration or one port; `same` are processes."""
+    if len(same) > 1:
+        processes = ", ".join(map(str, same))
+        yield fail(
+            "service",
+            f"{len(same)} daemons run for this line (processes {processes})",
+            "end all but one: each takes the other's client id at the broker, and only one can have the port",
+        )

@@ -1,0 +1,226 @@
+"""The serial port: whether it is there, who else wants it, and how the adapter is set."""
+
+from __future__ import annotations
+
+import grp
+import re
+import stat
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from lfs10d.cli.doctor.finding import Finding, fail, ok, warn
+from lfs10d.cli.port_holder import daemon_behind
+from lfs10d.modbus.port_lock import holder
+
+CH340: Final = "1a86:7523"
+"""brltty takes this adapter for a Braille display, up to Debian 12 and Ubuntu 22.04."""
+SLOW_LATENCY: Final = 2
+"""ms; more than that costs more of each exchange than the silence before it."""
+READ_WRITE: Final = stat.S_IRGRP | stat.S_IWGRP
+SERVICE_GROUP: Final = "dialout"
+"""The unit's SupplementaryGroups=."""
+RUNNING: Final = frozenset({"ModemManager", "brltty"})
+"""Programs that open serial ports by themselves."""
+
+
+@dataclass(frozen=True, slots=True)
+class PortState:
+    """What is known of a port. `""` and None: there is none, or it cannot be seen."""
+
+    path: str
+    device: str = ""
+    """Where the path leads."""
+    is_device: bool = False
+    lasting: str = ""
+    """The device's name below /dev/serial/by-id or by-path."""
+    group: str = ""
+    group_may_use: bool = False
+    driver: str = ""
+    usb_id: str = ""
+    latency_ms: int | None = None
+    holder: str = ""
+    held_by_daemon: bool = False
+    console: str = ""
+    """Why the port is a console, in words."""
+    mini_uart: bool = False
+    running: frozenset[str] = frozenset()
+    """Which of `RUNNING` run."""
+    container: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Root:
+    """Where the system's own files are; elsewhere in the tests."""
+
+    path: Path = Path("/")
+
+    def read(self, name: str) -> str:
+        """Return a small file's text, "" where it cannot be read."""
+        try:
+            return (self.path / name).read_text("utf-8", "replace").strip("\0\n ")
+        except OSError:
+            return ""
+
+
+def look(port: str, root: Root | None = None) -> PortState:
+    """Return what the system says of a port; nothing is opened."""
+    root = root or Root()
+    programs = set(_programs(root))
+    container = any((root.path / mark).exists() for mark in (".dockerenv", "run/.containerenv"))
+    path = root.path / port.lstrip("/")
+    try:
+        device = path.resolve(strict=True)
+        status = device.stat()
+    except (OSError, RuntimeError):
+        return PortState(port, running=frozenset(programs & RUNNING), container=container)
+    name = device.name
+    sys_device = root.path / "sys/class/tty" / name / "device"
+    found = holder(str(device), proc=root.path / "proc")
+    latency = root.read(f"sys/class/tty/{name}/device/latency_timer")
+    return PortState(
+        path=port,
+        device=f"/{device.relative_to(root.path)}",
+        is_device=stat.S_ISCHR(status.st_mode),
+        lasting=_lasting(device, root),
+        group=_group(status.st_gid),
+        group_may_use=status.st_mode & READ_WRITE == READ_WRITE,
+        driver=(sys_device / "driver").resolve().name if (sys_device / "driver").exists() else "",
+        usb_id=_usb_id(sys_device, root),
+        latency_ms=int(latency) if latency.isdecimal() else None,
+        holder="" if found is None else str(found),
+        held_by_daemon=found is not None and daemon_behind(found, proc=root.path / "proc") is not None,
+        console=_console(name, root),
+        mini_uart=name == "ttyS0" and "Raspberry Pi" in root.read("proc/device-tree/model"),
+        running=frozenset(programs & RUNNING),
+        container=container,
+    )
+
+
+def _lasting(device: Path, root: Root) -> str:
+    for folder in ("by-id", "by-path"):
+        try:
+            links = sorted((root.path / "dev/serial" / folder).iterdir())
+        except OSError:
+            continue
+        for link in links:
+            if link.resolve() == device:
+                return f"/dev/serial/{folder}/{link.name}"
+    return ""
+
+
+def _group(number: int) -> str:
+    try:
+        return grp.getgrgid(number).gr_name
+    except KeyError:
+        return str(number)
+
+
+def _usb_id(sys_device: Path, root: Root) -> str:
+    """Return `vendor:product` of the USB device that a tty belongs to."""
+    folder = sys_device.resolve()
+    while folder.is_relative_to(root.path) and folder != root.path:
+        vendor, product = (root.read(str((folder / name).relative_to(root.path))) for name in ("idVendor", "idProduct"))
+        if vendor and product:
+            return f"{vendor}:{product}"
+        folder = folder.parent
+    return ""
+
+
+def _programs(root: Root) -> Iterator[str]:
+    for process in (root.path / "proc").glob("[0-9]*"):
+        yield root.read(f"proc/{process.name}/comm")
+
+
+def _console(name: str, root: Root) -> str:
+    """Return why the port is a console: the kernel's, or a login's."""
+    names = {name}
+    alias = root.path / "dev/serial0"
+    if alias.exists() and alias.resolve().name == name:
+        names.add("serial0")
+    for word in root.read("proc/cmdline").split():
+        match = re.fullmatch(r"console=(\w+)(?:,.*)?", word)
+        if match and match[1] in names:
+            return f"the kernel's console is on it ({word} in its command line)"
+    for process in (root.path / "proc").glob("[0-9]*"):
+        words = root.read(f"proc/{process.name}/cmdline").split("\0")
+        if words[0].endswith("agetty") and names & set(words):
+            return f"a login waits on it (process {process.name})"
+    return ""
+
+
+def judge(state: PortState, *, service: bool) -> Iterator[Finding]:
+    """Yield what is to be said of a port; `service`: a service of the system opens it."""
+    if not state.device:
+        if state.container:
+            yield fail(
+                "port", f"{state.path} is not in this container", "pass it in: --device, see docs/installation.md"
+            )
+        else:
+            yield fail("port", f"{state.path} is absent", "is the adapter plugged in? ls -l /dev/serial/by-id")
+        yield from _programs_that_grab(state)
+        return
+    if not state.is_device:
+        yield fail("port", f"{state.path} is no device", "name a serial port: ls -l /dev/serial/by-id")
+        return
+    kind = " ".join(part for part in (state.driver, state.usb_id) if part)
+    yield ok("port", f"{state.path} is {state.device}" + (f" ({kind})" if kind else ""))
+    if state.lasting and state.path == state.device:
+        yield warn("port", f"{state.path} may be another adapter after a restart", f"set line.port to {state.lasting}")
+    if service and not (state.group == SERVICE_GROUP and state.group_may_use):
+        yield warn(
+            "port",
+            f"the service has the group {SERVICE_GROUP}, and {state.device} is for group {state.group}",
+            f"sudo systemctl edit lfs10d, section [Service]: SupplementaryGroups={state.group}",
+        )
+    yield from _holder(state)
+    if state.console:
+        yield fail(
+            "port",
+            f"{state.device}: {state.console}",
+            "Raspberry Pi: sudo raspi-config, Interface, Serial Port: no login shell, hardware on; elsewhere: take "
+            f"console= from the kernel's command line and sudo systemctl disable --now serial-getty@{_name(state)}",
+        )
+    if state.mini_uart:
+        yield warn(
+            "port",
+            f"{state.device} is the Pi's mini UART: its rate follows the core's clock, and it has no parity",
+            "use the PL011 (dtoverlay=disable-bt, port /dev/ttyAMA0) or a USB adapter",
+        )
+    if state.latency_ms is not None and state.latency_ms > SLOW_LATENCY:
+        yield warn(
+            "port",
+            f"the adapter keeps bytes for {state.latency_ms} ms before it passes them on",
+            "line.low_latency: true, or the udev rule of docs/installation.md (latency_timer)",
+        )
+    yield from _programs_that_grab(state)
+
+
+def _name(state: PortState) -> str:
+    return state.device.rpartition("/")[2]
+
+
+def _holder(state: PortState) -> Iterator[Finding]:
+    if state.held_by_daemon:
+        yield ok("port", f"held by the daemon: {state.holder}")
+    elif state.holder:
+        yield fail("port", f"{state.holder} holds {state.path}", "end that program: only one may speak on the line")
+    else:
+        yield ok("port", "nobody holds it")
+
+
+def _programs_that_grab(state: PortState) -> Iterator[Finding]:
+    if "ModemManager" in state.running:
+        yield warn(
+            "port",
+            "ModemManager runs: it sends AT commands into new serial ports",
+            "without a modem: sudo systemctl disable --now ModemManager",
+        )
+    if "brltty" in state.running or (state.usb_id == CH340 and not state.device):
+        level = fail if state.usb_id == CH340 or not state.device else warn
+        yield level(
+            "port",
+            f"brltty runs: it takes CH340 adapters ({CH340}) for Braille displays, and the port vanishes",
+            "without a Braille display: sudo apt remove brltty, then plug the adapter in again",
+        )

@@ -1,0 +1,163 @@
+"""The sensors: as the running daemon sees them, or asked one after the other where none runs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final
+
+from lfs10d.cli.direct_line import DirectLine
+from lfs10d.cli.doctor.finding import Finding, fail, ok, warn
+from lfs10d.cli.local_time import clock_text
+from lfs10d.cli.render.live_state import LiveState, ShownDevice
+from lfs10d.config.loader import LoadedConfig
+from lfs10d.config.models import LineConfig, SlaveConfig
+from lfs10d.errors import PortError
+from lfs10d.line.device import DeviceSpec, PollRules
+from lfs10d.modbus.frames import Checksum, Codec, Framing
+from lfs10d.modbus.port_settings import PortSettings
+from lfs10d.profiles.profile import Profile
+from lfs10d.reading import Reading
+
+ATTEMPTS: Final = 3
+PATIENCE: Final = 8.0
+"""s for each sensor at most, where the line is asked directly; a silent one takes 2 of them."""
+ADVICE: Final[Mapping[str, str]] = {
+    "timeout": "is it powered and wired (A, B)? does it have this id and rate? lfs10d scan",
+    "crc": "noise or two sensors of one id: termination, shield, ground; unplug one and look again",
+    "malformed": "noise or two sensors of one id: termination, shield, ground; unplug one and look again",
+    "wrong_slave": "two sensors have this id, or the adapter mixes frames",
+    "collision": "a second master, or another program, speaks on this line",
+    "duplicate_id": "two sensors have this id: unplug one, then lfs10d request device/readdress",
+    "wrong_rate": "sensors answer at another rate: set line.baudrate to it",
+    "config_conflict": "the file and the last verified place differ: lfs10d config",
+    "exception": "is the profile right? lfs10d profiles show",
+    "out_of_range": "is the profile right? is the register an integer? lfs10d read PORT ID",
+    "port_lost": "see port, above",
+    "port_busy": "see port, above",
+    "storage_full": "see disk, above",
+    "duplicate_client": "another client uses this client id: set mqtt.client_id",
+}
+"""What to do, by error code."""
+OTHERWISE: Final = "docs/when-it-goes-wrong.md has every code"
+
+
+def by_daemon(live: LiveState, wall: float) -> Iterator[Finding]:
+    """Yield what the daemon's line and devices show at `wall` (s since the epoch)."""
+    if live.line_error is not None:
+        code = live.line_error_code or ""
+        yield fail("line", f"{code}: {live.line_error}{_since(live.line_error_since)}", ADVICE.get(code, OTHERWISE))
+    activity = live.line.get("activity")
+    if activity not in {None, "polling"}:
+        yield warn("line", f"it is {activity} now, so nothing is polled as usual", "lfs10d request line/cancel ends it")
+    silent = [device for device in live.devices.values() if device.enabled and not device.online]
+    for device in live.devices.values():
+        if device.enabled and (device.error is not None or device in silent):
+            yield _bad(device)
+        elif device.enabled and live.late(device, wall):
+            yield warn("sensor", f"{device.name}: its last good value is old", "is the line overloaded? lfs10d check")
+    well = [device for device in live.devices.values() if device.enabled and device.online and device.error is None]
+    if well:
+        yield ok("sensors", f"{len(well)} of {sum(each.enabled for each in live.devices.values())} answer well")
+    if not live.devices:
+        yield warn("sensors", "none is configured", "lfs10d request line/scan, or line/adopt --repeat for new ones")
+
+
+def _bad(device: ShownDevice) -> Finding:
+    code = device.error or "timeout"
+    id_ = "" if device.slave is None else f" (slave id {device.slave})"
+    if code == "starting":
+        return warn("sensor", f"{device.name}{id_}: not polled yet", "look again in a minute")
+    level = fail if not device.online else warn
+    state = "offline" if not device.online else "online, but bad"
+    return level("sensor", f"{device.name}{id_}: {state}: {code}{_since(device.since)}", ADVICE.get(code, OTHERWISE))
+
+
+def _since(ts: float | None) -> str:
+    return "" if ts is None else f", since {clock_text(ts)}"
+
+
+def by_asking(loaded: LoadedConfig) -> list[Finding]:
+    """Ask each enabled slave of a line that nobody else holds, and return who answers."""
+    config = loaded.config
+    slaves = [slave for slave in config.slaves if slave.enabled]
+    if not slaves:
+        return [warn("sensors", "none is configured", f"lfs10d scan {config.line.port}")]
+    specs = [_spec(loaded, slave, loaded.profiles[slave.profile]) for slave in slaves]
+    try:
+        readings = _polled(_settings(config.line, config.line.baudrate), specs)
+        found = list(answers(specs, readings, config.line.port))
+        if not any(reading.fault is None for reading in readings.values()):
+            found += _at_another_rate(config.line, specs)
+    except PortError as error:
+        return [fail("port", str(error), "see port, above")]
+    return found
+
+
+def _settings(line: LineConfig, baudrate: int) -> PortSettings:
+    return PortSettings(line.port, baudrate, line.parity, line.databits, line.stopbits)
+
+
+def _at_another_rate(line: LineConfig, specs: Sequence[DeviceSpec]) -> Iterator[Finding]:
+    """Ask at the other rates that the profiles know; yield where somebody answers."""
+    rates = {rate for spec in specs if spec.profile.baudrate is not None for rate in spec.profile.baudrate.codes}
+    for rate in sorted(rates - {line.baudrate}):
+        readings = _polled(_settings(line, rate), specs)
+        names = [name for name, reading in readings.items() if reading.fault is None]
+        if names:
+            yield fail(
+                "sensors",
+                f"{', '.join(names)} answer at {rate} baud, not at {line.baudrate}",
+                f"set line.baudrate to {rate}; then lfs10d request line/baudrate can move them",
+            )
+            return
+
+
+def _spec(loaded: LoadedConfig, slave: SlaveConfig, profile: Profile) -> DeviceSpec:
+    codec = Codec(Framing(loaded.config.line.framing), Checksum(slave.checksum or profile.checksum))
+    return DeviceSpec(
+        name=slave.name,
+        slave=slave.id,
+        profile=profile,
+        codec=codec,
+        interval=max(0.5, profile.min_interval),
+        response_timeout=None,
+        request_gap=max(slave.request_gap, profile.request_gap),
+    )
+
+
+def _polled(settings: PortSettings, specs: Sequence[DeviceSpec]) -> dict[str, Reading]:
+    readings: dict[str, Reading] = {}
+    rules = PollRules(retries=1, offline_after=ATTEMPTS, probe_interval_max=1.0)
+    with DirectLine(settings) as line:
+        line.poll(specs, rules)
+        until = time.monotonic() + PATIENCE * len(specs)
+        while time.monotonic() < until and any(_unsettled(readings.get(spec.name)) for spec in specs):
+            for event in line.events(0.1):
+                if isinstance(event, Reading):
+                    readings[event.device] = event
+    return readings
+
+
+def _unsettled(reading: Reading | None) -> bool:
+    return reading is None or (reading.fault is not None and reading.online)
+
+
+def answers(specs: Sequence[DeviceSpec], readings: Mapping[str, Reading], port: str) -> Iterator[Finding]:
+    """Yield which sensors answer, and where none does what that may mean."""
+    good = [spec for spec in specs if (found := readings.get(spec.name)) is not None and found.fault is None]
+    for spec in specs:
+        reading = readings.get(spec.name)
+        if spec in good:
+            continue
+        code = "timeout" if reading is None or reading.fault is None else str(reading.fault.code)
+        message = "no answer" if reading is None or reading.fault is None else reading.fault.message
+        yield fail("sensor", f"{spec.name} (slave id {spec.slave}): {code}: {message}", ADVICE.get(code, OTHERWISE))
+    if good:
+        yield ok("sensors", f"{len(good)} of {len(specs)} answer well (asked now; no daemon runs)")
+    else:
+        yield fail(
+            "sensors",
+            "none answers",
+            f"at another rate? lfs10d scan {port}; else A and B swapped, no power, or the wrong adapter",
+        )
