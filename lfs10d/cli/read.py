@@ -25,6 +25,7 @@ from lfs10d.modbus.frames import Checksum, Codec
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import ALIVE_CODES, Exchanged, Fault, FaultCode, Reading, UartCounters
+from lfs10d.system.logs import escape
 
 ATTEMPTS = 3
 """Polls that are tried, with time-outs of 200, 400 and 1000 ms (`lfs10d.line.device.FIRST_TIMEOUTS`)."""
@@ -186,9 +187,14 @@ def _on_reading(options: _ReadOptions, attempts: _Attempts, reading: Reading, li
 
 def _numbers(options: _ReadOptions, reading: Reading) -> Iterator[tuple[str, str]]:
     units = options.profile.units
-    for name, number in (reading.values or {}).items():
-        unit = units[name]
-        yield name, f"{number}" if unit == "1" else f"{number} {unit}"
+    for name, value in (reading.values or {}).items():
+        if value is None:
+            yield name, f"no value ({reading.value_errors[name]})"
+            continue
+        shown = ("true" if value else "false") if isinstance(value, bool) else escape(str(value))
+        unit = units.get(name, "1")
+        age = f", {reading.ages[name]:.0f} s old" if name in reading.ages else ""
+        yield name, (shown if unit == "1" else f"{shown} {unit}") + age
 
 
 def _wall(reading: Reading) -> float:
@@ -274,6 +280,12 @@ def _json(options: _ReadOptions, reading: Reading) -> dict[str, Any]:
         **({"unit": units[names[0]]} if len(names) == 1 else {"units": units}),
         "quality": "bad" if fault is not None else "partial" if reading.value_errors else "good",
         "error": None if fault is None else fault.code.value,
+        **(
+            {"errors": {name: code.value for name, code in reading.value_errors.items()}}
+            if reading.value_errors
+            else {}
+        ),
+        **({"ages": {name: round(age, 3) for name, age in reading.ages.items()}} if reading.ages else {}),
         "message": None if fault is None else fault.message,
         "exception_code": None if fault is None else fault.exception_code,
         "heard": "" if fault is None else fault.heard.hex(" ").upper(),

@@ -229,7 +229,7 @@ class DeviceState:
             error=None if fault is None else fault.code.value,
             rtt_ms=None if values is None or rtt is None else round(rtt * 1000, 1),
             errors=errors,
-            ages=ages and {name: round(age, 3) for name, age in ages.items()},
+            ages=ages and {name: round(age, 3) for name, age in ages.items() if name not in errors},
         )
 
     def _show(self, sample: Sample, now: Instant, *, online: bool) -> list[Publication]:

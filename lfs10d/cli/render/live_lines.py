@@ -81,6 +81,7 @@ def _data(device: ShownDevice, row: TableRow, time: str, *, age: float | None, a
         "units": device.units,
         "state": row.state,
         "error": device.error,
+        "errors": device.errors,
         "online": device.online,
         "age_s": None if age is None else round(age, 1),
         "rtt_ms": device.rtt_ms,

@@ -10,9 +10,10 @@ from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import isfinite
-from typing import Any, Final
+from typing import Any, Final, TypeGuard
 
 from lfs10d.cli.render.response import BESIDES
+from lfs10d.reading import Value
 
 MOVES_WITHIN: Final = 3.0
 """s over which a value's movement is measured."""
@@ -24,7 +25,10 @@ LATE_AFTER: Final = 3.0
 
 @dataclass(slots=True)
 class ShownDevice:
-    """One slave. `values` are those of the last sample, `good_ts` (epoch ms, its clock) when there were any."""
+    """One slave. `values` are those of the last sample, `good_ts` (epoch ms, its clock) when there were any.
+
+    `good` are partial samples too: then `errors` says of each value that is not there why.
+    """
 
     name: str
     slave: int | None = None
@@ -34,7 +38,8 @@ class ShownDevice:
     online: bool = False
     seq: int = -1
     boot: str = ""
-    values: dict[str, float] = field(default_factory=dict)
+    values: dict[str, Value] = field(default_factory=dict)
+    errors: dict[str, str] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
     good: bool = False
     error: str | None = None
@@ -48,13 +53,13 @@ class ShownDevice:
 
     @property
     def value(self) -> float | None:
-        """The first of its values; None where it has none now."""
-        return next(iter(self.values.values()), None)
+        """The first of its values that is a number; None where it has none now."""
+        return next((value for value in map(_number, self.values.values()) if value is not None), None)
 
     @property
     def unit(self) -> str:
         """That value's unit."""
-        return next((self.units.get(name, "") for name in self.values), "")
+        return next((self.units.get(name, "") for name, value in self.values.items() if _number(value) is not None), "")
 
     def moved(self, now: float) -> float:
         """Return how far its value went to and fro in the last seconds."""
@@ -246,13 +251,21 @@ def _sample(
     device.good = sample.get("quality") in ("good", "partial")  # of a partial one the values that are there are good
     device.error = error if isinstance(error, str) else None
     device.rtt_ms = _number(sample.get("rtt_ms"))
-    device.values = {str(name): value for name, value in values.items() if _number(value) is not None}
+    device.values = {str(name): value for name, value in values.items() if _is_value(value)}
+    errors = sample.get("errors")
+    named = errors.items() if device.good and isinstance(errors, dict) else ()
+    device.errors = {str(name): code for name, code in named if isinstance(code, str)}
     device.units = {str(name): unit for name, unit in units.items() if isinstance(unit, str)}
 
 
 def _trail(device: ShownDevice, now: float) -> None:
     if device.value is not None:
         device.trail.append((now, device.value))
+
+
+def _is_value(value: object) -> TypeGuard[Value]:
+    """Whether something is a finite number, a text or a boolean."""
+    return isinstance(value, bool | str) or _number(value) is not None
 
 
 def _number(value: object) -> float | None:

@@ -12,6 +12,7 @@ from typing import Final, TypeAlias
 
 from lfs10d.cli.local_time import since_text, zone_name
 from lfs10d.cli.render.live_state import LiveState, ShownDevice
+from lfs10d.cli.render.value_text import with_unit
 from lfs10d.system.logs import escape
 
 Piece: TypeAlias = tuple[str, str]
@@ -89,20 +90,13 @@ def rows(live: LiveState, source: DataSource, *, now: float, wall: float, zone: 
     ]
 
 
-def _with_unit(device: ShownDevice, name: str, value: float) -> str:
-    """Return a value with its unit; a bare number among others with its name."""
-    unit = device.units.get(name, "")
-    if unit != "1":
-        return f"{_number(value)} {escape(unit)}".rstrip()
-    return _number(value) if len(device.values) == 1 else f"{escape(name)} {_number(value)}"
-
-
 def _row(live: LiveState, device: ShownDevice, source: DataSource, moment: _Moment, *, moved: bool) -> TableRow:
     stale = not source.alive or (device.good and live.late(device, moment.wall))
     just = "moved" if moved else ""
     if source.alive and device.turned is not None and moment.now - device.turned[0] < JUST:
         just = "came" if device.turned[1] else "went"
-    values = [_with_unit(device, name, value) for name, value in device.values.items()]
+    alone = len(device.values) == 1
+    values = [with_unit(name, value, device.units.get(name, ""), alone=alone) for name, value in device.values.items()]
     age = live.age(device, moment.wall) if device.enabled else None
     return TableRow(
         name=escape(device.name),
@@ -118,17 +112,14 @@ def _row(live: LiveState, device: ShownDevice, source: DataSource, moment: _Mome
     )
 
 
-def _number(value: float) -> str:
-    """Return a number as it is, a fraction with two decimals: figures that stand still are read at a glance."""
-    return str(value) if isinstance(value, int) else f"{value:.2f}"
-
-
 def _state(device: ShownDevice, moment: _Moment, *, stale: bool) -> str:
     """Return availability and error, as code and words, and since when."""
     if not device.enabled:
         return "disabled"
-    if device.good:
+    if device.good and (stale or not device.errors):
         return "old value" if stale else "good"
+    if device.good:
+        return "partial: " + ", ".join(f"{escape(name)} {escape(code)}" for name, code in device.errors.items())
     if device.error is None:
         return "not heard yet"
     code = escape(device.error)

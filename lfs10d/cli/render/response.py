@@ -52,14 +52,22 @@ def content_lines(response: Mapping[str, Any], zone: tzinfo | None = None) -> It
 
 
 def _sample(sample: Mapping[str, Any], zone: tzinfo | None) -> str:
-    units = sample.get("units")
+    units, found = sample.get("units"), sample.get("errors")
+    errors = found if isinstance(found, dict) else {}
     values = []
     for name, value in sample.items():
         if name in BESIDES:
             continue
         unit = units.get(name) if isinstance(units, dict) else sample.get("unit")
-        values.append(f"{_plain(name)} {'no value' if value is None else f'{_plain(value)} {_plain(unit)}'}")
-    quality = "good" if sample["error"] is None else f"{_plain(sample['quality'])} ({_plain(sample['error'])})"
+        why = errors.get(name)
+        missing = "no value" if why is None else f"no value ({_plain(why)})"
+        shown = (
+            _plain(value)
+            if isinstance(value, bool | str) and unit in (None, "1")
+            else f"{_plain(value)} {_plain(unit)}"
+        )
+        values.append(f"{_plain(name)} {missing if value is None else shown}")
+    quality = _plain(sample["quality"]) + ("" if sample["error"] is None else f" ({_plain(sample['error'])})")
     rtt = sample.get("rtt_ms")
     answered = "" if rtt is None else f", answered in {_plain(rtt)} ms"
     ts = sample.get("ts")

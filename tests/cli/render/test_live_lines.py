@@ -93,6 +93,7 @@ def test_programs_are_told_the_same_as_data() -> None:
         "units": {"wind_speed": "m/s"},
         "state": "good",
         "error": None,
+        "errors": {},
         "online": True,
         "age_s": 0.4,
         "rtt_ms": 18.2,

@@ -106,6 +106,18 @@ def test_of_several_values_each_has_its_unit_and_the_first_counts() -> None:
     assert (heard.device("a").values, heard.device("a").unit) == ({"speed": 1450, "current": 1.5}, "rpm")
 
 
+def test_of_a_partial_sample_the_first_number_counts_and_what_is_missing_is_told() -> None:
+    heard = Heard("a")
+    values = {"sky": "rain", "wet": True, "speed": None, "current": 1.5, "odd": [1], "units": {"current": "A"}}
+    partial = {"quality": "partial", "errors": {"speed": "unavailable", "odd": 7}}
+    heard.tell("device/a/telemetry", {"seq": 1, "boot": "x", "ts": 1, **partial, **values})
+    device = heard.device("a")
+    assert device.values == {"sky": "rain", "wet": True, "current": 1.5}
+    assert (device.good, device.value, device.unit, device.errors) == (True, 1.5, "A", {"speed": "unavailable"})
+    heard.tell("device/a/telemetry", {"seq": 2, "boot": "x", "ts": 2, **partial, **values, "quality": "bad"})
+    assert heard.device("a").errors == {}
+
+
 def test_a_bad_sample_takes_the_value_away_and_the_age_goes_on() -> None:
     heard = Heard("a")
     heard.sample("a", 12.5)

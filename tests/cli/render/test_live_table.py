@@ -149,6 +149,18 @@ def test_several_values_stand_beside_each_other() -> None:
     assert row.value == "1450 rpm, 1.50 A"
 
 
+def test_a_partial_sample_shows_what_is_there_and_why_the_rest_is_not() -> None:
+    values = {"speed": 4.5, "humidity": None, "sky": "rain", "heating": True, "dew": None}
+    errors = {"humidity": "unavailable", "dew": "not_finite"}
+    device = entry("a", 2, values=values, units={"speed": "m/s"}, quality="partial", errors=errors)
+    (row,) = rows(live(device), HERE, now=0.0, wall=WALL)
+    assert row.value == "4.50 m/s, rain, heating yes"
+    assert row.state == "partial: humidity unavailable, dew not_finite"
+    assert (row.good, row.stale) == (True, False)
+    (row,) = rows(live({**device, "age_s": 60.0}), HERE, now=0.0, wall=WALL)
+    assert (row.state, row.stale) == ("old value", True)
+
+
 @pytest.mark.parametrize(
     ("values", "words"), [({"count": 53493}, "53493"), ({"speed": 1450, "fault": 0}, "1450 rpm, fault 0")]
 )

@@ -28,6 +28,9 @@ SAMPLE = {
 }
 
 
+ANSWERED = "answered in 18.2 ms, at 2026-11-21 21:53:42.003 UTC"
+
+
 @pytest.mark.parametrize(
     ("response", "words"),
     [
@@ -64,6 +67,12 @@ def test_how_it_ended_is_one_line(response: dict[str, Any], words: str) -> None:
             {key: value for key, value in SAMPLE.items() if key not in {"unit", "wind_speed"}}
             | {"units": {"speed": "rpm", "output_current": "A"}, "speed": 1450, "output_current": 1.5},
             "mast-top: speed 1450 rpm, output_current 1.5 A, good, answered in 18.2 ms, at 2026-11-21 21:53:42.003 UTC",
+        ),
+        (
+            {key: value for key, value in SAMPLE.items() if key not in {"unit", "wind_speed"}}
+            | {"units": {"speed": "m/s"}, "speed": 1.5, "sky": "rain", "heating": True, "humidity": None}
+            | {"quality": "partial", "errors": {"humidity": "unavailable"}, "ages": {"sky": 34.2}},
+            f"mast-top: speed 1.5 m/s, sky rain, heating true, humidity no value (unavailable), partial, {ANSWERED}",
         ),
     ],
 )
