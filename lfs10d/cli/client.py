@@ -39,7 +39,6 @@ class CommandClient:
         arrived: Callable[[Incoming], None] = lambda _: None,
     ) -> None:
         self.topics = login.topics
-        self.place = login.settings.place
         self._missing_password = login.missing_password
         self.availability: str | None = None
         """The last availability of the daemon, published or its will; None: none yet."""
@@ -61,6 +60,11 @@ class CommandClient:
         self._response: dict[str, Any] | None = None
         self.by_response_topic = False
         """The daemon answers on the Response Topic (MQTT 5.0, section 4.10), so that a request needs no id."""
+
+    @property
+    def place(self) -> str:
+        """The broker as messages name it: of several nodes the one that is connected, or tried next."""
+        return self._link.settings.place
 
     @property
     def connected(self) -> bool:

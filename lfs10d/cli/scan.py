@@ -19,7 +19,8 @@ from lfs10d.cli.render import scan_findings, troubleshooting
 from lfs10d.cli.render.scan_progress import view
 from lfs10d.errors import FailedError, PortBusyError, PortError
 from lfs10d.line.jobs.scan import Scan
-from lfs10d.line.jobs.scan_plan import FIRST_TIMEOUT, ScanPlan, ids_of
+from lfs10d.line.jobs.scan_ids import ids_of
+from lfs10d.line.jobs.scan_plan import FIRST_TIMEOUT, ScanPlan
 from lfs10d.modbus.frames import Checksum, Codec, Framing
 from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.reading import FaultCode

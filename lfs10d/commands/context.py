@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Coroutine, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from lfs10d.command import Command, Result
 from lfs10d.commands.admission import CommandSpec
 from lfs10d.commands.reads import ReadResult
-from lfs10d.config.live_config import LiveConfig
-from lfs10d.config.models import SlaveConfig
-from lfs10d.line.jobs.ping import Ping
-from lfs10d.line.jobs.register_access import Access
-from lfs10d.line.jobs.scan import Scan
-from lfs10d.modbus.request import Request as RegisterRequest
-from lfs10d.profiles.profile import Profile
-from lfs10d.reconfiguration.adopt import AdoptRequest
+
+if TYPE_CHECKING:  # `lfs10d request` reads from the handlers what there is to ask, and speaks to no line
+    from lfs10d.config.live_config import LiveConfig
+    from lfs10d.config.models import SlaveConfig
+    from lfs10d.line.jobs.ping import Ping
+    from lfs10d.line.jobs.register_access import Access
+    from lfs10d.line.jobs.scan import Scan
+    from lfs10d.modbus.request import Request as RegisterRequest
+    from lfs10d.profiles.profile import Profile
+    from lfs10d.reconfiguration.adopt_request import AdoptRequest
 
 
 class LineCommands(Protocol):

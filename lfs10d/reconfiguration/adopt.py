@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -16,6 +15,7 @@ from lfs10d.errors import StateError
 from lfs10d.line.jobs.procedure import ProcedureClock
 from lfs10d.line.settings import DEFAULT_PROFILE
 from lfs10d.profiles.profile import Profile
+from lfs10d.reconfiguration.adopt_request import AdoptRequest
 from lfs10d.reconfiguration.journal import (
     AdoptFacts,
     CommandRecord,
@@ -93,25 +93,6 @@ _ERRORS: Mapping[ReaddressEnding, tuple[ErrorCode, str]] = {
         "since the write the sensor answers neither at slave id {old} nor at {to}; both are queried until it is found",
     ),
 }
-
-
-@dataclass(frozen=True, slots=True)
-class AdoptRequest:
-    """What a command wants: the sensor at `factory` (None: as the profile says) at id `to` (None: the next free).
-
-    `profile` is its profile's name or path, as in the configuration.
-    """
-
-    name: str | None = None
-    label: str | None = None
-    factory: int | None = None
-    to: int | None = None
-    profile: str = DEFAULT_PROFILE
-
-    @property
-    def slaves(self) -> frozenset[int]:
-        """The ids that it is known to use."""
-        return frozenset(slave for slave in (self.factory, self.to) if slave is not None)
 
 
 class Adopt:

@@ -15,7 +15,8 @@ from lfs10d.config.effective import Edit, Effective
 from lfs10d.config.models import Config
 from lfs10d.errors import StateError
 from lfs10d.reconfiguration import adopt, baudrate, readdress
-from lfs10d.reconfiguration.adopt import Adopt, AdoptRequest
+from lfs10d.reconfiguration.adopt import Adopt
+from lfs10d.reconfiguration.adopt_request import AdoptRequest
 from lfs10d.reconfiguration.baudrate import BaudrateChange
 from lfs10d.reconfiguration.baudrate_recovery import BaudrateRecovery
 from lfs10d.reconfiguration.journal import Journal, OpenChange

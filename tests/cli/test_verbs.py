@@ -74,3 +74,13 @@ def test_a_verb_that_draws_nothing_imports_nothing_to_draw_with(verb: str) -> No
     result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     imported = {name.partition(".")[0] for name in json.loads(result.stdout)}
     assert not imported & {"rich", "amqtt"}
+
+
+def test_a_request_is_described_without_what_speaks_to_a_line() -> None:
+    """Each completion by the Tab key begins with these imports."""
+    program = "import json, sys, lfs10d.cli.exit_status, lfs10d.cli.request; print(json.dumps(sorted(sys.modules)))"
+    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    imported = set(json.loads(result.stdout))
+    jobs = {name for name in imported if name.startswith("lfs10d.line.jobs.")}
+    assert jobs == {"lfs10d.line.jobs.access_end", "lfs10d.line.jobs.scan_ids"}
+    assert not imported & {"lfs10d.modbus.bus", "lfs10d.reconfiguration.adopt", "lfs10d.line.device"}

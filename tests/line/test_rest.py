@@ -8,7 +8,8 @@ from itertools import pairwise
 import pytest
 
 from lfs10d.line.device import DeviceSpec, PollRules
-from lfs10d.line.jobs.register_access import Access, End, Target
+from lfs10d.line.jobs.access_end import End
+from lfs10d.line.jobs.register_access import Access, Target
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.request import ReadRegisters, Request, WriteRegister
 from lfs10d.reading import FaultCode

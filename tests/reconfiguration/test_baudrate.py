@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from lfs10d.command import Command, Result
-from lfs10d.reconfiguration.adopt import AdoptRequest
+from lfs10d.reconfiguration.adopt_request import AdoptRequest
 from lfs10d.simulator.line import HeardRequest
 from lfs10d.simulator.sensor import Sensor
 from tests.support.lives import Bench, Life

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from lfs10d.command import Command
-from lfs10d.reconfiguration.adopt import AdoptRequest
+from lfs10d.reconfiguration.adopt_request import AdoptRequest
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from tests.support.lives import Bench, Life

@@ -26,7 +26,7 @@ from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Fault
-from lfs10d.reconfiguration.adopt import AdoptRequest
+from lfs10d.reconfiguration.adopt_request import AdoptRequest
 from lfs10d.system.disk import Disk
 from tests.support.volatile_disk import ForgetfulFiles
 

@@ -8,15 +8,17 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from lfs10d.cli.options import LineOptions
 from lfs10d.cli.render.table import columns
-from lfs10d.line.jobs.identification import FoundDevice
 from lfs10d.modbus.frames import EXCEPTION_NAMES, Framing
 from lfs10d.schema.quantities import duration_text
+
+if TYPE_CHECKING:  # as in `lfs10d.commands.context`
+    from lfs10d.line.jobs.identification import FoundDevice
 
 HEAD = ("id", "baud", "answers in", "what it is", "remark")
 RIGHT = (0, 1, 2)

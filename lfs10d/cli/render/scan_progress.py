@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Protocol
 import click
 
 from lfs10d.cli.render import scan_findings
-from lfs10d.line.jobs.identification import FoundDevice
-from lfs10d.line.jobs.scan import Scan
 
 if TYPE_CHECKING:  # rich is imported where something is drawn, and nowhere else
     from rich.progress import Progress as Bar
+
+    from lfs10d.line.jobs.identification import FoundDevice
+    from lfs10d.line.jobs.scan import Scan
 
 REPORT_EVERY = 10.0
 """Percent between two lines where no bar can be drawn."""

@@ -13,7 +13,7 @@ from lfs10d.commands.context import Context, Handler
 from lfs10d.commands.handlers import device
 from lfs10d.commands.message import Parameters
 from lfs10d.commands.pause import FREED
-from lfs10d.reconfiguration.adopt import AdoptRequest
+from lfs10d.reconfiguration.adopt_request import AdoptRequest
 from lfs10d.schema.fields import Choice, FilePath, Flag, Name, Text, Whole
 
 REMEMBERED_FOR = 86_400.0

@@ -12,7 +12,7 @@ Rules
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
@@ -23,13 +23,16 @@ from lfs10d.commands.handlers.config_edit import known_device, refuse
 from lfs10d.commands.message import Parameters
 from lfs10d.config.effective import Effective
 from lfs10d.config.models import SlaveConfig
-from lfs10d.line.jobs.register_access import Access, End
+from lfs10d.line.jobs.access_end import End
 from lfs10d.modbus.request import READ_COUNT_MAX, ReadRegisters, WriteRegister
 from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.profiles.settings import Setting
 from lfs10d.reading import FaultCode
 from lfs10d.schema.fields import Name, Whole
+
+if TYPE_CHECKING:  # as in `lfs10d.commands.context`
+    from lfs10d.line.jobs.register_access import Access
 
 REGISTERS = 0x1_0000
 """Register addresses and contents have 16 bits (Modbus Application Protocol V1.1b3, section 4.4)."""

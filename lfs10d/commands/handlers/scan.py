@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
@@ -13,11 +13,13 @@ from lfs10d.commands.admission import CommandSpec
 from lfs10d.commands.context import Context, Handler
 from lfs10d.commands.handlers import device
 from lfs10d.commands.message import Parameters
-from lfs10d.line.jobs.identification import FoundDevice
-from lfs10d.line.jobs.scan import Scan
-from lfs10d.line.jobs.scan_plan import LAST_ID, ids_of
+from lfs10d.line.jobs.scan_ids import LAST_ID, ids_of
 from lfs10d.schema.fields import Choice, FieldKind, Flag, Whole
 from lfs10d.schema.quantities import BAUDRATES
+
+if TYPE_CHECKING:  # as in `lfs10d.commands.context`
+    from lfs10d.line.jobs.identification import FoundDevice
+    from lfs10d.line.jobs.scan import Scan
 
 RATES = Choice(BAUDRATES)
 

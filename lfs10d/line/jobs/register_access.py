@@ -15,10 +15,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import TypeAlias
 
 from lfs10d.line.device import FIRST_TIMEOUTS
+from lfs10d.line.jobs.access_end import End
 from lfs10d.line.jobs.job import Done, Hold, Next, Requeue
 from lfs10d.line.jobs.poll import marked_busy
 from lfs10d.modbus.ask import Ask
@@ -39,25 +39,6 @@ DIFFERING = 3
 """Read back so often with another content than was written, the write did not take."""
 
 Steps: TypeAlias = "Generator[Request, Outcome, End]"
-
-
-class End(StrEnum):
-    """How it ended."""
-
-    DONE = "done"
-    """The registers were read; what was written was read back."""
-    REFUSED = "refused"
-    """An exception: `fault` has its code."""
-    BUSY = "busy"
-    """An exception that means so by the profile."""
-    NOT_VERIFIED = "not_verified"
-    """The slave answers, but its register does not hold what was written, or cannot be read."""
-    UNANSWERED = "unanswered"
-    """Silence, or bytes that are no answer: `fault` says which."""
-    ECHO_UNKNOWN = "echo_unknown"
-    """It could not be learned whether the adapter echoes, so nothing was written."""
-    CUT_OFF = "cut_off"
-    """The port was lost."""
 
 
 @dataclass(frozen=True, slots=True)

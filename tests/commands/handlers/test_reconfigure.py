@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from lfs10d.commands.handlers.registry import HANDLERS
-from lfs10d.reconfiguration.adopt import AdoptRequest
+from lfs10d.reconfiguration.adopt_request import AdoptRequest
 from tests.support.context import Ask, FakeContext
 
 

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from lfs10d.command import Result
-from lfs10d.line.jobs.register_access import End
+from lfs10d.line.jobs.access_end import End
 from lfs10d.modbus.request import ReadRegisters, WriteRegister
 from lfs10d.profiles.library import builtin_names
 from lfs10d.reading import Fault, FaultCode

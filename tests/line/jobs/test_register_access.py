@@ -9,8 +9,9 @@ from typing import Literal
 import pytest
 
 from lfs10d.line.device import DeviceSpec, PollRules
+from lfs10d.line.jobs.access_end import End
 from lfs10d.line.jobs.job import Hold
-from lfs10d.line.jobs.register_access import DIFFERING, ECHO_READS, VERIFY_WITHIN, Access, End, Target
+from lfs10d.line.jobs.register_access import DIFFERING, ECHO_READS, VERIFY_WITHIN, Access, Target
 from lfs10d.line.poller import Poller
 from lfs10d.line.scheduler import Scheduler
 from lfs10d.modbus.bus import Bus, LineRules

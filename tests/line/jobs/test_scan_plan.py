@@ -5,10 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from lfs10d.line.jobs.scan_plan import LAST_TIMEOUT, ScanPlan, ids_of
+from lfs10d.line.jobs.scan_plan import LAST_TIMEOUT, ScanPlan
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.request import ReadRegisters
 from lfs10d.modbus.timing import LineTiming
@@ -20,25 +18,6 @@ SLOW, FAST = LineTiming.of(9600), LineTiming.of(19200)
 
 def search(ids: tuple[int, ...], *, share: float = 1.0) -> ScanPlan:
     return ScanPlan(ids, (SLOW, FAST), Codec(Framing.RTU), (LFS10,), share=share)
-
-
-@pytest.mark.parametrize(
-    ("text", "ids"),
-    [("3", (3,)), ("1-4", (1, 2, 3, 4)), ("8, 1-2,2", (1, 2, 8)), (" 255 ", (255,)), ("7-7", (7,))],
-)
-def test_ids_are_written_as_numbers_and_ranges(text: str, ids: tuple[int, ...]) -> None:
-    assert ids_of(text) == ids
-
-
-@pytest.mark.parametrize("text", ["", "0", "256", "5-3", "1-", "-3", "a", "1--3", "1;2", "²", "1000", "1-999999999999"])
-def test_what_is_no_id_is_refused_in_words(text: str) -> None:
-    with pytest.raises(ValueError, match=r"ids go from 1 to 255|neither an id such as 3 nor a range"):
-        ids_of(text)
-
-
-@given(st.sets(st.integers(1, 255), min_size=1))
-def test_every_set_of_ids_can_be_written(ids: set[int]) -> None:
-    assert ids_of(",".join(map(str, ids))) == tuple(sorted(ids))
 
 
 def test_reserved_ids_are_asked_last_at_every_rate() -> None:
