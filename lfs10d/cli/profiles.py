@@ -30,8 +30,8 @@ Examples:
   lfs10d profiles show ./wind-vane.yaml your own
 """
 
-READ_FUNCTIONS = {3: "", 4: "input "}
-"""Function 03 reads holding registers, the usual ones; 04 reads input registers."""
+READ_FUNCTIONS = {1: "coil ", 2: "discrete input ", 3: "", 4: "input "}
+"""Function 03 reads holding registers, the usual ones; 04 reads input registers, 01 and 02 bits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,14 +78,25 @@ def _entry(profile: Profile) -> dict[str, object]:
         "values": list(profile.value_names),
         "units": profile.units,
         "framings": list(profile.framings),
+        "unverified": seen(profile),
     }
 
 
 def _overview(known: Iterable[Profile]) -> Table:
     rows = tuple(
-        (profile.name, profile.title, ", ".join(profile.value_names), ", ".join(profile.framings)) for profile in known
+        (profile.name, profile.title, ", ".join(profile.value_names), ", ".join(profile.framings), seen(profile))
+        for profile in known
     )
-    return Table("", ("name", "device", "values", "framings"), rows)
+    return Table("", ("name", "device", "values", "framings", "not verified"), rows)
+
+
+def seen(profile: Profile) -> str:
+    """Return which facts nobody has seen on hardware or in the source documents; empty where there are none."""
+    places = {"slave_id": profile.slave_id, "baudrate": profile.baudrate, "barrier": profile.barrier}
+    unverified = [value.name for value in profile.values if value.unverified]
+    if len(unverified) == len(profile.values):
+        unverified = ["all values"]
+    return ", ".join([*unverified, *(name for name, fact in places.items() if fact is not None and fact.unverified)])
 
 
 def explain(profile: Profile) -> list[Table]:

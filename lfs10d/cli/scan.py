@@ -55,6 +55,12 @@ def _new_file(context: click.Context, parameter: click.Parameter, value: Path | 
     return value
 
 
+def given(name: str) -> bool:
+    """Whether a person gave this option."""
+    source = click.get_current_context().get_parameter_source(name)
+    return source is not None and source is not click.core.ParameterSource.DEFAULT
+
+
 @click.command("scan", epilog=EXAMPLES)
 @click.argument("port", type=PORT)
 @click.option("--ids", callback=_ids, default="1-255", show_default=True, metavar="IDS", help="Such as 1-20,255.")
@@ -67,7 +73,13 @@ def _new_file(context: click.Context, parameter: click.Parameter, value: Path | 
     metavar="RATES",
     help="Rates to try.",
 )
-@click.option("--profile", "profiles", multiple=True, metavar="FILE", help="A profile of your own to recognise.")
+@click.option(
+    "--profile",
+    "profiles",
+    multiple=True,
+    metavar="NAME|FILE",
+    help="A profile to recognise, and whose rates are tried too.",
+)
 @click.option(
     "--checksum", type=click.Choice(["crc", "sum"]), default="crc", show_default=True, help="Of the rtu frames sent."
 )
@@ -97,6 +109,8 @@ def command(
     if line.framing is Framing.ASCII and checksum != "crc":
         raise click.UsageError("ascii frames always carry an LRC; leave --checksum out")
     own = {file: load_profile(file, relative_to=Path()) for file in profiles}
+    if not given("rates"):
+        rates = tuple(dict.fromkeys((*rates, *(rate for each in own.values() for rate in each.rates))))
     known = (*own.values(), *(load_profile(name, relative_to=Path()) for name in builtin_names()))
     search = ScanPlan(
         ids,

@@ -74,7 +74,7 @@ def _device_spec(slave: SlaveConfig, line: LineConfig, profile: Profile) -> Devi
 
 
 def scan_plan(loaded: LoadedConfig, ids: tuple[int, ...], rates: tuple[int, ...], *, share: float) -> ScanPlan:
-    """Return the plan of a scan; without `rates` its own, and those an LFS10 can have.
+    """Return the plan of a scan; without `rates` its own, those of an LFS10, and the factory's of configured profiles.
 
     Every id is asked with the check that all configured devices share, or CRC. May read the built-in profiles.
     """
@@ -88,7 +88,8 @@ def scan_plan(loaded: LoadedConfig, ids: tuple[int, ...], rates: tuple[int, ...]
         each for each in known
         if line.framing in each.framings and (ascii_line or codec.checksum.value in each.checksums)
     )  # fmt: skip
-    usual = next((each.baudrate.codes for each in profiles if each.name == DEFAULT_PROFILE and each.baudrate), ())
+    usual = [rate for each in profiles if each.name == DEFAULT_PROFILE for rate in each.rates]
+    usual += [each.factory.baudrate for each in loaded.profiles.values() if each in profiles and each.factory]
     return ScanPlan(
         ids,
         tuple(

@@ -13,7 +13,18 @@ from lfs10d.schema import document
 from lfs10d.schema.fields import quoted
 from lfs10d.system.regular_file import read_regular
 
-BUILTIN_NAMES = ("lfs10", "ld-e", "fuling-dzb", "eh600")
+BUILTIN_NAMES = (
+    "lfs10",
+    "ld-e",
+    "fuling-dzb",
+    "eh600",
+    "ecowitt-wn90lp",
+    "renke-rs-fxjt",
+    "renke-rs-fsjt",
+    "pr-3000-fsjt",
+    "dfrobot-sen0482",
+    "dfrobot-sen0483",
+)
 """The profiles that come with lfs10d, the first being a slave's default."""
 
 

@@ -238,6 +238,13 @@ class Profile(Facts):
         return {value.name: value.unit for value in self.values}
 
     @property
+    def rates(self) -> tuple[int, ...]:
+        """The rates that a device may speak at: those that can be set, and the factory's; as far as is known."""
+        codes = () if self.baudrate is None else tuple(self.baudrate.codes)
+        factory = () if self.factory is None else (self.factory.baudrate,)
+        return tuple(dict.fromkeys((*factory, *codes)))
+
+    @property
     def most_words(self) -> int:
         """Registers that one read may ask for in every framing that the device speaks."""
         return _words_per_read(self.__dict__)

@@ -42,7 +42,7 @@ def cells(name: str) -> dict[str, list[str]]:
 
 def test_the_list_has_a_line_for_each_device() -> None:
     head, *lines = run().splitlines()
-    assert head.split() == ["name", "device", "values", "framings"]
+    assert head.split() == ["name", "device", "values", "framings", "not", "verified"]
     assert [line.split()[0] for line in lines] == list(builtin_names())
     assert "running_frequency, output_current" in lines[2]
 
@@ -56,6 +56,7 @@ def test_the_list_is_json_for_programs() -> None:
         "values": ["wind_speed"],
         "units": {"wind_speed": "m/s"},
         "framings": ["rtu"],
+        "unverified": "",
     }
 
 

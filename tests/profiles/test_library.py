@@ -221,7 +221,7 @@ def test_a_name_that_is_no_file_is_answered_with_the_built_in_names(tmp_path: Pa
     (problem,) = caught.value.problems
     assert str(problem) == (
         f'{tmp_path}/lsf10:1:1: profile "lsf10": No such file or directory; '
-        "write lfs10, ld-e, fuling-dzb, eh600, or the path of a profile's YAML file"
+        f"write {', '.join(builtin_names())}, or the path of a profile's YAML file"
     )
 
 

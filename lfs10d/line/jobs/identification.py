@@ -6,7 +6,8 @@ Rules
    answered once is not asked again. Nothing is ever written.
 2. A profile fits that reads believable values. One with a register of its slave id fits only if all agree: that
    register holds a possible id, the values are believable, and the register of the rate, where it has one, holds one
-   of its codes. Values that collide do not disagree, where the id is the right one: then two such devices share it.
+   of its codes. Where the profile names registers that tell the device from others (`identify`), they must hold what
+   it says. Values that collide do not disagree, where the id is the right one: then two such devices share it.
 3. An answer is any right frame of the slave, an exception too. Silence is asked again, `SILENCES` times in all.
 4. Where bytes came that make no right frame, or a second frame behind the right one, the read is repeated, `TRIES`
    times in all. Spoilt `SPOILT` times, two devices probably share the id (`ALL_SPOILT` where no right answer came).
@@ -156,6 +157,8 @@ class Identification:
             if not profile.ids[0] <= number <= profile.ids[1]:
                 return False
             sure = number == self._slave
+        if not (yield from self._identified(profile)):
+            return False
         block = profile.reads()[0]
         outcome = yield from self._hear(_read_of(block, self._slave))
         values: Mapping[str, Value] | Fault = {}
@@ -166,6 +169,13 @@ class Identification:
         if isinstance(values, Fault) or not (yield from self._rate_agrees(profile)):
             return False
         self._note(values=values, id_register=number)
+        return True
+
+    def _identified(self, profile: Profile) -> Generator[ReadRegisters, Outcome, bool]:
+        for each in profile.identify:
+            said = yield from self._hear(ReadRegisters(self._slave, each.register, 1, each.function))
+            if said is None or said.answer is None or said.answer[0] not in each.holds:
+                return False
         return True
 
     def _rate_agrees(self, profile: Profile) -> Generator[ReadRegisters, Outcome, bool]:

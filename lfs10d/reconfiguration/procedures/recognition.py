@@ -2,8 +2,9 @@
 
 Rules
 -----
-1. *Recognised*: the register of the slave id has answered with the id of the request, the register of the rate (where
-   the profile has one) holds one of its codes, and every value has answered in range each time it was read.
+1. *Recognised*: the register of the slave id has answered with the id of the request, the registers of `identify` and
+   of the rate (where the profile has them) hold what they can hold, and every value that is available has answered in
+   range each time it was read.
 2. *One alone*: the value is read three times, and behind each read a silent slave id is read, so that the line is
    listened to for 0.2, 0.2 and 0.6 s. Two sensors share the id where any of these answers collides, is followed by
    another or by bytes that no longer come when the silent id alone is read, or is impossible (not in range, no finite
@@ -81,6 +82,11 @@ def recognise(
         return Recognition(f"it refuses register 0x{query.id_register:04X} (exception {identity.exception:02X})")
     if identity.register != endpoint.slave:
         return Recognition(f"its register 0x{query.id_register:04X} says {identity.register}, not {endpoint.slave}")
+    for each in profile.identify:
+        reply = yield from query.read_register(endpoint, register=each.register)
+        if reply.register not in each.holds:
+            held = "does not answer" if reply.register is None else f"holds 0x{reply.register:04X}"
+            return Recognition(f"its register 0x{each.register:04X} {held}, which is not this device")
     for block in profile.reads():
         found = yield from _values_fit(block, endpoint, query)
         if found.why is not None or found.spoilt:

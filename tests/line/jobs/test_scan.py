@@ -31,7 +31,7 @@ from lfs10d.simulator.registers import blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 
-PROFILES = tuple(load_profile(name, relative_to=Path()) for name in builtin_names())
+PROFILES = tuple(load_profile(name, relative_to=Path()) for name in builtin_names()[:4])
 RTU = Codec(Framing.RTU)
 ALL = range(1, 256)
 LONGEST = 400.0
