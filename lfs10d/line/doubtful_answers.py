@@ -90,6 +90,15 @@ class DoubtfulAnswers:
         state = self._slaves.get(slave)
         return -inf if state is None else state.proved_at
 
+    def doubt(self, slave: int, now: float) -> bool:
+        """Doubt an answer that is not proved, for broken bytes came behind it; False where noise is trusted."""
+        state = self._slaves[slave]
+        if now < state.trusted_until:
+            return False
+        state.doubted_at = self._duplicates.extras(slave)
+        self._duplicates.rest(slave, now + WATCHED)
+        return True
+
     def _broken(self, slave: int, state: _SlaveTrust, outcome: Outcome) -> None:
         near = outcome.asked - state.broken_at < APART
         state.broken_at = outcome.ended

@@ -29,8 +29,12 @@ class HeldReadings:
         """Hold these back until then."""
         self._held.extend((until, reading) for reading in readings)
 
+    def holds(self, device: str, at: float) -> bool:
+        """Whether a reading of a device was held back at `at`."""
+        return any(reading.device == device and reading.at < at <= until for until, reading in self._held)
+
     def spoil(self, device: str, at: float, fault: Fault) -> None:
-        """Let the readings of a device fail that are held back at `at`: another answer of its slave was heard."""
+        """Let the readings of a device fail that were held back at `at`: what was heard then may be its own answer."""
         for place, (until, reading) in enumerate(self._held):
             if reading.device == device and reading.at < at <= until:
                 failed = replace(reading, values=None, rtt=None, fault=fault)

@@ -7,8 +7,9 @@ from collections.abc import Iterable, Mapping
 from lfs10d.line.device import Device
 from lfs10d.line.doubtful_answers import DoubtfulAnswers
 from lfs10d.line.held_readings import HeldReadings
-from lfs10d.line.quiet_watch import QuietWatch
+from lfs10d.line.quiet_watch import QuietWatch, spoilt
 from lfs10d.modbus import diagnosis
+from lfs10d.modbus.exchange import FAULT_HEARD
 from lfs10d.modbus.frames import EXCEPTION_FLAG
 from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.overhearing import Overhearing
@@ -53,7 +54,17 @@ class SecondAnswers:
         if outcome.ended - max(self._asked_by_another.values(), default=float("-inf")) <= EXPLAINED:
             return False
         self._quiet.exchanged(outcome, online=device.online)
-        return self._doubts.exchanged(outcome, device.response_times, timeout)
+        doubtful = self._doubts.exchanged(outcome, device.response_times, timeout)
+        if spoilt(outcome) and outcome.began is not None:
+            self._doubt_held(outcome.began, outcome)
+        return doubtful
+
+    def _doubt_held(self, began: float, outcome: Outcome) -> None:
+        """Let the readings fail whose slaves' own answers may have run into this exchange."""
+        for slave, device in self._devices.items():
+            if self.held.holds(device.name, began) and self._doubts.doubt(slave, outcome.ended):
+                fault = Fault(FaultCode.COLLISION, diagnosis.RUN_INTO, heard=outcome.heard[-FAULT_HEARD:])
+                self.held.spoil(device.name, began, fault)
 
     def on_answer(self, outcome: Outcome) -> list[AnsweredTwice]:
         """Take an outcome that the scheduler knows of: a second answer may follow it, or none does any more."""

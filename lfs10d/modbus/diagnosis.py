@@ -104,6 +104,7 @@ def twice(found: Twice) -> str:
 
 
 UNDECIDED = "two answers came to one request: a second sensor with this id, or a repeater; none tells which is whose"
+RUN_INTO = "broken bytes came right behind the answer: noise, or another answer by a second sensor with this id"
 
 
 def refusal(code: int, request: Request) -> Diagnosis:

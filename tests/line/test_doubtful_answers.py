@@ -181,3 +181,16 @@ def test_where_broken_answers_are_rare_they_are_trusted_once_some_were_in_vain()
     assert line.alone_until(5.05) is None
     line.ask(5.1, code=FaultCode.CRC)  # so soon again
     assert line.alone_until(5.15) is not None
+
+
+def test_broken_bytes_behind_an_answer_raise_a_doubt_until_that_was_in_vain_often_enough() -> None:
+    line = Line()
+    doubts = 0
+    for n in range(VAIN + 2):
+        line.ask(1.0 + n)
+        at = 1.05 + n
+        if line.doubts.doubt(1, at):
+            doubts += 1
+            assert line.alone_until(at) == pytest.approx(at + WATCHED)
+        line.ask(1.3 + n)
+    assert doubts == VAIN
