@@ -233,6 +233,11 @@ class MqttConfig(Section):
     keepalive: Annotated[float, Duration(1, 65535)] = Field(
         20.0, description="Time without traffic after which the connection is tested; whole seconds, rounded up."
     )
+    hold: Annotated[float, Duration(0, 1)] = Field(
+        0.02,
+        description="A good sample may wait so long for others to go with it, which saves processor time; never where "
+        "no other can come in that time.",
+    )
 
     @property
     def nodes(self) -> tuple[tuple[str, int], ...]:

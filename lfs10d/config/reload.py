@@ -88,7 +88,8 @@ def plan(running: ConfigFiles, found: ConfigFiles) -> ReloadPlan:
         restart_required=changes.restart_required,
         line=line,
         realtime=before.config.line.realtime is not target.line.realtime,
-        polling=bool(line or profiles or changes.sections & {"slaves", "poll"}),
+        polling=bool(line or profiles or changes.sections & {"slaves", "poll"})
+        or before.config.mqtt.hold != target.mqtt.hold,
         broker=bool(login) or _connection(before.config.mqtt) != _connection(target.mqtt),
         publishing=_publishing(before.config.mqtt) != _publishing(target.mqtt),
         log=before.config.log != target.log,
@@ -100,7 +101,7 @@ PUBLISHING = {"telemetry", "state_every"}
 
 
 def _connection(mqtt: MqttConfig) -> dict[str, object]:
-    return mqtt.model_dump(exclude=PUBLISHING)
+    return mqtt.model_dump(exclude=PUBLISHING | {"hold"})
 
 
 def _publishing(mqtt: MqttConfig) -> dict[str, object]:

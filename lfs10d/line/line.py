@@ -1,6 +1,7 @@
 """The line as the daemon holds it: port, bus, scheduler and poller, and the thread that owns them.
 
-What happens in the thread is handed over to the asyncio loop by one `call_soon_threadsafe` per exchange.
+What happens in the thread is handed over to the asyncio loop by one `call_soon_threadsafe` per exchange, or for
+several together (`mqtt.hold`).
 """
 
 from __future__ import annotations
@@ -143,6 +144,7 @@ class Line:
             wanted = self._realtime = config.line.realtime
             self.poller.post(lambda _: self._precede(wanted=wanted))
         self.poller.replace(device_specs(config, profiles), poll_rules(config.poll))
+        self.poller.post(lambda _: self._hold(config.mqtt.hold))
         self.wake()
 
     # -- in the line's thread
@@ -163,6 +165,9 @@ class Line:
             log.warning("%s", refusal)
         else:
             self._thread.waking = WAKING_REALTIME
+
+    def _hold(self, hold: float) -> None:
+        self.poller.hand_over.hold = hold
 
     def _take_over(self, events: list[Event]) -> None:
         self._inbox.append(events)

@@ -13,6 +13,7 @@ from math import inf
 from typing import TypeAlias
 
 from lfs10d.line.device import DeviceSpec, PollRules
+from lfs10d.line.hand_over import HandOver
 from lfs10d.line.jobs.job import Job
 from lfs10d.line.jobs.poll import Poll
 from lfs10d.line.scheduler import Rest, Scheduler
@@ -32,7 +33,10 @@ Sink: TypeAlias = "Callable[[list[Event]], None]"
 
 
 class Poller:
-    """One line. `sink` takes what was heard, at most once per exchange; `clock` is the bus's."""
+    """One line. `sink` takes what was heard, at most once per exchange; `clock` is the bus's.
+
+    `hand_over.hold` lets several exchanges go together; 0 s without it.
+    """
 
     def __init__(self, bus: Bus, scheduler: Scheduler, sink: Sink, clock: Callable[[], float]) -> None:
         self.bus = bus
@@ -43,6 +47,8 @@ class Poller:
         self._events: list[Event] = []
         self._purpose = Purpose.POLL
         self._paused = False
+        self.hand_over = HandOver()
+        self._asked = 0.0
         self._count_at = clock()
         self._first_counters: UartCounters | None = None
         self._counted_before = self._counted = UartCounters(0, 0, 0, 0)
@@ -121,9 +127,16 @@ class Poller:
                 break
             readable = False
             now = self._clock()
-        if self._events:
-            events, self._events = self._events, []
-            self._sink(events)
+        return self._hand_over(wait, now) if self._events else wait
+
+    def _hand_over(self, wait: Wait, now: float) -> Wait:
+        """Hand over what happened, or have the turn after `wait` come when that is due."""
+        due = self.hand_over.due(self._events, now, self._asked)
+        if due > now:
+            return wait if wait.until <= due else wait._replace(until=due, not_before=min(wait.not_before, due))
+        self.hand_over.handed_over()
+        events, self._events = self._events, []
+        self._sink(events)
         return wait
 
     def _advance(self, now: float, *, readable: bool) -> Wait | None:
@@ -135,7 +148,9 @@ class Poller:
             decision = self.scheduler.next(now)
             if isinstance(decision, Rest):
                 resting = decision
+                self._asked = resting.until
             else:
+                self._asked = now
                 self._ask(decision)
         step = self.bus.step(now, readable=readable)
         quiet_until = self.scheduler.second_answers.quiet_until
@@ -170,6 +185,7 @@ class Poller:
 
     def _settled(self, outcome: Outcome) -> None:
         now = self._clock()
+        self.hand_over.on_exchange(outcome.ended - outcome.asked)
         told = (
             self.scheduler.second_answers.on_strays(outcome.strays, outcome)
             if outcome.answer is not None and outcome.strays

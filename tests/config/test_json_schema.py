@@ -16,7 +16,8 @@ from tests.support.json_schema import Validator
 ROOT = Path(__file__).parents[2]
 SCHEMA = json_schema()
 SHIPPED = ROOT / "config" / "lfs10d.schema.json"
-SAMPLES = sorted((ROOT / "config").glob("*.yaml"))
+INCOMPLETE = ROOT / "config" / "lfs10d.sample.yaml"
+SAMPLES = sorted({*(ROOT / "config").glob("*.yaml")} - {INCOMPLETE})
 
 
 def wrong(text: str) -> list[str]:
@@ -35,6 +36,12 @@ def test_each_sample_is_accepted_and_names_the_schema_for_editors(sample: Path) 
     named = re.match(r"# yaml-language-server: \$schema=(\S+)\n", text)
     assert named is not None
     assert (sample.parent / named[1]).resolve() == SHIPPED
+
+
+def test_the_sample_that_is_installed_lacks_the_port_alone() -> None:
+    text = INCOMPLETE.read_text(encoding="utf-8")
+    assert wrong(text) == ["line: required"]
+    assert wrong(text.replace("  # port: ", "  port: ")) == []
 
 
 def test_the_example_of_the_readme_is_accepted() -> None:

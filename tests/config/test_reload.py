@@ -51,6 +51,7 @@ def wanted(found: ReloadPlan) -> set[str]:
         ("host: localhost", "host: elsewhere", {"broker"}, ("mqtt.host",)),
         ("host: localhost", "host: localhost, telemetry: false", {"publishing"}, ("mqtt.telemetry",)),
         ("host: localhost", "host: localhost, state_every: 1m", {"publishing"}, ("mqtt.state_every",)),
+        ("host: localhost", "host: localhost, hold: 100ms", {"polling"}, ("mqtt.hold",)),
         (
             "host: localhost",
             "host: elsewhere, state_every: 1m",

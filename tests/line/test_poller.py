@@ -36,13 +36,19 @@ class Rig:
 
     clock: VirtualClock = field(default_factory=VirtualClock)
     told: list[list[Event]] = field(default_factory=list)
+    times: list[float] = field(default_factory=list)
+    """When each was given."""
 
     def __post_init__(self) -> None:
         self.line = SimulatedLine([Sensor(slave) for slave in (1, 2, 3)])
         self.port = SimulatedPort(self.line, self.clock, SETTINGS)
         scheduler = Scheduler(LineTiming.of(9600), 0.0)
         scheduler.replace([spec(1), spec(2)], PollRules(), 0.0)
-        self.poller = Poller(Bus(self.port, LineRules(), self.clock), scheduler, self.told.append, self.clock)
+        self.poller = Poller(Bus(self.port, LineRules(), self.clock), scheduler, self._take, self.clock)
+
+    def _take(self, events: list[Event]) -> None:
+        self.told.append(events)
+        self.times.append(self.clock.now)
 
     def run(self, until: float) -> None:
         run(self.poller.turn, self.port, self.clock, until)
@@ -69,6 +75,31 @@ def test_the_sink_is_told_at_most_once_per_exchange_and_never_nothing(rig: Rig) 
     assert all(rig.told)
     exchanges = sum(isinstance(event, Exchanged) for event in rig.events)
     assert len(rig.told) == exchanges + 1  # the opening of the port
+
+
+def test_with_a_hold_several_good_exchanges_go_together(rig: Rig) -> None:
+    rig.poller.hand_over.hold = 0.05
+    rig.poller.replace([spec(1, 0.0), spec(2, 0.0)], PollRules())
+    rig.run(10.0)
+    together = [[event for event in events if isinstance(event, Reading)] for events in rig.told[5:]]
+    assert {len(readings) for readings in together} == {2}, "an exchange takes 25 ms and more, two take more than 50"
+    assert all(last.at - first.at <= 0.05 for first, last in together)
+    assert len(rig.of(1)) > 150
+
+
+def test_what_is_held_goes_when_its_time_is_over_though_the_line_waits_for_a_silent_sensor(rig: Rig) -> None:
+    """Sensor 9 does not answer, so the next exchange ends long after the hold."""
+    rig.poller.hand_over.hold = 0.04
+    rig.poller.replace([spec(1, 0.0), spec(2, 0.0), spec(9, 0.0)], PollRules(offline_after=1000))
+    rig.run(10.0)
+    late = [
+        at - event.at
+        for at, events in zip(rig.times, rig.told, strict=True)
+        for event in events
+        if isinstance(event, Reading) and event.fault is None
+    ]
+    assert 0.03 < max(late) <= 0.0401
+    assert sum(each > 0.03 for each in late) >= 2, "one before each poll of the silent one, which is asked seldom"
 
 
 def test_an_exchange_is_told_with_its_reading(rig: Rig) -> None:
