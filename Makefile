@@ -30,7 +30,7 @@ demo: $(VENV)/.demo ## Show it at work: simulated line, broker, daemon; no hardw
 WORKERS ?= 4
 test test-oldest: export PYTHONDONTWRITEBYTECODE :=
 test: $(VENV)/.dev ## Run all tests
-	$(BIN)/python -m pytest -n $(WORKERS) --dist loadgroup --no-loadscope-reorder
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 # The ranges of pyproject.toml begin with versions that work: the lowest of each, in an environment of its own.
 OLDEST := $(VENV)/oldest

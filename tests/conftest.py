@@ -5,8 +5,8 @@
 `needs("program", ...)` marks a test that starts a program: where it is absent the test fails in CI (`CI` is
 set) and is skipped elsewhere, with one line that says what to install.
 
-Where several workers share the tests, those marked `long` begin first, so that none is waited for in the end; the
-others are mixed by a hash of their names, so that those that wait and those that compute go on side by side.
+Where several workers share the tests, files with tests marked `long` begin first, so that none is waited for in the
+end; the others are mixed by a hash of their names, so that those that wait and those that compute go on side by side.
 """
 
 from __future__ import annotations
@@ -26,17 +26,10 @@ settings.register_profile("ours", max_examples=int(os.environ.get("LFS10D_EXAMPL
 settings.load_profile("ours")  # without a deadline: a busy machine is no failure
 
 
-@pytest.hookimpl(tryfirst=True)  # before xdist reads the marks
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     if hasattr(config, "workerinput"):  # a worker of xdist's: every one finds the same order
-        items.sort(key=_turn)
-
-
-def _turn(item: pytest.Item) -> tuple[bool, bytes]:
-    """Return by what tests are ordered: those of one group stay together."""
-    group = item.get_closest_marker("xdist_group")
-    name = item.nodeid if group is None else str(group.args[0])
-    return item.get_closest_marker("long") is None, sha256(name.encode()).digest()
+        long = {item.path for item in items if item.get_closest_marker("long")}
+        items.sort(key=lambda item: (item.path not in long, sha256(str(item.path).encode()).digest()))
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:

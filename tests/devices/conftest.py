@@ -1,7 +1,6 @@
 """Lines of other devices than the LFS10, end to end: simulated, polled by the daemon, heard at a real broker.
 
-One recording of each line serves many tests: it is made once, what was heard and what the line knows is kept. Where
-several workers share the tests, those of one recording go to one worker.
+One recording of each line serves many tests: it is made once, what was heard and what the line knows is kept.
 """
 
 from __future__ import annotations
@@ -12,16 +11,6 @@ import pytest
 
 from tests.support.brokers import Mosquitto, path_of
 from tests.support.recordings import LINES, Recording, record
-
-
-@pytest.hookimpl(tryfirst=True)  # before tests/conftest.py orders them
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    for item in items:
-        if isinstance(item, pytest.Function) and "recordings" in item.fixturenames:
-            if item.get_closest_marker("xdist_group") is None:
-                parameters = item.callspec.params if hasattr(item, "callspec") else {}
-                item.add_marker(pytest.mark.xdist_group(parameters.get("recording", parameters.get("name", "rtu"))))
-            item.add_marker(pytest.mark.long)
 
 
 @pytest.fixture(name="recordings", scope="session")

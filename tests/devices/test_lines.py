@@ -15,6 +15,8 @@ CHECKS: tuple[Check, ...] = ("crc", "sum")
 
 pytestmark = pytest.mark.needs("mosquitto")
 
+pytestmark = pytest.mark.long
+
 
 def test_every_device_has_its_topics_and_is_online(recording: Recording) -> None:
     listed = recording.view.newest("devices")
@@ -153,7 +155,6 @@ def test_registers_are_read_and_written_within_what_the_profiles_permit(rtu: Rec
     assert rtu.responses["r7"]["data"] == {"device": "tank", "slave": 41, "address": 768, "value": 42, "before": 0}
 
 
-@pytest.mark.xdist_group("ascii-7E1")
 def test_registers_are_read_and_written_in_ascii_too(recordings: Any) -> None:  # noqa: ANN401  # a fixture's function
     seen = recordings("ascii-7E1")
     assert answers(seen) == [("ok", None), ("ok", None), ("ok", None), ("rejected", "not_allowed")]
@@ -200,7 +201,6 @@ def test_one_device_is_read_by_its_profile(rtu: Recording, unit: Any) -> None:  
     assert set(last.values()) == set(request.answers[0].values)
 
 
-@pytest.mark.xdist_group("ascii-7E1")
 def test_one_device_is_read_in_ascii(recordings: Any) -> None:  # noqa: ANN401 - plain data of any shape
     seen: Recording = recordings("ascii-7E1")
     done = seen.lfs10d(

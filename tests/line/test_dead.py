@@ -22,7 +22,6 @@ def alone() -> Rig:
     return Rigs()(LIVING).run(90.0)
 
 
-@pytest.mark.xdist_group("8 of 32 dead")
 @pytest.mark.parametrize("shy", [False, True])
 def test_8_of_32_dead_leave_the_others_94_percent_of_their_rate(rigs: Rigs, *, shy: bool) -> None:
     rig = rigs(ALL)

@@ -16,6 +16,8 @@ from lfs10d.simulator.wire import Format
 from tests.support.lives import Bench, Life
 from tests.support.volatile_disk import PowerCutError
 
+pytestmark = pytest.mark.long
+
 
 def plugged(bench: Bench, baudrate: int = 9600, slave: int = 1) -> Sensor:
     return bench.line.add(Sensor(slave, format=Format(baudrate)))

@@ -17,6 +17,8 @@ from lfs10d.simulator.wire import Format
 from tests.support.lives import Bench, Life
 from tests.support.volatile_disk import PowerCutError
 
+pytestmark = pytest.mark.long
+
 LONGEST = 3000
 """Turns of 50 ms after which a change counts as endless."""
 SETTLED_WITHIN = 140.0
