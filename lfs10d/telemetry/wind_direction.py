@@ -1,0 +1,161 @@
+"""Mean, standard deviation and range of a wind direction over any window of the last minutes. Pure.
+
+Directions are degrees from north, clockwise. Their mean is that of unit vectors, weighted by the time for which each
+holds; the standard deviation is Yamartino's (Journal of Climate and Applied Meteorology 23, 1984, p. 1362-1366).
+"""
+
+from __future__ import annotations
+
+from array import array
+from dataclasses import dataclass
+from math import asin, atan2, cos, degrees, hypot, radians, sin, sqrt
+from typing import Final
+
+from lfs10d.telemetry.wind_series import BLOCK, Series
+
+RESULTANT_LEAST: Final = 0.05
+"""Length of the mean vector below which it has no direction."""
+
+VARIABLE_FROM: Final = 60
+"""Degrees within 10 min from which a direction is variable (ICAO Annex 3, appendix 3, 4.1.4)."""
+
+VARIABLE_BELOW: Final = 180
+"""Degrees from which no extremes are reported (ICAO Annex 3, appendix 3, 4.1.4)."""
+
+CIRCLE: Final = 360
+
+
+def compass(direction: float) -> int:
+    """Return a direction as whole degrees from 1 to 360, which is north."""
+    return round(direction) % CIRCLE or CIRCLE
+
+
+@dataclass(slots=True)
+class Vector:
+    """`covered` milliseconds with the integrals of the unit vector's north and east parts (in ms)."""
+
+    covered: int = 0
+    north: float = 0.0
+    east: float = 0.0
+
+    def add(self, other: Vector) -> None:
+        """Take the time of another window as well."""
+        self.covered += other.covered
+        self.north += other.north
+        self.east += other.east
+
+    @property
+    def direction(self) -> int | None:
+        """The mean, None where the vectors cancel out or nothing is covered."""
+        if not self.covered or hypot(self.north, self.east) / self.covered < RESULTANT_LEAST:
+            return None
+        return compass(degrees(atan2(self.east, self.north)))
+
+    @property
+    def deviation(self) -> float | None:
+        """The standard deviation in degrees, None where nothing is covered."""
+        if not self.covered:
+            return None
+        length = hypot(self.north, self.east) / self.covered
+        apart = sqrt(max(0.0, 1.0 - length * length))
+        return degrees(asin(apart) * (1.0 + (2.0 / sqrt(3.0) - 1.0) * apart**3))
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """The least sector that holds all directions: clockwise from `begin` to `end`, `degrees` wide."""
+
+    degrees: int
+    begin: int
+    end: int
+
+
+def spread(seen: int) -> Spread | None:
+    """Return the sector of the directions whose bits (1 to 360) are set in `seen`, None where there is none."""
+    if not seen:
+        return None
+    bits = f"{seen >> 1:0{CIRCLE}b}"[::-1]  # one digit per degree, the first is that of 1
+    first = bits.index("1")
+    calms = (bits[first + 1 :] + bits[: first + 1]).split("1")[:-1]  # after each direction, to the next
+    widest = max(calms, key=len)
+    place, begin = first, first
+    for calm in calms:
+        following = (place + 1 + len(calm)) % CIRCLE
+        if calm is widest:
+            begin = following
+            break
+        place = following
+    return Spread(CIRCLE - 1 - len(widest), begin + 1, place + 1)
+
+
+class DirectionSeries(Series):
+    """The directions of one vane."""
+
+    __slots__ = ("_covered", "_east", "_north", "_samples", "_seen")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._covered, self._north, self._east = array("d"), array("d"), array("d")
+        self._samples = array("B")
+        self._seen: list[int] = []
+
+    def vector(self, begin: int, end: int) -> Vector:
+        """Return the mean vector over [begin, end)."""
+        parts = self._holding(begin, end)
+        covered, north, east = (sum(each[parts.blocks]) for each in (self._covered, self._north, self._east))
+        for first, last in parts.raw:
+            more = self._sums(first, last, begin, end)
+            covered, north, east = covered + more[0], north + more[1], east + more[2]
+        return Vector(round(covered), north, east)
+
+    def samples(self, begin: int, end: int) -> int:
+        """Return how many values were measured within [begin, end)."""
+        parts = self._measured(begin, end)
+        return sum(self._samples[parts.blocks]) + sum(len(self._good(*each)) for each in parts.raw)
+
+    def spread(self, begin: int, end: int) -> Spread | None:
+        """Return the sector of what was measured within [begin, end)."""
+        parts = self._measured(begin, end)
+        seen = 0
+        for each in self._seen[parts.blocks]:
+            seen |= each
+        for first, last in parts.raw:
+            seen |= self._bits(first, last)
+        return spread(seen)
+
+    def _good(self, first: int, last: int) -> list[float]:
+        return [value for value in self._values[first:last] if value == value]  # noqa: PLR0124 - a gap is not a number
+
+    def _bits(self, first: int, last: int) -> int:
+        seen = 0
+        for value in self._good(first, last):
+            seen |= 1 << compass(value)
+        return seen
+
+    def _sums(self, first: int, last: int, begin: int, end: int) -> tuple[float, float, float]:
+        covered = north = east = 0.0
+        for value, held in self._held(first, last, begin, end):
+            angle = radians(value)
+            covered += held
+            north += cos(angle) * held
+            east += sin(angle) * held
+        return covered, north, east
+
+    def _closed(self) -> int:
+        return len(self._covered)
+
+    def _close(self, first: int) -> None:
+        begin, end = (self._times[place] + self._origin for place in (first, first + BLOCK))
+        covered, north, east = self._sums(first, first + BLOCK, begin, end)
+        self._covered.append(covered)
+        self._north.append(north)
+        self._east.append(east)
+        self._samples.append(len(self._good(first, first + BLOCK)))
+        self._seen.append(self._bits(first, first + BLOCK))
+
+    def _drop(self, blocks: int) -> None:
+        for column in (self._covered, self._north, self._east, self._samples, self._seen):
+            del column[:blocks]
+
+    def _start(self, value: float) -> None:
+        """Nothing depends on it."""
