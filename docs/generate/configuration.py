@@ -12,7 +12,7 @@ from pydantic.fields import FieldInfo
 
 from docs.generate.markdown import plain
 from lfs10d.config.diff import RESTART_KEYS
-from lfs10d.config.models import LATER_SECTIONS, Config
+from lfs10d.config.models import Config
 from lfs10d.profiles.library import builtin_names
 from lfs10d.schema.fields import Duration, FieldKind, Size
 from lfs10d.schema.quantities import duration_text, size_text
@@ -28,13 +28,8 @@ _DEFAULT = " Default: "
 
 def parts() -> Mapping[str, str]:
     """Return the generated parts by name: one per section of the file, and the profiles."""
-    generated = {
-        name: "\n\n".join(_keys(Config, name, field))
-        for name, field in Config.model_fields.items()
-        if name not in LATER_SECTIONS
-    }
-    later = (f"`{key}`" for name in LATER_SECTIONS for key in _names(Config.model_fields[name], name))
-    return {**generated, "later": ", ".join(later), "profiles": ", ".join(f"`{name}`" for name in builtin_names())}
+    generated = {name: "\n\n".join(_keys(Config, name, field)) for name, field in Config.model_fields.items()}
+    return {**generated, "profiles": ", ".join(f"`{name}`" for name in builtin_names())}
 
 
 def _keys(owner: Model, path: str, field: FieldInfo) -> Iterator[str]:
@@ -47,12 +42,6 @@ def _keys(owner: Model, path: str, field: FieldInfo) -> Iterator[str]:
         below += ".NAME" if _named(field.annotation) else ""
         for name, inner in model.model_fields.items():
             yield from _keys(model, f"{below}.{name}", inner)
-
-
-def _names(field: FieldInfo, path: str) -> Iterator[str]:
-    model = model_in(field.annotation)
-    for name in model.model_fields if model else ():
-        yield f"{path}.{name}"
 
 
 def _entry(owner: Model, path: str, field: FieldInfo) -> str:

@@ -16,6 +16,7 @@ from docs.generate.examples import EVENT_TS, Story, responses, trace
 from docs.generate.markdown import example, plain, table
 from docs.generate.meanings import ERROR_CODES, FAULT_CODES
 from docs.generate.uplink import bytes_table
+from docs.generate.wind import wind_examples
 from lfs10d.command import ErrorCode
 from lfs10d.commands.context import Handler
 from lfs10d.commands.handlers.registry import HANDLERS
@@ -72,7 +73,7 @@ def _meanings(words: Mapping[str, str], codes: tuple[str, ...]) -> Iterator[tupl
 
 def examples() -> Mapping[str, tuple[object, ...]]:
     """Return payloads by the topic of the table."""
-    story = Story()
+    story, wind = Story(), wind_examples()
     return {
         "info": (story.newest("info"),),
         "devices": (story.newest("devices"),),
@@ -86,6 +87,8 @@ def examples() -> Mapping[str, tuple[object, ...]]:
         "device/+/availability": (story.newest("device/mast-top/availability"),),
         "device/+/error": (story.newest("device/slave-3/error"), story.cleared()),
         "device/+/stats": (story.newest("device/slave-3/stats"),),
+        "device/+/wind": (wind.wind,),
+        "device/+/record": (wind.record,),
         "event": tuple(events.payloads(EVENT_TS)),
         "response/+/+": tuple(responses()),
         "response/+": (),

@@ -9,10 +9,12 @@ from docs.generate.markdown import table
 from lfs10d.mqtt.encoding import encode, packet_size
 from lfs10d.mqtt.settings import Version
 from lfs10d.reading import Reading
+from lfs10d.schema.quantities import duration_text
 from lfs10d.system.clock import Instant
-from lfs10d.telemetry.info import DaemonInfo, DeviceInfo, LineInfo
+from lfs10d.telemetry.info import DaemonInfo, DeviceInfo, LineInfo, WindInfo
 from lfs10d.telemetry.publication import Publication, PublicationKind
 from lfs10d.telemetry.station import Station
+from lfs10d.telemetry.wind import WindValues
 
 DAY = 86_400
 MEASURED = 120
@@ -35,15 +37,30 @@ DEVICE = DeviceInfo(
     units={"wind_speed": "m/s"},
     offline_after=3,
 )
-SETTINGS = ((True, 1.0), (True, 60.0), (False, 1.0), (False, 10.0), (False, 60.0))
-"""`mqtt.telemetry` and `mqtt.state_every` of each row."""
+SETTINGS = (
+    (True, 1.0, 10.0),
+    (True, 60.0, 60.0),
+    (False, 1.0, 10.0),
+    (False, 10.0, 60.0),
+    (False, 60.0, 60.0),
+    (False, 60.0, 3600.0),
+)
+"""`mqtt.telemetry`, `mqtt.state_every` and `wind.every` of each row."""
 
 SENSORS = (1, 8, 32)
 
 
-def bytes_a_day(sensors: int, *, telemetry: bool, state_every: float) -> tuple[int, int]:
-    """Return the bytes of MQTT a day to the broker and back, of sensors that answer every second, without a burst."""
-    devices = [replace(DEVICE, name=f"slave-{2 + n}", slave=2 + n, state_every=state_every) for n in range(sensors)]
+def bytes_a_day(
+    sensors: int, *, telemetry: bool, state_every: float, wind_every: float | None = None
+) -> tuple[int, int]:
+    """Return the bytes of MQTT a day to the broker and back, of sensors that answer every second, without a burst.
+
+    `wind_every` in s is that of the wind statistics; None: without them.
+    """
+    wind = None if wind_every is None else WindInfo(WindValues("wind_speed", None, "m/s"), wind_every, records=0)
+    devices = [
+        replace(DEVICE, name=f"slave-{2 + n}", slave=2 + n, state_every=state_every, wind=wind) for n in range(sensors)
+    ]
     line = LineInfo("line0", "/dev/ttyUSB0", 9600, "none", 8, 1, "rtu", 0.0036458)
     daemon = DaemonInfo("0.1", "gateway", "k3f9a2c7", None, "0123456789ab", 0, {"version": "5"}, ())
     station = Station(daemon, line, devices, Instant(0.0, WALL, "synced"))
@@ -74,14 +91,20 @@ def _size(publication: Publication) -> int:
 
 def bytes_table() -> str:
     """Return the table: megabytes a day to the broker, and back in brackets."""
-    return table(("`telemetry`", "`state_every`", *(f"{each} sensor{'s' * (each > 1)}" for each in SENSORS)), _rows())
+    return table(
+        ("`telemetry`", "`state_every`", "`wind.every`", *(f"{each} sensor{'s' * (each > 1)}" for each in SENSORS)),
+        _rows(),
+    )
 
 
 def _rows() -> Iterable[tuple[str, ...]]:
-    for telemetry, state_every in SETTINGS:
-        cells = (bytes_a_day(each, telemetry=telemetry, state_every=state_every) for each in SENSORS)
+    for telemetry, state_every, wind_every in SETTINGS:
+        cells = (
+            bytes_a_day(each, telemetry=telemetry, state_every=state_every, wind_every=wind_every) for each in SENSORS
+        )
         yield (
             f"`{str(telemetry).lower()}`",
             f"`{state_every:g}s`",
+            f"`{duration_text(wind_every)}`",
             *(f"{there / 1e6:.1f} MB ({back / 1e6:.2f})" for there, back in cells),
         )

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from lfs10d.config.credentials import missing_in_authorities
 from lfs10d.config.loader import LoadedConfig
-from lfs10d.config.models import LATER_SECTIONS, default_line_name
+from lfs10d.config.models import default_line_name
 from lfs10d.errors import ConfigError, Problem
 from lfs10d.line.budget import ASSUMED_TURNAROUND, Budget
 from lfs10d.profiles.registers import spell
@@ -27,7 +27,6 @@ def advice(loaded: LoadedConfig, budget: Budget, host: str) -> tuple[Problem, ..
         *_files(loaded),
         *_names(loaded, host),
         *_calibration(loaded),
-        *_unused(loaded),
     )
     return tuple(sorted(loaded.document.problem(path, f"warning: {message}") for path, message in warnings))
 
@@ -163,9 +162,3 @@ def _calibration(loaded: LoadedConfig) -> Iterator[tuple[KeyPath, str]]:
                         f"for profile {slave.profile}"
                     ),
                 )
-
-
-def _unused(loaded: LoadedConfig) -> Iterator[tuple[KeyPath, str]]:
-    for section in LATER_SECTIONS:
-        if loaded.document.holds((section,)):
-            yield (section,), "has no effect yet"

@@ -26,8 +26,12 @@ from lfs10d.schema.fields import (
     Whole,
 )
 from lfs10d.schema.quantities import BAUDRATES
+from lfs10d.schema.steps import Steps
 
 MINUTE, HOUR, DAY = 60.0, 3600.0, 86400.0
+RECORD_LENGTHS = (60.0, 120.0, 300.0, 600.0, 900.0, 1200.0, 1800.0, 3600.0)
+"""Seconds that divide an hour, so that every record begins at a full one of them."""
+
 PLAIN_PORT, TLS_PORT = 1883, 8883
 """Registered with IANA for MQTT and for MQTT over TLS."""
 
@@ -284,13 +288,15 @@ class HomeassistantConfig(Section):
 
 
 class WindConfig(Section):
-    """Wind statistics. Without effect yet."""
+    """Wind statistics: means, gusts and records of every value that is a wind speed."""
 
-    every: Annotated[float, Duration(1, HOUR)] = Field(10.0, description="Time between two statistics.")
+    every: Annotated[float, Duration(1, HOUR)] = Field(
+        10.0, description="Time between two `wind` of a device, the figures of the last 2 and 10 min."
+    )
+    records: Annotated[float, Steps(MINUTE, HOUR, zero="none", steps=RECORD_LENGTHS)] = Field(
+        10 * MINUTE, description="Length of a `record`, the same figures of each such span of UTC."
+    )
 
-
-LATER_SECTIONS = ("wind",)
-"""Accepted and checked, but without effect yet."""
 
 CommandChoice: TypeAlias = Annotated[CommandClass, Choice(("polling", "sensors", "registers"))]
 
@@ -310,7 +316,7 @@ class Config(Section):
         "scans of the line), registers (raw access); [] for none.",
     )
     homeassistant: HomeassistantConfig = Field(HomeassistantConfig(), description="Home Assistant.")
-    wind: WindConfig = Field(WindConfig(), description="Wind statistics (later).")
+    wind: WindConfig = Field(WindConfig(), description="Wind statistics.")
     store: StoreConfig = Field(StoreConfig(), description="The backlog on disk while the broker is unreachable.")
     log: LogConfig = Field(LogConfig(), description="What is logged.")
 

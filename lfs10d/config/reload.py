@@ -91,7 +91,7 @@ def plan(running: ConfigFiles, found: ConfigFiles) -> ReloadPlan:
         polling=bool(line or profiles or changes.sections & {"slaves", "poll"})
         or before.config.mqtt.hold != target.mqtt.hold,
         broker=bool(login) or _connection(before.config.mqtt) != _connection(target.mqtt),
-        publishing=_publishing(before.config.mqtt) != _publishing(target.mqtt),
+        publishing=_publishing(before.config.mqtt) != _publishing(target.mqtt) or before.config.wind != target.wind,
         log=before.config.log != target.log,
     )
 

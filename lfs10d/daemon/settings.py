@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from lfs10d import __version__
 from lfs10d.config.effective import Effective
 from lfs10d.config.live_config import LiveConfig
-from lfs10d.config.models import Config, LineConfig, StoreConfig
+from lfs10d.config.models import Config, LineConfig, StoreConfig, WindConfig
 from lfs10d.daemon.boot import Boot
 from lfs10d.line.budget import request_gap, timing_of
 from lfs10d.line.device import FIRST_TIMEOUTS
@@ -19,7 +19,8 @@ from lfs10d.outbox.store.database import Limits
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Fault, FaultCode, Reading
 from lfs10d.system.secret import Secret
-from lfs10d.telemetry.info import DaemonInfo, DeviceInfo, LineInfo
+from lfs10d.telemetry.info import DaemonInfo, DeviceInfo, LineInfo, WindInfo
+from lfs10d.telemetry.wind import METRES_PER_SECOND, WindValues
 
 
 def daemon_info(now: Effective, boot: Boot) -> DaemonInfo:
@@ -83,9 +84,26 @@ def device_infos(config: Config, profiles: Mapping[str, Profile]) -> tuple[Devic
             offline_after=config.poll.offline_after,
             calibration={name: entry.model_dump() for name, entry in slave.calibration.items()},
             state_every=config.mqtt.state_every,
+            wind=wind_info(config.wind, profiles[slave.profile]),
         )
         for slave in config.slaves
     )
+
+
+def wind_info(config: WindConfig, profile: Profile) -> WindInfo | None:
+    """Return the wind statistics of a device of this profile; None where it measures no wind, or in an unknown unit."""
+    speed = profile.first_of("wind_speed")
+    if speed is not None and speed.unit not in METRES_PER_SECOND:
+        speed = None
+    direction = profile.first_of("wind_direction")
+    if speed is None and direction is None:
+        return None
+    values = WindValues(
+        speed=None if speed is None else speed.name,
+        direction=None if direction is None else direction.name,
+        unit=None if speed is None else speed.unit,
+    )
+    return WindInfo(values, config.every, config.records)
 
 
 def conflict_readings(conflicts: Mapping[str, str], at: float) -> list[Reading]:

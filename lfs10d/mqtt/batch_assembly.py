@@ -49,5 +49,5 @@ class BatchAssembly:
 
     @property
     def payload(self) -> bytes:
-        """The JSON array, once it is complete."""
-        return array(self._parts)
+        """The JSON array, once it is complete; the JSON object of what goes by itself."""
+        return array(self._parts) if self.batch.samples[0].sample.grouped else self._parts[0]

@@ -215,7 +215,7 @@ class Sender:
         if isinstance(item, LossNotice):
             loss = item.loss
             payload = publication.dropped(
-                loss.device, loss.boot, loss.from_seq, loss.to_seq, count=loss.count, ts=self._epoch_ms()
+                loss.source, loss.boot, loss.from_seq, loss.to_seq, count=loss.count, ts=self._epoch_ms()
             ).payload
         else:
             payload = item.publication.payload

@@ -9,13 +9,14 @@ The rules (contract, section 3):
 2. What was acknowledged to no purpose (`recent_acks`) goes once more, in its place by seq.
 3. What waits in memory is handed to the store while the broker is away or too slow (`spill`).
 4. Devices whose history the broker refuses are passed over: their samples wait where they are, the others go on.
+   So are samples while `telemetry` is False: then only records go.
 
 So everything in the store is older than everything in memory.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from collections.abc import Set as AbstractSet
 
 from lfs10d.outbox.drain import Drain
@@ -27,6 +28,7 @@ from lfs10d.outbox.spill import Spill
 from lfs10d.outbox.spool import Spool
 from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry import publication
+from lfs10d.telemetry.wind_record import is_record, source_of
 
 BATCH_MOST = 100
 """Samples in one history batch (contract, section 3)."""
@@ -51,6 +53,8 @@ class Backlog:
     """The rules above. `detection`: seconds in which a dead connection is noticed at the latest."""
 
     def __init__(self, *, capacity: int, detection: float) -> None:
+        self.telemetry = True
+        """Samples of polls are sent; False: they stay where they are, and only records go."""
         self._open_from = 0.0
         self._batch_at = 0.0
         self._batch_most = BATCH_MOST
@@ -108,7 +112,7 @@ class Backlog:
                 return notice
         if now < max(self._batch_at, self._free_at):
             return None
-        samples = self._take(_devices(refused))
+        samples = self._take(self._passed_over(refused))
         if not samples:
             return None
         at_once = AT_ONCE if self.drain.level > 1 else 0.0
@@ -129,13 +133,18 @@ class Backlog:
         """When the next batch may go for what is under way."""
         return float("-inf") if len(self._under_way) < self.drain.batches(self._window) else self._turn_at
 
-    def _take(self, passed_over: AbstractSet[str]) -> tuple[QueuedSample, ...]:
+    def _take(self, passed_over: Container[str]) -> tuple[QueuedSample, ...]:
         if self.spool.page:
             samples = self.spool.page.take(self._batch_most, passed_over)
             if samples:
                 return samples
             self.spool.leave()
         return () if self.spool.more else self.history.take(self._batch_most, passed_over)
+
+    def _passed_over(self, refused: AbstractSet[str]) -> Container[str]:
+        """Return the sources of which nothing is sent now."""
+        sources = _sources(refused) if refused else refused
+        return sources if self.telemetry else _Refused(sources)
 
     def lifted(self) -> None:
         """Try again what was passed over: topics are refused no longer."""
@@ -153,7 +162,7 @@ class Backlog:
         """Return when `next` may have something though nothing happens before; None: not by time alone."""
         declared = self.losses.due() if publication.EVENT not in refused and not self._notifying else None
         times = [] if declared is None else [declared]
-        in_memory = not self.spool.more and (self._recent.waiting or self.history.waits(_devices(refused)))
+        in_memory = not self.spool.more and (self._recent.waiting or self.history.waits(self._passed_over(refused)))
         if self.spool.page or in_memory:
             times.append(max(self._batch_at, self._free_at))
         return max(self._open_from, min(times)) if times else None
@@ -271,9 +280,15 @@ class Backlog:
             yield oldest
 
 
-def _devices(refused: AbstractSet[str]) -> AbstractSet[str]:
-    """Return the devices whose history is refused."""
-    if not refused:
-        return refused
-    topics = (topic.split("/") for topic in refused)
-    return {levels[1] for levels in topics if levels[0] == "device" and levels[-1] == publication.HISTORY}
+class _Refused(frozenset[str]):
+    """The sources whose samples are refused, and those of all polls."""
+
+    __slots__ = ()
+
+    def __contains__(self, source: object) -> bool:
+        return not is_record(str(source)) or super().__contains__(source)
+
+
+def _sources(refused: AbstractSet[str]) -> AbstractSet[str]:
+    """Return the sources whose history is refused."""
+    return {source for topic in refused if (source := source_of(topic)) is not None}

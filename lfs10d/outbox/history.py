@@ -1,15 +1,14 @@
 """The samples that wait for their turn on `history`. Pure.
 
-One shelf per device and boot, in order of seq. The next to be taken is the shelf that holds the oldest sample.
-A sample that the broker has acknowledged before may stand here once more (`repeated`): where there is no room,
-these go first, and their going is no loss.
+One shelf per source and boot, in order of seq: a device's samples, or its records. The next to be taken is the shelf
+that holds the oldest sample. A sample that the broker has acknowledged before may stand here once more (`repeated`):
+where there is no room, these go first, and their going is no loss.
 """
 
 from __future__ import annotations
 
 from bisect import insort
-from collections.abc import Iterable
-from collections.abc import Set as AbstractSet
+from collections.abc import Container, Iterable
 from dataclasses import dataclass, field, replace
 
 from lfs10d.outbox.losses import Key
@@ -33,8 +32,8 @@ class QueuedSample:
 
     @property
     def key(self) -> Key:
-        """Device and boot: one history batch holds samples of one key."""
-        return self.sample.device, self.sample.boot
+        """Source and boot: one history batch holds samples of one key."""
+        return self.sample.source, self.sample.boot
 
     def at(self, shift: int, clock: ClockState = "synced") -> QueuedSample:
         """Return it with the time that the clock tells now, whose word is `clock`.
@@ -47,7 +46,7 @@ class QueuedSample:
         return replace(self, sample=right, shift=shift)
 
 
-NONE: AbstractSet[str] = frozenset()
+NONE: Container[str] = frozenset()
 
 
 def _seq(queued: QueuedSample) -> int:
@@ -71,7 +70,7 @@ class History:
         return self._count
 
     def __contains__(self, key: Key) -> bool:
-        """Tell whether a sample of this device and boot waits."""
+        """Tell whether a sample of this source and boot waits."""
         return key in self._queues
 
     def add(self, queued: QueuedSample) -> None:
@@ -99,20 +98,22 @@ class History:
         self._count += len(taken)
         self._repeated += sum(queued.repeated for queued in taken)
 
-    def waits(self, passed_over: AbstractSet[str] = NONE) -> bool:
-        """Tell whether a sample waits of a device that is not `passed_over`."""
-        return any(device not in passed_over for device, _ in self._queues)
+    def waits(self, passed_over: Container[str] = NONE) -> bool:
+        """Tell whether a sample waits of a source that is not `passed_over`."""
+        return any(source not in passed_over for source, _ in self._queues)
 
-    def take(self, most: int, passed_over: AbstractSet[str] = NONE) -> tuple[QueuedSample, ...]:
+    def take(self, most: int, passed_over: Container[str] = NONE) -> tuple[QueuedSample, ...]:
         """Take up to `most` samples of the key that holds the oldest, in order of seq; () where none waits.
 
-        Those of devices that are `passed_over` stay.
+        Those of sources that are `passed_over` stay; of samples that are sent each by itself one is taken.
         """
         keys = [key for key in self._queues if key[0] not in passed_over]
         if not keys:
             return ()
         key = min(keys, key=lambda each: _age(self._queues[each][0]))
         queue = self._queues[key]
+        if not queue[0].sample.grouped:
+            most = 1
         taken = tuple(queue[:most])
         del queue[:most]
         if not queue:

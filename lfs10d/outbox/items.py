@@ -11,7 +11,7 @@ from typing import TypeAlias
 from lfs10d.outbox.history import QueuedSample
 from lfs10d.outbox.losses import Loss
 from lfs10d.system.clock_step import ClockState
-from lfs10d.telemetry.publication import EVENT, HISTORY, Publication, device_topic, iso_time
+from lfs10d.telemetry.publication import EVENT, Publication, iso_time
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,20 +58,23 @@ class LiveSample:
         if queued is self.queued or not isinstance(payload, dict):
             return self
         sample = queued.sample
-        corrected = {**payload, "ts": sample.ts, "time": iso_time(sample.ts), "clock": sample.clock}
+        if sample.grouped:
+            corrected = {**payload, "ts": sample.ts, "time": iso_time(sample.ts), "clock": sample.clock}
+        else:  # a record has more times than one
+            corrected = sample.payload(str(payload["line"]))
         return LiveSample(replace(self.publication, payload=corrected, sample=sample), queued)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HistoryBatch:
-    """1..100 samples of one device and boot in order of seq, for `history`."""
+    """1..100 samples of one device and boot in order of seq, for `history`; or one that goes by itself."""
 
     samples: tuple[QueuedSample, ...]
 
     @property
     def topic(self) -> str:
         """The topic under `B`."""
-        return device_topic(self.samples[0].sample.device, HISTORY)
+        return self.samples[0].sample.history_topic
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -27,7 +27,7 @@ class Losses:
     def add(self, sample: Sample) -> None:
         """Note that this sample will never be delivered."""
         self.total += 1
-        self.restore(Loss(sample.device, sample.boot, sample.seq, sample.seq, 1))
+        self.restore(Loss(sample.source, sample.boot, sample.seq, sample.seq, 1))
 
     def restore(self, loss: Loss) -> None:
         """Put back a loss whose declaration was not acknowledged."""
@@ -68,14 +68,14 @@ class Losses:
 
 
 Key: TypeAlias = tuple[str, str]
-"""Device and boot."""
+"""Source and boot."""
 
 
 @dataclass(frozen=True, slots=True)
 class Loss:
-    """`count` samples lost within `from_seq`..`to_seq`, both included."""
+    """`count` samples of a source lost within `from_seq`..`to_seq`, both included."""
 
-    device: str
+    source: str
     boot: str
     from_seq: int
     to_seq: int
@@ -83,13 +83,13 @@ class Loss:
 
     @property
     def key(self) -> Key:
-        """Device and boot."""
-        return self.device, self.boot
+        """Source and boot."""
+        return self.source, self.boot
 
     def joined(self, other: Loss) -> Loss:
         """Return both as one."""
         return Loss(
-            self.device,
+            self.source,
             self.boot,
             min(self.from_seq, other.from_seq),
             max(self.to_seq, other.to_seq),

@@ -74,12 +74,14 @@ class Outbox:
 
     @property
     def telemetry(self) -> bool:
-        """False: samples are not taken, and the backlog stays where it is."""
-        return self._queues.telemetry
+        """False: samples are not taken, and those of the backlog stay where they are; records go."""
+        return self.backlog.telemetry
 
     @telemetry.setter
     def telemetry(self, telemetry: bool) -> None:
-        self._queues.telemetry = telemetry
+        if telemetry and not self.backlog.telemetry:
+            self.backlog.lifted()
+        self.backlog.telemetry = telemetry
 
     # What comes in
 
@@ -92,7 +94,7 @@ class Outbox:
         """
         connected = self._in_flight.window > 0
         if publication.sample is not None:
-            if not self.telemetry:
+            if publication.sample.grouped and not self.telemetry:
                 return
             self._queues.live.add(LiveSample(publication, QueuedSample(publication.sample, now, shift=shift)))
             self.age(now)

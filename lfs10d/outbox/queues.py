@@ -37,8 +37,6 @@ class Queues:
         self.messages = MessageQueue()
         self.live = LiveQueue()
         self.backlog = backlog
-        self.telemetry = True
-        """False: the backlog stays where it is."""
         self._refusals = refusals
         self._suspects = suspects
         self._refused = refusals.topics
@@ -107,7 +105,7 @@ class Queues:
         return None
 
     def _next_history(self, now: float) -> OutboxItem | None:
-        return self.backlog.next(now, self._refused) if self._batch_may_go and self.telemetry else None
+        return self.backlog.next(now, self._refused) if self._batch_may_go else None
 
     def __bool__(self) -> bool:
         """Tell whether anything but the backlog waits."""
@@ -115,7 +113,7 @@ class Queues:
 
     def due(self) -> float | None:
         """Return when `next` may have something though nothing happens before; None: not by time alone."""
-        times = (self.backlog.due(self._refused) if self.telemetry else None, self._refusals.due())
+        times = (self.backlog.due(self._refused), self._refusals.due())
         return min((each for each in times if each is not None), default=None)
 
     # What waits again

@@ -249,6 +249,10 @@ class Profile(Facts):
         """Registers that one read may ask for in every framing that the device speaks."""
         return _words_per_read(self.__dict__)
 
+    def first_of(self, device_class: str) -> Value | None:
+        """Return the first value of a class, None where there is none."""
+        return next((value for value in self.values if value.device_class == device_class), None)
+
     def setting_at(self, register: int) -> Setting | None:
         """Return the setting at a register; None where the profile knows none: never to be written."""
         return next((setting for setting in self.settings if setting.register == register), None)

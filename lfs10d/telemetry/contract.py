@@ -27,6 +27,7 @@ from lfs10d.telemetry.payloads import (
     SamplePayload,
     TracePayload,
 )
+from lfs10d.telemetry.wind_payloads import RecordPayload, WindPayload
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +80,20 @@ OUTBOUND = (
     Outbound(_device(publication.AVAILABILITY), Availability, retain=True, qos=1, when=CHANGE),
     Outbound(_device(publication.ERROR), Error, retain=True, qos=1, when=RISE),
     Outbound(_device(publication.STATS), DeviceStats, retain=True, qos=0, when="30 s"),
+    Outbound(
+        _device(publication.WIND),
+        WindPayload,
+        retain=True,
+        qos=1,
+        when="every `wind.every`, and when a figure stops being valid; devices that measure wind",
+    ),
+    Outbound(
+        _device(publication.RECORD),
+        RecordPayload,
+        retain=False,
+        qos=1,
+        when="at each multiple of `wind.records` of UTC; kept like a sample while the broker is away",
+    ),
     Outbound(publication.EVENT, DroppedPayload | Event, retain=False, qos=1, when="as it happens"),
     Outbound("response/+/+", Response, retain=False, qos=1, when="one per request"),
     Outbound("response/+", Response, retain=False, qos=1, when="one per request of one level"),

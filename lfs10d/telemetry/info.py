@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from lfs10d.reading import NOTHING
 from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry.publication import VERSION
+from lfs10d.telemetry.wind import WindValues
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +71,18 @@ class LineInfo:
 
 
 @dataclass(frozen=True, slots=True)
+class WindInfo:
+    """Wind statistics as configured: of which values, published every `every` s, with records of `records` s.
+
+    `records` is 0 where there are none.
+    """
+
+    values: WindValues
+    every: float
+    records: float
+
+
+@dataclass(frozen=True, slots=True)
 class DeviceInfo:
     """A device as configured; durations in s; `response_timeout` is None where it is learned.
 
@@ -91,6 +104,8 @@ class DeviceInfo:
     """By value name what its certificate says: `scale` and `offset`."""
     state_every: float = 1.0
     """Seconds from one state of the same quality and error to the next, at least."""
+    wind: WindInfo | None = None
+    """Its wind statistics; None where it measures no wind."""
 
     def entry(self) -> dict[str, object]:
         """Return the device's place in the array `devices`."""

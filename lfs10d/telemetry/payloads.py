@@ -1,4 +1,4 @@
-"""Models of every outbound payload, for `docs/mqtt.md` and for the tests.
+"""Models of outbound payloads, for `docs/mqtt.md` and for the tests.
 
 The daemon builds plain dictionaries and never validates what it sends: these models say what it promises.
 Which of them goes to which topic is told by `lfs10d.telemetry.contract`.
@@ -258,7 +258,7 @@ class Event(Payload):
 
 
 class DroppedPayload(Payload):
-    """Samples of one device that are lost, within `from_seq`..`to_seq` both included."""
+    """Samples, or records, of one device that are lost, within `from_seq`..`to_seq` both included."""
 
     v: Version
     type: Literal["dropped"]
@@ -268,6 +268,7 @@ class DroppedPayload(Payload):
     from_seq: int
     to_seq: int
     count: int
+    topic: Literal["record"] | None = Field(None, description="set where records are lost")
 
 
 class RequestError(Payload):

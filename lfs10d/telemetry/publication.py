@@ -34,6 +34,7 @@ AVAILABILITY = "availability"
 ERROR = "error"
 STATS = "stats"
 WIND = "wind"
+RECORD = "record"
 TELEMETRY = "telemetry"
 HISTORY = "history"
 
@@ -62,7 +63,7 @@ class PublicationKind(StrEnum):
     RETAINED = "retained"
     """Not kept: every burst after a connect holds its newest form."""
     SAMPLE = "sample"
-    """Never lost while the daemon lives: kept, and sent as history when older than 3 s."""
+    """Never lost while the daemon lives: kept, and sent as history when older than 3 s. Records too."""
     EVENT = "event"
     RESPONSE = "response"
     TRACE = "trace"
@@ -97,9 +98,24 @@ class Sample:
     errors: Mapping[str, FaultCode] = field(default_factory=lambda: NOTHING)
     ages: Mapping[str, float] = field(default_factory=lambda: NOTHING)
 
-    def payload(self, line: str, *, historical: bool = False) -> dict[str, object]:
-        """Return the flat JSON object: all value names, then `unit`, or `units` where there are several."""
-        payload: dict[str, object] = {
+    @property
+    def source(self) -> str:
+        """What counts its `seq`: a device, or one series of records of a device."""
+        return self.device
+
+    @property
+    def history_topic(self) -> str:
+        """The topic under `B` that it goes to when it is no longer live."""
+        return device_topic(self.device, HISTORY)
+
+    @property
+    def grouped(self) -> bool:
+        """On `history_topic` it goes in an array with others; False: alone, as an object."""
+        return True
+
+    def header(self, line: str) -> dict[str, object]:
+        """Return what every payload of a device begins with."""
+        return {
             "v": VERSION,
             "line": line,
             "device": self.device,
@@ -109,6 +125,10 @@ class Sample:
             "time": iso_time(self.ts),
             "clock": self.clock,
         }
+
+    def payload(self, line: str, *, historical: bool = False) -> dict[str, object]:
+        """Return the flat JSON object: all value names, then `unit`, or `units` where there are several."""
+        payload = self.header(line)
         values = self.values or NOTHING
         for name in self.names:
             payload[name] = values.get(name)
@@ -133,8 +153,8 @@ class Publication:
     """One message for the broker; `topic` is under `B`, or a full one after `ELSEWHERE`.
 
     `payload` is an object or an array to be written as JSON, a bare word, or None to clear a retained topic.
-    `sample` is set for kind SAMPLE alone, whose topic is `device/<name>/telemetry`. `refresh`: only newer figures of a
-    retained topic, which may wait where the broker is slow and be replaced by the next.
+    `sample` is set for kind SAMPLE alone, whose topic is `device/<name>/telemetry` or, of records, `record`. `refresh`:
+    only newer figures of a retained topic, which may wait where the broker is slow and be replaced by the next.
     """
 
     topic: str
@@ -166,6 +186,13 @@ def event(kind: str, ts: int, **facts: object) -> Publication:
     return Publication(EVENT, payload, PublicationKind.EVENT, retain=False, qos=1)
 
 
-def dropped(device: str, boot: str, from_seq: int, to_seq: int, *, count: int, ts: int) -> Publication:
-    """Return the event that declares `count` samples lost, within `from_seq`..`to_seq` both included."""
-    return event("dropped", ts, device=device, boot=boot, from_seq=from_seq, to_seq=to_seq, count=count)
+def dropped(source: str, boot: str, from_seq: int, to_seq: int, *, count: int, ts: int) -> Publication:
+    """Return the event that declares `count` samples lost, within `from_seq`..`to_seq` both included.
+
+    That of records, whose source is `<device>/record`, says so: `"topic":"record"`.
+    """
+    device, _, topic = source.partition("/")
+    lost: dict[str, object] = {"device": device, "boot": boot, "from_seq": from_seq, "to_seq": to_seq, "count": count}
+    if topic:
+        lost["topic"] = topic
+    return event("dropped", ts, **lost)

@@ -2,7 +2,7 @@
 
 `on_event` and `tick` return publications and keep what the next burst needs; nothing here waits, reads a clock
 or knows a broker. The rules of the line are in `line_state`, those of a device in `device_state`, rise and clear of
-errors in `alarms`, statistics in `counters`.
+errors in `alarms`, statistics in `counters`, the wind in `wind_station`.
 
 While the port is lost, or freed for another program (activity `paused`), the devices' own errors are masked:
 one error of the line instead of one per device, and while paused none at all. The poller gives each device
@@ -42,6 +42,7 @@ from lfs10d.telemetry.publication import (
     iso_time,
     retained,
 )
+from lfs10d.telemetry.wind_station import WindStation
 
 STATS_EVERY: Final = 30.0
 """Seconds between two publications of the statistics."""
@@ -69,6 +70,7 @@ class Station:
         self._last_seqs: dict[str, int] = {}
         """Last sample number used of each device that was removed."""
         self._devices = {info.name: self._new_device(info, now) for info in devices}
+        self._wind = WindStation(line.name, daemon.boot, devices, now)
         self._states_due: float | None = None
         self._stats_due = now.mono + STATS_EVERY
 
@@ -116,6 +118,8 @@ class Station:
                 self._stats_due = now.mono + STATS_EVERY
             published.append(self._line.stats(now, backlog))
             published += [device.stats(now) for device in self._devices.values()]
+        if self._wind.due <= now.mono:
+            published += self._wind.tick(now)
         return published
 
     def _next_state(self) -> float | None:
@@ -124,7 +128,8 @@ class Station:
 
     def due(self) -> float:
         """Return the monotonic time at which `tick` is wanted next."""
-        return self._stats_due if self._states_due is None else min(self._states_due, self._stats_due)
+        due = min(self._stats_due, self._wind.due)
+        return due if self._states_due is None else min(self._states_due, due)
 
     def burst(self, now: Instant, backlog: BacklogStats = NOTHING_WAITS) -> list[Publication]:
         """Return every retained topic in its newest form, `B/availability` excepted."""
@@ -136,14 +141,14 @@ class Station:
             self._line.error(),
             self._line.stats(now, backlog),
         ]
-        for device in self._devices.values():
-            published += device.burst(now)
+        for name, device in self._devices.items():
+            published += [*device.burst(now), *self._wind.burst(name, now)]
         return published
 
     def topics(self) -> frozenset[str]:
         """Return every retained topic of this daemon, `B/availability` excepted."""
         leaves = (device_topic(name, leaf) for name in self._devices for leaf in RETAINED_LEAVES)
-        return frozenset((*LINE_TOPICS, *leaves))
+        return frozenset((*LINE_TOPICS, *leaves, *self._wind.topics()))
 
     def configure(self, line: LineInfo, devices: Sequence[DeviceInfo], now: Instant) -> list[Publication]:
         """Take the configuration as it is now; return the difference, with the topics of removed devices cleared.
@@ -169,6 +174,7 @@ class Station:
             configured[info.name] = device
         self._devices = configured
         self._states_due = self._next_state()
+        published += self._wind.configure(devices, now)
         published += self._line.reconfigure(line)
         list_now = self._device_list()
         if list_now != list_before:
@@ -214,7 +220,9 @@ class Station:
             "time": iso_time(ts),
             "info": self._daemon.payload(started=self._started_ts, clock=self._clock),
             "line": self._line.snapshot(now),
-            "devices": [device.snapshot(now) for device in self._devices.values()],
+            "devices": [
+                {**device.snapshot(now), **self._wind.snapshot(name)} for name, device in self._devices.items()
+            ],
         }
 
     def summary(self, now: Instant) -> str:
@@ -238,6 +246,7 @@ class Station:
             self._line.counters.overran(reading.overruns)
         if reading.fault is None or reading.fault.code not in PORT_CODES:
             self._line.counters.polled(reading, since_last)
+        self._wind.on_reading(reading, now)
         due = device.state_due
         if due is not None and (self._states_due is None or due < self._states_due):
             self._states_due = due

@@ -3,7 +3,8 @@
 Pure.
 
 Times are whole milliseconds of a clock that never goes back. A mean with less than half its window covered is None.
-After a discontinuity (ICAO Annex 3, appendix 3, 4.1.3.2) only what came after it counts: the last 2 min.
+After a discontinuity (ICAO Annex 3, appendix 3, 4.1.3.1) only what came after it counts: the last 2 min, and the gusts
+that lie wholly within them.
 """
 
 from __future__ import annotations
@@ -13,9 +14,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from lfs10d.reading import Number
+from lfs10d.reading import Number, Value
 from lfs10d.telemetry.wind_direction import VARIABLE_BELOW, VARIABLE_FROM, DirectionSeries, Vector
-from lfs10d.telemetry.wind_speed import Extremes, Mean, Peak, SpeedSeries
+from lfs10d.telemetry.wind_speed import GUST_OVER, Extremes, Mean, Peak, SpeedSeries
 
 MINUTE: Final = 60_000
 SHORT: Final = 2 * MINUTE
@@ -25,7 +26,7 @@ METRES_PER_SECOND: Final = {"m/s": 1.0, "km/h": 1 / 3.6, "kn": 1852 / 3600, "mph
 """What one of each unit is in m/s: a value in another has no statistics."""
 
 DISCONTINUITY: Final = 5.0
-"""m/s by which the mean of 2 min differs from that of the 10 min before (ICAO Annex 3, appendix 3, 4.1.3.2)."""
+"""m/s by which the mean of 2 min differs from that of the 10 min before (ICAO Annex 3, appendix 3, 4.1.3.1)."""
 
 GUST_REPORTED: Final = 5.0
 """m/s by which a gust exceeds the mean of 10 min to be reported (ICAO Annex 3, appendix 3, 4.1.5.2)."""
@@ -82,15 +83,16 @@ class MeasuredWind:
         self._speed = SpeedSeries()
         self._direction = DirectionSeries()
 
-    def on_values(self, values: Mapping[str, Number | None], at: int, hold: int) -> None:
-        """Take what was measured at `at`; each value holds until the next, for `hold` at most."""
+    def on_values(self, values: Mapping[str, Value | None], ages: Mapping[str, float], at: int, hold: int) -> None:
+        """Take what was measured at `at`, but for values with an age, which are of an earlier poll.
+
+        Each value holds until the next, for `hold` at most.
+        """
         names = self.values
-        speed = None if names.speed is None else values.get(names.speed)
-        if speed is not None:
-            self._speed.add(at, speed, hold)
-        direction = None if names.direction is None else values.get(names.direction)
-        if direction is not None:
-            self._direction.add(at, direction, hold)
+        for name, series in ((names.speed, self._speed), (names.direction, self._direction)):
+            value = None if name is None or name in ages else values.get(name)
+            if isinstance(value, int | float):
+                series.add(at, value, hold)
 
     def end(self, at: int) -> None:
         """Take that nothing holds beyond `at`: the device is no longer measured."""
@@ -116,6 +118,14 @@ class MeasuredWind:
             self._direction.samples(begin, end),
         )
 
+    def samples(self, totals: WindTotals) -> int:
+        """Return how many values of the series were measured whose coverage is published."""
+        return totals.directions if self.values.speed is None else totals.extremes.samples
+
+    def covered(self, totals: WindTotals) -> int:
+        """Return the milliseconds of that series."""
+        return totals.vector.covered if self.values.speed is None else totals.mean.covered
+
     def figures(self, now: int, shift: int, *, undersampled: bool) -> dict[str, object]:
         """Return the figures of the topic `wind`; `shift` is the wall clock less the clock of `now`, in ms."""
         figures = self._speeds(now, shift, undersampled=undersampled)
@@ -131,7 +141,7 @@ class MeasuredWind:
         window = SHORT if discontinuity else LONG
         long = short if discontinuity else speed.mean(now - LONG, now)
         whole = speed.extremes(now - LONG + 1, now + 1)
-        peaks = speed.extremes(now - SHORT + 1, now + 1) if discontinuity else whole
+        peaks = speed.extremes(now - SHORT + GUST_OVER, now + 1) if discontinuity else whole
         gust, lull = (None, None) if undersampled else (peaks.gust, peaks.lull)
         newest = None if undersampled or now >= speed.held_until else speed.newest_gust()
         mean = round(long.mean, SPEED_DECIMALS) if _means(long, window) else None

@@ -11,16 +11,16 @@ from dataclasses import dataclass
 from math import asin, atan2, cos, degrees, hypot, radians, sin, sqrt
 from typing import Final
 
-from lfs10d.telemetry.wind_series import BLOCK, Series
+from lfs10d.telemetry.wind_series import BLOCK, HeldSeries
 
 RESULTANT_LEAST: Final = 0.05
 """Length of the mean vector below which it has no direction."""
 
 VARIABLE_FROM: Final = 60
-"""Degrees within 10 min from which a direction is variable (ICAO Annex 3, appendix 3, 4.1.4)."""
+"""Degrees within 10 min from which a direction is variable (ICAO Annex 3, appendix 3, 4.1.5.2)."""
 
 VARIABLE_BELOW: Final = 180
-"""Degrees from which no extremes are reported (ICAO Annex 3, appendix 3, 4.1.4)."""
+"""Degrees from which no extremes are reported (ICAO Annex 3, appendix 3, 4.1.5.2)."""
 
 CIRCLE: Final = 360
 
@@ -88,7 +88,7 @@ def spread(seen: int) -> Spread | None:
     return Spread(CIRCLE - 1 - len(widest), begin + 1, place + 1)
 
 
-class DirectionSeries(Series):
+class DirectionSeries(HeldSeries):
     """The directions of one vane."""
 
     __slots__ = ("_covered", "_east", "_north", "_samples", "_seen")

@@ -26,14 +26,14 @@ _LATEST: Final = 2**31
 """Milliseconds after the first entry's origin at which times are counted from a newer one: they have 32 bits."""
 
 
-class Parts(NamedTuple):
+class WindowParts(NamedTuple):
     """The entries of a window: half-open ranges of raw ones, and the whole blocks between them."""
 
     raw: tuple[tuple[int, int], ...]
     blocks: slice
 
 
-class Series:
+class HeldSeries:
     """Entries in order of time: a good value, or a gap (not a number) that begins where a value holds no longer."""
 
     __slots__ = ("_origin", "_times", "_values", "held_until", "newest")
@@ -93,23 +93,23 @@ class Series:
 
     # What a window is made of
 
-    def _measured(self, begin: int, end: int) -> Parts:
+    def _measured(self, begin: int, end: int) -> WindowParts:
         """Return the entries that begin within [begin, end)."""
         first, last = bisect_left(self._times, begin - self._origin), bisect_left(self._times, end - self._origin)
         return self._parts(first, max(first, last), first, last)
 
-    def _holding(self, begin: int, end: int) -> Parts:
+    def _holding(self, begin: int, end: int) -> WindowParts:
         """Return the entries that may hold within [begin, end); only raw ones begin before it or hold beyond it."""
         first = max(0, bisect_right(self._times, begin - self._origin) - 1)
         last = max(first, bisect_left(self._times, end - self._origin))
         return self._parts(first, last, first + 1, last - 1)
 
-    def _parts(self, first: int, last: int, inner_first: int, inner_last: int) -> Parts:
+    def _parts(self, first: int, last: int, inner_first: int, inner_last: int) -> WindowParts:
         """Return entries `first` to `last` with whole blocks from between `inner_first` and `inner_last`."""
         block, blocks = -(-inner_first // BLOCK), min(inner_last // BLOCK, self._closed())
         if block >= blocks:
-            return Parts(((first, last),), slice(0, 0))
-        return Parts(((first, block * BLOCK), (blocks * BLOCK, last)), slice(block, blocks))
+            return WindowParts(((first, last),), slice(0, 0))
+        return WindowParts(((first, block * BLOCK), (blocks * BLOCK, last)), slice(block, blocks))
 
     def _held(self, first: int, last: int, begin: int, end: int) -> Iterator[tuple[float, int]]:
         """Yield each value of these entries with the milliseconds for which it holds within [begin, end)."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from math import inf, sqrt
 from typing import Final
 
-from lfs10d.telemetry.wind_series import BLOCK, Series
+from lfs10d.telemetry.wind_series import BLOCK, HeldSeries
 
 GUST_OVER: Final = 3000
 """Milliseconds of a gust's mean (WMO-No. 8)."""
@@ -101,7 +101,7 @@ class _Blocks:
         )  # fmt: skip
 
 
-class SpeedSeries(Series):
+class SpeedSeries(HeldSeries):
     """The speeds of one anemometer."""
 
     __slots__ = ("_blocks", "_zero")

@@ -69,7 +69,7 @@ def test_the_smallest_file_gets_every_default() -> None:
         },
         "commands": ("polling", "sensors"),
         "homeassistant": {"discovery": False, "prefix": "homeassistant"},
-        "wind": {"every": 10.0},
+        "wind": {"every": 10.0, "records": 600.0},
         "store": {"max_size": 512_000_000, "max_age": 604800.0},
         "log": {"level": "info", "format": "auto"},
     }

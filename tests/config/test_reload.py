@@ -58,6 +58,8 @@ def wanted(found: ReloadPlan) -> set[str]:
             {"broker", "publishing"},
             ("mqtt.host", "mqtt.state_every"),
         ),
+        ("slaves:", "wind: {every: 1m}\nslaves:", {"publishing"}, ("wind.every",)),
+        ("slaves:", "wind: {records: 0}\nslaves:", {"publishing"}, ("wind.records",)),
         ("slaves:", "log: {level: debug}\nslaves:", {"log"}, ("log.level",)),
         ("slaves:", "commands: []\nslaves:", set(), ("commands",)),
     ],

@@ -9,6 +9,8 @@ import pytest
 from lfs10d.config.loader import LoadedConfig, load
 from lfs10d.daemon.settings import config_hash, device_infos, line_info
 from lfs10d.line.budget import timing_of
+from lfs10d.telemetry.info import WindInfo
+from lfs10d.telemetry.wind import WindValues
 
 FILE = """
 line:
@@ -71,3 +73,30 @@ def test_the_hash_tells_configurations_apart(loaded: LoadedConfig, tmp_path: Pat
     assert config_hash(load(same).config) == config_hash(loaded.config)
     assert config_hash(load(other).config) != config_hash(loaded.config)
     assert len(config_hash(loaded.config)) == 12
+
+
+VANE = (
+    "{name: sonic, title: Sonic, values: ["
+    "{name: gust, register: 1, type: uint16, unit: UNIT, device_class: wind_speed}, "
+    "{name: from, register: 2, type: uint16, unit: \u00b0, device_class: wind_direction}]}"
+)
+
+
+@pytest.mark.parametrize(
+    ("unit", "values"),
+    [("km/h", WindValues("gust", "from", "km/h")), ("furlongs", WindValues(None, "from", None))],
+)
+def test_a_device_has_wind_statistics_of_the_first_values_of_their_classes_in_a_unit_that_is_known(
+    tmp_path: Path, unit: str, values: WindValues
+) -> None:
+    (tmp_path / "sonic.yaml").write_text(VANE.replace("UNIT", unit))
+    file = tmp_path / "lfs10d.yaml"
+    file.write_text(
+        "line: {port: tty}\nslaves: [{id: 3, profile: sonic.yaml}, 4, {id: 5, profile: eh600}]\n"
+        "mqtt: {host: localhost}\nwind: {every: 1m, records: 1h}\n"
+    )
+    config = load(file)
+    sonic, lfs10, inverter = (each.wind for each in device_infos(config.config, config.profiles))
+    assert sonic == WindInfo(values, every=60.0, records=3600.0)
+    assert lfs10 == WindInfo(WindValues("wind_speed", None, "m/s"), every=60.0, records=3600.0)
+    assert inverter is None

@@ -115,7 +115,7 @@ def test_every_key_of_the_full_example_has_its_entry() -> None:
 
 
 def test_the_page_has_a_part_for_every_section_of_the_file() -> None:
-    assert set(parts()) == (set(Config.model_fields) - {"wind"}) | {"later", "profiles"}
+    assert set(parts()) == set(Config.model_fields) | {"profiles"}
 
 
 @pytest.mark.parametrize("topic", [row.topic for row in OUTBOUND])

@@ -11,7 +11,9 @@ from lfs10d.mqtt.encoding import packet_size
 from lfs10d.mqtt.messages import Accepted
 from lfs10d.mqtt.settings import Version
 from lfs10d.outbox.backlog import BATCH_BYTES
-from tests.support.outbox_items import batch
+from lfs10d.outbox.history import QueuedSample
+from lfs10d.outbox.items import HistoryBatch
+from tests.support.outbox_items import batch, record
 
 TOPIC = "b/line0/device/a/history"
 
@@ -51,3 +53,10 @@ def test_one_sample_is_never_cut() -> None:
     assembly = BatchAssembly(batch("a", 1), 10)
     assert assembly.serialise_some("line0") is None
     assert assembly.complete
+
+
+def test_a_record_is_an_object_by_itself_and_says_that_it_waited() -> None:
+    assembly = BatchAssembly(HistoryBatch((QueuedSample(record(3), 0.0),)), 100_000)
+    assert assembly.serialise_some("line0") is None
+    assert json.loads(assembly.payload) == record(3).payload("line0", historical=True)
+    assert json.loads(assembly.payload)["historical"] is True

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from lfs10d.outbox.history import History, QueuedSample
 from lfs10d.telemetry.publication import Sample
+from tests.support.outbox_items import record
 
 
 def queued(device: str, seq: int, since: float | None = None, *, repeated: bool = False) -> QueuedSample:
@@ -156,3 +157,14 @@ def test_it_tells_whether_a_sample_of_a_key_waits() -> None:
     assert one.key in history
     history.take(1)
     assert one.key not in history
+
+
+def test_a_device_s_records_wait_beside_its_samples_and_go_one_by_one() -> None:
+    history = History()
+    history.extend([queued("a", 1), queued("a", 2), QueuedSample(record(1, "a"), 0.5), QueuedSample(record(2, "a"), 3)])
+    assert ("a/record", "k") in history
+    assert [each.sample for each in history.take(100)] == [record(1, "a")]
+    assert seqs(history.take(100)) == [("a", 1), ("a", 2)]
+    assert not history.waits({"a/record"})
+    assert history.take(100, {"a/record"}) == ()
+    assert [each.sample for each in history.take(100, {"a"})] == [record(2, "a")]

@@ -10,7 +10,7 @@ from lfs10d.outbox.history import QueuedSample
 from lfs10d.outbox.items import HistoryBatch, LiveSample, LossNotice, Message, OutboxItem, Retained, samples_of
 from lfs10d.outbox.losses import Loss
 from lfs10d.telemetry.publication import Publication, PublicationKind, event, retained
-from tests.support.outbox_items import live
+from tests.support.outbox_items import live, record, recorded
 from tests.support.samples import SAMPLE
 
 KEPT = QueuedSample(SAMPLE, since=0.0)
@@ -25,6 +25,7 @@ LIVE = Publication("device/mast-top/telemetry", {}, PublicationKind.SAMPLE, reta
         (Message(event("device_added", 0), b"c"), "event", ()),
         (LiveSample(LIVE, KEPT), "device/mast-top/telemetry", (KEPT,)),
         (HistoryBatch((KEPT, NEXT)), "device/mast-top/history", (KEPT, NEXT)),
+        (HistoryBatch((QueuedSample(record(1), 0.0),)), "device/a/record", (QueuedSample(record(1), 0.0),)),
         (LossNotice(Loss("mast-top", "k3f9a2c7", 1, 2, 2)), "event", ()),
     ],
 )
@@ -53,3 +54,12 @@ def test_a_live_sample_is_given_the_time_that_the_clock_tells_now_in_its_payload
     }  # fmt: skip
     assert right.publication.sample == right.queued.sample
     assert right.at(90_000) is right, "its clock was synchronised"
+
+
+def test_a_live_record_is_given_the_time_that_the_clock_tells_now_in_all_its_times() -> None:
+    measured = record(1, clock="unsynced")
+    early = LiveSample(replace(recorded(1), sample=measured), QueuedSample(measured, 0.0, shift=0))
+    payload = early.at(60_000).publication.payload
+    assert payload == replace(measured, ts=660_000, clock="synced").payload("line0")
+    assert isinstance(payload, dict)
+    assert (payload["from"], payload["to"], payload["gust_ts"]) == (60_000, 660_000, 658_750)

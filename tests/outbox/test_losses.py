@@ -39,7 +39,7 @@ def test_devices_are_declared_apart() -> None:
     losses = Losses()
     losses.add(sample(1, "a"))
     losses.add(sample(2, "b"))
-    assert {loss.device for loss in all_of(losses)} == {"a", "b"}
+    assert {loss.source for loss in all_of(losses)} == {"a", "b"}
 
 
 def test_nothing_lost_is_nothing_declared() -> None:

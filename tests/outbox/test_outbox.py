@@ -1034,7 +1034,7 @@ class OutboxLaws(RuleBasedStateMachine):
                 break
             self.now = max(self.now, due)
         assert self.outbox.depth == 0
-        covered = {(loss.device, seq) for loss in self.declared for seq in range(loss.from_seq, loss.to_seq + 1)}
+        covered = {(loss.source, seq) for loss in self.declared for seq in range(loss.from_seq, loss.to_seq + 1)}
         measured = {(device, seq) for device, last in self.seqs.items() for seq in range(1, last + 1)}
         assert self.delivered | covered == measured
         assert sum(loss.count for loss in self.declared) == self.outbox.dropped

@@ -5,13 +5,14 @@ from __future__ import annotations
 import pytest
 
 from lfs10d.outbox.backlog import HISTORY_AFTER, Backlog
+from lfs10d.outbox.history import QueuedSample
 from lfs10d.outbox.items import HistoryBatch, LossNotice
 from lfs10d.outbox.losses import Loss
 from lfs10d.outbox.queues import BURST_FIRST, Queues
 from lfs10d.outbox.refusals import Refusals
 from lfs10d.outbox.suspects import Culprit, Suspects
 from lfs10d.telemetry import publication
-from tests.support.outbox_items import batch, event, live, queued, retained, trace
+from tests.support.outbox_items import batch, event, live, queued, record, retained, trace
 
 NOT_AUTHORIZED = 0x87
 QUOTA = 0x97
@@ -58,9 +59,20 @@ def test_no_history_while_the_batch_before_is_not_on_its_way_or_samples_are_not_
     waiting.backlog.history.add(queued("h", 1))
     assert waiting.queues.next(0.0, batch=False) is None
     assert waiting.queues.due() is not None
-    waiting.queues.telemetry = False
+    waiting.backlog.telemetry = False
     assert waiting.queues.next(0.0, batch=True) is None
     assert waiting.queues.due() is None
+
+
+def test_records_go_though_samples_are_not_wanted(waiting: Waiting) -> None:
+    waiting.backlog.telemetry = False
+    waiting.backlog.history.add(queued("h", 1))
+    waiting.backlog.history.add(QueuedSample(record(1, "h"), 5.0))
+    assert waiting.queues.due() is not None
+    batch = waiting.queues.next(0.0, batch=True)
+    assert isinstance(batch, HistoryBatch)
+    assert batch.topic == "device/h/record"
+    assert waiting.queues.next(10.0, batch=True) is None
 
 
 def test_a_burst_keeps_everything_else_back_for_ten_seconds(waiting: Waiting) -> None:

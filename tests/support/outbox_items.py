@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from lfs10d.outbox.history import QueuedSample
 from lfs10d.outbox.items import HistoryBatch, LiveSample, Message, Retained
+from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry import publication
 from lfs10d.telemetry.publication import Publication, PublicationKind, Sample
+from lfs10d.telemetry.wind_record import RECORD_NAMES, WindRecord
 
 
 def queued(device: str, seq: int, *, since: float = 0.0, row: int | None = None) -> QueuedSample:
@@ -40,3 +42,17 @@ def event(name: str) -> Message:
 def trace() -> Message:
     """Return a trace."""
     return Message(Publication("line/trace", {}, PublicationKind.TRACE, retain=False, qos=0))
+
+
+def record(seq: int, device: str = "a", *, boot: str = "k", clock: ClockState = "synced") -> WindRecord:
+    """Return a record of ten minutes that ends at 600 x seq s."""
+    values = {"length": 600_000, "mean": 5.25, "gust": 9.5, "gust_before": 1250, "samples": 2400, "coverage": 1.0}
+    ts, units = 600_000 * seq, {"mean": "m/s"}
+    return WindRecord(device, boot, seq, ts, clock, values, units, RECORD_NAMES, "good", None, None)
+
+
+def recorded(seq: int, device: str = "a") -> Publication:
+    """Return what publishes a record."""
+    sample = record(seq, device)
+    payload = sample.payload("line0")
+    return Publication(sample.history_topic, payload, PublicationKind.SAMPLE, retain=False, qos=1, sample=sample)

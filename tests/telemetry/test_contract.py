@@ -28,6 +28,8 @@ def test_every_topic_of_the_contract_has_one_row() -> None:
         ("device/+/availability", True, 1),
         ("device/+/error", True, 1),
         ("device/+/stats", True, 0),
+        ("device/+/wind", True, 1),
+        ("device/+/record", False, 1),
         ("event", False, 1),
         ("response/+/+", False, 1),
         ("response/+", False, 1),
@@ -40,7 +42,7 @@ def test_errors_of_line_and_devices_have_one_form(topic: str) -> None:
     assert isinstance(check(topic, FINE), NoError)
 
 
-@pytest.mark.parametrize("topic", ["device/mast-top", "device/a/b/error", "weather", "device/a/wind"])
+@pytest.mark.parametrize("topic", ["device/mast-top", "device/a/b/error", "weather", "device/a/winds"])
 def test_a_topic_nobody_promised_is_unknown(topic: str) -> None:
     with pytest.raises(KeyError):
         outbound(topic)

@@ -141,3 +141,15 @@ def test_dropped_declares_which_numbers_are_gone() -> None:
 )
 def test_a_topic_tells_whose_it_is(topic: str, device: str | None) -> None:
     assert device_of(topic, "state") == device
+
+
+def test_a_loss_of_records_says_so() -> None:
+    lost = dropped("mast-top/record", "k3f9a2c7", 3, 5, count=3, ts=7).payload
+    assert lost == {
+        "v": 1, "type": "dropped", "ts": 7, "device": "mast-top", "boot": "k3f9a2c7", "from_seq": 3, "to_seq": 5,
+        "count": 3, "topic": "record",
+    }  # fmt: skip
+
+
+def test_a_sample_is_counted_by_its_device_and_grouped_on_history() -> None:
+    assert (SAMPLE.source, SAMPLE.history_topic, SAMPLE.grouped) == ("mast-top", "device/mast-top/history", True)

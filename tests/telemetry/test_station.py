@@ -34,6 +34,7 @@ from tests.support.stations import (
     station,
     topics,
 )
+from tests.support.winds import ANEMOMETER
 
 # -- the burst ----------------------------------------------------------------------------------------------------
 
@@ -506,3 +507,31 @@ def test_another_pace_of_states_is_taken_up_by_a_reload() -> None:
     running.configure(LINE, [replace(slow, state_every=5.0)], instant(3.0))
     assert running.due() == 8.0
     assert [each.topic for each in running.tick(instant(8.0))] == ["device/a/state"]
+
+
+# -- the wind -----------------------------------------------------------------------------------------------------
+
+
+def test_the_wind_of_a_device_is_in_every_burst_among_the_topics_and_in_the_snapshot() -> None:
+    running = station(ANEMOMETER, TWO_VALUES)
+    assert topics(running.burst(instant(0))).count("device/a/wind") == 1
+    assert running.topics() == set(topics(running.burst(instant(0))))
+    assert "wind" in cast("list[dict[str, object]]", running.snapshot(instant(0))["devices"])[0]
+    assert "wind" not in cast("list[dict[str, object]]", running.snapshot(instant(0))["devices"])[1]
+
+
+def test_the_wind_is_published_by_time_from_readings_as_they_come() -> None:
+    running = station(ANEMOMETER)
+    for second in range(1, 10):
+        assert running.on_event(good("a", second), instant(second))
+    assert running.due() <= 10.01
+    published = [each for each in running.tick(instant(10.01)) if each.topic == "device/a/wind"]
+    assert [fields(each.payload, "samples_10m", "gust_3s") for each in published] == [(9, 12.34)]
+
+
+def test_a_device_added_shows_its_wind_and_one_that_is_gone_clears_it() -> None:
+    running = station(TWO_VALUES)
+    added = running.configure(LINE, [TWO_VALUES, ANEMOMETER], instant(1))
+    assert topics(added).count("device/a/wind") == 1
+    gone = running.configure(LINE, [TWO_VALUES], instant(2))
+    assert [each.payload for each in gone if each.topic == "device/a/wind"] == [None]

@@ -132,7 +132,7 @@ class Series:
     """What many samples have in common, as one row of its own; `repeated`: the broker has acknowledged them once."""
 
     boot: str
-    device: str
+    source: str
     quality: Quality
     error: str | None
     names: tuple[str, ...]
@@ -143,12 +143,12 @@ class Series:
     def of(cls, sample: Sample, *, repeated: bool) -> Series:
         """Return the series a sample belongs to."""
         units = tuple(sample.units.items())
-        return cls(sample.boot, sample.device, sample.quality, sample.error, sample.names, units, repeated)
+        return cls(sample.boot, sample.source, sample.quality, sample.error, sample.names, units, repeated)
 
     @property
     def text(self) -> str:
         """JSON, from which `parse` makes the same."""
-        facts = [self.boot, self.device, self.quality, self.error, self.names, self.units, self.repeated]
+        facts = [self.boot, self.source, self.quality, self.error, self.names, self.units, self.repeated]
         return json.dumps(facts, ensure_ascii=False, separators=(",", ":"))
 
     @classmethod

@@ -27,6 +27,7 @@ from lfs10d.outbox.store.row import (
 )
 from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry.publication import Sample
+from lfs10d.telemetry.wind_record import WindRecord, device_of_source, is_record
 
 EVICTED_AT_ONCE = 256
 """Samples evicted in one go: two pages."""
@@ -133,7 +134,7 @@ class SampleFile:
         series_id, series, base = self._catalogue.place(sample, entry.shift, repeated=entry.repeated)
         key, at, rtt = self.next, sample.ts - base, pack_rtt(sample.rtt_ms)
         cells = values_of(sample)
-        if not self._wide and beyond_first_schema(cells):
+        if not self._wide and (beyond_first_schema(cells) or is_record(sample.source)):
             database.widen(self._db)
             self._wide = True
         first, *others = cells or (None,)
@@ -177,8 +178,9 @@ class SampleFile:
         if check(series.text, seq, at, rtt, value, *others) != checked:
             raise DamagedError("a sample is not what was written")
         content = content_of(series, (value, *others))
-        sample = Sample(
-            device=series.device,
+        form = WindRecord if is_record(series.source) else Sample
+        sample = form(
+            device=device_of_source(series.source),
             boot=series.boot,
             seq=seq,
             ts=era.base + at,
@@ -236,7 +238,7 @@ class SampleFile:
             for key, series_id, seq, _ in found:
                 _, series = self._catalogue.find(series_id)
                 if key not in delivered and not series.repeated:
-                    loss = Loss(series.device, series.boot, seq, seq, 1)
+                    loss = Loss(series.source, series.boot, seq, seq, 1)
                     lost[loss.key] = joined([*lost.get(loss.key, ()), loss], RANGES_MOST)
             self._delete(found[0][0], found[-1][0])
         return tuple(loss for losses in lost.values() for loss in losses)
@@ -270,7 +272,7 @@ class SampleFile:
             self._db.execute("DELETE FROM loss")
             self._db.executemany(
                 "INSERT INTO loss VALUES (?, ?, ?, ?, ?)",
-                [(each.device, each.boot, each.from_seq, each.to_seq, each.count) for each in losses],
+                [(each.source, each.boot, each.from_seq, each.to_seq, each.count) for each in losses],
             )
             self.losses = tuple(losses)
 

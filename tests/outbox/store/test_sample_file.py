@@ -16,6 +16,8 @@ from lfs10d.outbox.store.row import DamagedError
 from lfs10d.outbox.store.sample_file import SampleFile, runs
 from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry.publication import Sample
+from lfs10d.telemetry.wind_record import WindRecord
+from tests.support.outbox_items import record
 from tests.support.rows import BOOT, ROOMY, START, entries, sample
 
 NOW = START + 60_000
@@ -439,3 +441,31 @@ def test_a_file_with_flipped_bits_never_holds_a_wrong_sample(written: Written, t
         flipped[place] ^= 1 << place % 8
         for each in written.opened(tmp_path / "copy", bytes(flipped), b"") or []:
             assert each == known[each.seq]
+
+
+# Records
+
+
+def test_records_come_back_as_they_were_beside_the_samples_of_their_device(file: SampleFile, path: Path) -> None:
+    kept_ones = [sample(1), record(1, boot=BOOT), sample(2), record(2, boot=BOOT)]
+    keep(file, *kept_ones)
+    again = reopened(file, path)
+    assert kept(again) == kept_ones
+    assert [type(each) for each in kept(again)] == [Sample, WindRecord, Sample, WindRecord]
+    again.close()
+
+
+def test_a_record_that_is_evicted_is_a_loss_of_records(path: Path) -> None:
+    file = SampleFile(path, boot=BOOT, limits=Limits(size=ROOMY.size, age=1000))
+    file.append(entries(record(1, boot=BOOT), shift=0), losses=(), now=NOW, mono=600_000)
+    lost = file.append(entries(sample(2, ts=700_000), shift=0), losses=(), now=NOW, mono=700_000)
+    assert lost == (Loss("a/record", BOOT, 1, 1, 1),)
+    assert file.losses == lost
+    file.close()
+
+
+def test_a_clock_set_right_moves_all_times_of_a_record(file: SampleFile) -> None:
+    keep(file, record(1, boot=BOOT, clock="unsynced"), shift=0)
+    file.correct(5000)
+    [right] = kept(file)
+    assert right == replace(record(1, boot=BOOT), ts=605_000)
