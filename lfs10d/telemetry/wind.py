@@ -45,6 +45,9 @@ BEAUFORT: Final = (0.3, 1.6, 3.4, 5.5, 8.0, 10.8, 13.9, 17.2, 20.8, 24.5, 28.5, 
 
 SPEED_DECIMALS, RATIO_DECIMALS = 6, 4
 
+_NUMBERS: Final = frozenset({int, float})
+"""Types of values that are numbers; a boolean is none."""
+
 
 @dataclass(frozen=True, slots=True)
 class WindValues:
@@ -75,24 +78,25 @@ class WindTotals:
 class MeasuredWind:
     """The wind at a device with these values; `on_values` takes good ones alone."""
 
-    __slots__ = ("_direction", "_factor", "_speed", "values")
+    __slots__ = ("_direction", "_factor", "_inputs", "_speed", "values")
 
     def __init__(self, values: WindValues) -> None:
         self.values = values
         self._factor = METRES_PER_SECOND.get(values.unit or "", 1.0)
         self._speed = SpeedSeries()
         self._direction = DirectionSeries()
+        inputs = ((values.speed, self._speed), (values.direction, self._direction))
+        self._inputs = tuple((name, series) for name, series in inputs if name is not None)
 
     def on_values(self, values: Mapping[str, Value | None], ages: Mapping[str, float], at: int, hold: int) -> None:
         """Take what was measured at `at`, but for values with an age, which are of an earlier poll.
 
         Each value holds until the next, for `hold` at most.
         """
-        names = self.values
-        for name, series in ((names.speed, self._speed), (names.direction, self._direction)):
-            value = None if name is None or name in ages else values.get(name)
-            if isinstance(value, int | float):
-                series.add(at, value, hold)
+        for name, series in self._inputs:
+            value = values.get(name)
+            if type(value) in _NUMBERS and name not in ages:
+                series.add(at, value, hold)  # type: ignore[arg-type] # a number
 
     def end(self, at: int) -> None:
         """Take that nothing holds beyond `at`: the device is no longer measured."""

@@ -41,19 +41,15 @@ class WindClock:
 
     def at(self, reading_at: float, now: Instant) -> int:
         """Return the time of a reading, whose time by the monotonic clock is `reading_at`, as seen at `now`."""
-        self._look(now)
-        return now.ts(reading_at) - self._shift
+        ahead = now.wall - now.mono
+        if not -EVEN_WITHIN <= ahead * 1000 - self._shift <= EVEN_WITHIN:
+            self._shift = round(ahead * 1000)
+        return round((ahead + reading_at) * 1000) - self._shift
 
     def moment(self, now: Instant) -> WindMoment:
         """Return the moment `now`."""
-        self._look(now)
         ts = now.ts()
-        return WindMoment(ts - self._shift, ts, now.clock)
-
-    def _look(self, now: Instant) -> None:
-        shift = _shift(now)
-        if abs(shift - self._shift) > EVEN_WITHIN:
-            self._shift = shift
+        return WindMoment(self.at(now.mono, now), ts, now.clock)
 
 
 def _shift(now: Instant) -> int:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from array import array
 from dataclasses import dataclass
-from math import asin, atan2, cos, degrees, hypot, radians, sin, sqrt
+from math import asin, atan2, cos, degrees, hypot, isnan, radians, sin, sqrt
 from typing import Final
 
 from lfs10d.telemetry.wind_series import BLOCK, HeldSeries
@@ -124,7 +124,7 @@ class DirectionSeries(HeldSeries):
         return spread(seen)
 
     def _good(self, first: int, last: int) -> list[float]:
-        return [value for value in self._values[first:last] if value == value]  # noqa: PLR0124 - a gap is not a number
+        return [value for value in self._values[first:last] if not isnan(value)]
 
     def _bits(self, first: int, last: int) -> int:
         seen = 0
@@ -133,13 +133,10 @@ class DirectionSeries(HeldSeries):
         return seen
 
     def _sums(self, first: int, last: int, begin: int, end: int) -> tuple[float, float, float]:
-        covered = north = east = 0.0
-        for value, held in self._held(first, last, begin, end):
-            angle = radians(value)
-            covered += held
-            north += cos(angle) * held
-            east += sin(angle) * held
-        return covered, north, east
+        values, times = self._held(first, last, begin, end)
+        pairs = [(radians(value), held) for value, held in zip(values, times, strict=True) if not isnan(value)]
+        north, east = sum(cos(angle) * held for angle, held in pairs), sum(sin(angle) * held for angle, held in pairs)
+        return sum(held for _, held in pairs), north, east
 
     def _closed(self) -> int:
         return len(self._covered)

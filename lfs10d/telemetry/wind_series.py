@@ -10,9 +10,8 @@ from __future__ import annotations
 from abc import abstractmethod
 from array import array
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator
-from itertools import pairwise
 from math import nan
+from operator import sub
 from typing import Final, NamedTuple
 
 BLOCK: Final = 32
@@ -36,12 +35,14 @@ class WindowParts(NamedTuple):
 class HeldSeries:
     """Entries in order of time: a good value, or a gap (not a number) that begins where a value holds no longer."""
 
-    __slots__ = ("_origin", "_times", "_values", "held_until", "newest")
+    __slots__ = ("_close_at", "_origin", "_times", "_values", "held_until", "newest")
 
     def __init__(self) -> None:
         self._times = array("I")
         self._values = array("d")
         self._origin = 0
+        self._close_at = BLOCK
+        """Entries with which the next block is complete, and the entry behind it is not known yet."""
         self.newest = 0
         """When the newest value was measured; 0: there is none."""
         self.held_until = 0
@@ -50,46 +51,48 @@ class HeldSeries:
     def add(self, at: int, value: float, hold: int) -> None:
         """Take a good value measured at `at`, which holds for `hold` at most; one before the newest counts as new."""
         at = max(at, self.newest)
-        if not self._times or self.held_until < at - REACH:
-            self._begin(at, value)
-        elif at - self._origin >= _LATEST:
-            self._rebase()
-        if self.held_until < at and self._times:
-            self._append(self.held_until, nan)
-        self._append(at, value)
+        if self.held_until < at:
+            self._resume(at, value)
+        self._times.append(at - self._origin)
+        self._values.append(value)
         self.newest = at
         self.held_until = at + hold
+        if len(self._times) > self._close_at:
+            self._sum_up(at)
 
     def end(self, at: int) -> None:
         """Let the newest value hold no longer than `at`, which is not before it."""
         self.held_until = min(self.held_until, max(at, self.newest))
 
-    def _append(self, at: int, value: float) -> None:
-        self._times.append(at - self._origin)
-        self._values.append(value)
-        closed = self._closed()
-        if len(self._times) > (closed + 1) * BLOCK:
-            self._close(closed * BLOCK)
-            self._trim(at - REACH)
+    def _resume(self, at: int, value: float) -> None:
+        """Note the gap before a value; where nothing before it is in any window the series begins with it."""
+        if self._times and at - REACH <= self.held_until:
+            self._times.append(self.held_until - self._origin)
+            self._values.append(nan)
+            if len(self._times) > self._close_at:
+                self._sum_up(at)
+        else:
+            del self._times[:], self._values[:]
+            self._drop(self._closed())
+            self._close_at = BLOCK
+            self._origin = at
+            self._start(value)
 
-    def _begin(self, at: int, value: float) -> None:
-        """Forget everything: the series begins with `value`."""
-        del self._times[:], self._values[:]
-        self._drop(self._closed())
-        self._origin = at
-        self._start(value)
+    def _sum_up(self, at: int) -> None:
+        """Sum up the block that is complete, and drop what lies before all windows that end at `at` or later.
 
-    def _rebase(self) -> None:
-        oldest = self._times[0]
-        self._times = array("I", [each - oldest for each in self._times])
-        self._origin += oldest
-
-    def _trim(self, horizon: int) -> None:
-        """Drop what lies before `horizon`, but for the entry that may hold at it."""
-        blocks = max(0, bisect_right(self._times, horizon - self._origin) - 1) // BLOCK
+        The entry that may hold at their beginning stays.
+        """
+        self._close(self._close_at - BLOCK)
+        blocks = max(0, bisect_right(self._times, at - REACH - self._origin) - 1) // BLOCK
         if blocks * BLOCK >= _DROPPED_AT_ONCE:
             del self._times[: blocks * BLOCK], self._values[: blocks * BLOCK]
             self._drop(blocks)
+        self._close_at = (self._closed() + 1) * BLOCK
+        if at - self._origin >= _LATEST:
+            oldest = self._times[0]
+            self._times = array("I", [each - oldest for each in self._times])
+            self._origin += oldest
 
     # What a window is made of
 
@@ -111,17 +114,15 @@ class HeldSeries:
             return WindowParts(((first, last),), slice(0, 0))
         return WindowParts(((first, block * BLOCK), (blocks * BLOCK, last)), slice(block, blocks))
 
-    def _held(self, first: int, last: int, begin: int, end: int) -> Iterator[tuple[float, int]]:
-        """Yield each value of these entries with the milliseconds for which it holds within [begin, end)."""
+    def _held(self, first: int, last: int, begin: int, end: int) -> tuple[list[float], list[int]]:
+        """Return these entries, and the milliseconds for which each holds within [begin, end)."""
         bounds = self._times[first : last + 1].tolist()
         if last == len(self._times):
             bounds.append(self.held_until - self._origin)
         begin, end = begin - self._origin, end - self._origin
-        if bounds and (bounds[0] < begin or bounds[-1] > end):
+        if bounds[0] < begin or bounds[-1] > end:
             bounds = [min(max(each, begin), end) for each in bounds]
-        for value, (since, until) in zip(self._values[first:last], pairwise(bounds), strict=True):
-            if value == value:  # noqa: PLR0124 - a gap is not a number
-                yield value, until - since
+        return self._values[first:last].tolist(), list(map(sub, bounds[1:], bounds))
 
     @abstractmethod
     def _closed(self) -> int:

@@ -9,8 +9,11 @@ from __future__ import annotations
 
 from array import array
 from bisect import bisect_right
+from collections import deque
 from dataclasses import dataclass, field
-from math import inf, sqrt
+from itertools import accumulate
+from math import inf, isnan, sqrt
+from operator import mul
 from typing import Final
 
 from lfs10d.telemetry.wind_series import BLOCK, HeldSeries
@@ -141,14 +144,18 @@ class SpeedSeries(HeldSeries):
         return None if gust is None else gust.speed
 
     def _sums(self, first: int, last: int, begin: int, end: int) -> tuple[float, float, float]:
-        covered = one = two = 0.0
+        """Return time covered, and the integrals of the speed and of its square, counted from `_zero`."""
+        values, held = self._held(first, last, begin, end)
         zero = self._zero
-        for value, held in self._held(first, last, begin, end):
-            apart = value - zero
-            covered += held
-            one += apart * held
-            two += apart * apart * held
-        return covered, one, two
+        apart = [value - zero for value in values]
+        weighted = list(map(mul, apart, held))
+        one = sum(weighted)
+        if isnan(one):  # a gap is not a number
+            held = [0 if isnan(value) else time for value, time in zip(apart, held, strict=True)]
+            apart = [0.0 if isnan(value) else value for value in apart]
+            weighted = list(map(mul, apart, held))
+            one = sum(weighted)
+        return sum(held), one, sum(map(mul, weighted, apart))
 
     def _scan(self, first: int, last: int) -> Extremes:
         """Return the extremes of these entries; a gust may reach back to entries before them."""
@@ -156,31 +163,54 @@ class SpeedSeries(HeldSeries):
             return Extremes()
         start = bisect_right(self._times, self._times[first] - GUST_OVER, 0, first)
         times, values = self._times[start:last].tolist(), self._values[start:last].tolist()
-        samples, greatest, gust, gust_at, lull, lull_at = 0, -inf, -inf, 0, inf, 0
-        total, oldest, gap = 0.0, 0, -1
-        for place, value in enumerate(values):
-            if value != value:  # noqa: PLR0124 - a gap is not a number
-                gap = place
-                continue
-            total += value
-            if place < first - start:
-                continue
-            samples += 1
-            greatest = max(greatest, value)
+        sums = list(accumulate(values, initial=0.0))
+        if isnan(sums[-1]):
+            return self._scan_gaps(first - start, times, values)
+        gusts, places, oldest = [], [], 0
+        for place in range(first - start, last - start):
             until = times[place] - GUST_OVER
             while times[oldest] <= until:
-                if (left := values[oldest]) == left:
-                    total -= left
                 oldest += 1
-            count = place + 1 - oldest - (gap == oldest)
-            if gap > oldest or count < GUST_LEAST:
+            count = place + 1 - oldest
+            if count >= GUST_LEAST:
+                gusts.append((sums[place + 1] - sums[oldest]) / count)
+                places.append(place)
+        return self._found(last - first, max(values[first - start :]), gusts, [times[place] for place in places])
+
+    def _scan_gaps(self, first: int, times: list[int], values: list[float]) -> Extremes:
+        """Return the extremes of the entries from `first` on, where there are gaps among them or before them."""
+        gusts, ends, good, window = [], [], [], deque[float]()
+        since = deque[int]()
+        whole_from = 0  # the window has no gap between its values if its oldest entry is none before this one
+        for place, (at, value) in enumerate(zip(times, values, strict=True)):
+            while since and times[since[0]] <= at - GUST_OVER:
+                since.popleft()
+                window.popleft()
+            if isnan(value):
+                whole_from = place
                 continue
-            mean = total / count
-            if mean >= gust:
-                gust, gust_at = mean, times[place]
-            if mean <= lull:
-                lull, lull_at = mean, times[place]
-        return self._extremes(samples, greatest, (gust, gust_at + self._origin), (lull, lull_at + self._origin))
+            since.append(place)
+            window.append(value)
+            if place < first:
+                continue
+            good.append(value)
+            if len(window) >= GUST_LEAST and since[0] >= whole_from:
+                gusts.append(sum(window) / len(window))
+                ends.append(at)
+        return self._found(len(good), max(good, default=-inf), gusts, ends)
+
+    def _found(self, samples: int, greatest: float, gusts: list[float], ends: list[int]) -> Extremes:
+        if not gusts:
+            return self._extremes(samples, greatest, (-inf, 0), (inf, 0))
+        gust, lull = max(gusts), min(gusts)
+        last, origin = len(gusts) - 1, self._origin
+        backwards = gusts[::-1]  # of equal ones the later counts
+        return self._extremes(
+            samples,
+            greatest,
+            (gust, ends[last - backwards.index(gust)] + origin),
+            (lull, ends[last - backwards.index(lull)] + origin),
+        )
 
     def _of_blocks(self, which: slice) -> Extremes:
         blocks = self._blocks
