@@ -20,7 +20,8 @@ from lfs10d.config.credentials import reason
 from lfs10d.config.effective import Effective, effective, merged_data
 from lfs10d.config.json_schema import json_schema
 from lfs10d.config.loader import LoadedConfig, leaves, load
-from lfs10d.config.models import Config, Section
+from lfs10d.config.models import Config
+from lfs10d.config.sections import Section
 from lfs10d.daemon.state_directory import state_directory
 from lfs10d.errors import FailedError, StateError
 from lfs10d.schema.document import path_text

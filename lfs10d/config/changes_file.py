@@ -15,7 +15,8 @@ from pydantic import BeforeValidator, Field, ValidationError
 
 from lfs10d.config.changes import OPTIONS, Changes, DeviceChange, Place, Rate, Values, Verified
 from lfs10d.config.credentials import reason
-from lfs10d.config.models import Section, SlaveConfig, SlaveId
+from lfs10d.config.models import SlaveConfig, SlaveId
+from lfs10d.config.sections import Section
 from lfs10d.errors import ConfigError, StateError
 from lfs10d.schema.document import LARGEST_FILE, decode, parse
 from lfs10d.schema.fields import Choice, Name, Whole, plain_error

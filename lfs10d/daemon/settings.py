@@ -10,7 +10,8 @@ from collections.abc import Mapping
 from lfs10d import __version__
 from lfs10d.config.effective import Effective
 from lfs10d.config.live_config import LiveConfig
-from lfs10d.config.models import Config, LineConfig, StoreConfig, WindConfig
+from lfs10d.config.models import Config, LineConfig
+from lfs10d.config.sections import StoreConfig, WindConfig
 from lfs10d.daemon.boot import Boot
 from lfs10d.line.budget import request_gap, timing_of
 from lfs10d.line.device import FIRST_TIMEOUTS
