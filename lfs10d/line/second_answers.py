@@ -55,7 +55,8 @@ class SecondAnswers:
             return False
         self._quiet.exchanged(outcome, online=device.online)
         doubtful = self._doubts.exchanged(outcome, device.response_times, timeout)
-        if spoilt(outcome) and outcome.began is not None:
+        whole = diagnosis.stranger(outcome.request, device.spec.codec, outcome.heard) is not None
+        if spoilt(outcome) and not whole and outcome.began is not None:
             self._doubt_held(outcome.began, outcome)
         return doubtful
 
