@@ -102,6 +102,7 @@ class Watch:
             publication.AVAILABILITY,
             publication.STATS,
             publication.ERROR,
+            publication.WIND,
         )
         filters = [*once, *(publication.device_topic("+", leaf) for leaf in leaves)]
         self._client = CommandClient(

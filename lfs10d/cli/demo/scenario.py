@@ -57,6 +57,7 @@ def configuration(port: Path, broker_port: int, mqtt_version: str) -> str:
     return (
         f"line: {{name: {LINE}, port: {json.dumps(str(port))}, baudrate: {BAUDRATE}}}\n"
         f"poll: {{interval: {INTERVAL}}}\n"
+        "wind: {every: 2s}\n"
         f"slaves:\n{slaves}"
         f"mqtt: {{host: 127.0.0.1, port: {broker_port}, version: {mqtt_version}, base_topic: {BASE_TOPIC}}}\n"
     )

@@ -85,6 +85,8 @@ def _data(device: ShownDevice, row: TableRow, time: str, *, age: float | None, a
         "online": device.online,
         "age_s": None if age is None else round(age, 1),
         "rtt_ms": device.rtt_ms,
+        "gust_10m": device.gust,
+        "mean_2m": device.mean,
         "just": row.just or None,
         "live": alive and not row.stale,
     }

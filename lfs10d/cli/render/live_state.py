@@ -47,6 +47,10 @@ class ShownDevice:
     good_ts: float | None = None
     since: float | None = None
     """When its error rose, epoch ms of the daemon's clock; None while it has none."""
+    gust: float | None = None
+    """The greatest mean of 3 s of the last 10 min; None where there is none."""
+    mean: float | None = None
+    """The mean of the last 2 min."""
     trail: deque[tuple[float, float]] = field(default_factory=deque)
     turned: tuple[float, bool] | None = None
     """When it came online or went offline last, and whether it came."""
@@ -132,6 +136,8 @@ class LiveState:
                     device.good_ts = last
             elif leaf == "error":
                 device.since = _since(payload)
+            elif leaf == "wind":
+                _wind(device, payload)
             elif leaf in {"state", "telemetry"}:
                 self._on_sample(device, payload, old=old, now=now, wall=wall)
 
@@ -186,6 +192,8 @@ class LiveState:
         fresh = seq != device.seq
         device.seq = seq if isinstance(seq, int) else -1
         _sample(device, entry, values if isinstance(values, dict) else {}, units if isinstance(units, dict) else {})
+        wind = entry.get("wind")
+        _wind(device, wind if isinstance(wind, dict) else {})
         alarm = entry.get("alarm")
         device.since = _since(alarm) if isinstance(alarm, dict) else None
         age = _number(entry.get("age_s"))
@@ -256,6 +264,10 @@ def _sample(
     named = errors.items() if device.good and isinstance(errors, dict) else ()
     device.errors = {str(name): code for name, code in named if isinstance(code, str)}
     device.units = {str(name): unit for name, unit in units.items() if isinstance(unit, str)}
+
+
+def _wind(device: ShownDevice, wind: Mapping[str, Any]) -> None:
+    device.gust, device.mean = _number(wind.get("gust_10m")), _number(wind.get("mean_2m"))
 
 
 def _trail(device: ShownDevice, now: float) -> None:

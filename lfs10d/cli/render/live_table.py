@@ -70,6 +70,8 @@ class TableRow:
     just: str
     stale: bool
     good: bool
+    gust: str = ""
+    mean: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +111,8 @@ def _row(live: LiveState, device: ShownDevice, source: DataSource, moment: _Mome
         just=just,
         stale=stale,
         good=device.good,
+        gust="" if device.gust is None else f"{device.gust:.2f}",
+        mean="" if device.mean is None else f"{device.mean:.2f}",
     )
 
 
@@ -155,13 +159,15 @@ class _Column:
 _NAME = _Column("sensor", lambda row: row.name, least=6, most=20)
 _ID = _Column("id", lambda row: row.slave, right=True, least=3)
 _VALUE = _Column("value", lambda row: row.value, right=True, least=9, most=24)
+_GUST = _Column("gust 10m", lambda row: row.gust, right=True)
+_MEAN = _Column("mean 2m", lambda row: row.mean, right=True)
 _STATE = _Column("state", lambda row: row.state, least=9, most=60)
 _AGE = _Column("age", lambda row: row.age, right=True, least=4)
 _RTT = _Column("answer", lambda row: row.rtt, right=True, least=6)
 _LABEL = _Column("label", lambda row: row.label, most=30)
 
-_ALL: Final = (_NAME, _ID, _VALUE, _STATE, _AGE, _RTT, _LABEL)
-_GIVEN_UP_FIRST: Final = (_LABEL, _RTT, _AGE, _ID)
+_ALL: Final = (_NAME, _ID, _VALUE, _GUST, _MEAN, _STATE, _AGE, _RTT, _LABEL)
+_GIVEN_UP_FIRST: Final = (_LABEL, _RTT, _MEAN, _GUST, _AGE, _ID)
 """Columns left out on a narrow terminal, in this order."""
 LEAST_LABEL: Final = 6
 """A label is not cut shorter than this."""
@@ -196,7 +202,7 @@ def _widths(shown: Sequence[TableRow], width: int) -> dict[_Column, int]:
     wanted = {
         column: min(column.most, max(column.least, len(column.head), *(len(column.of(row)) for row in shown), 0))
         for column in _ALL
-        if column is not _LABEL or any(row.label for row in shown)
+        if column not in (_GUST, _MEAN, _LABEL) or any(column.of(row) for row in shown)
     }
     for column in _GIVEN_UP_FIRST:
         excess = 2 + sum(wanted.values()) + len(wanted) - width

@@ -97,6 +97,8 @@ def test_programs_are_told_the_same_as_data() -> None:
         "online": True,
         "age_s": 0.4,
         "rtt_ms": 18.2,
+        "gust_10m": None,
+        "mean_2m": None,
         "just": None,
         "live": True,
     }

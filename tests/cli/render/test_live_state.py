@@ -369,3 +369,16 @@ def test_since_when_a_device_and_the_line_fail_is_known_from_their_errors() -> N
     heard.tell("line/error", cleared)
     now = heard.live
     assert [heard.device("a").since, now.line_error_since, now.line_error_code, now.line_error] == [None] * 4
+
+
+def test_gust_and_mean_are_those_of_the_topic_wind_or_of_the_status() -> None:
+    live = LiveState("line0")
+    live.on_message("devices", [{"name": "mast", "id": 2}], old=True, now=0.0, wall=0.0)
+    live.on_message("device/mast/wind", {"gust_10m": 9.5, "mean_2m": 5.25}, old=True, now=0.0, wall=0.0)
+    assert (live.devices["mast"].gust, live.devices["mast"].mean) == (9.5, 5.25)
+    live.on_message("device/mast/wind", {"gust_10m": None, "mean_2m": "x"}, old=False, now=1.0, wall=1.0)
+    assert (live.devices["mast"].gust, live.devices["mast"].mean) == (None, None)
+    status = {"ts": 1000, "devices": [{"name": "mast", "wind": {"gust_10m": 8.0, "mean_2m": 4.0}}, {"name": "fan"}]}
+    live.on_status(status, now=2.0)
+    assert (live.devices["mast"].gust, live.devices["mast"].mean) == (8.0, 4.0)
+    assert live.devices["fan"].gust is None

@@ -254,3 +254,18 @@ def test_remarks_stand_below_where_all_rows_and_they_fit() -> None:
     short = texts(screen(shown, HERE, (80, len(whole) - 1), now=0.0, wall=WALL, remarks=["first remark", "second"]))
     assert not any("remark" in each for each in short)
     assert len(short) == len(whole) - 3
+
+
+def test_gust_and_mean_have_columns_where_a_device_has_them_and_room_is_left() -> None:
+    live = LiveState("line0")
+    live.on_message("devices", [{"name": "mast", "id": 2}, {"name": "fan", "id": 3}], old=True, now=0.0, wall=0.0)
+    source = DataSource("live", alive=True)
+    heads = ["".join(text for text, _ in table(rows(live, source, now=0.0, wall=0.0), 120)[0])]
+    live.on_message("device/mast/wind", {"gust_10m": 9.876, "mean_2m": 5.25}, old=True, now=0.0, wall=0.0)
+    shown = rows(live, source, now=0.0, wall=0.0)
+    wide, narrow = table(shown, 120), table(shown, 40)
+    heads += ["".join(text for text, _ in lines[0]) for lines in (wide, narrow)]
+    assert ["gust 10m" in head and "mean 2m" in head for head in heads] == [False, True, False]
+    words = "".join(text for text, _ in wide[1]).split()
+    assert words[words.index("9.88") + 1] == "5.25"
+    assert (shown[1].gust, shown[1].mean) == ("", "")
