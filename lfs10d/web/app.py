@@ -23,6 +23,7 @@ from lfs10d.commands.message import LARGEST
 from lfs10d.schema.fields import Name
 from lfs10d.web import metrics
 from lfs10d.web.actions import Answer
+from lfs10d.web.connection import LARGEST_HEAD
 from lfs10d.web.guard import HEADER, HEADERS, HostList, Token, Verdict, cookies_of, same_origin, set_cookie
 from lfs10d.web.viewers import Viewers
 
@@ -91,6 +92,8 @@ class _Guard:
         if len(named) != 1 or not self._hosts.allows(named[0], server[0] if server else None):
             text = "This name is not one of the page's own; start lfs10d web with --allow-host NAME to permit it.\n"
             app = PlainTextResponse(text, 421)
+        elif sum(len(name) + len(value) for name, value in scope["headers"]) > LARGEST_HEAD:
+            app = PlainTextResponse("The headers are too large.\n", 431)
         elif len(scope["query_string"]) > LONGEST_QUERY:
             app = PlainTextResponse("The address is too long.\n", 414)
         await app(scope, receive, guarded)

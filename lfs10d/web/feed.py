@@ -118,7 +118,9 @@ class Feed:
             link.connected = client.connected
             link.place = client.place
             link.why = "" if client.connected else client.ended_by or self._why
-            if line.name == self._own and client.availability is not None:
+            if not client.connected:
+                link.daemon = None  # what is retained comes again with the next connection
+            elif line.name == self._own:
                 link.daemon = client.availability
         for line, places in self._files:
             for place in places:

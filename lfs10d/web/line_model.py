@@ -269,10 +269,13 @@ class LineModel:
 
     def devices(self, names: set[str] | None, wall: float) -> Iterator[tuple[str, dict[str, Any]]]:
         """Yield the devices of these names (None: all), each with its summary."""
-        side = self.side(self.source(wall))
+        source = self.source(wall)
+        side = self.side(source)
         for name, device in side.live.devices.items():
             if names is None or name in names:
-                yield name, self._device(side, device, wall)
+                shown = self._device(side, device, wall)
+                # The status file has no wind statistics: those published before are not beside its live values.
+                yield name, {**shown, "wind": None} if source.kind == "status" else shown
 
     def _device(self, side: Side, device: ShownDevice, wall: float) -> dict[str, Any]:
         name = device.name

@@ -13,6 +13,7 @@ from typing import Final
 
 import click
 import uvicorn
+from starlette.types import ASGIApp
 
 from lfs10d.cli.login import Login
 from lfs10d.errors import BrokerError
@@ -39,17 +40,9 @@ class _Server(uvicorn.Server):
         yield
 
 
-async def serve(
-    logins: Sequence[tuple[Path, Login]], listen: tuple[str, int], token: Secret | None, names: Sequence[str]
-) -> None:
-    """Serve until cancelled; raises BrokerError where the address cannot be used."""
-    _log_errors()
-    site = SiteModel()
-    own = feeds(logins, site)
-    viewers = Viewers(site, own)
-    listener = _listener(*listen)
-    app = application(viewers, Token(token), HostList([*names, *_own_names(listen[0])]))
-    server = _Server(
+def http_server(app: ASGIApp) -> uvicorn.Server:
+    """Return the server of an application, with the limits of the page."""
+    return _Server(
         uvicorn.Config(
             app,
             http=LimitedConnection,
@@ -64,6 +57,19 @@ async def serve(
             h11_max_incomplete_event_size=LARGEST_HEAD,
         )
     )
+
+
+async def serve(
+    logins: Sequence[tuple[Path, Login]], listen: tuple[str, int], token: Secret | None, names: Sequence[str]
+) -> None:
+    """Serve until cancelled; raises BrokerError where the address cannot be used."""
+    _log_errors()
+    site = SiteModel()
+    own = feeds(logins, site)
+    viewers = Viewers(site, own)
+    listener = listening(*listen)
+    app = application(viewers, Token(token), HostList([*names, *_own_names(listen[0])]))
+    server = http_server(app)
     connecting = [asyncio.ensure_future(feed.connect()) for feed in own]
     feeding = asyncio.ensure_future(viewers.run())
     serving = asyncio.ensure_future(server.serve(sockets=[listener]))
@@ -92,7 +98,7 @@ def _log_errors() -> None:
     log.propagate = False
 
 
-def _listener(host: str, port: int) -> socket.socket:
+def listening(host: str, port: int) -> socket.socket:
     """Return the listening socket; raises BrokerError, by which a busy port ends with 69."""
     place = node_text(host, port)
     try:

@@ -19,7 +19,8 @@ export function lineFacts(line) {
     if (activity && activity !== "polling") words.push(activity.replaceAll("_", " "));
   }
   const broker = line.broker ?? {};
-  words.push(broker.connected ? `broker connected${broker.waiting > 20 ? `, ${broker.waiting} samples wait` : ""}` : "broker away");
+  if (line.source?.kind === "none" && line.daemon === "offline") words.push("daemon offline");
+  else words.push(broker.connected ? `broker connected${broker.waiting > 20 ? `, ${broker.waiting} samples wait` : ""}` : "broker away");
   return words.join(" · ");
 }
 
@@ -78,10 +79,10 @@ export function linePage(root, key) {
 }
 
 function sensorTable(key, rows) {
-  const head = ["sensor", "id", "label", "value", "state"].map((name) => h("th", { scope: "col" }, name));
+  const head = ["sensor", "id", "label", "value", "state"].map((name) => h("th", { scope: "col", class: name === "label" ? "wide" : "" }, name));
   return h("div", { class: "table", tabIndex: 0, role: "region", "aria-label": "Sensors" }, h("table", {}, h("thead", {}, h("tr", {}, head)), h("tbody", {}, rows.map(([name, id, label, value, words, isOld]) =>
     h("tr", { class: isOld ? "old" : "" }, h("td", {}, h("a", { href: `/device/${encodeURIComponent(key)}/${encodeURIComponent(name)}`, "data-link": "" }, name)), h("td", {}, String(id ?? "")),
-      h("td", { dir: "auto" }, label), h("td", { class: isOld ? "age" : "" }, value), h("td", {}, words))))));
+      h("td", { dir: "auto", class: "wide" }, label), h("td", { class: isOld ? "figure age" : "figure" }, value), h("td", {}, words))))));
 }
 
 function lineTable(line) {

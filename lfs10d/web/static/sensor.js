@@ -13,7 +13,7 @@ export function age(device) {
 export function old(line, device) {
   const seconds = age(device);
   const interval = Math.max(device.interval ?? 1, device.interval === 0 ? line.line?.cycle_s ?? 1 : 0);
-  return seconds === null || seconds > 3 * interval + WAY || !live();
+  return seconds === null || seconds > 3 * interval + WAY || !live() || line.source?.kind === "none";
 }
 
 export function main(device) {
@@ -25,8 +25,9 @@ export function main(device) {
 export function state(line, device) {
   if (device.enabled === false) return ["", "disabled"];
   if (line.line?.activity === "paused") return ["", "the line is paused"];
-  if (device.fault) return ["bad", `${device.online ? "" : "offline: "}${device.fault.meaning} since ${timeText(device.fault.since, now())}`];
-  if (device.error && device.error !== "starting") return ["bad", device.error_words];
+  const gone = line.source?.kind === "none" || !live();
+  if (device.fault && !gone) return ["bad", `${device.online ? "" : "offline: "}${device.fault.meaning} since ${timeText(device.fault.since, now())}`];
+  if (device.error && device.error !== "starting" && !gone) return ["bad", device.error_words];
   if (old(line, device)) return ["", age(device) === null ? "no value yet" : "no new value"];
   const partly = device.errors ? Object.keys(device.errors) : [];
   return partly.length ? ["", `partly good: no ${partly.join(", ").replaceAll("_", " ")}`] : ["good", "good"];

@@ -27,7 +27,7 @@ async function look() {
     const other = controls !== session.controls || open !== session.open;
     Object.assign(session, { controls, open });
     button.hidden = !controls;
-    setText(button, open ? "Close the controls" : "Enter the token");
+    setText(button, open ? "Close controls" : "Enter token");
     if (other) changed();
   } catch {
     // The stream's banner tells that the server is away.
