@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-oldest coverage check format docs bench soak deb clean
+.PHONY: help demo test test-oldest coverage check format docs bench soak screens deb clean
 
 help: ## Print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -72,6 +72,9 @@ soak: $(VENV)/.dev ## Account for every sample under faults: FOR=12h SEED=7
 
 deb: $(VENV)/.demo ## Build the Debian package into dist/: SUITE=trixie or SUITE=bookworm
 	packaging/build-deb $(or $(SUITE),trixie)
+
+screens: $(VENV)/.dev ## Write a screenshot of every state of the page to screens/ (needs chromium)
+	$(BIN)/python -m tests.web.screens screens
 
 clean: ## Remove .venv and built files
 	rm -rf $(VENV) bench/build build dist

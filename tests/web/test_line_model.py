@@ -171,6 +171,7 @@ def test_without_a_broker_nothing_is_live_and_the_reason_is_told() -> None:
 def test_while_the_broker_is_away_the_status_file_is_shown() -> None:
     line = PublishedLine()
     line.measure(1)
+    line.publish("device/mast/wind", {"v": 1, "gust_10m": 9.0})
     line.model.summary(line.wall)
     line.model.link.connected = False
     line.model.link.why = "refused"
@@ -187,6 +188,7 @@ def test_while_the_broker_is_away_the_status_file_is_shown() -> None:
     assert shown["broker"] == {"connected": False, "waiting": 42, "place": PLACE}
     device = line.device
     assert (device["values"], device["id"], device["fault"]) == ({"wind_speed": 6.5}, 2, None)
+    assert device["wind"] is None, "a gust of before stands beside no value of now"
     assert device["good_at"] == round((line.wall - 0.5) * 1000) + 1
     assert line.model.recent("mast")[-1][1] == 6.5
     assert "mast" in line.model.changed

@@ -1,0 +1,162 @@
+"""What a person does with the page, in Debian's chromium; accessibility by axe-core's rules."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]  # it has no types
+from playwright.sync_api import Browser, Page, expect
+
+from tests.support.chromium import chromium
+from tests.support.page_states import HOSTILE, STATES, ShownLine
+from tests.support.pages import TOKEN, PageServer, serving
+
+pytestmark = pytest.mark.needs("chromium")
+READ_FAILS = {"status": "failed", "words": "It failed: does not answer. Check power, the plug, and the wires."}
+IN_TIME = 15_000
+"""ms: a loaded machine is slow."""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    with chromium() as started:
+        yield started
+
+
+@pytest.fixture
+def server() -> Iterator[PageServer]:
+    with serving() as made:
+        yield made
+
+
+@pytest.fixture
+def page(browser: Browser, server: PageServer) -> Iterator[Page]:
+    """Give a page on a phone; no script may fail, and nothing be asked of another host."""
+    context = browser.new_context(viewport={"width": 360, "height": 740}, reduced_motion="reduce")
+    made = context.new_page()
+    made.set_default_timeout(IN_TIME)
+    expect.set_options(timeout=IN_TIME)
+    faults: list[str] = []
+    made.on("pageerror", lambda error: faults.append(str(error)))
+    made.on("request", lambda sent: None if sent.url.startswith(server.address) else faults.append(sent.url))
+    yield made
+    context.close()
+    assert faults == []
+
+
+def login(page: Page) -> None:
+    page.get_by_role("button", name="Enter token", exact=True).click()
+    page.get_by_role("textbox", name="Token").fill(TOKEN)
+    page.get_by_role("button", name="Open the controls").click()
+    expect(page.get_by_role("button", name="Close controls")).to_be_visible()
+
+
+def test_a_sensor_is_followed_live_its_unit_kept_and_what_is_old_is_grey(page: Page, server: PageServer) -> None:
+    line = server.do(lambda: ShownLine(server, sensors=2))
+    server.do(lambda: line.measure(10.0))
+    page.goto(server.address)
+    card = page.locator(".card").first
+    expect(card.locator(".speed")).to_have_text("10.0 m/s")
+    server.do(lambda: line.measure(20.0))
+    expect(card.locator(".speed")).to_have_text("20.0 m/s")
+    page.get_by_label("Speed in").select_option("bft")
+    expect(card.locator(".speed")).to_have_text("8 Bft")
+    page.reload()
+    expect(card.locator(".speed")).to_have_text("8 Bft")
+    expect(card).to_have_class("card old")
+    expect(card.locator(".state")).to_contain_text("ago")
+
+
+def test_a_phone_that_wakes_after_an_hour_shows_nothing_old_as_live(page: Page, server: PageServer) -> None:
+    line = server.do(lambda: ShownLine(server, sensors=1, interval=600.0))
+    server.do(lambda: line.measure(10.0))
+    page.goto(server.address)
+    expect(page.locator("#banner")).to_have_text("Live")
+    shown = page.evaluate(
+        """async () => {
+            const later = Date.now() + 3600e3;
+            Date.now = () => later;
+            document.getElementById("unit").dispatchEvent(new Event("change"));
+            return [document.getElementById("banner").textContent, document.querySelector(".card").className];
+        }"""
+    )
+    assert shown[0].startswith("NOT LIVE")
+    assert shown[1] == "card old"
+
+
+def test_when_the_server_goes_away_the_page_says_so(page: Page, server: PageServer) -> None:
+    line = server.do(lambda: ShownLine(server, sensors=1, interval=600.0))
+    server.do(lambda: line.measure(10.0))
+    page.goto(server.address)
+    expect(page.locator("#banner")).to_have_text("Live")
+    server.close()
+    expect(page.locator("#banner")).to_contain_text("NOT LIVE")
+    expect(page.locator(".card").first).to_have_class("card old")
+
+
+def test_with_the_token_a_sensor_is_polled_and_readdressed_by_two_clicks(page: Page, server: PageServer) -> None:
+    line = server.do(lambda: ShownLine(server, sensors=2, interval=600.0))
+    server.do(line.measure)
+    actions = server.answers("line0", {"device/read": READ_FAILS})
+    page.goto(f"{server.address}/device/line0/mast-2")
+    page.get_by_role("button", name="Enter token", exact=True).click()
+    page.get_by_role("textbox", name="Token").fill("wrong")
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("alert")).to_have_text("The token is wrong.")
+    page.get_by_role("textbox", name="Token").fill(TOKEN)
+    page.keyboard.press("Enter")
+    page.get_by_role("button", name="Poll now").click()
+    expect(page.locator(".answer.bad").first).to_have_text(READ_FAILS["words"])
+    page.get_by_label("New id").fill("9")
+    page.get_by_role("button", name="Try it first (changes nothing)").click()
+    page.get_by_role("button", name="Change id 2 to 9 now").click()
+    expect(page.get_by_text("Done.").first).to_be_visible()
+    assert actions.sent == [
+        ("device/read", {"device": "mast-2"}),
+        ("device/readdress", {"device": "mast-2", "to": 9, "dry_run": True}),
+        ("device/readdress", {"device": "mast-2", "to": 9}),
+    ]
+
+
+def test_the_keyboard_alone_reaches_a_sensor_and_comes_back(page: Page, server: PageServer) -> None:
+    line = server.do(lambda: ShownLine(server, sensors=2, interval=600.0))
+    server.do(line.measure)
+    page.goto(server.address)
+    expect(page.locator(".card")).to_have_count(2)
+    for _ in range(12):
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement.textContent") == "mast-3":
+            break
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("heading", level=1)).to_have_text("mast-3")
+    page.go_back()
+    expect(page.get_by_role("heading", level=1)).to_have_text("All lines")
+
+
+def test_what_comes_from_a_broker_is_text_and_never_a_script(page: Page, server: PageServer) -> None:
+    server.do(lambda: STATES["labels"][1](server))
+    page.goto(server.address)
+    expect(page.get_by_text(HOSTILE)).to_be_visible()
+    assert page.locator("main img, main script").count() == 0
+    assert page.title() == "lfs10d"
+
+
+@pytest.mark.parametrize("state", ["offline", "offline-device", "line", "labels", "status-file"])
+def test_no_rule_of_accessibility_is_broken_and_nothing_scrolls_sideways(
+    state: str, page: Page, server: PageServer
+) -> None:
+    path, make = STATES[state]
+    server.do(lambda: make(server))
+    page.goto(server.address + path)
+    if state in {"line", "offline-device"}:
+        login(page)
+    expect(page.locator("#banner")).not_to_have_text("Connecting to the page's server ...")
+    for scheme in ("light", "dark"):
+        page.emulate_media(color_scheme="dark" if scheme == "dark" else "light")
+        results = Axe().run(page)
+        found = [(each["id"], [node["html"] for node in each["nodes"]]) for each in results.response["violations"]]
+        assert found == [], scheme
+    for width in (360, 768, 1440):
+        page.set_viewport_size({"width": width, "height": 740})
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
