@@ -8,6 +8,7 @@ from pathlib import Path
 
 from lfs10d import __version__
 from lfs10d.config.models import Config, SlaveConfig
+from lfs10d.daemon.settings import wind_info
 from lfs10d.profiles.profile import Profile
 from lfs10d.profiles.values import Value
 from lfs10d.schema.addresses import TopicPrefix
@@ -35,11 +36,12 @@ def discovery_payloads(config: Config, profiles: Mapping[str, Profile]) -> dict[
         state_every=config.mqtt.state_every,
         wind_every=config.wind.every,
     )
-    return announcements(gateway, (_device(slave, profiles[slave.profile]) for slave in config.slaves))
+    return announcements(gateway, (_device(config, slave, profiles[slave.profile]) for slave in config.slaves))
 
 
-def _device(slave: SlaveConfig, profile: Profile) -> DiscoveredDevice:
+def _device(config: Config, slave: SlaveConfig, profile: Profile) -> DiscoveredDevice:
     values = tuple(_value(value) for value in profile.values)
+    wind = wind_info(config.wind, profile)
     return DiscoveredDevice(
         name=slave.name,
         label=slave.label,
@@ -47,7 +49,7 @@ def _device(slave: SlaveConfig, profile: Profile) -> DiscoveredDevice:
         model=profile.model or profile.title,
         interval=slave.interval,
         values=values,
-        wind=next((value for value in values if value.device_class == "wind_speed" and value.unit == "m/s"), None),
+        wind=next((value for value in values if wind is not None and value.name == wind.values.speed), None),
     )
 
 

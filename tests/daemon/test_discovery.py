@@ -72,6 +72,17 @@ def test_words_texts_and_booleans_are_announced_as_such(tmp_path: Path) -> None:
     assert list(complaints(found)) == []
 
 
+@pytest.mark.parametrize(("unit", "shown"), [("m/s", "wind_speed"), ("km/h", "wind_speed"), ("furlong", None)])
+def test_wind_is_shown_of_a_speed_that_has_statistics_in_its_unit(tmp_path: Path, unit: str, shown: str | None) -> None:
+    (tmp_path / "cup.yaml").write_text(
+        "name: cup\ntitle: Cup\nvalues:\n"
+        f"- {{name: speed, register: 1, type: uint16, unit: {unit}, device_class: wind_speed}}\n"
+    )
+    found = payloads(tmp_path, "slaves: [{id: 2, name: a, profile: cup.yaml}]\nhomeassistant: {discovery: true}\n")
+    gust = found[topic("a")]["components"].get("wind-gust", {})
+    assert (gust.get("device_class"), gust.get("unit_of_measurement")) == (shown, unit if shown else None)
+
+
 def test_prefixes_are_kept_and_a_damaged_file_is_none(tmp_path: Path) -> None:
     prefixes, file = AnnouncedPrefixes(tmp_path, Disk()), tmp_path / "homeassistant"
     assert prefixes.load() == set()
