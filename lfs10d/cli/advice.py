@@ -27,6 +27,7 @@ def advice(loaded: LoadedConfig, budget: Budget, host: str) -> tuple[Problem, ..
         *_files(loaded),
         *_names(loaded, host),
         *_calibration(loaded),
+        *_addresses(loaded),
     )
     return tuple(sorted(loaded.document.problem(path, f"warning: {message}") for path, message in warnings))
 
@@ -162,3 +163,12 @@ def _calibration(loaded: LoadedConfig) -> Iterator[tuple[KeyPath, str]]:
                         f"for profile {slave.profile}"
                     ),
                 )
+
+
+def _addresses(loaded: LoadedConfig) -> Iterator[tuple[KeyPath, str]]:
+    told: set[str] = set()
+    for index, slave in enumerate(loaded.config.slaves):
+        if slave.profile not in told:
+            told.add(slave.profile)
+            for doubt in loaded.profiles[slave.profile].doubts():
+                yield ("slaves", index), f"profile {quoted(slave.profile)}: {doubt}"

@@ -69,6 +69,8 @@ def show(name: str, *, as_json: bool) -> None:
         click.echo(json.dumps(profile.model_dump(mode="json", by_alias=True), indent=2))
     else:
         _draw(explain(profile))
+    for doubt in profile.doubts():
+        click.echo(f"lfs10d: warning: {doubt}", err=True)
 
 
 def _entry(profile: Profile) -> dict[str, object]:

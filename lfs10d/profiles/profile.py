@@ -15,7 +15,7 @@ from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_v
 from lfs10d.profiles.blocks import Block, batch
 from lfs10d.profiles.contents import BIT_FUNCTIONS
 from lfs10d.profiles.device_facts import MOST_WORDS, Barrier, Factory, Identity, IdRegister, RateRegister, SlaveId
-from lfs10d.profiles.facts import Facts, Place, Register, Sentence, refuse
+from lfs10d.profiles.facts import Facts, Place, Register, Registered, Sentence, refuse
 from lfs10d.profiles.settings import Setting
 from lfs10d.profiles.values import Value
 from lfs10d.reading import Fault, Number
@@ -24,6 +24,8 @@ from lfs10d.schema.fields import Duration, Name, Whole
 
 FramingName: TypeAlias = Literal["rtu", "ascii"]
 ChecksumName: TypeAlias = Literal["crc", "sum"]
+MANUAL_NUMBERS = (3, 4)
+"""First digits of five that manuals put before input and holding registers."""
 BUSY_EXCEPTIONS = (6,)
 """Server device busy (Modbus Application Protocol V1.1b3, section 7; EH600: the maker's fuller manual)."""
 
@@ -236,6 +238,19 @@ class Profile(Facts):
     def units(self) -> dict[str, str]:
         """The unit of each value by name."""
         return {value.name: value.unit for value in self.values}
+
+    def doubts(self) -> tuple[str, ...]:
+        """Return what is valid and probably a mistake, one sentence each."""
+        facts: list[tuple[str, Registered | None]] = [(value.name, value) for value in self.values]
+        facts += [("slave_id", self.slave_id), ("baudrate", self.baudrate), ("barrier", self.barrier)]
+        facts += [(setting.name, setting) for setting in self.settings]
+        return tuple(
+            f"{name}: register {fact.register} looks like a number of the manual, not an address: 4xxxx and 3xxxx "
+            "stand for holding and input registers there, counted from one, so the address would be "
+            f"{fact.register % 10000 - 1}"
+            for name, fact in facts
+            if fact is not None and fact.register // 10000 in MANUAL_NUMBERS and fact.register % 10000
+        )
 
     @property
     def rates(self) -> tuple[int, ...]:

@@ -181,6 +181,8 @@ def _syntax(error: yaml.MarkedYAMLError) -> str:
     problem = str(error.problem)
     if "'\\t'" in problem:
         return "a tab may not indent or separate here; use spaces"
+    if "'%'" in problem:
+        return 'a percent sign cannot begin a plain word; put it in quotes: "%"'
     if "but found another document" in problem:
         return "a second document begins here; the file may hold only one"
     context = f" ({error.context})" if error.context else ""

@@ -270,3 +270,23 @@ def test_a_calibrated_profile_knows_what_the_maker_says(profile_of: Build) -> No
     assert calibrated != profile
     assert calibrated.plain == profile
     assert calibrated.calibrated({"level": (1, 1)}).plain == profile
+
+
+def test_a_register_that_looks_like_a_number_of_the_manual_is_doubted(profile_of: Build) -> None:
+    value = {"type": "uint16", "unit": "m"}
+    profile = profile_of(
+        values=[{"name": "level", "register": 40001} | value, {"name": "flow", "register": 100} | value],
+        slave_id={"register": 42001},
+        settings=[{"name": "round", "register": 30000}],
+    )
+    level, slave_id = profile.doubts()
+    assert level.startswith("level: register 40001 looks like a number of the manual, not an address")
+    assert level.endswith("the address would be 0")
+    assert slave_id.endswith("the address would be 2000")
+    assert profile_of().doubts() == ()
+
+
+def test_the_rates_of_a_device_are_the_factorys_first_and_those_that_can_be_set(profile_of: Build) -> None:
+    codes = {"register": 4, "codes": {2400: 0, 4800: 1, 9600: 2}}
+    assert profile_of(factory={"id": 1, "baudrate": 4800}, baudrate=codes).rates == (4800, 2400, 9600)
+    assert profile_of().rates == ()

@@ -379,3 +379,9 @@ def test_any_bytes_are_text_or_a_configuration_error(raw: bytes) -> None:
 
 def test_where_yaml_1_1_and_1_2_agree_so_do_pyyaml_and_we() -> None:
     assert data(TEXT) == yaml.safe_load(TEXT)
+
+
+def test_a_bare_percent_sign_is_answered_with_its_quotes() -> None:
+    with pytest.raises(ConfigError) as caught:
+        parse("values:\n  - {name: humidity, unit: %}\n", "a.yaml")
+    assert str(caught.value) == 'a.yaml:2:28: a percent sign cannot begin a plain word; put it in quotes: "%"'
