@@ -6,7 +6,7 @@ import contextlib
 import json
 import signal
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from lfs10d.simulator.builder import LinePlan, build, slave_ids
 from lfs10d.simulator.fault_file import FaultFile, load_faults, profiles_of
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
+from lfs10d.simulator.recorded import load_recording
 from lfs10d.simulator.registers import LFS10, blueprint_of
 from lfs10d.simulator.wire import SECOND, Format, Framing, Parity
 
@@ -30,6 +31,7 @@ Examples:
   lfs10d simulate --link /tmp/line0                       eight sensors
   lfs10d simulate --link /tmp/line0 --slaves 1-4,255      these ids
   lfs10d simulate --link /tmp/line0 --faults faults.yaml  some of them faulty
+  lfs10d simulate --link /tmp/line0 --wind wind.csv       recorded values
   lfs10d read /tmp/line0 3                                in another terminal
 
   \b
@@ -67,6 +69,7 @@ class SimulateOptions:
     latency: float | None
     echo: bool
     values: str
+    wind: Path | None
     seed: int
     interval: float | None
     as_json: bool
@@ -118,10 +121,11 @@ class SimulateOptions:
 @click.option("--latency", type=DURATION, default=None, help="Interval at which the adapter delivers bytes.")
 @click.option("--echo", is_flag=True, help="The adapter returns the master's own bytes.")
 @click.option("--values", type=click.Choice(["wind", "unique"]), default="wind", show_default=True)
+@click.option("--wind", type=click.Path(path_type=Path), metavar="FILE", help="A recording (CSV) to play.")
 @click.option("--seed", type=int, default=1, show_default=True, help="Seed of wind and faults.")
 @click.option("--interval", type=DURATION, default=None, help="Print the counts at this interval.")
 @json_option
-def command(**values: Any) -> None:  # noqa: ANN401  # sixteen options; `SimulateOptions` names and types them
+def command(**values: Any) -> None:  # noqa: ANN401  # seventeen options; `SimulateOptions` names and types them
     """Run a line full of simulated sensors on a pseudo terminal, and judge who polls it.
 
     A request that begins before 3.5 characters of silence, or pauses for more than 1.5 inside, is ignored and
@@ -132,6 +136,11 @@ def command(**values: Any) -> None:  # noqa: ANN401  # sixteen options; `Simulat
     faults = FaultFile() if options.faults is None else load_faults(options.faults, plan.slaves)
     folder = Path() if options.faults is None else options.faults.parent
     blueprints = {slave: blueprint_of(each) for slave, each in profiles_of(faults, folder).items()}
+    if options.wind is not None:
+        names = {
+            slave: [signal.name for signal in blueprints.get(slave, plan.blueprint).signals] for slave in plan.slaves
+        }
+        plan = replace(plan, recorded=load_recording(options.wind, names))
     latency = faults.line.latency if options.latency is None else options.latency
     port = PtyLine(
         build(plan, faults, blueprints),

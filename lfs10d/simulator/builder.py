@@ -9,6 +9,7 @@ from lfs10d.simulator.fault_file import FaultFile, SlaveEntry
 from lfs10d.simulator.faults import window
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.line_faults import babble, second_master, stray
+from lfs10d.simulator.recorded import Recording
 from lfs10d.simulator.registers import LFS10, Blueprint
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.signals import READ_HOLDING
@@ -31,6 +32,8 @@ class LinePlan:
     seed: int = 1
     unique: bool = False
     """Values unique in the run, in place of moving wind."""
+    recorded: Recording | None = None
+    """Values from a file, where it has them, in place of both."""
 
 
 def build(
@@ -53,6 +56,8 @@ def build(
             sensor = line.add(
                 _sensor(plan, slave, entry, plan.seed + copy, (blueprints or {}).get(slave, plan.blueprint))
             )
+            if plan.recorded is not None:
+                sensor.memory.recorded = plan.recorded.of_slave(slave)
             sensor.faults += [fault.sensor_fault for fault in (*faults.all, *entry.faults)]
     for spell in faults.line.babble:
         babble(line, spell.after, spell.last, spell.every)

@@ -7,6 +7,7 @@ from typing import Final, TypeAlias
 
 from lfs10d.simulator.faults import ActiveFaults, FaultKind, SensorFault
 from lfs10d.simulator.frame_faults import broken_float
+from lfs10d.simulator.recorded import RecordedValue
 from lfs10d.simulator.registers import (
     READ_INPUT,
     WRITE_COILS,
@@ -50,10 +51,14 @@ def is_whole(body: bytes) -> bool:
 
 
 class Memory:
-    """What one device holds. `words` are its registers by address, `inputs` those that only function 4 reads."""
+    """What one device holds. `words` are its registers by address, `inputs` those that only function 4 reads.
 
-    def __init__(self, blueprint: Blueprint) -> None:
+    `recorded` has the values, by name, that do not come from the sensor's source.
+    """
+
+    def __init__(self, blueprint: Blueprint, recorded: Mapping[str, RecordedValue] | None = None) -> None:
         self.blueprint = blueprint
+        self.recorded: Mapping[str, RecordedValue] = recorded or {}
         self.words = dict(blueprint.words)
         self.inputs: dict[int, int] = {}
         self.bits: dict[tuple[int, int], int] = {}
@@ -103,7 +108,16 @@ class Memory:
         """Put the signal's value into its registers; return it, or None if it is a broken one."""
         last = self._last.get(signal)
         stuck = last is not None and _strikes(active, FaultKind.STUCK, signal)
-        value = last if stuck and last is not None else signal.fitted(source(now))
+        if stuck and last is not None:
+            value = last
+        elif (recorded := self.recorded.get(signal.name)) is None:
+            value = signal.fitted(source(now))
+        else:
+            known = recorded(now)
+            if known is None:
+                self._empty(signal)
+                return None
+            value = known
         self._last[signal] = value
         if signal.is_bit:
             self.bits[signal.function, signal.address] = int(bool(signal.settled(value)))
@@ -111,11 +125,19 @@ class Memory:
         broken = broken_float(active, signal.name)
         empty = _strikes(active, FaultKind.UNAVAILABLE, signal)
         words = signal.empty() if empty else signal.words(value) if broken is None else signal.broken(broken)
+        self._put(signal, words)
+        return None if empty or broken is not None else signal.settled(value)
+
+    def _empty(self, signal: Signal) -> None:
+        """Put into the signal's registers that there is no value; a bit, which cannot say so, stays as it is."""
+        if not signal.is_bit:
+            self._put(signal, signal.empty())
+
+    def _put(self, signal: Signal, words: tuple[int, ...]) -> None:
         space, mask = self._space(signal), signal.mask
         for n, word in enumerate(words):
             place = signal.address + n
             space[place] = space[place] & ~mask | word & mask
-        return None if empty or broken is not None else signal.settled(value)
 
     def refuses(self, body: bytes) -> int | None:
         """Return the exception to a write that is not allowed; None for one that is."""

@@ -102,6 +102,14 @@ def test_faults_come_from_a_file(tmp_path: Path) -> None:
         assert registers(path, 2, 5) == [2]
 
 
+def test_recorded_wind_comes_from_a_file(tmp_path: Path) -> None:
+    wind = tmp_path / "wind.csv"
+    wind.write_text("time,wind_speed,2.wind_speed\n0,12.99,4.5\n", "utf-8")
+    with simulating("--json", "--slaves", "1-2", "--wind", str(wind)) as (_, first):
+        path = json.loads(first)["path"]
+        assert [registers(path, slave, 1, 2) for slave in (1, 2)] == [[0x414F, 0xD70A], [0x4090, 0x0000]]
+
+
 def test_another_device_is_played_by_its_profile() -> None:
     with simulating("--json", "--profile", "ld-e", "--slaves", "9") as (_, first):
         words = registers(json.loads(first)["path"], 9, 0x1004, 2)
@@ -128,6 +136,7 @@ def test_a_power_cycle_can_be_asked_for_by_signal(tmp_path: Path) -> None:
     ("arguments", "code", "message"),
     [
         (("--faults", "none.yaml"), 78, "none.yaml:1:1: cannot be read: No such file or directory"),
+        (("--wind", "none.csv"), 78, "none.csv:1:1: cannot be read: No such file or directory"),
         (("--slaves", "0"), 2, "'0': ids go from 1 to 255, the smaller first"),
         (("--turnaround", "soon"), 2, "'soon' is not a duration; write 5ms, 1s or 2m"),
         (("--link", "none/line0"), 1, "none/line0: the link cannot be made: No such file or directory"),

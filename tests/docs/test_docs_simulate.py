@@ -19,6 +19,8 @@ from lfs10d.simulator.fault_file import (
     parse_faults,
 )
 from lfs10d.simulator.faults import DEFAULT_DELAYS, FaultKind
+from lfs10d.simulator.recorded import parse_recording
+from lfs10d.simulator.wire import SECOND
 
 PAGE = (Path(__file__).parents[2] / "docs" / "simulate.md").read_text(encoding="utf-8")
 
@@ -44,6 +46,13 @@ def test_the_example_is_a_faults_file() -> None:
     faults = parse_faults(text, "faults.yaml", range(1, 9))
     assert faults.line.echo
     assert faults.slaves[4].faults[1].sensor_fault.rate == 0.05
+
+
+def test_the_example_is_a_recording() -> None:
+    (text,) = re.findall(r"^```csv\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+    recording = parse_recording(text, "storm.csv", dict.fromkeys(range(1, 5), ("wind_speed",)))
+    assert recording.of_slave(3)["wind_speed"](SECOND) is None
+    assert recording.of_slave(1)["wind_speed"](SECOND) == 15.9
 
 
 def test_a_key_without_description_is_refused() -> None:
