@@ -1,0 +1,50 @@
+"""Values that hold, gaps between them, and what is kept of them."""
+
+from __future__ import annotations
+
+from lfs10d.telemetry.wind_series import BLOCK, REACH
+from lfs10d.telemetry.wind_speed import SpeedSeries
+
+T = 1_000_000_000
+
+
+def test_blocks_are_summed_up_as_they_are_complete_though_a_gap_completes_one() -> None:
+    filled = SpeedSeries()
+    for place in range(BLOCK):
+        filled.add(T + 250 * place, 5.0, 2000)
+    assert filled._closed() == 0
+    filled.add(T + 250 * BLOCK + 9000, 5.0, 2000)  # first the gap, then the value
+    assert filled._closed() == 1
+    assert filled.mean(T, T + 10**6).covered == 250 * (BLOCK - 1) + 2000 + 2000
+
+
+def test_a_window_between_blocks_in_one_block_and_over_several_has_all_of_its_entries() -> None:
+    filled = SpeedSeries()
+    for place in range(10 * BLOCK):
+        filled.add(T + 1000 * place, float(place), 2000)
+    for first, last in ((0, 5), (BLOCK, 2 * BLOCK), (BLOCK - 1, 5 * BLOCK + 1), (3, 300), (300, 320), (0, 320)):
+        begin, end = T + 1000 * first, T + 1000 * last
+        assert filled.extremes(begin, end).samples == last - first
+        assert filled.mean(begin, end).covered == end - begin
+        assert filled.mean(begin, end).mean == (first + last - 1) / 2
+
+
+def test_what_is_older_than_all_windows_is_dropped_and_a_long_silence_begins_anew() -> None:
+    filled = SpeedSeries()
+    for place in range(2000):
+        filled.add(T + 1000 * place, 5.0, 2000)
+    assert REACH // 1000 <= len(filled._times) <= REACH // 1000 + 5 * BLOCK
+    filled.add(T + 10**7, 7.0, 2000)
+    assert (len(filled._times), filled._closed()) == (1, 0)
+    filled.end(T + 10**7 + 500)
+    assert filled.held_until == T + 10**7 + 500
+
+
+def test_times_go_on_beyond_24_days_in_32_bits() -> None:
+    filled = SpeedSeries()
+    hour = 3_600_000
+    for place in range(700):
+        filled.add(T + hour * place, 5.0, 2 * hour)
+    end = T + hour * 700
+    assert end - filled._origin < 2**31
+    assert filled.mean(end - hour, end).covered == hour
