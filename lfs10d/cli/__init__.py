@@ -92,8 +92,8 @@ def lfs10d() -> None:
     """
 
 
-def config_option(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Add `-c FILE`, passed on as `config: Path`."""
+def config_option(function: Callable[..., Any], text: str = "The configuration file.") -> Callable[..., Any]:
+    """Add `-c FILE`, passed on as `config: Path`; `text` is its help."""
     return click.option(
         "-c",
         "--config",
@@ -103,7 +103,7 @@ def config_option(function: Callable[..., Any]) -> Callable[..., Any]:
         show_default=True,
         metavar="FILE",
         type=click.Path(path_type=Path, readable=False),  # whether it can be read is reported in our words
-        help="The configuration file.",
+        help=text,
     )(function)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import stat
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,11 +11,10 @@ from typing import Any
 import click
 
 from lfs10d.cli import EXIT_FAILED, config_option, json_option
+from lfs10d.cli.effective_file import with_changes
 from lfs10d.cli.json_text import json_text
 from lfs10d.cli.render.table import columns
 from lfs10d.config.changes import Changes
-from lfs10d.config.changes_file import ChangesFile
-from lfs10d.config.credentials import reason
 from lfs10d.config.effective import Effective, effective, merged_data
 from lfs10d.config.json_schema import json_schema
 from lfs10d.config.loader import LoadedConfig, leaves, load
@@ -28,7 +26,6 @@ from lfs10d.schema.document import path_text
 from lfs10d.schema.fields import Duration, Size
 from lfs10d.schema.quantities import duration_text, size_text
 from lfs10d.schema.yaml12 import render
-from lfs10d.system.disk import Disk
 from lfs10d.system.logs import escape
 
 DENIED = "permission denied"
@@ -80,7 +77,7 @@ def command(config: Path, state_dir: Path | None, *, merged: bool, as_json: bool
     directory = state_directory(config, file.config.line.name, chosen=state_dir, environment=os.environ)
     missing = None
     try:
-        now = _with_changes(file, directory, chosen=state_dir is not None)
+        now = with_changes(file, directory, chosen=state_dir is not None)
     except StateError as error:
         if merged or DENIED not in str(error):
             raise
@@ -104,27 +101,6 @@ def command(config: Path, state_dir: Path | None, *, merged: bool, as_json: bool
         click.echo(f"lfs10d: {missing}; what requests changed is missing here: call it as root", err=True)
         return EXIT_FAILED
     return 0
-
-
-def _with_changes(file: LoadedConfig, directory: Path, *, chosen: bool) -> Effective:
-    """Return what holds; raises StateError rather than tell half of it.
-
-    Where nobody named the directory and there is none, no daemon ever ran by this file, and nothing was changed.
-    """
-    why = None
-    try:
-        if not stat.S_ISDIR(directory.stat().st_mode):
-            why = "it is no directory"
-    except FileNotFoundError:
-        why = "it is not there" if chosen else None
-    except OSError as error:
-        why = reason(error)
-    if why is not None:
-        raise StateError(f"the state directory {directory} cannot be read: {why}")
-    found = ChangesFile(directory, Disk()).read()
-    if found.trouble is not None:
-        raise StateError(f"what requests changed cannot be understood: {found.trouble}")
-    return effective(file, found.changes)
 
 
 def _refuse_conflicts(now: Effective, file: Path) -> None:

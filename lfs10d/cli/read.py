@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from typing import Any
 import click
 
 from lfs10d.cli import EXIT_FAILED, EXIT_UNAVAILABLE, json_option
+from lfs10d.cli.calibrated import NONE, Calibrations, calibration_option, calibrations_of
 from lfs10d.cli.direct_line import DirectLine
 from lfs10d.cli.local_time import clock_text, stamp
 from lfs10d.cli.options import PORT, DurationType, LineOptions, SlaveId, baudrate_of, line_options, profile_names, take
@@ -24,7 +25,7 @@ from lfs10d.modbus.description import describe
 from lfs10d.modbus.frames import Checksum, Codec
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
-from lfs10d.reading import ALIVE_CODES, Exchanged, Fault, FaultCode, Reading, UartCounters
+from lfs10d.reading import ALIVE_CODES, Exchanged, Fault, FaultCode, Reading, UartCounters, Value
 from lfs10d.system.logs import escape
 
 ATTEMPTS = 3
@@ -77,20 +78,24 @@ def _rate(context: click.Context, parameter: click.Parameter, value: str) -> int
     help="How often.",
 )
 @line_options
+@calibration_option
 @json_option
-def command(**values: Any) -> int:  # noqa: ANN401  # eleven options; `_ReadOptions` names and types them
+def command(**values: Any) -> int:  # noqa: ANN401  # twelve options; `_ReadOptions` names and types them
     """Read the sensor with slave id ID on the line at PORT, now.
 
-    The port must be free. Exit code 1 if there is no value.
+    The port must be free. Exit code 1 if there is no value. A slave that is configured with `calibration` is shown
+    raw and calibrated.
     """
     line = take(values)
+    config = values.pop("config")
     profile = load_profile(values.pop("profile_name"), relative_to=Path())
     if line.framing.value not in profile.framings:
         raise click.UsageError(f"profile {profile.name} does not speak {line.framing.value}")
-    options = _ReadOptions(line=line, profile=profile, **values)
     first, last = profile.ids
-    if not first <= options.slave <= last:
-        raise click.UsageError(f"profile {profile.name} has ids {first} to {last}, not {options.slave}")
+    if not first <= values["slave"] <= last:
+        raise click.UsageError(f"profile {profile.name} has ids {first} to {last}, not {values['slave']}")
+    calibrations = calibrations_of(line.port, config)
+    options = _ReadOptions(line=line, profile=profile, calibrations=calibrations, **values)
     try:
         return _read(options)
     except PortBusyError as error:
@@ -112,6 +117,11 @@ class _ReadOptions:
     watch: bool
     interval: float
     as_json: bool
+    calibrations: Calibrations = NONE
+
+    def calibrated(self, reading: Reading) -> Mapping[str, Value | None]:
+        """Return the calibrated values of those that have a calibration."""
+        return self.calibrations.of(self.slave, self.baudrate, self.profile, reading.values or {})
 
     @property
     def codec(self) -> Codec:
@@ -187,14 +197,23 @@ def _on_reading(options: _ReadOptions, attempts: _Attempts, reading: Reading, li
 
 def _numbers(options: _ReadOptions, reading: Reading) -> Iterator[tuple[str, str]]:
     units = options.profile.units
+    calibrated = options.calibrated(reading)
     for name, value in (reading.values or {}).items():
         if value is None:
             yield name, f"no value ({reading.value_errors[name]})"
             continue
-        shown = ("true" if value else "false") if isinstance(value, bool) else escape(str(value))
-        unit = units.get(name, "1")
-        age = f", {reading.ages[name]:.0f} s old" if name in reading.ages else ""
-        yield name, (shown if unit == "1" else f"{shown} {unit}") + age
+        text = _with_unit(value, units.get(name, "1"))
+        if name in calibrated:
+            number = calibrated[name]
+            text += f", calibrated {'out of range' if number is None else _with_unit(number, units[name])}"
+        if name in reading.ages:
+            text += f", {reading.ages[name]:.0f} s old"
+        yield name, text
+
+
+def _with_unit(value: Value, unit: str) -> str:
+    shown = ("true" if value else "false") if isinstance(value, bool) else escape(str(value))
+    return shown if unit == "1" else f"{shown} {unit}"
 
 
 def _wall(reading: Reading) -> float:
@@ -270,6 +289,7 @@ def _json(options: _ReadOptions, reading: Reading) -> dict[str, Any]:
     fault = reading.fault
     names, units = options.profile.value_names, options.profile.units
     values = reading.values or {}
+    calibrated = options.calibrated(reading)
     return {
         "slave": options.slave,
         "port": options.line.port,
@@ -285,6 +305,7 @@ def _json(options: _ReadOptions, reading: Reading) -> dict[str, Any]:
             if reading.value_errors
             else {}
         ),
+        **({"calibrated": calibrated} if calibrated else {}),
         **({"ages": {name: round(age, 3) for name, age in reading.ages.items()}} if reading.ages else {}),
         "message": None if fault is None else fault.message,
         "exception_code": None if fault is None else fault.exception_code,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,18 +12,20 @@ from typing import Any
 import click
 
 from lfs10d.cli import EXIT_FAILED, EXIT_UNAVAILABLE, json_option
+from lfs10d.cli.calibrated import NONE, Calibrations, calibration_option, calibrations_of
 from lfs10d.cli.direct_line import DirectLine
 from lfs10d.cli.options import PORT, LineOptions, baudrate_of, line_options, take
 from lfs10d.cli.port_holder import instead
 from lfs10d.cli.render import scan_findings, troubleshooting
 from lfs10d.cli.render.scan_progress import view
 from lfs10d.errors import FailedError, PortBusyError, PortError
+from lfs10d.line.jobs.identification import FoundDevice
 from lfs10d.line.jobs.scan import Scan
 from lfs10d.line.jobs.scan_ids import ids_of
 from lfs10d.line.jobs.scan_plan import FIRST_TIMEOUT, ScanPlan
 from lfs10d.modbus.frames import Checksum, Codec, Framing
 from lfs10d.profiles.library import builtin_names, load_profile
-from lfs10d.reading import FaultCode
+from lfs10d.reading import FaultCode, Value
 
 LOOK_EVERY = 0.1
 """Seconds between two updates of the progress."""
@@ -91,6 +93,7 @@ def given(name: str) -> bool:
     help="Write a configuration for what was found; no file is overwritten.",
 )
 @line_options
+@calibration_option
 @json_option
 def command(
     ids: tuple[int, ...],
@@ -102,7 +105,8 @@ def command(
     """Find the devices on the line at PORT.
 
     Polls every id at every rate; nothing is ever written to a device. A device set to the other checksum does not
-    answer: scan once with each. The port must be free. Exit code 1 if no device answers.
+    answer: scan once with each. The port must be free. Exit code 1 if no device answers. A slave that is configured
+    with `calibration` is shown raw and calibrated.
     """
     as_json, checksum = options.pop("as_json"), options.pop("checksum")
     line = take(options)
@@ -122,7 +126,7 @@ def command(
     if not search.profiles:
         raise click.UsageError(f"none of these profiles speaks {line.framing.value}")
     asked = scan_findings.ScanRequest(checksum, {profile.name: file for file, profile in own.items()})
-    result = _Result(Scan(search), line, asked)
+    result = _Result(Scan(search), line, asked, calibrations_of(line.port, options["config"]))
     code = _scan(result, as_json=as_json)
     if not result.opened:
         return code
@@ -150,8 +154,13 @@ class _Result:
     scan: Scan
     line: LineOptions
     asked: scan_findings.ScanRequest
+    calibrations: Calibrations = NONE
     framing_errors: int | None = None
     opened: bool = False
+
+    def calibrated(self, finding: FoundDevice) -> Mapping[str, Value | None]:
+        """Return the calibrated values of those that have a calibration."""
+        return self.calibrations.of(finding.slave, finding.baudrate, finding.profile, finding.values)
 
     def report(self) -> dict[str, Any]:
         """Return everything for JSON."""
@@ -161,7 +170,7 @@ class _Result:
             "complete": self.scan.complete,
             "asked": progress.asked,
             "total": progress.total,
-            "found": [scan_findings.plain(finding) for finding in self.scan.found],
+            "found": [scan_findings.plain(finding, self.calibrated(finding)) for finding in self.scan.found],
             "noisy_ids": self.scan.noise.ids,
             "echo": self.scan.noise.echoed,
             "framing_errors": self.framing_errors,
@@ -171,7 +180,7 @@ class _Result:
         """Print what was found, or what it means that nothing was; the configuration unless it is `written`."""
         found = self.scan.found
         if found:
-            scan_findings.show([scan_findings.row(finding) for finding in found])
+            scan_findings.show([scan_findings.row(finding, self.calibrated(finding)) for finding in found])
         if found and not written:
             click.echo()
             click.echo("# To poll them, save this as lfs10d.yaml, then: lfs10d run -c lfs10d.yaml")

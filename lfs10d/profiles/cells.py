@@ -80,10 +80,10 @@ class Cell:
         if self.unavailable and self._is_unavailable(content, bits):
             return self._nothing(content)
         value = self._float32(bits) if self.type == "float32" else self._of_another_kind(bits)
-        return value if isinstance(value, (Fault, str)) else self._believed(value)
+        return value if isinstance(value, (Fault, str)) else self.believed(value)
 
-    def _believed(self, number: Number) -> Number | Fault:
-        """Return a number as it is published, or why it is not."""
+    def believed(self, number: Number) -> Number | Fault:
+        """Return a number of the profile as it is published, calibrated, or why it is not."""
         if self.calibration is not None:
             number = self.calibration.apply(number)
             if abs(number) == inf:

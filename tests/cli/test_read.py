@@ -55,6 +55,26 @@ def test_json_is_a_sample_for_programs(lfs10d: Lfs10d, sensors: PtyLine) -> None
     assert (sample["quality"], sample["error"], sample["unit"], sample["slave"]) == ("good", None, "m/s", 2)
 
 
+def test_a_calibrated_slave_is_shown_raw_and_calibrated(lfs10d: Lfs10d, sensors: PtyLine, tmp_path: Path) -> None:
+    sensors.line.add(Sensor(2, source=lambda _: 12.99))
+    (tmp_path / "own.yaml").write_text(
+        f"line: {{port: {sensors.path}}}\nmqtt: {{host: localhost}}\n"
+        "slaves: [{id: 2, calibration: {wind_speed: {scale: 1.0137, offset: 0.061}}}]\n"
+    )
+    done = lfs10d("read", sensors.path, "2", "-c", "own.yaml")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.splitlines()[1] == "  wind_speed   12.99 m/s, calibrated 13.22896 m/s"
+    sample = json.loads(lfs10d("read", sensors.path, "2", "--json", LFS10D_CONFIG="own.yaml").stdout)
+    assert (sample["wind_speed"], sample["calibrated"]) == (12.99, {"wind_speed": 13.22896})
+    report = json.loads(
+        lfs10d("scan", sensors.path, "--ids=2", "--baudrate=9600", "--json", "--config=own.yaml").stdout
+    )
+    (found,) = report["found"]
+    assert (found["values"], found["calibrated"]) == ({"wind_speed": 12.99}, {"wind_speed": 13.22896})
+    table = lfs10d("scan", sensors.path, "--ids=2", "--baudrate=9600", "-c", "own.yaml").stdout
+    assert "LFS10 wind speed sensor, 12.99 m/s, calibrated 13.22896 m/s" in table
+
+
 def test_another_device_at_another_rate_is_read_by_its_profile(
     lfs10d: Lfs10d, sensors: PtyLine, tmp_path: Path
 ) -> None:

@@ -95,6 +95,7 @@ def test_json_is_all_that_standard_output_carries(lfs10d: Lfs10d, sensors: PtyLi
         "profile": "lfs10",
         "title": "LFS10 wind speed sensor",
         "values": None,
+        "calibrated": {},
         "units": {"wind_speed": "m/s"},
         "id_register": 2,
         "exception_code": None,

@@ -15,6 +15,7 @@ import click
 from lfs10d.cli.options import LineOptions
 from lfs10d.cli.render.table import columns
 from lfs10d.modbus.frames import EXCEPTION_NAMES, Framing
+from lfs10d.reading import NOTHING, Value
 from lfs10d.schema.quantities import duration_text
 
 if TYPE_CHECKING:  # as in `lfs10d.commands.context`
@@ -31,10 +32,10 @@ ILLEGAL_FUNCTION = 1
 BY_ID = Path("/dev/serial/by-id")
 
 
-def row(finding: FoundDevice) -> tuple[str, ...]:
-    """Return a finding as a row of the table."""
+def row(finding: FoundDevice, calibrated: Mapping[str, Value | None] = NOTHING) -> tuple[str, ...]:
+    """Return a finding as a row of the table, the first value calibrated too where it has a calibration."""
     answers_in = f"{finding.rtt * 1e3:.0f} ms" if finding.rtt is not None else "-"
-    return str(finding.slave), str(finding.baudrate), answers_in, what(finding), "; ".join(remarks(finding))
+    return str(finding.slave), str(finding.baudrate), answers_in, what(finding, calibrated), "; ".join(remarks(finding))
 
 
 def show(rows: list[tuple[str, ...]]) -> None:
@@ -60,11 +61,11 @@ def show(rows: list[tuple[str, ...]]) -> None:
     Console().print(table)
 
 
-def what(finding: FoundDevice) -> str:
+def what(finding: FoundDevice, calibrated: Mapping[str, Value | None] = NOTHING) -> str:
     """Return what it is, with what it measures just now."""
     profile = finding.profile
     if profile is not None:
-        return profile.title if finding.duplicate else f"{profile.title}, {value_text(finding)}"
+        return profile.title if finding.duplicate else f"{profile.title}, {value_text(finding, calibrated)}"
     if not finding.answers:
         return "something that gives no valid reply"
     if finding.exception is not None:
@@ -74,14 +75,18 @@ def what(finding: FoundDevice) -> str:
     return "unknown device, answers function 03"
 
 
-def value_text(finding: FoundDevice) -> str:
-    """Return its first value with its unit."""
+def value_text(finding: FoundDevice, calibrated: Mapping[str, Value | None] = NOTHING) -> str:
+    """Return its first value with its unit, and calibrated where it has a calibration."""
     profile = finding.profile
     if profile is None or profile.value_names[0] not in finding.values:
         return "no plausible value"
     first = profile.values[0]
     unit = "" if first.unit == "1" else f" {first.unit}"
-    return f"{finding.values[first.name]}{unit}"
+    text = f"{finding.values[first.name]}{unit}"
+    if first.name not in calibrated:
+        return text
+    number = calibrated[first.name]
+    return f"{text}, calibrated {'out of range' if number is None else f'{number}{unit}'}"
 
 
 def remarks(finding: FoundDevice) -> Iterator[str]:
@@ -180,8 +185,8 @@ def _obstacle(finding: FoundDevice, baudrate: int) -> str | None:
     return None
 
 
-def plain(finding: FoundDevice) -> dict[str, Any]:
-    """Return a finding for JSON."""
+def plain(finding: FoundDevice, calibrated: Mapping[str, Value | None] = NOTHING) -> dict[str, Any]:
+    """Return a finding for JSON; `calibrated` are its values of those that have a calibration."""
     profile = finding.profile
     return {
         "id": finding.slave,
@@ -191,6 +196,7 @@ def plain(finding: FoundDevice) -> dict[str, Any]:
         "profile": None if profile is None else profile.name,
         "title": None if profile is None else profile.title,
         "values": dict(finding.values),
+        "calibrated": dict(calibrated),
         "units": {} if profile is None else {name: profile.units[name] for name in finding.values},
         "id_register": finding.id_register,
         "exception_code": finding.exception if profile is None else None,

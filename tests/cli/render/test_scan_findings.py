@@ -158,3 +158,10 @@ def test_a_relative_port_is_called_by_its_absolute_name(tmp_path: Path, monkeypa
     (tmp_path / "line0").symlink_to("/dev/null")
     assert lasting_name("line0", tmp_path / "none") == str(tmp_path / "line0")
     assert lasting_name("../x/ttyUSB0", tmp_path / "none") == str(tmp_path.parent / "x/ttyUSB0")
+
+
+def test_a_calibrated_device_is_shown_raw_and_calibrated() -> None:
+    assert what(sensor(3), {"wind_speed": 5.63}) == "LFS10 wind speed sensor, 5.5 m/s, calibrated 5.63 m/s"
+    assert what(sensor(3), {"wind_speed": None}) == "LFS10 wind speed sensor, 5.5 m/s, calibrated out of range"
+    found = plain(sensor(3), {"wind_speed": 5.63})
+    assert (found["values"], found["calibrated"]) == ({"wind_speed": 5.5}, {"wind_speed": 5.63})

@@ -1,0 +1,114 @@
+"""The calibration of configured slaves, for the verbs that read a line themselves and show the raw values."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+
+from lfs10d.cli import config_option
+from lfs10d.cli.effective_file import with_changes
+from lfs10d.config.effective import Effective
+from lfs10d.config.loader import load
+from lfs10d.daemon.state_directory import state_directory
+from lfs10d.errors import ConfigError, StateError
+from lfs10d.profiles.profile import Profile
+from lfs10d.reading import Fault, Value
+
+
+def calibration_option(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add `-c FILE`, passed on as `config: Path`; `calibrations_of` takes it."""
+    return config_option(function, "Whose `calibration` is shown beside raw values.")
+
+
+@dataclass(frozen=True, slots=True)
+class Calibrations:
+    """The calibrated profiles of one line by slave id, each at the line's rate."""
+
+    profiles: Mapping[int, Profile]
+    baudrate: int
+
+    def of(
+        self, slave: int, baudrate: int, profile: Profile | None, raw: Mapping[str, Value | None]
+    ) -> dict[str, Value | None]:
+        """Return the calibrated values by name, {} where the configuration has no calibration for this place.
+
+        As the daemon would publish them: None where there is no raw value, or the calibrated one is out of range. The
+        calibration is of a device of the configured profile: as another one nothing is calibrated.
+        """
+        calibrated = self.profiles.get(slave)
+        if calibrated is None or baudrate != self.baudrate or calibrated.plain != profile:
+            return {}
+        values: dict[str, Value | None] = {}
+        for value in calibrated.values:
+            cell = value.cell(value.register)
+            if cell.calibration is None:
+                continue
+            number = raw.get(value.name)
+            believed = cell.believed(number) if isinstance(number, int | float) else None
+            values[value.name] = None if isinstance(believed, Fault) else believed
+        return values
+
+
+NONE = Calibrations({}, 0)
+
+
+def calibrations_of(port: str, file: Path) -> Calibrations:
+    """Return the calibrations that a configuration has for the line at `port`; called by a verb.
+
+    Raises ConfigError if a person named the file and it is not valid. Prints on standard error what cannot be known
+    and why; then raw values alone are shown. A file that nobody named and that is not there has no calibration.
+    """
+    named = click.get_current_context().get_parameter_source("config") is click.core.ParameterSource.COMMANDLINE
+    calibrations, trouble = _found(port, file, named=named)
+    if trouble is not None:
+        click.echo(f"lfs10d: {trouble}; raw values alone are shown", err=True)
+    return calibrations
+
+
+def _found(port: str, file: Path, *, named: bool) -> tuple[Calibrations, str | None]:
+    try:
+        loaded = load(file, files=False)
+    except ConfigError as error:
+        if named:
+            raise
+        return NONE, None if _absent(file) else str(error.problems[0])
+    line = loaded.config.line
+    if os.path.realpath(line.port) != os.path.realpath(port):
+        return NONE, f"{file} is of another port, {line.port}" if named else None
+    if not any(slave.calibration for slave in loaded.config.slaves):
+        return NONE, None
+    directory = state_directory(file, line.name, chosen=None, environment=os.environ)
+    try:
+        return _by_place(with_changes(loaded, directory, chosen=False))
+    except StateError as error:
+        return NONE, f"{error}, and so which sensor has which id now: call it as root to see calibrated values"
+
+
+def _by_place(now: Effective) -> tuple[Calibrations, str | None]:
+    """Return the calibrations by where their devices are; a device that is to be looked for has no place."""
+    profiles: dict[int, Profile] = {}
+    unsure: list[str] = []
+    for slave in now.polled.slaves:
+        if not slave.calibration:
+            continue
+        if len(now.places[slave.name]) > 1:
+            unsure.append(slave.name)
+        else:
+            profiles[slave.id] = now.loaded.profiles[slave.profile].calibrated(slave.certificates)
+    trouble = f"the daemon has not found out yet which slave id {', '.join(unsure)} has" if unsure else None
+    return Calibrations(profiles, now.config.line.baudrate), trouble
+
+
+def _absent(file: Path) -> bool:
+    try:
+        file.stat()
+    except FileNotFoundError:
+        return True
+    except OSError:
+        return False
+    return False
