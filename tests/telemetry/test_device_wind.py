@@ -229,6 +229,6 @@ def test_disabling_what_shows_nothing_publishes_nothing() -> None:
 
 def test_a_live_view_shows_what_was_published_last() -> None:
     line = weather()
-    line.run(65, lambda _: 6.0)
+    line.run(75, lambda _: 6.0)
     shown = cast("dict[str, object]", line.station.snapshot("a")["wind"])
     assert (shown["mean_2m"], shown["gust_10m"]) == (6.0, 6.0)
