@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from lfs10d.config.loader import LoadedConfig, load
 from lfs10d.errors import ConfigError, Problem
+from lfs10d.profiles.library import builtin_names
 from lfs10d.schema.document import LARGEST_FILE
 
 SMALL = "line: {port: /dev/x}\nslaves: [2, 3]\nmqtt: {host: localhost}\n"
@@ -128,7 +129,7 @@ def test_all_problems_are_told_at_once_in_order_of_place() -> None:
             [
                 (
                     '2:27: slaves[0].profile: no profile "lsf10": "{folder}/lsf10" cannot be read: no such file or '
-                    "directory; built in are lfs10, ld-e, fuling-dzb, eh600; else the path of a profile YAML"
+                    f"directory; built in are {', '.join(builtin_names())}; else the path of a profile YAML"
                 )
             ],
         ),
@@ -137,7 +138,7 @@ def test_all_problems_are_told_at_once_in_order_of_place() -> None:
             [
                 (
                     '2:27: slaves[0].profile: no profile "p": "{folder}/p" cannot be read: no such file or '
-                    "directory; built in are lfs10, ld-e, fuling-dzb, eh600; else the path of a profile YAML"
+                    f"directory; built in are {', '.join(builtin_names())}; else the path of a profile YAML"
                 )
             ],
         ),
