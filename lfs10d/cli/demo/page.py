@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from lfs10d.cli.demo.broker import LOOPBACK
-from lfs10d.cli.demo.processes import PYTHON, Children
+from lfs10d.cli.demo.processes import PYTHON, Child, Children
 
 USUAL_PORT: Final = 8073
 _ADDRESS: Final = re.compile(r"http://[0-9.:]+/")
@@ -25,8 +25,16 @@ class Page:
     token: str
 
 
-async def start_page(children: Children, configuration: Path) -> Page | None:
-    """Start the page and return it; None where its extra is not installed, or it does not start."""
+@dataclass(frozen=True, slots=True)
+class StartingPage:
+    """The page's process and the token it was given."""
+
+    child: Child
+    token: str
+
+
+def begin_page(children: Children, configuration: Path) -> StartingPage | None:
+    """Start the page's process; None where its extra is not installed."""
     if not (importlib.util.find_spec("starlette") and importlib.util.find_spec("uvicorn")):
         return None
     token, token_file = secrets.token_hex(8), children.folder / "web-token"
@@ -38,11 +46,24 @@ async def start_page(children: Children, configuration: Path) -> Page | None:
         *(*PYTHON, "-m", "lfs10d", "web", "-c", str(configuration)),
         *("--listen", f"{LOOPBACK}:{port}", "--token-file", str(token_file)),
     )
-    if not await children.ready(child, lambda: _ADDRESS.search(child.log.read_text(errors="replace")) is not None):
-        await children.discard(child)
+    return StartingPage(child, token)
+
+
+async def finish_page(children: Children, starting: StartingPage | None) -> Page | None:
+    """Wait for the page; None where there is none, or it does not start."""
+    if starting is None:
         return None
-    found = _ADDRESS.search(child.log.read_text(errors="replace"))
-    return None if found is None else Page(found[0], token)
+
+    def address() -> str | None:
+        found = _ADDRESS.search(starting.child.log.read_text(errors="replace"))
+        return None if found is None else found[0]
+
+    await children.ready(starting.child, lambda: address() is not None)
+    found = address()
+    if found is None:
+        await children.discard(starting.child)
+        return None
+    return Page(found, starting.token)
 
 
 def _is_free(port: int) -> bool:

@@ -14,7 +14,7 @@ import click
 
 from lfs10d.cli.demo import texts
 from lfs10d.cli.demo.broker import Broker, start_broker
-from lfs10d.cli.demo.page import Page, start_page
+from lfs10d.cli.demo.page import Page, begin_page, finish_page
 from lfs10d.cli.demo.processes import PYTHON, Children, temporary_folder
 from lfs10d.cli.demo.scenario import BAUDRATE, LINE, configuration, faults, slaves
 from lfs10d.cli.login import log_in
@@ -115,14 +115,14 @@ async def _start(children: Children, wanted: str) -> tuple[Watch, Broker, Page |
     if not await children.ready(simulator, link.is_symlink):
         raise FailedError(f"the demo's simulated line does not start: {simulator.last_words()}")
     configuration_file.write_text(configuration(link, broker.port, broker.speaks))
-    page = await start_page(children, configuration_file)
+    page = begin_page(children, configuration_file)
     daemon = children.start("daemon", *ours, "run", "-c", str(configuration_file), "--state-dir", str(children.folder))
     watch = Watch(log_in(configuration_file, "demo", username=None, password_file=None))
     await watch.connect()
     if not await children.ready(daemon, lambda: watch.online):
         await watch.disconnect()
         raise FailedError(f"the demo's daemon does not start: {daemon.last_words()}")
-    return watch, broker, page
+    return watch, broker, await finish_page(children, page)
 
 
 def _is_writable() -> bool:
