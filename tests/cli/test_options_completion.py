@@ -18,7 +18,7 @@ from tests.support.verbs import Lfs10d
         ("lfs10d profiles show ld", "plain,ld-e"),
         ("lfs10d profiles show ./own", "file,./own"),
         ("lfs10d read /dev/ttyUSB0 2 --profile fu", "plain,fuling-dzb"),
-        ("lfs10d simulate --profile e", "plain,eh600"),
+        ("lfs10d simulate --profile eh", "plain,eh600"),
         ("lfs10d request line/b", "plain,line/baudrate"),
         ("lfs10d scan /dev/ttyUSB0 --framing a", "plain,ascii"),
     ],
