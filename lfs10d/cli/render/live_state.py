@@ -47,6 +47,8 @@ class ShownDevice:
     good_ts: float | None = None
     since: float | None = None
     """When its error rose, epoch ms of the daemon's clock; None while it has none."""
+    alarm: str | None = None
+    """The code of that error: of `device/<name>/error`, not of the last sample."""
     gust: float | None = None
     """The greatest mean of 3 s of the last 10 min; None where there is none."""
     mean: float | None = None
@@ -135,7 +137,7 @@ class LiveState:
                 if last is not None and (device.good_ts is None or last > device.good_ts):
                     device.good_ts = last
             elif leaf == "error":
-                device.since = _since(payload)
+                _error(device, payload)
             elif leaf == "wind":
                 _wind(device, payload)
             elif leaf in {"state", "telemetry"}:
@@ -195,7 +197,7 @@ class LiveState:
         wind = entry.get("wind")
         _wind(device, wind if isinstance(wind, dict) else {})
         alarm = entry.get("alarm")
-        device.since = _since(alarm) if isinstance(alarm, dict) else None
+        _error(device, alarm if isinstance(alarm, dict) else {})
         age = _number(entry.get("age_s"))
         device.good_ts = None if age is None else ts - age * 1000
         if fresh and now is not None:
@@ -264,6 +266,12 @@ def _sample(
     named = errors.items() if device.good and isinstance(errors, dict) else ()
     device.errors = {str(name): code for name, code in named if isinstance(code, str)}
     device.units = {str(name): unit for name, unit in units.items() if isinstance(unit, str)}
+
+
+def _error(device: ShownDevice, error: Mapping[str, Any]) -> None:
+    """Take a device's error object; empty: there is none."""
+    device.since = _since(error)
+    device.alarm = str(error.get("code")) if error.get("active") is True else None
 
 
 def _wind(device: ShownDevice, wind: Mapping[str, Any]) -> None:

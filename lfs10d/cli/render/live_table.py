@@ -11,6 +11,7 @@ from datetime import tzinfo
 from typing import Final, TypeAlias
 
 from lfs10d.cli.local_time import since_text, zone_name
+from lfs10d.cli.render.error_words import BESIDE_GOOD, OF_THE_LINE, in_words
 from lfs10d.cli.render.live_state import LiveState, ShownDevice
 from lfs10d.cli.render.value_text import with_unit
 from lfs10d.system.logs import escape
@@ -24,26 +25,6 @@ LONGEST_WORD: Final = 200
 JUST: Final = 5.0
 """s for which it is marked that a device came or went."""
 
-_MEANINGS: Final = {
-    "timeout": "no answer",
-    "crc": "garbled answer",
-    "malformed": "broken answer",
-    "wrong_slave": "another slave answers",
-    "wrong_function": "answers something else",
-    "exception": "refuses",
-    "out_of_range": "impossible value",
-    "not_finite": "not a number",
-    "unavailable": "has no value now",
-    "starting": "not polled yet",
-    "late": "answers too late",
-    "collision": "line never silent",
-    "port_lost": "no port",
-    "port_busy": "another program has the port",
-    "config_conflict": "two devices with one id",
-}
-"""A code in a word or two, shown behind the code itself; details in docs/when-it-goes-wrong.md."""
-_OF_THE_LINE: Final = frozenset({"starting", "port_lost", "port_busy", "config_conflict"})
-"""Codes that are not about the device itself."""
 _MARKS: Final = {"moved": ">", "came": "+", "went": "-"}
 _MARK_STYLES: Final = {"moved": "bold black on green", "came": "bold green", "went": "bold red"}
 
@@ -110,7 +91,7 @@ def _row(live: LiveState, device: ShownDevice, source: DataSource, moment: _Mome
         rtt="" if device.rtt_ms is None or stale else f"{device.rtt_ms:.0f} ms",
         just=just,
         stale=stale,
-        good=device.good,
+        good=device.good and device.alarm not in BESIDE_GOOD,
         gust="" if device.gust is None else f"{device.gust:.2f}",
         mean="" if device.mean is None else f"{device.mean:.2f}",
     )
@@ -120,15 +101,17 @@ def _state(device: ShownDevice, moment: _Moment, *, stale: bool) -> str:
     """Return availability and error, as code and words, and since when."""
     if not device.enabled:
         return "disabled"
-    if device.good and (stale or not device.errors):
-        return "old value" if stale else "good"
+    if device.good and stale:
+        return "old value"
+    if device.good and device.alarm in BESIDE_GOOD:
+        return in_words(device.alarm) + _since(device.since, moment.wall, moment.zone)
     if device.good:
-        return "partial: " + ", ".join(f"{escape(name)} {escape(code)}" for name, code in device.errors.items())
+        lacking = ", ".join(f"{escape(name)} {escape(code)}" for name, code in device.errors.items())
+        return f"partial: {lacking}" if lacking else "good"
     if device.error is None:
         return "not heard yet"
-    code = escape(device.error)
-    trouble = f"{code}, {_MEANINGS[code]}" if code in _MEANINGS else code
-    if not device.online and code not in _OF_THE_LINE:
+    trouble = in_words(device.error)
+    if not device.online and device.error not in OF_THE_LINE:
         trouble = f"offline: {trouble}"
     return trouble + _since(device.since, moment.wall, moment.zone)
 
@@ -257,9 +240,10 @@ def header(
     if line.get("open") is False and live.line_error is None:
         lines.append((("the port is not open", "bold red"),))
     if live.line_error is not None:
-        code = f"{live.line_error_code}: " if live.line_error_code != live.line_error else ""
-        trouble = escape(f"{code}{live.line_error}") + _since(live.line_error_since, wall, zone)
-        lines.append(((trouble, "bold red"),))
+        trouble = escape(f"{live.line_error_code}: {live.line_error}")
+        if live.line_error_code == live.line_error:
+            trouble = in_words(live.line_error)
+        lines.append(((trouble + _since(live.line_error_since, wall, zone), "bold red"),))
     return [piece for whole in lines for piece in _wrapped(whole, width)]
 
 

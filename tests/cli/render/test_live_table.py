@@ -119,6 +119,9 @@ def test_one_that_just_came_or_went_is_marked_for_five_seconds(online: bool, mar
         (bad("a", 2, "port_busy"), "port_busy, another program has the port"),
         (bad("a", 2, "config_conflict"), "config_conflict, two devices with one id"),
         (bad("a", 2, "something new"), "offline: something new"),
+        (entry("a", 2, alarm={"active": True, "code": "duplicate_id"}), "duplicate_id, two sensors answer"),
+        (entry("a", 2, alarm={**AN_HOUR_AGO, "code": "duplicate_id"}), "duplicate_id, two sensors answer; since 20:53"),
+        (entry("a", 2, alarm=AN_HOUR_AGO), "good"),
         (bad("a", 2, None), "not heard yet"),
         (bad("a", 2, "starting"), "starting, not polled yet"),
         (bad("a", 2, alarm={"active": False, "code": None}), "offline: timeout, no answer"),
@@ -132,6 +135,17 @@ def test_one_that_just_came_or_went_is_marked_for_five_seconds(online: bool, mar
 )
 def test_availability_and_error_are_told_in_words(device: dict[str, Any], state: str) -> None:
     assert states(device) == [state]
+
+
+def test_one_id_with_two_sensors_is_no_good_state_though_its_samples_are_good() -> None:
+    """Before, the table showed it as good; only an alarm that has nothing to do with samples outlives a good one."""
+    twin = {"v": 1, "active": True, "code": "duplicate_id", "message": "two answers", "since": WALL * 1000}
+    shown = live(entry("a", 2))
+    shown.on_message("device/a/error", twin, old=True, now=0.0, wall=WALL)
+    (row,) = rows(shown, HERE, now=0.0, wall=WALL, zone=UTC)
+    assert (row.good, row.state, row.value) == (False, "duplicate_id, two sensors answer; since 21:53", "4.50 m/s")
+    shown.on_message("device/a/error", {"active": False, "code": None}, old=False, now=0.0, wall=WALL)
+    assert rows(shown, HERE, now=0.0, wall=WALL)[0].good
 
 
 def test_what_is_old_is_never_shown_as_live() -> None:
@@ -208,7 +222,7 @@ def test_a_line_error_is_told_in_words_above_all() -> None:
     assert (("port_lost: no such file; since 21:53", "bold red"),) in header(shown, HERE, 80, wall=WALL, zone=east)
     assert (("port_lost: no such file; since 21 Nov 21:53", "bold red"),) in header(shown, HERE, 80, zone=east)
     wordless = live(open=False, error={"active": True, "code": "port_lost"})
-    assert (("port_lost", "bold red"),) in header(wordless, HERE, 80)
+    assert (("port_lost, no port", "bold red"),) in header(wordless, HERE, 80)
     assert (("the port is not open", "bold red"),) in header(live(open=False), HERE, 80)
 
 
