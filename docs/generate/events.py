@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from docs.generate.markdown import example, plain, table
+from lfs10d.telemetry.publication import EventType
 
 PACKAGE: Final = Path(__file__).resolve().parents[2] / "lfs10d"
 COMMON: Final = frozenset({"v", "type", "ts"})
@@ -29,7 +30,7 @@ _DEVICE = ("text", "name of the device")
 _SLAVE = ("whole number", "slave id")
 _PLACE = "object: slave, baudrate"
 
-EVENTS: Final[Mapping[str, EventPage]] = {
+EVENTS: Final[Mapping[EventType, EventPage]] = {
     "device_added": EventPage(
         "A device is polled that was not before: by a request or a reload.",
         {"device": _DEVICE, "slave": _SLAVE},

@@ -13,6 +13,7 @@ from typing import Final
 from lfs10d.line.jobs.job import Job
 from lfs10d.line.jobs.scan import Scan
 from lfs10d.line.jobs.scan_plan import ScanPlan
+from lfs10d.telemetry.publication import EventType
 
 SCANNING: Final = "scanning"
 """The activity of the line meanwhile."""
@@ -36,7 +37,7 @@ class Scanner:
         *,
         submit: Callable[[Job], None],
         act: Callable[[str | None], None],
-        announce: Callable[[str, Mapping[str, object]], None],
+        announce: Callable[[EventType, Mapping[str, object]], None],
     ) -> None:
         self._submit = submit
         self._act = act

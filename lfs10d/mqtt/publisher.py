@@ -14,7 +14,7 @@ from lfs10d.system.clock import Clock, Instant
 from lfs10d.telemetry.first_burst import FirstBurst
 from lfs10d.telemetry.info import DaemonInfo, DeviceInfo, LineInfo
 from lfs10d.telemetry.line_state import PAUSED, POLLING, Requests
-from lfs10d.telemetry.publication import Publication, event
+from lfs10d.telemetry.publication import EventType, Publication, event
 from lfs10d.telemetry.station import Station
 
 TICK_SLACK = 0.03
@@ -61,7 +61,7 @@ class Publisher:
         if self._timer is not None and self._station.due() + TICK_SLACK < self._timer.when():
             self._set_timer()
 
-    def announce(self, kind: str, facts: Mapping[str, object]) -> None:
+    def announce(self, kind: EventType, facts: Mapping[str, object]) -> None:
         """Publish an event of a kind."""
         self.publish([event(kind, self._clock.epoch_ms(), **facts)])
 

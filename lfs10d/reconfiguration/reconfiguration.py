@@ -27,6 +27,7 @@ from lfs10d.reconfiguration.readdress import Readdress
 from lfs10d.reconfiguration.recovery import Recovery
 from lfs10d.reconfiguration.runner import ChangeRunner, Recall
 from lfs10d.system.clock import Instant
+from lfs10d.telemetry.publication import EventType
 
 log = logging.getLogger(__name__)
 
@@ -46,7 +47,7 @@ class Reconfiguration:
         change: Callable[[Edit], Awaitable[object]],
         learn: Callable[[Edit], Awaitable[object]],
         wire: Callable[[], Wire],
-        tell: Callable[[str, Mapping[str, object]], None],
+        tell: Callable[[EventType, Mapping[str, object]], None],
         recall: Recall,
         now: Callable[[], Instant],
         act: Callable[[str | None], None],

@@ -29,7 +29,7 @@ from lfs10d.config.effective import Edit, Effective
 from lfs10d.config.models import LineConfig
 from lfs10d.line.device import Device
 from lfs10d.schema.fields import Choice, Whole
-from lfs10d.telemetry.publication import CONFIG, LINE_STATE, device_of, device_topic
+from lfs10d.telemetry.publication import CONFIG, LINE_STATE, EventType, device_of, device_topic
 
 log = logging.getLogger(__name__)
 
@@ -86,7 +86,7 @@ class Restore:
         running: Callable[[], Effective],
         learn: Callable[[Edit], Awaitable[object]],
         devices: Callable[[], Iterable[Device]],
-        announce: Callable[[str, Mapping[str, object]], None],
+        announce: Callable[[EventType, Mapping[str, object]], None],
     ) -> None:
         self._running = running
         self._learn = learn

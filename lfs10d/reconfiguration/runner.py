@@ -39,6 +39,7 @@ from lfs10d.reconfiguration.reservations import Reservations
 from lfs10d.system.clock import Instant
 from lfs10d.system.tasks import BackgroundTasks
 from lfs10d.system.threads import run_in_thread
+from lfs10d.telemetry.publication import EventType
 
 log = logging.getLogger(__name__)
 T = TypeVar("T")
@@ -73,7 +74,7 @@ class ChangeRunner:
         change: Callable[[Edit], Awaitable[object]],
         learn: Callable[[Edit], Awaitable[object]],
         wire: Callable[[], Wire],
-        announce: Callable[[str, Mapping[str, object]], None],
+        announce: Callable[[EventType, Mapping[str, object]], None],
         recall: Recall,
         now: Callable[[], Instant],
     ) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 from typing import Literal, TypeAlias
 
@@ -57,6 +57,22 @@ Quality: TypeAlias = Literal["good", "partial", "bad"]
 """Every value is there; some are; none is."""
 
 
+EventType: TypeAlias = Literal[
+    "device_added",
+    "device_removed",
+    "readdressed",
+    "baudrate_changed",
+    "change_applied",
+    "change_dropped",
+    "change_conflict",
+    "scan_progress",
+    "duplicate_id",
+    "dropped",
+    "store_put_aside",
+]
+"""Every type of event the daemon publishes; docs/mqtt.md has a section for each."""
+
+
 class PublicationKind(StrEnum):
     """How a publication is treated while the broker is away."""
 
@@ -69,10 +85,12 @@ class PublicationKind(StrEnum):
     TRACE = "trace"
 
 
+_EPOCH = datetime.fromtimestamp(0, UTC).replace(tzinfo=None)
+
+
 def iso_time(ts: int) -> str:
     """Return epoch milliseconds as ISO 8601 in UTC with milliseconds: `2026-11-21T21:53:42.003Z`."""
-    seconds, milliseconds = divmod(ts, 1000)
-    return f"{datetime.fromtimestamp(seconds, UTC).replace(tzinfo=None).isoformat()}.{milliseconds:03d}Z"
+    return f"{(_EPOCH + timedelta(milliseconds=ts)).isoformat(timespec='milliseconds')}Z"
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,7 +198,7 @@ def retained(topic: str, payload: Payload, *, qos: int = 1, refresh: bool = Fals
     return Publication(topic, payload, PublicationKind.RETAINED, retain=True, qos=qos, refresh=refresh)
 
 
-def event(kind: str, ts: int, **facts: object) -> Publication:
+def event(kind: EventType, ts: int, **facts: object) -> Publication:
     """Return a publication on `event` of type `kind` at `ts` (epoch ms)."""
     payload = {"v": VERSION, "type": kind, "ts": ts, **facts}
     return Publication(EVENT, payload, PublicationKind.EVENT, retain=False, qos=1)

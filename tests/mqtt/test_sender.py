@@ -20,6 +20,7 @@ from lfs10d.mqtt.topics import Topics
 from lfs10d.outbox.backlog import BATCH_BYTES, HISTORY_AFTER
 from lfs10d.outbox.outbox import Outbox
 from lfs10d.telemetry.publication import Publication, PublicationKind, Sample, event, retained
+from tests.support.outbox_items import named_event
 
 ONLINE = retained("availability", "online")
 LOST = Disconnect(DisconnectReason.LOST, "broker b:1: the connection is lost")
@@ -472,7 +473,7 @@ def test_a_message_that_the_broker_never_acknowledges_while_it_does_others_is_fo
     async def scenario() -> None:
         desk = Desk()
         await desk.connect()
-        desk.add(event("swallowed", 0))
+        desk.add(named_event("swallowed"))
         for ends in (1, 2):
             await desk.turn()
             desk.add(retained("info", {}))

@@ -21,6 +21,7 @@ from lfs10d.outbox.queues import BURST_FIRST
 from lfs10d.outbox.turns import LEAST_WEIGHT, REFRESH_WEIGHT, WEIGHT
 from lfs10d.telemetry import publication
 from lfs10d.telemetry.publication import Publication, PublicationKind, Sample
+from tests.support.outbox_items import named_event
 
 ONLINE = publication.retained("availability", "online")
 WEIGHTS = 3 * WEIGHT + WEIGHT * LEVEL_MOST + REFRESH_WEIGHT + 2 * LEAST_WEIGHT
@@ -302,7 +303,7 @@ def test_messages_go_in_turn_with_everything_else() -> None:
     uplink.connect(burst=0)
     uplink.run(60.0)
     for number in range(30):
-        uplink.outbox.add(publication.event(f"e{number}", 0), uplink.now)
+        uplink.outbox.add(named_event(f"e{number}"), uplink.now)
     arrived = sum(map(len, uplink.arrived.values()))
     events = uplink.events
     uplink.run(20.0, measuring=False)

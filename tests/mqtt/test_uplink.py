@@ -24,6 +24,7 @@ from lfs10d.telemetry import publication
 from lfs10d.telemetry.publication import Publication, PublicationKind, Sample
 from tests.support.brokers import Listener, Mosquitto
 from tests.support.old_brokers import OldBroker
+from tests.support.outbox_items import named_event
 
 B = "site/line0"
 PATIENCE = 10.0
@@ -396,7 +397,7 @@ def test_what_is_larger_than_the_broker_takes_is_reported_once_and_stops_nothing
         async with running(site) as uplink:
             await online(listener)
             for _ in range(2):
-                uplink.publish([publication.event("too_much", 0, text="x" * 1000)])
+                uplink.publish([named_event("too_much", text="x" * 1000)])
             uplink.publish([sample(1)])
             await until(lambda: seqs(listener) == {1}, "the sample")
             assert site.changes == [True]
@@ -412,7 +413,7 @@ def test_what_is_no_json_is_reported_and_stops_nothing(mosquitto: Mosquitto, cap
         site = Site(mosquitto.port)
         async with running(site) as uplink:
             await online(listener)
-            uplink.publish([publication.event("odd", 0, value=float("nan")), sample(1)])
+            uplink.publish([named_event("odd", value=float("nan")), sample(1)])
             await until(lambda: seqs(listener) == {1}, "the sample")
 
     asyncio.run(scenario())

@@ -22,6 +22,7 @@ from lfs10d.outbox.refusals import BANNED_FOR
 from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry import publication as telemetry
 from lfs10d.telemetry.publication import Publication, PublicationKind, Sample
+from tests.support.outbox_items import named_event
 
 BATCH_EVERY = BATCH_MOST * SAMPLE_EVERY
 NOT_AUTHORIZED = 0x87
@@ -126,7 +127,7 @@ def test_a_refused_part_of_the_burst_does_not_keep_online_back() -> None:
 def test_a_flood_of_responses_delays_no_sample() -> None:
     outbox = connected()
     for number in range(4):
-        outbox.add(telemetry.event(f"e{number}", 0), 0.0)
+        outbox.add(named_event(f"e{number}"), 0.0)
     outbox.add(sample(1), 0.0)
     outbox.add(sample(2), 0.0)
     kinds = [type(outbox.next(0.0)) for _ in range(6)]
@@ -333,7 +334,7 @@ def test_an_unfit_batch_is_declared_but_for_what_was_acknowledged_before() -> No
 def test_messages_under_way_wait_again_in_order_and_traces_do_not() -> None:
     outbox = connected()
     for number in range(3):
-        outbox.add(telemetry.event(f"e{number}", 0), 0.0)
+        outbox.add(named_event(f"e{number}"), 0.0)
     outbox.add(trace(1), 0.0)
     outbox.add(trace(2), 0.0)
     for _ in range(2):
@@ -345,7 +346,7 @@ def test_messages_under_way_wait_again_in_order_and_traces_do_not() -> None:
     while (item := outbox.next(1.0)) is not None:
         assert isinstance(item, Message)
         told.append(item.publication)
-    assert told == [telemetry.event(f"e{number}", 0) for number in range(3)]
+    assert told == [named_event(f"e{number}") for number in range(3)]
 
 
 def test_a_trace_under_way_is_gone() -> None:
@@ -359,10 +360,10 @@ def test_a_trace_under_way_is_gone() -> None:
 
 def test_messages_that_wait_are_bounded() -> None:
     outbox = connected()
-    outbox.add(telemetry.event("first", 0), 0.0)
+    outbox.add(named_event("first"), 0.0)
     take(outbox, 0.0, Message)
     for number in range(MESSAGES_MOST + 5):
-        outbox.add(telemetry.event(f"e{number}", 0), 0.0)
+        outbox.add(named_event(f"e{number}"), 0.0)
     outbox.lost(1.0)
     connect(outbox, 2.0, window=MESSAGES_MOST * 2)
     count = 0
@@ -612,9 +613,9 @@ def test_a_live_sample_that_is_refused_goes_as_history_and_the_next_is_tried_liv
 
 def test_an_event_that_is_refused_waits_and_delays_no_response() -> None:
     outbox = connected()
-    outbox.add(telemetry.event("first", 0), 0.0)
+    outbox.add(named_event("first"), 0.0)
     event = take(outbox, 0.0, Message)
-    outbox.add(telemetry.event("second", 0), 0.0)
+    outbox.add(named_event("second"), 0.0)
     outbox.add(Publication("response/x", {}, PublicationKind.RESPONSE, retain=False, qos=1), 0.0)
     assert outbox.refused(event, QUOTA_EXCEEDED, 0.0)
     assert take(outbox, 0.0, Message).topic == "response/x"
@@ -743,7 +744,7 @@ def test_a_live_sample_that_ends_connections_goes_as_history() -> None:
 
 def test_a_message_that_ends_connections_is_dead_and_the_others_go_on() -> None:
     outbox = connected()
-    outbox.add(telemetry.event("first", 0), 0.0)
+    outbox.add(named_event("first"), 0.0)
     found = []
     for _ in range(2):
         take(outbox, 0.0, Message)
