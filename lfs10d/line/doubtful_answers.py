@@ -12,8 +12,9 @@ Rules
 3. Where leaving it alone showed nothing `VAIN` times in a row, its noise is trusted for `TRUST`, doubled each time up
    to `TRUST_MOST`: some lines make noise before each answer, some lose 2 of 100. Broken answers are trusted only
    `APART` from each other.
-4. Any other answer to such a request is *proved* when the slave's own would have come, by the usual times, after
-   `WATCHED` at the latest. Until then a second frame of the slave shows that nobody knows which of the two it was.
+4. Any other answer to such a request is *proved* when the slave was read again, after `WATCHED` at the latest. A second
+   frame of the slave before that shows that nobody knows which of the two it was. It is a matter of order, not of the
+   usual times: on a busy machine bytes may lie unread for long.
 """
 
 from __future__ import annotations
@@ -46,7 +47,9 @@ class _SlaveTrust:
     """When bytes came last in an exchange with it."""
     broken_at: float = -inf
     proved_at: float = -inf
-    """Until when the slave's own answer may still follow the last one."""
+    """Until when a second frame of the slave shows that the last one may not have been its own."""
+    own_by: float = -inf
+    """When the slave's own would have come, by the usual times."""
     doubted_at: int | None = None
     """How many extra answers were known when noise raised a doubt that is not settled yet."""
     vain: int = 0
@@ -69,7 +72,7 @@ class DoubtfulAnswers:
             return False
         state = self._slaves.setdefault(slave, _SlaveTrust())
         before, state.ended = state.ended, outcome.ended
-        state.proved_at = -inf
+        state.proved_at = state.own_by = -inf
         self._settle(slave, state, outcome.ended)
         if outcome.answer is None:
             if spoilt(outcome):
@@ -79,7 +82,8 @@ class DoubtfulAnswers:
             return False
         noisy = spoilt(outcome) and outcome.ended >= state.trusted_until
         if not noisy and not _unusual(outcome, usual):
-            state.proved_at = _proved_at(outcome, usual)
+            state.own_by = _own_by(outcome, usual)
+            state.proved_at = -inf if state.own_by == -inf else outcome.ended + WATCHED
             return False
         state.doubted_at = self._duplicates.extras(slave) if noisy else None
         self._duplicates.rest(slave, outcome.ended + max(WATCHED, timeout))
@@ -89,6 +93,11 @@ class DoubtfulAnswers:
         """Return when the slave's last answer is proved (rule 4); -inf where it is so by its own time."""
         state = self._slaves.get(slave)
         return -inf if state is None else state.proved_at
+
+    def own_by(self, slave: int) -> float:
+        """Return when the slave's own answer would have come by the usual times; -inf where that is over."""
+        state = self._slaves.get(slave)
+        return -inf if state is None else state.own_by
 
     def doubt(self, slave: int, now: float) -> bool:
         """Doubt an answer that is not proved, for broken bytes came behind it; False where noise is trusted."""
@@ -129,8 +138,8 @@ def _unusual(outcome: Outcome, usual: ResponseTimes) -> bool:
     return usual.count_near(outcome.turnaround, margin) < alike
 
 
-def _proved_at(outcome: Outcome, usual: ResponseTimes) -> float:
-    """Return when an answer to the same request would be over that takes as long as the slowest."""
+def _own_by(outcome: Outcome, usual: ResponseTimes) -> float:
+    """Return when an answer to the same request would be over that takes as long as the slowest; -inf where it was."""
     if usual.p99 is None or outcome.turnaround is None or outcome.sent_end is None:
         return -inf
     length = outcome.ended - outcome.sent_end - outcome.turnaround

@@ -90,7 +90,7 @@ class SecondAnswers:
             if reading.values is None or until <= outcome.ended:
                 proved.append(reading)
             else:
-                self.held.hold([reading], until)
+                self.held.hold([reading], until, self._doubts.own_by(outcome.request.slave))
         return proved
 
     def on_strays(self, strays: Iterable[tuple[bytes, float]], outcome: Outcome | None = None) -> list[AnsweredTwice]:

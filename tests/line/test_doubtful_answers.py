@@ -86,21 +86,22 @@ def test_of_many_answers_two_must_have_taken_as_long_of_few_one(learned: int, ou
     assert line.ask(1.05, 0.06) is doubtful
 
 
-def proved_after(usual: list[float], turnaround: float, began: float = 1.05) -> float:
-    """Return how long after its end an answer of 10 ms is proved."""
+def proved_after(usual: list[float], turnaround: float, began: float = 1.05) -> tuple[float, float]:
+    """Return how long after its end an answer of 10 ms is proved, and the slave's own would have come."""
     line = Line(0)
     for each in usual:
         line.usual.learn(each)
     line.ask(1.0)
     assert not line.ask(began, turnaround)
-    return line.doubts.proved_at(1) - (began + 0.018 + turnaround)
+    ended = began + 0.018 + turnaround
+    return line.doubts.proved_at(1) - ended, line.doubts.own_by(1) - ended
 
 
-def test_an_answer_is_proved_when_the_slaves_own_would_have_come() -> None:
+def test_an_answer_is_held_for_as_long_as_bytes_may_lie_unread_and_its_own_comes_by_the_usual_times() -> None:
     """The own answer would begin behind it, at the usual time at the latest, and be as long."""
     late = [0.02] * 50 + [0.04] * 50
-    assert proved_after(late, 0.02) == pytest.approx(0.04 + LEAST_MARGIN - 0.02)
-    assert proved_after([0.02, 0.02, 0.5], 0.02) == pytest.approx(WATCHED)
+    assert proved_after(late, 0.02) == pytest.approx((WATCHED, 0.04 + LEAST_MARGIN - 0.02))
+    assert proved_after([0.02, 0.02, 0.5], 0.02) == pytest.approx((WATCHED, WATCHED))
 
 
 @pytest.mark.parametrize(
@@ -110,11 +111,12 @@ def test_an_answer_is_proved_when_the_slaves_own_would_have_come() -> None:
 def test_it_is_so_at_once_where_none_could_follow_it_or_nothing_was_asked_before(
     usual: list[float], turnaround: float, began: float
 ) -> None:
-    assert proved_after(usual, turnaround, began) == -inf
+    assert proved_after(usual, turnaround, began) == (-inf, -inf)
 
 
 def test_of_one_that_never_answered_nothing_is_to_be_proved() -> None:
     assert Line().doubts.proved_at(7) == -inf
+    assert Line().doubts.own_by(7) == -inf
 
 
 def test_it_is_left_alone_for_as_long_as_a_second_answer_may_take_or_its_own() -> None:

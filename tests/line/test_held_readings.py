@@ -18,8 +18,8 @@ def test_a_reading_is_released_when_its_time_is_over_the_earlier_first() -> None
     held = HeldReadings()
     assert held.next_at == inf
     a, b, c = reading("a", 1.0), reading("b", 1.1), reading("c", 1.2)
-    held.hold([a], 1.3)
-    held.hold([b, c], 1.25)
+    held.hold([a], 1.3, 1.3)
+    held.hold([b, c], 1.25, 1.25)
     assert held.next_at == 1.25
     assert list(held.released(1.24)) == []
     assert list(held.released(1.25)) == [b, c]
@@ -30,14 +30,14 @@ def test_a_reading_is_released_when_its_time_is_over_the_earlier_first() -> None
 def test_those_of_one_device_are_released_alone() -> None:
     held = HeldReadings()
     a, b = reading("a", 1.0), reading("b", 1.0)
-    held.hold([a, b], 9.0)
+    held.hold([a, b], 9.0, 9.0)
     assert list(held.released(device="b")) == [b]
     assert list(held.released()) == [a]
 
 
 def test_a_second_answer_makes_the_reading_fail_that_is_held_back_and_no_other() -> None:
     held = HeldReadings()
-    held.hold([reading("a", 1.0), reading("b", 1.0)], 1.2)
+    held.hold([reading("a", 1.0), reading("b", 1.0)], 1.2, 1.2)
     held.spoil("a", 1.1, TWO)
     assert held.holds("b", 1.1)
     assert not held.holds("a", 1.1)
@@ -47,9 +47,19 @@ def test_a_second_answer_makes_the_reading_fail_that_is_held_back_and_no_other()
     assert other == reading("b", 1.0)
 
 
+def test_broken_bytes_may_be_its_own_answer_only_until_that_would_have_come_a_right_frame_always() -> None:
+    held = HeldReadings()
+    held.hold([reading("a", 1.0)], 1.2, 1.05)
+    assert held.holds("a", 1.05)
+    assert not held.holds("a", 1.06)
+    held.spoil("a", 1.19, TWO)
+    (failed,) = held.released()
+    assert failed.fault == TWO
+
+
 def test_what_came_before_it_or_after_its_time_does_not() -> None:
     held = HeldReadings()
-    held.hold([reading("a", 1.0)], 1.2)
+    held.hold([reading("a", 1.0)], 1.2, 1.2)
     held.spoil("a", 1.0, TWO)
     held.spoil("a", 1.21, TWO)
     assert list(held.released()) == [reading("a", 1.0)]
@@ -57,6 +67,6 @@ def test_what_came_before_it_or_after_its_time_does_not() -> None:
 
 def test_one_that_failed_waits_for_nothing() -> None:
     held = HeldReadings()
-    held.hold([reading("a", 1.0)], 1.2)
+    held.hold([reading("a", 1.0)], 1.2, 1.2)
     held.spoil("a", 1.1, TWO)
     assert [each.fault for each in held.released(1.1)] == [TWO]
