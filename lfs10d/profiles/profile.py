@@ -249,7 +249,7 @@ class Profile(Facts):
             "stand for holding and input registers there, counted from one, so the address would be "
             f"{fact.register % 10000 - 1}"
             for name, fact in facts
-            if fact is not None and fact.register // 10000 in MANUAL_NUMBERS and fact.register % 10000
+            if fact is not None and _is_of_a_manual(fact.register)
         )
 
     @property
@@ -283,6 +283,11 @@ class Profile(Facts):
     def decode(self, block: Block, registers: tuple[int, ...]) -> dict[str, Published] | Fault:
         """Return the values of `block` that are available, or the first fault: `not_finite` or `out_of_range`."""
         return block.decode(registers)
+
+
+def _is_of_a_manual(register: int) -> bool:
+    """Whether a register looks like 40001, and not like an address that is round in hexadecimal, such as 0x8000."""
+    return register // 10000 in MANUAL_NUMBERS and register % 10000 != 0 and register % 0x1000 != 0
 
 
 def _words_per_read(data: dict[str, Any]) -> int:

@@ -68,14 +68,16 @@ def test_without_slaves_there_is_no_table_but_a_warning_and_exit_code_0() -> Non
 
 
 def test_a_program_gets_the_same_as_json() -> None:
-    code, out, err = check(GOOD + "wind: {}\n", "--json")
+    calibrated = GOOD.replace("interval: 0}", "interval: 0, calibration: {wind_speed: {scale: 1, offset: -0.06}}}")
+    code, out, err = check(calibrated, "--json")
     found = json.loads(out)
     assert code == 0
     assert found["valid"] is True
     assert found["budget"]["load_pct"] == 2.5
     assert [slave["load_pct"] for slave in found["budget"]["slaves"]] == [2.5, None]
-    assert [warning["path"] for warning in found["warnings"]] == ["wind"]
-    assert err.startswith("lfs10d.yaml:3:7: wind: warning: ")
+    path = "slaves[1].calibration.wind_speed.offset"
+    assert [warning["path"] for warning in found["warnings"]] == [path]
+    assert err.startswith(f"lfs10d.yaml:2:79: {path}: warning: ")
 
 
 def test_a_program_gets_the_problems_as_json_and_a_person_as_lines() -> None:

@@ -241,11 +241,13 @@ def test_a_port_held_by_the_daemon_is_69_and_says_what_to_type(
         text=True,
         env={"PATH": "/usr/bin:/bin", "HOME": str(tmp_path)},
     ) as daemon:
-        assert daemon.stderr is not None
-        while "is open" not in daemon.stderr.readline():
-            assert daemon.poll() is None
-        done = lfs10d("read", sensors.path, "2")
-        daemon.terminate()
+        try:
+            assert daemon.stderr is not None
+            while "is open" not in daemon.stderr.readline():
+                assert daemon.poll() is None
+            done = lfs10d("read", sensors.path, "2")
+        finally:
+            daemon.terminate()
         daemon.communicate(timeout=10)
     assert (done.returncode, done.stdout) == (69, "")
     assert f"in use by lfs10d (process {daemon.pid})" in done.stderr

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
 from pydantic import ValidationError
 
+from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Fault, FaultCode
 
@@ -284,6 +286,12 @@ def test_a_register_that_looks_like_a_number_of_the_manual_is_doubted(profile_of
     assert level.endswith("the address would be 0")
     assert slave_id.endswith("the address would be 2000")
     assert profile_of().doubts() == ()
+
+
+@pytest.mark.parametrize("name", builtin_names())
+def test_no_profile_that_is_shipped_is_doubted(name: str) -> None:
+    """The fault register of the EH600 is 0x8000, which in decimal begins as a manual's numbers do."""
+    assert load_profile(name, relative_to=Path()).doubts() == ()
 
 
 def test_the_rates_of_a_device_are_the_factorys_first_and_those_that_can_be_set(profile_of: Build) -> None:
