@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-oldest coverage check format docs bench soak screens deb clean
+.PHONY: help demo test test-oldest coverage check format docs bench integrations soak deb screens clean
 
 help: ## Print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -66,6 +66,10 @@ docs: $(VENV)/.dev ## Write the generated pages of docs/
 
 bench: $(VENV)/.dev ## Measure against a master in C on a paced line (20 minutes)
 	$(BIN)/python -m bench
+
+# Telegraf, Node-RED, weewx, Prometheus, VictoriaMetrics and PostgreSQL are too large for CI: those installed are run.
+integrations: $(VENV)/.dev ## Run the recipes of docs/integrations (10 minutes): ONLY="telegraf weewx"
+	$(BIN)/python -m integrations $(ONLY)
 
 soak: $(VENV)/.dev ## Account for every sample under faults: FOR=12h SEED=7
 	$(BIN)/python -m soak --for $(or $(FOR),5m) --exchanges $(or $(EXCHANGES),1000000) $(if $(SEED),--seed $(SEED))

@@ -77,7 +77,9 @@ def main() -> None:
         sys.exit(f"{len(failures)} runs failed; bench/RESULTS.md is left as it was")
     if not options.no_write:
         when = dt.datetime.now(dt.UTC).date().isoformat()
-        (HERE / "RESULTS.md").write_text(results(rows, runs, when))
+        page = HERE / "RESULTS.md"
+        _, heading, others = page.read_text().partition("\n## ")  # what other programs measured stays
+        page.write_text(results(rows, runs, when) + heading + others)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from docs.generate import architecture, commands, configuration, mqtt, profiles, simulate
+from docs.generate import architecture, commands, configuration, dashboard, mqtt, profiles, simulate
 
 FOLDER = Path(__file__).resolve().parent.parent
 TEMPLATES = Path(__file__).resolve().parent / "templates"
@@ -28,6 +28,8 @@ def _page(name: str, parts: Callable[[], Mapping[str, str]]) -> Callable[[], str
     return lambda: filled((TEMPLATES / name).read_text(encoding="utf-8"), parts())
 
 
+DASHBOARD = "../config/integrations/grafana-dashboard.json"
+
 PAGES: Mapping[str, Callable[[], str]] = {
     "architecture.md": _page("architecture.md", architecture.parts),
     "commands.md": _page("commands.md", commands.parts),
@@ -35,6 +37,7 @@ PAGES: Mapping[str, Callable[[], str]] = {
     "mqtt.md": _page("mqtt.md", mqtt.parts),
     "profiles.md": _page("profiles.md", profiles.parts),
     "simulate.md": _page("simulate.md", simulate.parts),
+    DASHBOARD: dashboard.page,
 }
 """What makes each page, by its file below docs/."""
 

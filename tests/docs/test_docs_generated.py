@@ -16,7 +16,7 @@ from docs.generate.configuration import parts
 from docs.generate.examples import HEARD, SENT
 from docs.generate.markdown import WIDTH, example, plain
 from docs.generate.mqtt import _meanings, examples
-from docs.generate.pages import PAGES, filled, stale
+from docs.generate.pages import DASHBOARD, PAGES, filled, stale
 from lfs10d.command import Command, Result
 from lfs10d.commands.handlers.registry import HANDLERS
 from lfs10d.commands.message import parameters_of
@@ -52,6 +52,7 @@ def test_a_page_that_differs_or_is_missing_is_stale(tmp_path: Path) -> None:
         "mqtt.md",
         "profiles.md",
         "simulate.md",
+        DASHBOARD,
     ]
 
 

@@ -33,4 +33,5 @@ def test_every_page_and_every_file_that_is_installed_comes_with_the_wheel() -> N
     sources = wheel["shared-data"]
     assert [page.name for page in (root / "docs").glob("*.md") if f"docs/{page.name}" not in sources] == []
     assert [source for source in sources if not (root / source).exists()] == []
+    assert {"docs/decisions", "docs/integrations"} <= sources.keys()
     assert {sources["config"], sources["systemd"]} == {"share/lfs10d/config", "share/lfs10d/systemd"}
