@@ -69,6 +69,13 @@ def test_a_calibration_is_of_one_place_and_one_kind_of_device(file: Path) -> Non
     assert found.of(3, 19200, None, {}) == {}
 
 
+def test_of_several_values_those_with_a_calibration_are_calibrated(file: Path) -> None:
+    station = load_profile("ecowitt-wn90lp", relative_to=Path())
+    entry = "{id: 9, profile: ecowitt-wn90lp, calibration: {temperature: {scale: 1, offset: -0.4}}}"
+    file.write_text(TEXT.replace("- 4", f"- {entry}"))
+    assert called(file).of(9, 19200, station, {"temperature": 20.5, "humidity": 40}) == {"temperature": 20.1}
+
+
 def test_a_port_is_known_by_any_of_its_names(file: Path) -> None:
     (file.parent / "ttyUSB0").touch()
     for name in ("line0", "by-id"):
