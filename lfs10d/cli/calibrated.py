@@ -79,14 +79,14 @@ def _found(port: str, file: Path, *, named: bool) -> tuple[Calibrations, str | N
         return NONE, None if _absent(file) else str(error.problems[0])
     line = loaded.config.line
     if os.path.realpath(line.port) != os.path.realpath(port):
-        return NONE, f"{file} is of another port, {line.port}" if named else None
+        return NONE, f"{file} is for another port, {line.port}" if named else None
     if not any(slave.calibration for slave in loaded.config.slaves):
         return NONE, None
     directory = state_directory(file, line.name, chosen=None, environment=os.environ)
     try:
         return _by_place(with_changes(loaded, directory, chosen=False))
     except StateError as error:
-        return NONE, f"{error}, and so which sensor has which id now: call it as root to see calibrated values"
+        return NONE, f"{error}; so it is not known which sensor has which slave id now (call it as root)"
 
 
 def _by_place(now: Effective) -> tuple[Calibrations, str | None]:

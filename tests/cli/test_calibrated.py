@@ -89,7 +89,7 @@ def test_another_port_has_no_calibration_and_who_named_the_file_is_told(
     assert called(file, "/dev/other", named=False) == NONE
     assert capsys.readouterr().err == ""
     assert called(file, "/dev/other") == NONE
-    expected = f"lfs10d: {file} is of another port, {file.parent}/line0; raw values alone are shown\n"
+    expected = f"lfs10d: {file} is for another port, {file.parent}/line0; raw values alone are shown\n"
     assert capsys.readouterr().err == expected
 
 
@@ -135,7 +135,9 @@ def test_without_the_changes_nothing_is_calibrated(file: Path, capsys: pytest.Ca
     (file.parent / "state").mkdir()
     (file.parent / "state/changes.yaml").write_text("no: changes\n")
     assert called(file) == NONE
-    assert "what requests changed cannot be understood" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert told.startswith("lfs10d: what requests changed cannot be understood: ")
+    assert told.endswith("which sensor has which slave id now (call it as root); raw values alone are shown\n")
     file.write_text(TEXT.replace(", calibration: {wind_speed: {scale: 1.01, offset: 0.06}}", ""))
     assert called(file) == NONE
     assert capsys.readouterr().err == ""
