@@ -82,7 +82,7 @@ def prometheus(rig: Rig) -> str:
     alerts = 'ALERTS{alertname="WindSensorSilent",alertstate="firing",device="slave-4"}'
     rig.until(lambda: _asked(port, alerts), "the alert of the silent sensor", 120)
     rig.end(running)
-    return f"{rig.call(server, '--version').split(',')[0]}: rules tested, two speeds stored, slave-4 alerted"
+    return f"Prometheus {rig.call(server, '--version').split()[2]}: rules tested, two speeds stored, slave-4 alerted"
 
 
 def victoriametrics(rig: Rig) -> str:
