@@ -45,7 +45,7 @@ def test_every_module_that_a_decision_names_is_there(name: str) -> None:
     assert missing == set()
 
 
-def test_five_recipes_name_files_and_tests() -> None:
+def test_every_recipe_names_files_and_tests() -> None:
     recipes = re.split(r"^## ", CONTRIBUTING, flags=re.MULTILINE)[1:]
     assert [each.partition("\n")[0] for each in recipes] == [
         "A register type",
@@ -53,6 +53,7 @@ def test_five_recipes_name_files_and_tests() -> None:
         "A published topic",
         "A retry rule",
         "A CLI verb",
+        "The page",
     ]
     for each in recipes:
         assert re.search(r"`lfs10d/[\w/]+\.py`", each)

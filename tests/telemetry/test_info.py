@@ -30,6 +30,7 @@ def test_a_learned_time_out_is_published_as_the_yaml_spells_it(fixed: float | No
         "enabled": True,
         "response_timeout": published,
         "request_gap": 0.0,
+        "calibration": {},
     }
 
 
