@@ -36,6 +36,11 @@ SOON_AFTER_START = 600.0
 """Seconds after the start during which `unknown` is asked again soon: timedate1 may still be starting."""
 
 
+LOOKS = 3
+TOGETHER = 0.0005
+"""s between two looks that count as one: `ts` is in ms."""
+
+
 def look_again(state: ClockState, age: float) -> float:
     """Return in how many seconds to look again, `age` seconds after the start."""
     soon = state == "unknown" and age < SOON_AFTER_START
@@ -91,6 +96,16 @@ class Instant:
         return round((self.wall if at is None else self.wall - self.mono + at) * 1000)
 
 
+def _together() -> tuple[float, float]:
+    """Return both clocks, read so close together that no other program ran between them for long, if that can be."""
+    mono, wall = time.monotonic(), time.time()
+    for _ in range(LOOKS):
+        if time.monotonic() - mono < TOGETHER:
+            break
+        mono, wall = time.monotonic(), time.time()
+    return mono, wall
+
+
 class ClockEvents(Protocol):
     """What `Clock.watch` reports to."""
 
@@ -115,7 +130,8 @@ class Clock:
 
     def now(self) -> Instant:
         """Return this moment."""
-        now = Instant(time.monotonic(), time.time(), self._state)
+        mono, wall = _together()
+        now = Instant(mono, wall, self._state)
         shift = round((now.wall - now.mono) * 1000)
         if clock_step.stepped(self._shift, shift):
             self._set.set()

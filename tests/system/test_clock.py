@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from lfs10d.system.clock import LOOK_AGAIN, SOON_AFTER_START, judge, look, look_again
+from lfs10d.system.clock import LOOK_AGAIN, SOON_AFTER_START, _together, judge, look, look_again
 
 
 @pytest.mark.parametrize(
@@ -58,3 +58,11 @@ def test_soon_after_the_start_what_nobody_knows_is_looked_at_as_often() -> None:
     assert look_again("unknown", 0.0) == look_again("unknown", SOON_AFTER_START - 1) == LOOK_AGAIN["unsynced"]
     assert look_again("unknown", SOON_AFTER_START) == LOOK_AGAIN["unknown"]
     assert look_again("synced", 0.0) == LOOK_AGAIN["synced"]
+
+
+def test_both_clocks_are_read_again_where_another_program_ran_between(monkeypatch: pytest.MonkeyPatch) -> None:
+    monos = iter([10.0, 10.004, 10.010, 10.0101])
+    walls = iter([1010.003, 1010.010])
+    monkeypatch.setattr("lfs10d.system.clock.time.monotonic", lambda: next(monos))
+    monkeypatch.setattr("lfs10d.system.clock.time.time", lambda: next(walls))
+    assert _together() == (10.010, 1010.010)
