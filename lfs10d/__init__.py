@@ -1,3 +1,3 @@
 """lfs10d: one RS485 line of Modbus sensors, polled with true gaps and published over MQTT."""
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"

@@ -124,8 +124,8 @@ def remove(*, user: bool, instance: str | None) -> int:
         click.echo(f"{_unit(instance)} stopped and disabled")
         return 0
     wanted = sorted(places.units.glob("*.wants/lfs10d.service")) + sorted(places.units.glob("*.wants/lfs10d@*.service"))
-    for unit in {"lfs10d.service", *(each.name for each in wanted)}:
-        if unit != "lfs10d.service" or (places.units / unit).exists():
+    for unit in sorted({"lfs10d.service", "lfs10d-web.service", *(each.name for each in wanted)}):
+        if "@" in unit or (places.units / unit).exists():
             places.call("disable", "--now", unit)
             click.echo(f"{unit} stopped and disabled")
     places.call("stop", "lfs10d@*.service")

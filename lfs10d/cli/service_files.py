@@ -12,7 +12,7 @@ from lfs10d.errors import FailedError
 from lfs10d.system.shipped import shipped
 from lfs10d.system.unit_file import for_installation, for_user, is_unchanged, marked
 
-UNITS = ("lfs10d.service", "lfs10d@.service")
+UNITS = ("lfs10d.service", "lfs10d@.service", "lfs10d-web.service")
 _HIDDEN = (Path("/home"), Path("/root"), Path("/run/user"))
 """ProtectHome=yes hides them from the service."""
 

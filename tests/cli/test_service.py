@@ -79,7 +79,11 @@ def test_an_installation_without_a_configuration_gets_units_and_a_sample_and_sta
     assert call("install") == 0
     shown = capsys.readouterr().out
     sample = system.places.configurations / "lfs10d.yaml"
-    assert {each.name for each in system.places.units.iterdir()} == {"lfs10d.service", "lfs10d@.service"}
+    assert {each.name for each in system.places.units.iterdir()} == {
+        "lfs10d.service",
+        "lfs10d@.service",
+        "lfs10d-web.service",
+    }
     assert system.asked() == ["daemon-reload"]
     assert f"{sample}:" in shown
     assert "line.port: is missing" in shown
@@ -138,7 +142,11 @@ def test_removing_stops_every_instance_and_keeps_configuration(
     assert call("remove") == 0
     asked = system.asked()
     assert set(asked) == {
-        "disable --now lfs10d.service", "disable --now lfs10d@roof.service", "stop lfs10d@*.service", "daemon-reload",
+        "disable --now lfs10d.service",
+        "disable --now lfs10d-web.service",
+        "disable --now lfs10d@roof.service",
+        "stop lfs10d@*.service",
+        "daemon-reload",
     }  # fmt: skip
     assert asked[-1] == "daemon-reload"
     assert not list(system.places.units.glob("*.service"))
