@@ -15,6 +15,8 @@ import multiprocessing
 import os
 import random
 import resource
+import shutil
+import subprocess
 import sys
 import tempfile
 import time
@@ -23,14 +25,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Self
 
 from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion, MQTTProtocolVersion
 
-from bench.broker import Broker
+from bench.broker import SEARCH_PATH, Broker, free_port
 from bench.replay import LIMITS, SWITCH_INTERVAL, NothingElse, percentile
-from lfs10d.mqtt.settings import BrokerSettings
+from lfs10d.mqtt.settings import BrokerSettings, Version
 from lfs10d.mqtt.uplink import Uplink
 from lfs10d.outbox.store.store import Store
 from lfs10d.telemetry import publication
@@ -78,10 +80,67 @@ class Heard:
         return sum(sent.values()) - len(self.keys)
 
 
-def listen(port: int, pipe: Connection) -> None:
+class Nats:
+    """A NATS cluster of three with JetStream and MQTT (3.1.1); the last node is killed, and stays away."""
+
+    version: Final = Version.V311
+
+    def __init__(self, folder: Path) -> None:
+        executable = shutil.which("nats-server", path=SEARCH_PATH)
+        if executable is None:
+            raise RuntimeError("needs nats-server (Debian: apt install nats-server)")
+        self.ports = tuple(free_port() for _ in range(3))
+        routes = [free_port() for _ in self.ports]
+        known = ", ".join(f'"nats://127.0.0.1:{each}"' for each in routes)
+        self._nodes = []
+        for port, route in zip(self.ports, routes, strict=True):
+            file = folder / f"nats-{port}.conf"
+            file.write_text(
+                f'server_name: n{port}\nlisten: "127.0.0.1:{free_port()}"\n'
+                f'jetstream {{store_dir: "{folder}/n{port}"}}\n'
+                f'mqtt {{listen: "127.0.0.1:{port}"}}\n'
+                f'cluster {{name: fleet, listen: "127.0.0.1:{route}", routes: [{known}]}}\n'
+            )
+            self._nodes.append(
+                subprocess.Popen([executable, "-c", str(file)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            )
+        time.sleep(8)  # a leader is chosen
+
+    def kill(self) -> None:
+        """Kill the last node."""
+        self._nodes[-1].kill()
+
+    def start(self) -> None:
+        """Leave the node away: the others go on."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for node in self._nodes:
+            node.kill()
+            node.wait()
+
+
+class Mosquitto(Broker):
+    """One mosquitto, which comes back after it was killed."""
+
+    version: Final = Version.V5
+
+    @property
+    def ports(self) -> tuple[int, ...]:
+        """Its port."""
+        return (self.port,)
+
+
+def listen(port: int, version: Version, pipe: Connection) -> None:
     """Subscribe until told to end; a message on the pipe sets `watch` and `back`, and None asks for what was heard."""
     heard = Heard()
-    client = Client(CallbackAPIVersion.VERSION2, protocol=MQTTProtocolVersion.MQTTv5)
+    newer = version is Version.V5
+    client = Client(
+        CallbackAPIVersion.VERSION2,
+        protocol=MQTTProtocolVersion.MQTTv5 if newer else MQTTProtocolVersion.MQTTv311,
+    )
     client.reconnect_delay_set(1, 1)
     filters = [("fleet/+/line0/device/+/telemetry", 1), ("fleet/+/line0/device/+/history", 1)]
     client.on_connect = lambda client, *_: client.subscribe(filters)
@@ -103,14 +162,22 @@ def listen(port: int, pipe: Connection) -> None:
 class Gateway:
     """One gateway: sensors that are measured once a second, and its uplink."""
 
-    def __init__(self, number: int, devices: int, port: int, folder: Path) -> None:
+    def __init__(self, number: int, devices: int, broker: Mosquitto | Nats, folder: Path) -> None:
         self.name = f"gw{number:03}"
         self.sent: dict[tuple[str, str], int] = {}
         self._devices = devices
+        turn = number % len(broker.ports)
+        ports = broker.ports[turn:] + broker.ports[:turn]
         state = folder / self.name
         state.mkdir()
         self.uplink = Uplink(
-            BrokerSettings("127.0.0.1", port, f"lfs10d-{self.name}-line0"),
+            BrokerSettings(
+                "127.0.0.1",
+                ports[0],
+                f"lfs10d-{self.name}-line0",
+                version=broker.version,
+                others=tuple(("127.0.0.1", port) for port in ports[1:]),
+            ),
             base=f"fleet/{self.name}/line0",
             epoch_ms=lambda: time.time_ns() // 1_000_000,
             store=Store(state, boot=BOOT, limits=LIMITS),
@@ -145,17 +212,20 @@ async def run(options: argparse.Namespace, folder: Path) -> bool:
     """Run the fleet; return True if nothing was lost."""
     load = os.getloadavg()[0]
     ours, theirs = multiprocessing.Pipe()
-    with Broker(folder) as broker:
-        listener = multiprocessing.get_context("spawn").Process(target=listen, args=(broker.port, theirs), daemon=True)
+    with Nats(folder) if options.nats else Mosquitto(folder) as broker:
+        listener = multiprocessing.get_context("spawn").Process(
+            target=listen, args=(broker.ports[0], broker.version, theirs), daemon=True
+        )
         listener.start()
         await asyncio.to_thread(ours.recv)
         loop = asyncio.get_running_loop()
-        gateways = [Gateway(number, options.devices, broker.port, folder) for number in range(1, options.gateways + 1)]
+        gateways = [Gateway(number, options.devices, broker, folder) for number in range(1, options.gateways + 1)]
         began = loop.time()
         tasks = [asyncio.create_task(each.run(began + options.seconds)) for each in gateways]
         await asyncio.sleep(options.seconds / 3)
         broker.kill()
         killed = time.time()
+        ours.send((killed, float("inf")))
         await asyncio.sleep(options.away)
         await asyncio.to_thread(broker.start)
         back = time.time()
@@ -189,8 +259,9 @@ def report(
     late: float,
 ) -> None:
     """Print the table's row and what belongs to it."""
-    seconds = [each - heard.back for each in heard.first_after.values()]
-    drained = [each - heard.back for each in heard.caught_up.values()]
+    begin = heard.watch if options.nats else heard.back  # two nodes of three go on
+    seconds = [each - begin for each in heard.first_after.values()]
+    drained = [each - begin for each in heard.caught_up.values()]
     usual = sorted(heard.per_second.values())[len(heard.per_second) // 2]
     usage = resource.getrusage(resource.RUSAGE_SELF)
     columns = {
@@ -218,6 +289,7 @@ def main() -> None:
     parser.add_argument("--devices", type=int, default=4, help="sensors of each, at 1 Hz")
     parser.add_argument("--seconds", type=float, default=60.0, help="how long is measured")
     parser.add_argument("--away", type=float, default=15.0, help="how long the broker is away, in s")
+    parser.add_argument("--nats", action="store_true", help="a NATS cluster of three, one node of which is killed")
     options = parser.parse_args()
     sys.setswitchinterval(SWITCH_INTERVAL)
     logging.disable(logging.WARNING)  # each gateway says that the broker is away

@@ -98,6 +98,7 @@ class Rig:
                 stderr=file,
                 cwd=self.folder,
                 env={**os.environ, **(environment or {})},
+                start_new_session=True,  # weewx ends its whole process group
             )
         self._running.append(process)
         return process
