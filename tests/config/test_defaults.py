@@ -51,6 +51,7 @@ def test_the_smallest_file_gets_every_default() -> None:
                 "response_timeout": None,
                 "request_gap": 0.0,
                 "checksum": None,
+                "calibration": {},
             }
             for number in (2, 3, 4)
         ),
@@ -66,6 +67,7 @@ def test_the_smallest_file_gets_every_default() -> None:
             "password_file": None,
             "tls": None,
             "keepalive": 20.0,
+            "hold": 0.02,
         },
         "commands": ("polling", "sensors"),
         "homeassistant": {"discovery": False, "prefix": "homeassistant"},

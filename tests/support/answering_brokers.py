@@ -6,6 +6,8 @@ import socket
 import threading
 from contextlib import suppress
 
+from lfs10d.mqtt.cleanup import SECOND_CLIENT
+
 CONNECT, PUBLISH, SUBSCRIBE, PINGREQ, DISCONNECT = 1, 3, 8, 12, 14
 BASE = "lfs10d/line0/"
 
@@ -17,6 +19,7 @@ class Capricious:
     and each PUBACK comes `delay` seconds late. `delay` None: none comes.
     In an answer `{mid}` stands for the packet identifier. An answer of no bytes, or a DISCONNECT, ends the connection;
     at the next one the will is published.
+    The second connection, over which the daemon looks for what is retained, is served and not counted.
     """
 
     def __init__(self, receive_maximum: int | None = None, delay: float | None = 0.0) -> None:
@@ -35,6 +38,7 @@ class Capricious:
         self._server = socket.create_server(("127.0.0.1", 0))
         self.port: int = self._server.getsockname()[1]
         self._clients: list[socket.socket] = []
+        self._second: set[socket.socket] = set()
         threading.Thread(target=self._serve, daemon=True).start()
 
     def taken(self, topic: str) -> list[bytes]:
@@ -60,7 +64,7 @@ class Capricious:
             while self._answer(client, client.makefile("rb", buffering=0)):
                 pass
             client.shutdown(socket.SHUT_RDWR)
-        self.gone += 1
+        self.gone += client not in self._second
 
     def _answer(self, client: socket.socket, stream: socket.SocketIO) -> bool:
         head = _exactly(stream, 1)[0]
@@ -71,8 +75,11 @@ class Capricious:
         body = _exactly(stream, length | byte << shift)
         match head >> 4:
             case 1:
-                self.connects += 1
-                self._unacknowledged = 0
+                if SECOND_CLIENT.encode() in body:
+                    self._second.add(client)
+                else:
+                    self.connects += 1
+                    self._unacknowledged = 0
                 maximum = self._receive_maximum
                 properties = b"" if maximum is None else b"\x21" + maximum.to_bytes(2, "big")
                 client.sendall(bytes((0x20, 3 + len(properties), 0, 0, len(properties))) + properties)
@@ -89,7 +96,7 @@ class Capricious:
             case 12:
                 client.sendall(b"\xd0\x00")
             case 14:
-                self.disconnects += 1
+                self.disconnects += client not in self._second
                 return False
         return True
 

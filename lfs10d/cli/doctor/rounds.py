@@ -93,6 +93,7 @@ async def _sensors(file: Path, loaded: LoadedConfig, login: Login, seen: port.Po
     watch = Watch(login, status_places(file, loaded.config.line.name, os.environ))
     try:
         await watch.find()
+        live, source = watch.best()
     except (BrokerError, FailedError) as error:
         if seen.held_by_daemon:
             return [warn("sensors", f"a daemon holds the port, and cannot be asked: {error}", "see broker, above")]
@@ -101,7 +102,6 @@ async def _sensors(file: Path, loaded: LoadedConfig, login: Login, seen: port.Po
         return await asyncio.to_thread(sensors.by_asking, loaded)
     finally:
         await watch.disconnect()
-    live, source = watch.best()
     if not source.alive:
         return [fail("sensors", source.words, "start the daemon: sudo systemctl start lfs10d")]
     return [ok("daemon", source.words), *sensors.by_daemon(live, time.time())]
