@@ -105,7 +105,6 @@ class Sensor:
         seed: int = 0,
     ) -> None:
         self.slave = slave
-        self.blueprint = blueprint
         self.format = format or Format()
         self.framing: Framing = framing
         self.turnaround = turnaround
@@ -130,6 +129,15 @@ class Sensor:
     def __repr__(self) -> str:
         """Return slave id and rate."""
         return f"<Sensor {self.slave} at {self.format.baudrate}>"
+
+    @property
+    def blueprint(self) -> Blueprint:
+        """What kind of device it is; another one is obeyed from the next request on, with the registers it has."""
+        return self.memory.blueprint
+
+    @blueprint.setter
+    def blueprint(self, blueprint: Blueprint) -> None:
+        self.memory.blueprint = blueprint
 
     def add_fault(
         self, kind: FaultKind | str, rate: float = 1.0, **particulars: float | str | tuple[str, ...] | None

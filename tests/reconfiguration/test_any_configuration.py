@@ -20,7 +20,9 @@ from lfs10d.config.effective import Effective
 from lfs10d.config.reload import ReloadPlan
 from lfs10d.daemon.settings import device_infos, line_info
 from lfs10d.line.line import Line
+from lfs10d.mqtt.discovery import Discovery
 from lfs10d.mqtt.publisher import Publisher
+from lfs10d.mqtt.topics import Topics
 from lfs10d.mqtt.uplink import Uplink
 from lfs10d.profiles.library import load_profile
 from lfs10d.reading import Event
@@ -89,6 +91,9 @@ class NoBroker:
 
     backlog = BacklogStats()
     connected = False
+
+    def __init__(self) -> None:
+        self.discovery = Discovery(Topics("lfs10d/line0"), self.publish, is_out=lambda: True)
 
     def publish(self, publications: Iterable[Publication]) -> None:
         """Send nothing."""

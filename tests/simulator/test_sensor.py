@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -425,3 +426,13 @@ def test_other_devices_are_just_data(bench: Maker) -> None:
 def test_a_sensor_at_an_odd_rate_keeps_its_register_as_it_was() -> None:
     assert Sensor(1, format=Format(38400)).words[RATE] == 1
     assert Sensor(1, format=Format(19200)).words[RATE] == 2
+
+
+def test_one_made_another_kind_refuses_what_that_kind_refuses(bench: Maker) -> None:
+    sensor = Sensor(1)
+    line = bench(sensor)
+    assert line.write(1, RATE, 1) == bytes.fromhex("01 06 00 04 00 01")
+    sensor.blueprint = replace(sensor.blueprint, writable={})
+    assert line.write(1, RATE, 1) == bytes.fromhex("01 86 02")
+    sensor.blueprint = replace(sensor.blueprint, functions=frozenset({4}))
+    assert line.write(1, RATE, 1) == bytes.fromhex("01 86 01")
