@@ -56,16 +56,16 @@ class SecondAnswers:
         self._quiet.exchanged(outcome, online=device.online)
         doubtful = self._doubts.exchanged(outcome, device.response_times, timeout)
         whole = diagnosis.stranger(outcome.request, device.spec.codec, outcome.heard) is not None
-        if spoilt(outcome) and not whole and outcome.began is not None:
-            self._doubt_held(outcome.began, outcome)
+        if spoilt(outcome) and not whole and outcome.strays:
+            self._doubt_held(outcome.strays[0][1], outcome)
         return doubtful
 
-    def _doubt_held(self, began: float, outcome: Outcome) -> None:
-        """Let the readings fail whose slaves' own answers may have run into this exchange."""
+    def _doubt_held(self, broken_at: float, outcome: Outcome) -> None:
+        """Let the readings fail whose slaves' own answers may be what came broken in this exchange from then on."""
         for slave, device in self._devices.items():
-            if self.held.holds(device.name, began) and self._doubts.doubt(slave, outcome.ended):
+            if self.held.holds(device.name, broken_at) and self._doubts.doubt(slave, outcome.ended):
                 fault = Fault(FaultCode.COLLISION, diagnosis.RUN_INTO, heard=outcome.heard[-FAULT_HEARD:])
-                self.held.spoil(device.name, began, fault)
+                self.held.spoil(device.name, broken_at, fault)
 
     def on_answer(self, outcome: Outcome) -> list[AnsweredTwice]:
         """Take an outcome that the scheduler knows of: a second answer may follow it, or none does any more."""

@@ -89,6 +89,7 @@ def test_every_value_has_its_origin_wherever_its_device_stands_now(file: Callabl
         "slaves[0].response_timeout": "default",
         "slaves[0].checksum": "lfs10d.yaml:5",
         "slaves[0].request_gap": "default",
+        "slaves[0].calibration": "default",
     }
     assert origins["slaves[2].name"] == origins["slaves[2].id"] == origins["slaves[2].label"] == "changes.yaml"
     assert origins["slaves[2].interval"] == "lfs10d.yaml:2 (poll.interval)"

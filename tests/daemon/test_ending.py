@@ -32,7 +32,7 @@ def test_a_clean_exit_changes_nothing_but_availability(
     assert not [each.topic for each in view.heard[last + 1 :]]
     retained = mosquitto.retained("lfs10d/line0/device/+/availability")
     assert set(retained.values()) == {b"online"}
-    assert len(mosquitto.retained("lfs10d/line0/#")) == 5 + 2 * 5 + 1
+    assert len(mosquitto.retained("lfs10d/line0/#")) == 5 + 2 * 6 + 1
     assert run.log.splitlines()[-1].endswith("ended")
     assert run.manager.all("STOPPING=1")
 

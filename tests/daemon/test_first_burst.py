@@ -11,7 +11,7 @@ from tests.support.brokers import Mosquitto
 from tests.support.sites import Site, View, good
 
 LINE_TOPICS = {"info", "devices", "line/state", "line/error", "line/stats"}
-DEVICE_LEAVES = {"state", "config", "availability", "error", "stats"}
+DEVICE_LEAVES = {"state", "config", "availability", "error", "stats", "wind"}
 SAMPLE = {
     "v",
     "line",

@@ -171,7 +171,7 @@ def test_changes_at_any_moment_wedge_nothing(
     changed = rig.clock.now
     rig.poller.replace([rigs.spec(2, 0.25), rigs.spec(4, 0.0)], RULES)
     settled = changed + 17.0  # the longest pause between probes, and a probe
-    rig.run(settled + 2.0)
+    rig.run(settled + 8.0)
     assert {exchange.slave for exchange in rig.exchanges if exchange.at > changed + 1.2} == {2, 4}
-    assert len(rig.good(2, since=settled)) >= 7
-    assert len(rig.good(4, since=settled)) >= 50
+    assert len(rig.good(2, since=settled)) >= 31
+    assert len(rig.good(4, since=settled)) >= 200

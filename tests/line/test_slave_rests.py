@@ -115,6 +115,7 @@ def test_a_poll_begins_no_sooner_than_the_shortest_interval_after_the_one_before
     poll = Poll(device, PendingRequests(), due=1.5, purpose=Purpose.REQUEST)
     assert line.until(ask(1), poll) == 3.0
     assert line.until(ask(1)) == -inf
+    poll.ask(3.0)
     poll.on_outcome(ended(ask(1).request, fault=Fault(FaultCode.CRC, "crc"), ended=3.1), 3.1)
     assert line.until(ask(1), poll) == -inf
 
