@@ -203,10 +203,11 @@ class Site:
         shape: Format | None = None,
         echo: bool = False,
         started: bool = True,
+        realtime: bool = False,
     ) -> PtyLine:
-        """Put up a simulated line; with `started`, plugged in."""
+        """Put up a simulated line; with `started`, plugged in; with `realtime`, before other programs if permitted."""
         line = build(LinePlan(slaves, shape or Format(19200), turnaround=0.003, unique=True), keep_log=True)
-        served = PtyLine(line, link=self.tty, echo=echo)
+        served = PtyLine(line, link=self.tty, echo=echo, realtime=realtime)
         self.lines.append(served)
         if started:
             served.start()
