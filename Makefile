@@ -27,7 +27,7 @@ demo: $(VENV)/.demo ## Show it at work: simulated line, broker, daemon; no hardw
 
 # Many tests wait for brokers, pseudo terminals and daemons: WORKERS share two cores. The long ones begin first.
 # Each of the hundreds of processes finds the modules compiled, also where PYTHONDONTWRITEBYTECODE is set.
-WORKERS ?= 4
+WORKERS ?= 3
 test test-oldest: export PYTHONDONTWRITEBYTECODE :=
 test: $(VENV)/.dev ## Run all tests
 	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder

@@ -6,6 +6,7 @@ import struct
 import termios
 import time
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 
@@ -28,13 +29,32 @@ def test_a_request_after_due_silence_is_heard_and_answered(paced: Starter) -> No
     assert (counts["requests"], counts["heard"], counts["answered"], counts["too_early"]) == (3, 3, 3, 0)
 
 
+TRIES = 10
+"""A busy machine may bring bytes to the line, or the line to the processor, later than the test has them sent."""
+
+
+def played(
+    paced: Starter, send: Callable[[Terminal], None], shown: Callable[[dict[str, Any]], bool], *rate: int
+) -> dict[str, Any]:
+    """Return the line's counts after `send`, which is played again while what it is about did not come to be."""
+    counts: dict[str, Any] = {}
+    for _ in range(TRIES):
+        line = paced()
+        with Terminal(line, *rate) as terminal:
+            send(terminal)
+            time.sleep(20 * CHARACTER)
+        counts = line.close()
+        if shown(counts):
+            break
+    return counts
+
+
 def test_a_request_begun_before_t35_is_not_heard(paced: Starter) -> None:
-    line = paced()
-    with Terminal(line) as terminal:
+    def send(terminal: Terminal) -> None:
         terminal.ask(request(1))
         terminal.send(request(2))
-        time.sleep(20 * CHARACTER)
-    counts = line.close()
+
+    counts = played(paced, send, lambda counts: counts["gap_us"]["min"] < T35 * 1e6)
     assert (counts["requests"], counts["heard"], counts["too_early"]) == (2, 1, 1)
     assert counts["gap_us"]["min"] < T35 * 1e6
 
@@ -52,25 +72,23 @@ def test_a_request_into_an_answer_destroys_both(paced: Starter) -> None:
 
 
 def test_a_request_with_a_pause_inside_is_not_heard(paced: Starter) -> None:
-    line = paced()
-    with Terminal(line) as terminal:
+    def send(terminal: Terminal) -> None:
         terminal.rest()
         terminal.send(request(1)[:4])
         time.sleep(4 * CHARACTER + 2.5 * CHARACTER)
         terminal.send(request(1)[4:])
-        time.sleep(20 * CHARACTER)
-    counts = line.close()
+
+    counts = played(paced, send, lambda counts: bool(counts["pauses"] + counts["bad_frames"]))
     assert counts["heard"] == 0
     assert counts["pauses"] + counts["bad_frames"] > 0
 
 
 def test_a_request_at_another_rate_is_not_heard(paced: Starter) -> None:
-    line = paced()
-    with Terminal(line, termios.B9600) as terminal:
+    def send(terminal: Terminal) -> None:
         terminal.rest()
         terminal.send(request(1))
-        time.sleep(20 * CHARACTER)
-    counts = line.close()
+
+    counts = played(paced, send, lambda counts: bool(counts["wrong_rate"]), termios.B9600)
     assert (counts["heard"], counts["wrong_rate"]) == (0, 1)
 
 
