@@ -217,7 +217,7 @@ def _programs_that_grab(state: PortState) -> Iterator[Finding]:
             "ModemManager runs: it sends AT commands into new serial ports",
             "without a modem: sudo systemctl disable --now ModemManager",
         )
-    if "brltty" in state.running or (state.usb_id == CH340 and not state.device):
+    if "brltty" in state.running:
         level = fail if state.usb_id == CH340 or not state.device else warn
         yield level(
             "port",
