@@ -215,6 +215,8 @@ class Gate:
     def _admit(self, client: socket.socket) -> None:
         with client, suppress(OSError):
             first = client.recv(4096)
+            if not first:  # it hung up before it said a word: a connection begun as the daemon ended
+                return
             level = first[first.index(b"MQTT") + 4]
             self.levels.append(level)
             if level == 5:
