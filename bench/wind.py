@@ -16,9 +16,8 @@ from math import sin
 from lfs10d.mqtt.encoding import encode
 from lfs10d.reading import Reading
 from lfs10d.system.clock import Instant
-from lfs10d.telemetry.info import DeviceInfo, WindInfo
-from lfs10d.telemetry.wind import WindValues
-from lfs10d.telemetry.wind_station import WindStation
+from lfs10d.telemetry.info import DeviceInfo, WindInfo, WindValues
+from lfs10d.telemetry.wind.station import WindStation
 
 DEVICES, HERTZ = 32, 4
 MEMORY_MOST, CPU_MOST = 2_000_000, 0.001

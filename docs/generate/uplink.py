@@ -11,10 +11,9 @@ from lfs10d.mqtt.settings import Version
 from lfs10d.reading import Reading
 from lfs10d.schema.quantities import duration_text
 from lfs10d.system.clock import Instant
-from lfs10d.telemetry.info import DaemonInfo, DeviceInfo, LineInfo, WindInfo
+from lfs10d.telemetry.info import DaemonInfo, DeviceInfo, LineInfo, WindInfo, WindValues
 from lfs10d.telemetry.publication import Publication, PublicationKind
 from lfs10d.telemetry.station import Station
-from lfs10d.telemetry.wind import WindValues
 
 DAY = 86_400
 MEASURED = 120

@@ -9,10 +9,9 @@ from typing import Final
 from docs.generate.examples import BEGUN, BOOT, LINE
 from lfs10d.reading import Reading
 from lfs10d.system.clock import Instant
-from lfs10d.telemetry.info import DeviceInfo, WindInfo
+from lfs10d.telemetry.info import DeviceInfo, WindInfo, WindValues
 from lfs10d.telemetry.publication import RECORD, WIND, device_topic
-from lfs10d.telemetry.wind import WindValues
-from lfs10d.telemetry.wind_station import WindStation
+from lfs10d.telemetry.wind.station import WindStation
 
 SECONDS: Final = 1000
 _MAST: Final = DeviceInfo(

@@ -20,8 +20,8 @@ from lfs10d.outbox.store.database import Limits
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Fault, FaultCode, Reading
 from lfs10d.system.secret import Secret
-from lfs10d.telemetry.info import DaemonInfo, DeviceInfo, LineInfo, WindInfo
-from lfs10d.telemetry.wind import METRES_PER_SECOND, WindValues
+from lfs10d.telemetry.info import DaemonInfo, DeviceInfo, LineInfo, WindInfo, WindValues
+from lfs10d.telemetry.wind.figures import METRES_PER_SECOND
 
 
 def daemon_info(now: Effective, boot: Boot) -> DaemonInfo:

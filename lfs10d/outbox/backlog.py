@@ -28,7 +28,7 @@ from lfs10d.outbox.spill import Spill
 from lfs10d.outbox.spool import Spool
 from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry import publication
-from lfs10d.telemetry.wind_record import is_record, source_of
+from lfs10d.telemetry.wind.record import is_record, source_of
 
 BATCH_MOST = 100
 """Samples in one history batch (contract, section 3)."""

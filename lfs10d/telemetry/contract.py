@@ -27,7 +27,7 @@ from lfs10d.telemetry.payloads import (
     SamplePayload,
     TracePayload,
 )
-from lfs10d.telemetry.wind_payloads import RecordPayload, WindPayload
+from lfs10d.telemetry.wind.payloads import RecordPayload, WindPayload
 
 
 @dataclass(frozen=True, slots=True)

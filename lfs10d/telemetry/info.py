@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from lfs10d.reading import NOTHING
 from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry.publication import VERSION
-from lfs10d.telemetry.wind import WindValues
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +67,15 @@ class LineInfo:
             "activity": activity,
             "requests": requests,
         }
+
+
+@dataclass(frozen=True, slots=True)
+class WindValues:
+    """The names of a device's first wind speed, in `unit`, and first wind direction; None where it has none."""
+
+    speed: str | None
+    direction: str | None
+    unit: str | None
 
 
 @dataclass(frozen=True, slots=True)

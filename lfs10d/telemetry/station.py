@@ -2,7 +2,7 @@
 
 `on_event` and `tick` return publications and keep what the next burst needs; nothing here waits, reads a clock
 or knows a broker. The rules of the line are in `line_state`, those of a device in `device_state`, rise and clear of
-errors in `alarms`, statistics in `counters`, the wind in `wind_station`.
+errors in `alarms`, statistics in `counters`, the wind in `wind.station`.
 
 While the port is lost, or freed for another program (activity `paused`), the devices' own errors are masked:
 one error of the line instead of one per device, and while paused none at all. The poller gives each device
@@ -42,7 +42,7 @@ from lfs10d.telemetry.publication import (
     iso_time,
     retained,
 )
-from lfs10d.telemetry.wind_station import WindStation
+from lfs10d.telemetry.wind.station import WindStation
 
 STATS_EVERY: Final = 30.0
 """Seconds between two publications of the statistics."""

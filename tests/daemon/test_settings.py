@@ -9,8 +9,7 @@ import pytest
 from lfs10d.config.loader import LoadedConfig, load
 from lfs10d.daemon.settings import config_hash, device_infos, line_info
 from lfs10d.line.budget import timing_of
-from lfs10d.telemetry.info import WindInfo
-from lfs10d.telemetry.wind import WindValues
+from lfs10d.telemetry.info import WindInfo, WindValues
 
 FILE = """
 line:

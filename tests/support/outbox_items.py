@@ -7,7 +7,7 @@ from lfs10d.outbox.items import HistoryBatch, LiveSample, Message, Retained
 from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry import publication
 from lfs10d.telemetry.publication import Publication, PublicationKind, Sample
-from lfs10d.telemetry.wind_record import RECORD_NAMES, WindRecord
+from lfs10d.telemetry.wind.record import RECORD_NAMES, WindRecord
 
 
 def queued(device: str, seq: int, *, since: float = 0.0, row: int | None = None) -> QueuedSample:

@@ -9,10 +9,9 @@ from typing import cast
 from lfs10d.reading import Reading
 from lfs10d.system.clock import Instant
 from lfs10d.system.clock_step import ClockState
-from lfs10d.telemetry.info import DeviceInfo, WindInfo
+from lfs10d.telemetry.info import DeviceInfo, WindInfo, WindValues
 from lfs10d.telemetry.publication import Publication
-from lfs10d.telemetry.wind import WindValues
-from lfs10d.telemetry.wind_station import WindStation
+from lfs10d.telemetry.wind.station import WindStation
 from tests.support.stations import ONE_VALUE, TIMEOUT, failed
 
 ANEMOMETER = replace(ONE_VALUE, wind=WindInfo(WindValues("wind_speed", None, "m/s"), every=10.0, records=600.0))

@@ -27,7 +27,7 @@ from lfs10d.outbox.store.row import (
 )
 from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry.publication import Sample
-from lfs10d.telemetry.wind_record import WindRecord, device_of_source, is_record
+from lfs10d.telemetry.wind.record import WindRecord, device_of_source, is_record
 
 EVICTED_AT_ONCE = 256
 """Samples evicted in one go: two pages."""

@@ -16,7 +16,7 @@ from lfs10d.outbox.store.row import DamagedError
 from lfs10d.outbox.store.sample_file import SampleFile, runs
 from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry.publication import Sample
-from lfs10d.telemetry.wind_record import WindRecord
+from lfs10d.telemetry.wind.record import WindRecord
 from tests.support.outbox_items import record
 from tests.support.rows import BOOT, ROOMY, START, entries, sample
 

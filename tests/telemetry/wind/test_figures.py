@@ -7,13 +7,13 @@ from collections.abc import Callable
 
 import pytest
 
-from lfs10d.telemetry.wind import (
+from lfs10d.telemetry.info import WindValues
+from lfs10d.telemetry.wind.figures import (
     LONG,
     METRES_PER_SECOND,
     SHORT,
     MeasuredWind,
     WindTotals,
-    WindValues,
     record_figures,
 )
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import asin, atan2, cos, degrees, hypot, isnan, radians, sin, sqrt
 from typing import Final
 
-from lfs10d.telemetry.wind_series import BLOCK, HeldSeries
+from lfs10d.telemetry.wind.series import BLOCK, HeldSeries
 
 RESULTANT_LEAST: Final = 0.05
 """Length of the mean vector below which it has no direction."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from lfs10d.system.clock import Instant
-from lfs10d.telemetry.wind_clock import EVEN_WITHIN, WindClock
+from lfs10d.telemetry.wind.clock import EVEN_WITHIN, WindClock
 
 WALL = 1_795_298_000.0
 

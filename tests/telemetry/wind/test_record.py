@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lfs10d.telemetry.contract import check
-from lfs10d.telemetry.wind_record import (
+from lfs10d.telemetry.wind.record import (
     CLOSED_AFTER,
     DIRECTION_NAMES,
     EVEN_WITHIN,

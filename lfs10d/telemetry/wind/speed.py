@@ -16,7 +16,7 @@ from math import inf, isnan, sqrt
 from operator import mul
 from typing import Final
 
-from lfs10d.telemetry.wind_series import BLOCK, HeldSeries
+from lfs10d.telemetry.wind.series import BLOCK, HeldSeries
 
 GUST_OVER: Final = 3000
 """Milliseconds of a gust's mean (WMO-No. 8)."""

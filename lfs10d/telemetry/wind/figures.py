@@ -15,8 +15,9 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from lfs10d.reading import Number, Value
-from lfs10d.telemetry.wind_direction import VARIABLE_BELOW, VARIABLE_FROM, DirectionSeries, Vector
-from lfs10d.telemetry.wind_speed import GUST_OVER, Extremes, Mean, Peak, SpeedSeries
+from lfs10d.telemetry.info import WindValues
+from lfs10d.telemetry.wind.direction import VARIABLE_BELOW, VARIABLE_FROM, DirectionSeries, Vector
+from lfs10d.telemetry.wind.speed import GUST_OVER, Extremes, Mean, Peak, SpeedSeries
 
 MINUTE: Final = 60_000
 SHORT: Final = 2 * MINUTE
@@ -47,15 +48,6 @@ SPEED_DECIMALS, RATIO_DECIMALS = 6, 4
 
 _NUMBERS: Final = frozenset({int, float})
 """Types of values that are numbers; a boolean is none."""
-
-
-@dataclass(frozen=True, slots=True)
-class WindValues:
-    """The names of a device's first wind speed, in `unit`, and first wind direction; None where it has none."""
-
-    speed: str | None
-    direction: str | None
-    unit: str | None
 
 
 @dataclass(slots=True)

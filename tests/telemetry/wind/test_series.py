@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from lfs10d.telemetry.wind_series import BLOCK, REACH
-from lfs10d.telemetry.wind_speed import SpeedSeries
+from lfs10d.telemetry.wind.series import BLOCK, REACH
+from lfs10d.telemetry.wind.speed import SpeedSeries
 
 T = 1_000_000_000
 

@@ -7,10 +7,10 @@ from math import inf
 
 from lfs10d.reading import Reading
 from lfs10d.system.clock import Instant
-from lfs10d.telemetry.device_wind import DeviceWind
 from lfs10d.telemetry.info import DeviceInfo
 from lfs10d.telemetry.publication import WIND, Publication, device_topic, retained
-from lfs10d.telemetry.wind_clock import WindClock, WindMoment
+from lfs10d.telemetry.wind.clock import WindClock, WindMoment
+from lfs10d.telemetry.wind.device import DeviceWind
 
 
 class WindStation:

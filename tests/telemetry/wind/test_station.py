@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from lfs10d.reading import Reading
 from lfs10d.telemetry.info import DeviceInfo, WindInfo
-from lfs10d.telemetry.wind_station import WindStation
+from lfs10d.telemetry.wind.station import WindStation
 from tests.support.stations import ONE_VALUE
 from tests.support.winds import ANEMOMETER, MIDNIGHT, TEN_MINUTES, Weather, reading, silence, weather
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.telemetry.wind_direction import DirectionSeries, Spread, compass, spread
-from lfs10d.telemetry.wind_series import BLOCK
+from lfs10d.telemetry.wind.direction import DirectionSeries, Spread, compass, spread
+from lfs10d.telemetry.wind.series import BLOCK
 from tests.support.naive_wind import Good, Naive, sector, yamartino
 
 T = 1_000_000_000

@@ -14,17 +14,22 @@ Time = Annotated[str, Field(pattern=r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z$",
 Compass = Annotated[int | None, Field(ge=1, le=360)]
 
 
-class WindPayload(Payload):
-    """The wind of the last 2 and 10 min; a vane adds the directions. See [wind.md](wind.md)."""
+class WindHeader(Payload):
+    """What both begin with."""
 
     v: Version
     line: str
     device: str
-    boot: str = Field(min_length=8, max_length=8, description="this run of the daemon, sortable by start")
+    boot: str = Field(min_length=8, max_length=8, description="one run of the daemon, sortable by start")
     ts: Milliseconds
     time: Time
     clock: Clock
     unit: str | None = Field(description="of the speeds; null: a vane alone")
+
+
+class WindPayload(WindHeader):
+    """The wind of the last 2 and 10 min; a vane adds the directions. See [wind.md](wind.md)."""
+
     mean_2m: Speed = Field(description="mean of the last 2 min; null: less than half of them covered, as of every mean")
     mean_10m: Speed = Field(description="mean of the last 10 min, or since a discontinuity")
     gust_3s: Speed = Field(description="the newest mean of 3 s; null: none is, or the value is old")
@@ -51,18 +56,11 @@ class WindPayload(Payload):
     direction_to: Compass = Field(None, description="to here")
 
 
-class RecordPayload(Payload):
+class RecordPayload(WindHeader):
     """The wind of one whole span of UTC, [`from`, `to`); a vane adds the directions. See [wind.md](wind.md)."""
 
-    v: Version
-    line: str
-    device: str
-    boot: str = Field(min_length=8, max_length=8, description="one run of the daemon, sortable by start")
-    seq: int = Field(ge=1, description="of the records, from 1 per device and boot, without gaps")
     ts: Milliseconds = Field(description="as `to`")
-    time: Time
-    clock: Clock
-    unit: str | None = Field(description="of the speeds; null: a vane alone")
+    seq: int = Field(ge=1, description="of the records, from 1 per device and boot, without gaps")
     from_: int = Field(alias="from", description="epoch milliseconds, UTC")
     to: Milliseconds
     mean: Speed = Field(description="null: less than half covered")

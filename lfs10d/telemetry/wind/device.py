@@ -17,7 +17,7 @@ from math import inf
 from typing import Final
 
 from lfs10d.reading import Value
-from lfs10d.telemetry.info import DeviceInfo, WindInfo
+from lfs10d.telemetry.info import DeviceInfo, WindInfo, WindValues
 from lfs10d.telemetry.publication import (
     RECORD,
     VERSION,
@@ -29,18 +29,17 @@ from lfs10d.telemetry.publication import (
     iso_time,
     retained,
 )
-from lfs10d.telemetry.wind import (
+from lfs10d.telemetry.wind.clock import WindMoment
+from lfs10d.telemetry.wind.figures import (
     LONG,
     MINUTE,
     RATIO_DECIMALS,
     SHORT,
     MeasuredWind,
     WindTotals,
-    WindValues,
     record_figures,
 )
-from lfs10d.telemetry.wind_clock import WindMoment
-from lfs10d.telemetry.wind_record import DIRECTION_NAMES, RECORD_NAMES, RecordSpans, WindRecord
+from lfs10d.telemetry.wind.record import DIRECTION_NAMES, RECORD_NAMES, RecordSpans, WindRecord
 
 HOLD_INTERVALS, HOLD_LEAST = 2, 2.0
 """A value holds for so many intervals at most, and for so many seconds at least."""

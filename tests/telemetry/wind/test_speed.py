@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.telemetry.wind_series import BLOCK, REACH
-from lfs10d.telemetry.wind_speed import Extremes, Mean, Peak, SpeedSeries
+from lfs10d.telemetry.wind.series import BLOCK, REACH
+from lfs10d.telemetry.wind.speed import Extremes, Mean, Peak, SpeedSeries
 from tests.support.naive_wind import Good, Naive
 
 T = 1_000_000_000
