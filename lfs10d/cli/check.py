@@ -105,6 +105,7 @@ def _report(loaded: LoadedConfig, found: Budget, warnings: tuple[Problem, ...]) 
                     "interval": share.interval,
                     "exchanges": share.exchanges,
                     "wire_ms": round(share.wire * 1e3, 3),
+                    "longest_wire_ms": round(share.longest_wire * 1e3, 3),
                     "rest_ms": round(share.rest * 1e3, 3),
                     "load_pct": None if share.load is None else round(share.load * 100, 3),
                     "calibration": certificates[share.device],
@@ -128,8 +129,10 @@ def _lines(loaded: LoadedConfig, found: Budget) -> Iterator[str]:
     if not found.shares:
         return
     rests = any(share.rest for share in found.shares)
+    slow = any(share.longest_wire > share.wire for share in found.shares)
+    heads = ("wire time", *(["with slow values"] if slow else []), *(["rest"] if rests else []), "load")
     yield from columns(
-        ("device", "id", "profile", "interval", "wire time", *(["rest"] if rests else []), "load"),
+        ("device", "id", "profile", "interval", *heads),
         [
             (
                 share.device,
@@ -137,12 +140,13 @@ def _lines(loaded: LoadedConfig, found: Budget) -> Iterator[str]:
                 share.profile,
                 duration_text(share.interval) if share.interval else "0",
                 f"{share.wire * 1e3:.1f} ms",
+                *([f"{share.longest_wire * 1e3:.1f} ms"] if slow else []),
                 *([f"{share.rest * 1e3:.1f} ms"] if rests else []),
                 "the rest" if share.load is None else f"{share.load:.1%}",
             )
             for share in found.shares
         ],
-        right=(1, 3, 4, 5, 6),
+        right=(1, 3, 4, 5, 6, 7),
     )
     yield ""
     calibrated = [

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from lfs10d.config.models import Config, LineConfig, SlaveConfig
+from lfs10d.line.read_plan import part_of_polls
 from lfs10d.modbus.frames import Checksum, Codec, Framing
 from lfs10d.modbus.request import ReadRegisters
 from lfs10d.modbus.timing import LineTiming
@@ -20,12 +21,15 @@ LONGEST_LEARNED_TIMEOUT = 1.0
 
 @dataclass(frozen=True, slots=True)
 class LoadShare:
-    """What one device takes of the line. `wire` is the time of one poll without turnaround, in seconds.
+    """What one device takes of the line. `wire` is the time of a usual poll without turnaround, in seconds.
 
-    `exchanges` make one poll, with `rest` s in all in which the device must be left in peace, and others are polled.
-    `load` and `load_with_turnaround` are parts of one: of the device's own time, its rest included, so that with more
-    than 1 it cannot be polled so often even if it is alone; None for interval 0, which takes what the others leave.
-    `slowest` is a poll whose answers all begin at the last moment.
+    `exchanges` make a usual poll, with `rest` s in all in which the device must be left in peace, and others are
+    polled. The longest poll reads the slow values too (those with an interval of their own): `longest_wire` and
+    `longest_rest` are the same of it.
+    Loads are parts of one, each read counted as often as it is asked: `load` and `load_with_turnaround` of the
+    device's own time, its rest included, so that with more than 1 it cannot be polled so often even if it is alone;
+    `wire_load` and `wire_load_with_turnaround` of the line's time, without the rest. None for interval 0, which takes
+    what the others leave. `slowest` is the longest poll if its answers all begin at the last moment.
     """
 
     device: str
@@ -35,8 +39,12 @@ class LoadShare:
     exchanges: int
     wire: float
     rest: float
+    longest_wire: float
+    longest_rest: float
     load: float | None
     load_with_turnaround: float | None
+    wire_load: float | None
+    wire_load_with_turnaround: float | None
     slowest: float
 
 
@@ -64,24 +72,23 @@ class Budget:
     @property
     def wire_load(self) -> float:
         """The same of what goes over the wire alone, without the rests, in which others are polled."""
-        return sum(share.wire / share.interval for share in self.shares if share.interval)
+        return sum(share.wire_load or 0.0 for share in self.shares)
 
     @property
     def wire_load_with_turnaround(self) -> float:
         """The same with a turnaround of 5 ms."""
-        waited = ((share.wire + share.exchanges * ASSUMED_TURNAROUND, share.interval) for share in self.shares)
-        return sum(taken / interval for taken, interval in waited if interval)
+        return sum(share.wire_load_with_turnaround or 0.0 for share in self.shares)
 
     @property
     def shortest_cycle(self) -> float:
-        """Seconds in which every device can be polled once, without turnaround."""
+        """Seconds in which every device can be polled once as usual, without turnaround."""
         alone = (share.wire + share.rest for share in self.shares)
         return max(sum(share.wire for share in self.shares), *alone, 0.0)
 
     @property
     def slowest_cycle(self) -> float:
-        """Seconds for every device once, if each answer begins at the end of its time-out."""
-        alone = (share.slowest + share.rest for share in self.shares)
+        """Seconds for every device once, slow values too, if each answer begins at the end of its time-out."""
+        alone = (share.slowest + share.longest_rest for share in self.shares)
         return max(sum(share.slowest for share in self.shares), *alone, 0.0)
 
 
@@ -115,20 +122,34 @@ def budget(config: Config, profiles: Mapping[str, Profile]) -> Budget:
 
 def _share(slave: SlaveConfig, profile: Profile, timing: LineTiming, framing: Framing) -> LoadShare:
     codec = Codec(framing, Checksum(slave.checksum or profile.checksum))
-    requests = [ReadRegisters(slave.id, read.address, read.count, read.function) for read in profile.reads()]
-    wire = sum(timing.exchange(len(codec.encode(request)), codec.answer_size(request)) for request in requests)
     timeout = LONGEST_LEARNED_TIMEOUT if slave.response_timeout is None else slave.response_timeout
-    waited = wire + len(requests) * ASSUMED_TURNAROUND
-    rest = len(requests) * max(0.0, request_gap(slave, profile) - timing.gap)
+    rest = max(0.0, request_gap(slave, profile) - timing.gap)
+    wires: list[float] = []
+    parts: list[float] = []
+    for read in profile.reads():
+        request = ReadRegisters(slave.id, read.address, read.count, read.function)
+        wires.append(timing.exchange(len(codec.encode(request)), codec.answer_size(request)))
+        parts.append(part_of_polls(profile, read, slave.interval))
+    usual = [wire for wire, part in zip(wires, parts, strict=True) if part == 1.0]
+
+    def load(more: float) -> float | None:
+        """Return the load if each read takes `more` s than on the wire."""
+        taken = sum(part * (wire + more) for wire, part in zip(wires, parts, strict=True))
+        return taken / slave.interval if slave.interval else None
+
     return LoadShare(
         device=slave.name,
         slave=slave.id,
         profile=slave.profile,
         interval=slave.interval,
-        exchanges=len(requests),
-        wire=wire,
-        rest=rest,
-        load=(wire + rest) / slave.interval if slave.interval else None,
-        load_with_turnaround=(waited + rest) / slave.interval if slave.interval else None,
-        slowest=wire + len(requests) * timeout,
+        exchanges=len(usual),
+        wire=sum(usual),
+        rest=len(usual) * rest,
+        longest_wire=sum(wires),
+        longest_rest=len(wires) * rest,
+        load=load(rest),
+        load_with_turnaround=load(rest + ASSUMED_TURNAROUND),
+        wire_load=load(0.0),
+        wire_load_with_turnaround=load(ASSUMED_TURNAROUND),
+        slowest=sum(wires) + len(wires) * timeout,
     )

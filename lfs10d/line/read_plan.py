@@ -3,7 +3,8 @@
 Rules
 -----
 1. A poll reads every value, neighbours together. A value with an `interval` of its own is read when that has passed;
-   in between the samples carry the newest one, with its age where that is greater than the device's interval.
+   in between the samples carry the newest one, with its age where that is greater than the device's interval. Where
+   every value has an interval, those with the shortest are read in each poll.
 2. Where a read of several registers is refused with exception 02 and some of them are optional, the rest is read
    without them in the same poll, and each optional register alone: those that are refused again are absent.
 3. What is absent is null in every sample, with the error `exception`, and read again after `ABSENT_AGAIN`.
@@ -16,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from math import ceil
 
 from lfs10d.profiles.blocks import Block
 from lfs10d.profiles.profile import Profile
@@ -38,6 +40,22 @@ class Newest:
     at: float
     value: Published | None
     fault: Fault | None
+
+
+def part_of_polls(profile: Profile, block: Block, interval: float) -> float:
+    """Return in which part of the polls of a device that is polled every `interval` a read of the profile is asked.
+
+    1.0: in each. With an interval of 0 (as often as the line allows) a slow value's part is not known: 0.0.
+    """
+    own = block.values[0].interval
+    if own is None or own <= _shortest(profile.values):
+        return 1.0
+    return 1 / max(1, ceil(own / interval - EARLY)) if interval else 0.0
+
+
+def _shortest(values: Iterable[Value]) -> float:
+    """Return the shortest interval of slow values: 0 where one has none of its own."""
+    return min((value.interval or 0.0 for value in values), default=0.0)
 
 
 class ReadPlan:
@@ -72,10 +90,16 @@ class ReadPlan:
         resting = set() if everything else {each.name for each in self._slow if not self._due(each, now, interval)}
         absent = {name for name, (_, again_at) in self._absent.items() if now < again_at}
         if len(resting | absent) == len(self._profile.values):
-            resting = set()
+            resting = self._slower({name for name in resting if name not in absent})
         if len(absent) == len(self._profile.values):
             absent = set()
         return self._reads_but(frozenset(resting | absent), frozenset((self._alone | self._absent.keys()) - absent))
+
+    def _slower(self, names: set[str]) -> set[str]:
+        """Return the names of slow values without those that have the shortest interval among them."""
+        values = [value for value in self._slow if value.name in names]
+        shortest = _shortest(values)
+        return {value.name for value in values if (value.interval or 0.0) > shortest}
 
     def _due(self, value: Value, now: float, interval: float) -> bool:
         newest = self._newest.get(value.name)

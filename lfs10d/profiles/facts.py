@@ -9,7 +9,8 @@ from typing import Annotated, TypeAlias
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import InitErrorDetails
 
-from lfs10d.schema.fields import FieldError, FieldKind, Text, Whole, plain_error
+from lfs10d.profiles.manual_numbers import hint_for_number
+from lfs10d.schema.fields import FieldError, FieldKind, Text, Whole, plain_error, shown
 
 Place: TypeAlias = tuple[str | int, ...]
 
@@ -97,9 +98,20 @@ class Factor(FieldKind):
         return float(value)
 
 
+@dataclass(frozen=True)
+class Address(Whole):
+    """The address of a register on the wire; a number of the manual is refused with what it stands for."""
+
+    def refusal(self, value: object) -> FieldError:
+        """Return the error for this value."""
+        hint = hint_for_number(value) if isinstance(value, int) else None
+        return FieldError(f"must be {self.words}{f'; {hint}' if hint else f', not {shown(value)}'}")
+
+
 Sentence: TypeAlias = Annotated[str, Text(500)]
 UnitText: TypeAlias = Annotated[str, Text(16, what="a unit ('1' for a bare number)")]
 Register: TypeAlias = Annotated[int, Whole(0, LAST_REGISTER)]
+RegisterAddress: TypeAlias = Annotated[int, Address(0, LAST_REGISTER)]
 Scale: TypeAlias = Annotated[float, Factor()]
 Offset: TypeAlias = Annotated[float, Field(ge=-LARGEST_FACTOR, le=LARGEST_FACTOR)]
 
@@ -133,7 +145,9 @@ class Registered(Fact):
     pydantic's metaclass, an ABCMeta, has a method `register`: a field of that name inherits it as its default.
     """
 
-    address: Register = Field(alias="register", description="The (first) register's address on the wire, 0 to 0xFFFF.")
+    address: RegisterAddress = Field(
+        alias="register", description="The (first) register's address on the wire, 0 to 0xFFFF."
+    )
 
     @property
     def register(self) -> int:

@@ -16,6 +16,7 @@ from lfs10d.profiles.blocks import Block, batch
 from lfs10d.profiles.contents import BIT_FUNCTIONS
 from lfs10d.profiles.device_facts import MOST_WORDS, Barrier, Factory, Identity, IdRegister, RateRegister, SlaveId
 from lfs10d.profiles.facts import Facts, Place, Register, Registered, Sentence, refuse
+from lfs10d.profiles.manual_numbers import hint_for_address
 from lfs10d.profiles.settings import Setting
 from lfs10d.profiles.values import Value
 from lfs10d.reading import Fault, Number
@@ -24,8 +25,6 @@ from lfs10d.schema.fields import Duration, Name, Whole
 
 FramingName: TypeAlias = Literal["rtu", "ascii"]
 ChecksumName: TypeAlias = Literal["crc", "sum"]
-MANUAL_NUMBERS = (3, 4)
-"""First digits of five that manuals put before input and holding registers."""
 BUSY_EXCEPTIONS = (6,)
 """Server device busy (Modbus Application Protocol V1.1b3, section 7; EH600: the maker's fuller manual)."""
 
@@ -243,14 +242,14 @@ class Profile(Facts):
         """Return what is valid and probably a mistake, one sentence each."""
         facts: list[tuple[str, Registered | None]] = [(value.name, value) for value in self.values]
         facts += [("slave_id", self.slave_id), ("baudrate", self.baudrate), ("barrier", self.barrier)]
+        facts += [("identify", each) for each in self.identify]
         facts += [(setting.name, setting) for setting in self.settings]
-        return tuple(
-            f"{name}: register {fact.register} looks like a number of the manual, not an address: 4xxxx and 3xxxx "
-            "stand for holding and input registers there, counted from one, so the address would be "
-            f"{fact.register % 10000 - 1}"
+        hints = (
+            (name, hint_for_address(fact.register, getattr(fact, "function", None)))
             for name, fact in facts
-            if fact is not None and _is_of_a_manual(fact.register)
+            if fact is not None
         )
+        return tuple(f"{name}: {hint}" for name, hint in hints if hint is not None)
 
     @property
     def rates(self) -> tuple[int, ...]:
@@ -283,11 +282,6 @@ class Profile(Facts):
     def decode(self, block: Block, registers: tuple[int, ...]) -> dict[str, Published] | Fault:
         """Return the values of `block` that are available, or the first fault: `not_finite` or `out_of_range`."""
         return block.decode(registers)
-
-
-def _is_of_a_manual(register: int) -> bool:
-    """Whether a register looks like 40001, and not like an address that is round in hexadecimal, such as 0x8000."""
-    return register // 10000 in MANUAL_NUMBERS and register % 10000 != 0 and register % 0x1000 != 0
 
 
 def _words_per_read(data: dict[str, Any]) -> int:

@@ -9,6 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from lfs10d.cli.check import command
+from lfs10d.errors import ConfigError
 from tests.support.verbs import Lfs10d
 
 
@@ -45,6 +46,53 @@ def test_a_valid_file_is_answered_with_the_time_budget_as_a_table() -> None:
     ]
     assert "fastest cycle    50.0 ms" in out
     assert "slowest cycle    2.05 s" in out
+
+
+SLOW = """\
+name: station
+title: A station
+values:
+  - {name: wind_speed, register: 0, type: uint16, unit: m/s}
+  - {name: battery, register: 40001, type: uint16, unit: V, interval: 1m}
+"""
+"""A slow value, whose register is written as the manual's number."""
+
+
+def test_a_slow_value_is_counted_at_its_own_rate() -> None:
+    Path("station.yaml").write_text(SLOW)
+    text = "line: {port: /dev/x}\nslaves: [{id: 2, profile: station.yaml, interval: 100ms}, 3]\n"
+    code, out, _ = check(text)
+    assert code == 0
+    assert out.splitlines()[5:8] == [
+        "device   id  profile       interval  wire time  with slow values   load",
+        "slave-2   2  station.yaml     100ms    22.9 ms           45.8 ms  23.0%",
+        "slave-3   3  lfs10               1s    25.0 ms           25.0 ms   2.5%",
+    ]
+    _, out, _ = check(text, "--json")
+    found = json.loads(out)["budget"]
+    assert found["load_pct"] == 25.45
+    assert [(each["wire_ms"], each["longest_wire_ms"]) for each in found["slaves"]] == [(22.917, 45.833), (25.0, 25.0)]
+
+
+def test_a_register_that_is_a_number_of_the_manual_is_a_warning_once_for_its_profile() -> None:
+    Path("station.yaml").write_text(SLOW)
+    code, _, err = check(
+        "line: {port: /dev/x}\nslaves: [2, {id: 3, profile: station.yaml}, {id: 4, profile: station.yaml}]\n"
+    )
+    assert code == 0
+    assert err == (
+        'lfs10d.yaml:2:13: slaves[1]: warning: profile "station.yaml": battery: register 40001 looks like a number of '
+        "the manual, not an address: 4 stands for holding register there, and the rest counts from one, so write 0\n"
+    )
+
+
+def test_a_profile_with_a_bare_percent_sign_is_told_to_quote_it() -> None:
+    Path("station.yaml").write_text(SLOW.replace("unit: V", "unit: %"))
+    with pytest.raises(ConfigError) as caught:
+        check("line: {port: /dev/x}\nslaves: [{id: 2, profile: station.yaml}]\n")
+    assert str(caught.value).endswith(
+        '/station.yaml:5:58: a percent sign cannot begin a plain word; put it in quotes: "%"'
+    )
 
 
 def test_calibrations_are_shown() -> None:

@@ -12,7 +12,8 @@ from click import unstyle
 from click.testing import CliRunner
 
 from lfs10d.cli import profiles as verb
-from lfs10d.cli.profiles import command, explain
+from lfs10d.cli.profiles import command
+from lfs10d.cli.render.profile_tables import explain
 from lfs10d.errors import ConfigError
 from lfs10d.profiles.library import builtin_names, load_profile, parse_profile
 
@@ -92,11 +93,39 @@ def test_a_profile_of_the_user_is_explained_like_any_other() -> None:
     assert "1..60 s" in text
 
 
+def test_a_warning_of_a_profile_goes_to_standard_error(tmp_path: Path) -> None:
+    (tmp_path / "tank.yaml").write_text(TANK.replace("register: 7", "register: 30007"))
+    result = CliRunner().invoke(command, ["show", str(tmp_path / "tank.yaml")], catch_exceptions=False)
+    assert result.exit_code == 0
+    assert "30007" not in result.stdout
+    assert result.stderr == (
+        "lfs10d: warning: level: register 30007 looks like a number of the manual, not an address: 3 stands for input "
+        "register there, and the rest counts from one, so write 6\n"
+    )
+
+
+def test_a_number_of_six_digits_is_answered_with_the_address_that_is_meant(tmp_path: Path) -> None:
+    (tmp_path / "tank.yaml").write_text(TANK.replace("register: 7", "register: 400007"))
+    with pytest.raises(ConfigError) as caught:
+        run("show", str(tmp_path / "tank.yaml"))
+    assert str(caught.value).endswith(
+        "tank.yaml:5:29: values[0].register: must be a whole number from 0 to 65535; 400007 looks like a number of the "
+        "manual: 4 stands for holding register there, and the rest counts from one, so write 6"
+    )
+
+
+def test_a_bare_percent_sign_is_answered_with_its_quotes(tmp_path: Path) -> None:
+    (tmp_path / "tank.yaml").write_text(TANK.replace("unit: m", "unit: %"))
+    with pytest.raises(ConfigError) as caught:
+        run("show", str(tmp_path / "tank.yaml"))
+    assert str(caught.value).endswith('a percent sign cannot begin a plain word; put it in quotes: "%"')
+
+
 def test_the_unusual_is_spelled_out() -> None:
     tables = explain(parse_profile(TANK, "tank.yaml"))
     device = dict(row for row in tables[0].rows if len(row) == 2)
     assert device["after silence"] == "the line rests for twice the time-out, for no read of another length is known"
-    assert device["interval"] == "at least 0.5 s"
+    assert device["interval"] == "at least 500ms"
     assert tables[1].rows == (("level", "input 0x0007", "int16, bytes swapped", "x 0.1 -40 m", "any", ""),)
     assert tables[2].rows == (("mode", "0x0009", "uint16 x 2", "0 = off, 1 = on", "no", ""),)
     assert len(tables) == 3

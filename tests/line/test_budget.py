@@ -20,7 +20,8 @@ VALUES = [
 TWO_READS = Profile.model_validate(
     {"name": "two", "title": "Two", "framings": ["rtu", "ascii"], "checksums": ["crc", "sum"], "values": VALUES}
 )
-PROFILES = {"lfs10": load_profile("lfs10", relative_to=Path()), "two": TWO_READS}
+SLOW = Profile.model_validate({"name": "slow", "title": "Slow", "values": [VALUES[0], VALUES[1] | {"interval": "1m"}]})
+PROFILES = {"slow": SLOW, "lfs10": load_profile("lfs10", relative_to=Path()), "two": TWO_READS}
 
 
 def of(slaves: Sequence[object], **line: Any) -> Budget:  # noqa: ANN401  # any key of the line
@@ -87,6 +88,40 @@ def test_a_rest_is_taken_before_each_read_of_a_poll() -> None:
     assert share.rest == pytest.approx(2 * (0.1 - 3645.8e-6))
     (share,) = of([{"id": 3, "request_gap": "1ms"}]).shares  # less than the line's own silence
     assert share.rest == 0
+
+
+ONE_READ = (8 + 7 + 2 * 3.5) * 10 / 9600
+"""Seconds of the wire for a read of one register."""
+
+
+def test_a_slow_value_counts_as_often_as_it_is_asked() -> None:
+    (share,) = of([{"id": 2, "profile": "slow"}]).shares
+    assert share.exchanges == 1
+    assert [share.wire, share.longest_wire] == pytest.approx([ONE_READ, 2 * ONE_READ])
+    assert share.load == share.wire_load == pytest.approx(ONE_READ * (1 + 1 / 60))
+    assert share.load_with_turnaround == pytest.approx((ONE_READ + 0.005) * (1 + 1 / 60))
+    assert share.slowest == pytest.approx(2 * (ONE_READ + 1))
+
+
+def test_a_slow_value_is_asked_in_whole_polls_and_in_each_where_it_is_not_slower() -> None:
+    (share,) = of([{"id": 2, "profile": "slow", "interval": "40s"}]).shares
+    assert share.load == pytest.approx(ONE_READ * (1 + 1 / 2) / 40)
+    (share,) = of([{"id": 2, "profile": "slow", "interval": "1m"}]).shares
+    assert share.exchanges == 2
+    assert share.load == pytest.approx(2 * ONE_READ / 60)
+    (share,) = of([{"id": 2, "profile": "slow", "interval": 0}]).shares
+    assert (share.exchanges, share.load, share.wire_load) == (1, None, None)
+
+
+def test_the_rest_before_a_slow_value_counts_as_often_too() -> None:
+    found = of([{"id": 2, "profile": "slow", "request_gap": "500ms", "response_timeout": "100ms"}])
+    (share,) = found.shares
+    rest = 0.5 - found.gap
+    assert [share.rest, share.longest_rest] == pytest.approx([rest, 2 * rest])
+    assert share.load == found.load == pytest.approx((ONE_READ + rest) * (1 + 1 / 60))
+    assert found.wire_load == pytest.approx(ONE_READ * (1 + 1 / 60))
+    assert found.slowest_cycle == pytest.approx(2 * (ONE_READ + 0.1 + rest))
+    assert found.shortest_cycle == pytest.approx(ONE_READ + rest)
 
 
 @pytest.mark.parametrize(("of_slave", "of_profile", "kept"), [(0, 0.3, 0.3), (0.2, 0.3, 0.3), (0.4, 0.3, 0.4)])

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from lfs10d.line.read_plan import ABSENT_AGAIN, ReadPlan
+import pytest
+
+from lfs10d.line.read_plan import ABSENT_AGAIN, ReadPlan, part_of_polls
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Fault, FaultCode, Value
 
@@ -165,3 +167,51 @@ def test_another_profile_of_the_same_device_is_followed() -> None:
     absent(plan, 0.0)
     plan.follow(station({"name": "gust", "register": 2}))
     assert spans(plan, 1.0) == [(0, 1), (2, 1)]
+
+
+def test_where_every_value_is_slow_a_poll_reads_the_least_slow_ones() -> None:
+    plan = ReadPlan(all_slow())
+    plan.complete({"rain": 1, "battery": 1}, {}, 0.0, 1.0)
+    assert spans(plan, 1.0) == [(1, 1)]
+    assert spans(plan, 3600.0) == [(1, 1), (9, 1)]
+
+
+def test_where_the_only_fast_value_is_absent_a_poll_reads_the_least_slow_ones() -> None:
+    slow = [value.model_dump(by_alias=True) for value in all_slow().values]
+    fast = {"name": "wind", "register": 0, "type": "uint16", "unit": "1", "optional": True}
+    plan = ReadPlan(Profile.model_validate({"name": "s", "title": "S", "values": [fast, *slow]}))
+    assert plan.refused(plan.reads(0.0, 1.0)[0], REFUSED, 0.0) == ()
+    plan.complete({"rain": 1, "battery": 1}, {}, 0.0, 1.0)
+    assert spans(plan, 1.0) == [(1, 1)]
+
+
+def all_slow() -> Profile:
+    values = [{"name": "rain", "register": 1, "interval": "1m"}, {"name": "battery", "register": 9, "interval": "1h"}]
+    plain = {"type": "uint16", "unit": "1"}
+    return Profile.model_validate({"name": "s", "title": "S", "values": [plain | each for each in values]})
+
+
+@pytest.mark.parametrize(
+    ("interval", "parts"), [(1.0, [1.0, 1 / 60]), (7.0, [1.0, 1 / 9]), (120.0, [1.0, 1.0]), (0.0, [1.0, 0.0])]
+)
+def test_a_slow_read_is_a_part_of_the_polls(interval: float, parts: list[float]) -> None:
+    profile = station({"name": "battery", "register": 9, "interval": "1m"})
+    assert [part_of_polls(profile, block, interval) for block in profile.reads()] == parts
+
+
+def test_the_least_slow_read_is_in_each_poll_where_all_are_slow() -> None:
+    profile = all_slow()
+    assert [part_of_polls(profile, block, 60.0) for block in profile.reads()] == [1.0, 1 / 60]
+
+
+@pytest.mark.parametrize("interval", [1.0, 7.0, 13.0, 45.0, 60.0, 120.0])
+def test_the_part_of_the_polls_is_how_often_they_really_ask(interval: float) -> None:
+    """Polls on their grid, each of which takes 50 ms."""
+    profile = station({"name": "battery", "register": 9, "interval": "1m"})
+    plan, polls, asked = ReadPlan(profile), round(36_000 / interval), 0
+    for number in range(polls):
+        now = number * interval
+        names = {value.name for block in plan.reads(now, interval) for value in block.values}
+        asked += "battery" in names
+        plan.complete(dict.fromkeys(names, 1), {}, now + 0.05, interval)
+    assert asked / polls == pytest.approx(part_of_polls(profile, profile.reads()[1], interval), rel=0.01)

@@ -10,7 +10,17 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from lfs10d.profiles.registers import WORDS, ByteOrder, RegisterType, WordOrder, shortest, span, spell
+from lfs10d.profiles.registers import (
+    WORDS,
+    ByteOrder,
+    Linear,
+    RegisterType,
+    WordOrder,
+    float_of,
+    shortest,
+    span,
+    spell,
+)
 
 FORMATS: dict[RegisterType, str] = {"int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "float32": "f"}
 WIRE_ORDER: dict[tuple[WordOrder, ByteOrder], str] = {
@@ -111,3 +121,32 @@ def test_a_range_is_spelled_for_people(low: float | None, high: float | None, un
 )
 def test_a_number_is_spelled_with_its_unit(number: float, unit: str, text: str) -> None:
     assert spell(number, unit) == text
+
+
+DECIMALS = st.sampled_from([1, -1, 0.1, 0.01, 2.5, 10, 1e-6])
+
+
+@given(raw=st.integers(-(2**63), 2**64), scale=DECIMALS, offset=st.sampled_from([0, -40, 0.5, 273.15]))
+def test_a_scaled_integer_is_the_float_nearest_to_the_decimal_result(raw: int, scale: float, offset: float) -> None:
+    exact = raw * Fraction(repr(scale)) + Fraction(repr(offset))
+    number = Linear.of(scale, offset).of_integer(raw)
+    assert number == (
+        int(exact) if Fraction(repr(scale)).denominator == Fraction(repr(offset)).denominator == 1 else float(exact)
+    )
+
+
+def test_a_scaled_float_is_scaled_as_the_decimal_it_prints_as() -> None:
+    assert Linear.of(0.1, 0).of_decimal(12.3) == 1.23
+    assert Linear.of(1, -40).of_decimal(66.2) == 26.2
+
+
+def test_only_a_scale_of_one_without_an_offset_changes_nothing() -> None:
+    assert Linear.of(1, 0).plain
+    assert not Linear.of(1, 0.5).plain
+    assert not Linear.of(2, 0).plain
+
+
+@given(number=st.floats(width=32, allow_nan=False))
+def test_bits_of_a_float_are_that_float(number: float) -> None:
+    assert float_of(float_bits(number), "float32") == number
+    assert float_of(int.from_bytes(struct.pack(">d", number), "big"), "float64") == number

@@ -135,3 +135,35 @@ def test_a_number_that_its_calibration_makes_infinite_is_none() -> None:
     cell = replace(Value.model_validate(VALUE | {"scale": 0.5}).cell(1), calibration=Calibration(1e308, 0.0))
     fault = cell.decode((0xFFFF,))
     assert fault == Fault(FaultCode.NOT_FINITE, "level is infinite with its calibration")
+
+
+@pytest.mark.parametrize(
+    ("data", "wrong"),
+    [
+        (
+            VALUE | {"type": "float32", "word_order": "low_first", "bits": [0, 3]},
+            [(("bits",), "is a part of a whole number, and the type is float32")],
+        ),
+        (VALUE | {"bits": [0, 3], "byte": "low"}, [(("byte",), "bits says already which part is meant")]),
+        (VALUE | {"bits": [9, 16]}, [(("bits",), "there are bits 0 to 15")]),
+        (
+            {"name": "on", "register": 1, "function": 1, "unit": "1", "byte_order": "little"},
+            [(("byte_order",), "a boolean has no bytes; leave the byte order out")],
+        ),
+        (
+            VALUE | {"type": "float32", "word_order": "low_first", "map": {0: "dry"}},
+            [(("map",), "words stand for whole numbers, and the type is float32")],
+        ),
+        (VALUE | {"map": {}}, [(("map",), "names no content")]),
+        (VALUE | {"type": "int17", "byte": "low", "map": {0: "a"}, "unavailable": [7]}, [(("type",), None)]),
+    ],
+)
+def test_a_part_and_its_words_fit_the_type(data: dict[str, Any], wrong: list[tuple[Any, str | None]]) -> None:
+    """A type with an error of its own binds nothing else."""
+    found = problems(Value, data)
+    assert [place for place, _ in found] == [place for place, _ in wrong]
+    assert all(message in {None, said} for (_, message), (_, said) in zip(wrong, found, strict=True))
+
+
+def test_the_bytes_of_any_register_may_be_swapped() -> None:
+    assert decoded(Value.model_validate(VALUE | {"byte_order": "little"}), 0x1234) == 0x3412
