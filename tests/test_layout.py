@@ -23,7 +23,8 @@ def test_the_listing_shows_fifteen_packages_and_five_files() -> None:
 
 
 def test_no_module_is_long() -> None:
-    lines = {str(each.relative_to(PACKAGE)): len(each.read_text().splitlines()) for each in PACKAGE.rglob("*.py")}
+    files = [*PACKAGE.rglob("*.py"), *Path(__file__).parent.rglob("*.py")]
+    lines = {str(each.relative_to(PACKAGE.parent)): len(each.read_text().splitlines()) for each in files}
     assert {name: count for name, count in lines.items() if count > LONGEST_MODULE} == {}
 
 

@@ -5,101 +5,12 @@ from __future__ import annotations
 import asyncio
 import json
 import logging
-from collections.abc import Coroutine
-from dataclasses import dataclass, field
-from typing import Any, cast
 
 import pytest
 
-from lfs10d.command import Command, Result, ok
-from lfs10d.commands.admission import BURST, Admission, CommandSpec
-from lfs10d.commands.context import Context, Handler
-from lfs10d.commands.dispatcher import Dispatcher
-from lfs10d.commands.message import LARGEST, LARGEST_CORRELATION, NoParameters, Parameters
-from lfs10d.commands.responder import Responder
-from lfs10d.mqtt.topics import InboundRequest
-
-
-class Text(Parameters):
-    """Any text."""
-
-    text: str = ""
-
-
-CONTEXT = cast("Context", object())
-
-
-@dataclass
-class Bench:
-    """A service with a few requests; what it answers and clears."""
-
-    answered: list[tuple[str, dict[str, Any], bytes | None]] = field(default_factory=list)
-    cleared: list[str] = field(default_factory=list)
-    performed: list[str] = field(default_factory=list)
-    gate: asyncio.Event = field(default_factory=asyncio.Event)
-
-    def __post_init__(self) -> None:
-        handlers = {
-            "echo": Handler(CommandSpec("always", Text), self._echo),
-            "device/wait": Handler(CommandSpec("polling", Text), self._wait),
-            "device/break": Handler(CommandSpec("polling"), self._break),
-            "register/read": Handler(CommandSpec("registers"), self._break),
-        }
-        specs = {name: handler.spec for name, handler in handlers.items()}
-        self.responder = Responder(Admission(specs, frozenset({"polling"})), self)
-        self.service = Dispatcher(handlers, CONTEXT, self.responder)
-
-    def respond(self, topic: str, payload: dict[str, object], correlation: bytes | None = None) -> None:
-        self.answered.append((topic, payload, correlation))
-
-    def clear_retained(self, topic: str) -> None:
-        self.cleared.append(topic)
-
-    async def _echo(self, parameters: Text, context: Context, command: Command) -> Result:
-        assert context is CONTEXT
-        assert command.parameters.get("text", "") == parameters.text
-        self.performed.append("echo")
-        return ok({"text": parameters.text})
-
-    async def _wait(self, parameters: Text, _: Context, __: Command) -> Result:
-        self.performed.append(f"wait {parameters.text}")
-        await self.gate.wait()
-        return ok({"text": parameters.text})
-
-    async def _break(self, _: NoParameters, context: Context, __: Command) -> Result:
-        raise RuntimeError(f"a mistake with {context}")
-
-    def ask(
-        self,
-        name: str,
-        content: object = None,
-        *,
-        retained: bool = False,
-        response_topic: str | None = None,
-        correlation: bytes | None = None,
-    ) -> None:
-        payload = content if isinstance(content, bytes) else json.dumps({} if content is None else content).encode()
-        levels = tuple(name.split("/")) if name else ()
-        self.service.on_request(
-            InboundRequest(f"request/{name}", levels, payload, retained, response_topic, correlation)
-        )  # fmt: skip
-
-    async def settle(self) -> None:
-        """Let everything that can end come to its end."""
-        for _ in range(10):
-            await asyncio.sleep(0)
-
-    @property
-    def codes(self) -> list[str | None]:
-        return [payload["error"] and payload["error"]["code"] for _, payload, _ in self.answered]
-
-    @property
-    def topics(self) -> list[str]:
-        return [topic for topic, _, _ in self.answered]
-
-
-def run(scene: Coroutine[None, None, None]) -> None:
-    asyncio.run(scene)
+from lfs10d.commands.admission import BURST
+from lfs10d.commands.message import LARGEST_CORRELATION
+from tests.support.dispatchers import Bench, run
 
 
 def test_a_request_is_answered_on_the_topic_of_its_name_with_its_id() -> None:
@@ -292,57 +203,3 @@ def test_every_request_of_a_flood_is_answered_and_the_log_has_one_line_of_it(
     with caplog.at_level(logging.INFO, "lfs10d"):
         run(scene())
     assert [record.levelname for record in caplog.records] == ["WARNING"]
-
-
-@pytest.mark.parametrize(("content", "retained"), [({}, True), (b" " * (LARGEST + 1), False)])
-def test_of_a_flood_that_is_retained_or_too_large_the_log_has_the_burst_and_one_line(
-    content: object, retained: bool, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch  # noqa: FBT001 - a column of the table
-) -> None:  # fmt: skip
-    async def scene() -> None:
-        bench = Bench()
-        monkeypatch.setattr(asyncio.get_running_loop(), "time", lambda: 0.0)  # all of it at one moment
-        for _ in range(5 * BURST):
-            bench.ask("echo", content, retained=retained)
-        assert len(bench.answered) == 5 * BURST
-
-    with caplog.at_level(logging.INFO, "lfs10d"):
-        run(scene())
-    assert len(caplog.records) == BURST + 1
-    assert caplog.records[-1].levelname == "WARNING"
-
-
-HOSTILE = "\x1b[31m\r\n\u2028\u202e"
-
-
-def test_nothing_of_a_topic_or_a_payload_reaches_the_log_unescaped(caplog: pytest.LogCaptureFixture) -> None:
-    async def scene() -> None:
-        bench = Bench()
-        bench.ask(f"no/{HOSTILE}", {"id": HOSTILE})
-        bench.ask("echo", {"id": HOSTILE, HOSTILE: HOSTILE})
-        bench.ask("echo", b"\x1b[31m")
-        bench.ask("echo", b"\x1b" * (LARGEST + 1), retained=True)
-        bench.ask("device/wait", {"id": HOSTILE, "text": HOSTILE}, response_topic=f"response/{HOSTILE}")
-        await bench.settle()
-        bench.ask("device/wait", {"id": HOSTILE, "text": HOSTILE})
-        bench.gate.set()
-        await bench.settle()
-        assert len(bench.answered) == 6
-
-    with caplog.at_level(logging.DEBUG, "lfs10d"):
-        run(scene())
-    messages = [record.getMessage() for record in caplog.records]
-    assert len(messages) >= 5
-    assert all(message.isprintable() for message in messages)
-
-
-def test_what_is_always_allowed_and_goes_well_is_no_news(caplog: pytest.LogCaptureFixture) -> None:
-    async def scene() -> None:
-        bench = Bench()
-        bench.gate.set()
-        bench.ask("echo")
-        bench.ask("device/wait")
-        await bench.settle()
-
-    with caplog.at_level(logging.INFO, "lfs10d"):
-        run(scene())
-    assert [record.getMessage() for record in caplog.records] == ["request device/wait: ok"]

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.brokers import Mosquitto
+from tests.support.operators import Operator, operator_of
 from tests.support.sites import Site, View
 
 
@@ -29,3 +30,9 @@ def site(tmp_path: Path, request: pytest.FixtureRequest, unused_port: int) -> It
 def view(mosquitto: Mosquitto) -> View:
     """Give an independent subscriber to everything."""
     return View(mosquitto.subscribe())
+
+
+@pytest.fixture
+def operator(site: Site, mosquitto: Mosquitto) -> Operator:
+    site.line()
+    return operator_of(site, mosquitto)

@@ -6,88 +6,17 @@ import json
 import signal
 import subprocess
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
-from itertools import count
-from typing import Any
 
 import pytest
 
-from lfs10d.simulator.line import SimulatedLine
-from lfs10d.telemetry.contract import check
-from tests.support.brokers import Heard, Listener, Mosquitto
-from tests.support.sites import Run, Site, View, eventually, good, tell
-
-BASE = "lfs10d/line0"
-
-
-@dataclass
-class Operator:
-    """Somebody who sends requests and hears every response."""
-
-    listener: Listener
-    run: Run
-
-    def __post_init__(self) -> None:
-        self._fences = count()
-
-    def send(self, name: str, payload: object = None, **how: Any) -> None:  # noqa: ANN401 - as Listener.publish
-        """Publish a request and wait until the broker has it; "." is the topic above all requests."""
-        content = payload if isinstance(payload, bytes) else json.dumps({} if payload is None else payload)
-        topic = f"{BASE}/request" if name == "." else f"{BASE}/request/{name}"
-        self.listener.publish(topic, content, **how)
-
-    @property
-    def responses(self) -> list[Heard]:
-        """Every response so far, each as the documentation promises."""
-        found = [each for each in list(self.listener.heard) if each.topic.startswith(f"{BASE}/response/")]
-        for each in found:
-            levels = each.topic.removeprefix(f"{BASE}/").split("/")
-            check("/".join(levels if len(levels) < 3 else ["response", "any", "topic"]), each.payload.decode())
-            assert not each.retain
-            assert each.qos == 1
-        return found
-
-    def settled(self) -> list[Heard]:
-        """Return every response once the daemon has answered all that was sent before, without the question for it."""
-        token = f"fence-{next(self._fences)}"
-        self.send("health", {"id": token})
-        eventually(lambda: any(_id(each) == token for each in self.responses), "the answer to the last request")
-        return [each for each in self.responses if not str(_id(each)).startswith("fence-")]
-
-    def ask(self, name: str, payload: object = None, **how: Any) -> dict[str, Any]:  # noqa: ANN401 - plain data of any shape
-        """Send one request and return its one response."""
-        before = len(self.responses)
-        self.send(name, payload, **how)
-        eventually(lambda: len(self.responses) > before, f"a response to {name}")
-        (response,) = self.responses[before:]
-        parsed: dict[str, Any] = json.loads(response.payload)
-        return parsed
-
-
-def _id(heard: Heard) -> object:
-    return json.loads(heard.payload)["id"]
+from tests.support.brokers import Heard, Mosquitto
+from tests.support.operators import BASE, Operator, id_of, operator_of, silence
+from tests.support.sites import Site, eventually, tell
 
 
 def codes(heard: list[Heard]) -> list[str | None]:
     errors = [json.loads(each.payload)["error"] for each in heard]
     return [error and error["code"] for error in errors]
-
-
-def operator_of(site: Site, mosquitto: Mosquitto, **sections: Any) -> Operator:  # noqa: ANN401 - plain data of any shape
-    """Start the daemon and return somebody who is subscribed before anything is answered."""
-    listener = mosquitto.subscribe(f"{BASE}/#")
-    site.write(**sections)
-    run = site.run()
-    listener.wait_for(f"{BASE}/availability")
-    eventually(lambda: listener.on(f"{BASE}/availability")[-1].payload == b"online", "online")
-    return Operator(listener, run)
-
-
-@pytest.fixture
-def operator(site: Site, mosquitto: Mosquitto) -> Operator:
-    site.line()
-    return operator_of(site, mosquitto)
 
 
 def test_every_kind_of_wrong_request_has_its_one_answer_where_it_belongs(operator: Operator) -> None:
@@ -143,7 +72,7 @@ def test_a_request_retained_while_the_daemon_was_away_is_rejected_when_it_comes(
     mosquitto.publish(f"{BASE}/request/device/read", '{"id":"old","device":"slave-1"}', retain=True)
     operator = operator_of(site, mosquitto)
     (response,) = operator.settled()
-    assert (codes([response]), _id(response)) == (["retained"], "old")
+    assert (codes([response]), id_of(response)) == (["retained"], "old")
     assert mosquitto.retained(f"{BASE}/request/#") == {}
 
 
@@ -197,7 +126,7 @@ def test_a_burst_beyond_64_is_rate_limited_and_every_request_of_it_is_answered(o
     told = codes(operator.responses)
     assert 64 <= told.count(None) <= 64 + 20 * (time.monotonic() - begun)
     assert told.count(None) + told.count("rate_limited") == 100
-    assert sorted(str(_id(each)) for each in operator.responses) == sorted(str(number) for number in range(100))
+    assert sorted(str(id_of(each)) for each in operator.responses) == sorted(str(number) for number in range(100))
 
 
 def test_with_no_class_allowed_only_looking_is(site: Site, mosquitto: Mosquitto) -> None:
@@ -211,63 +140,6 @@ def test_with_no_class_allowed_only_looking_is(site: Site, mosquitto: Mosquitto)
     operator.run.reload()
     assert operator.ask("device/read", {"device": "slave-1"})["status"] == "ok"
     assert operator.ask("line/trace")["error"]["code"] == "not_allowed"
-
-
-def test_device_read_polls_now_and_its_sample_is_on_telemetry_too(site: Site, mosquitto: Mosquitto, view: View) -> None:
-    served = site.line((1, 2, 3))
-    tell(served, lambda line: _silence(line, 2))
-    slaves = [1, 2, {"id": 3, "enabled": False}]
-    operator = operator_of(site, mosquitto, slaves=slaves, poll={"interval": "1h", "retries": 0})
-    response = operator.ask("device/read", {"id": "r", "device": "slave-1"})
-    (sample,) = view.wait_samples("slave-1", 1, lambda one: one["seq"] == response["data"]["seq"])
-    assert (response["status"], response["data"]) == ("ok", sample)
-    assert good(sample)
-
-    silent = operator.ask("device/read", {"device": "slave-2"})
-    assert (silent["status"], silent["error"]["code"]) == ("failed", "timeout")
-    assert (silent["data"]["quality"], silent["data"]["error"]) == ("bad", "timeout")
-
-    disabled = operator.ask("device/read", {"device": "slave-3"})
-    assert (disabled["status"], disabled["data"]["quality"]) == ("ok", "good")
-    assert view.newest("device/slave-3/state")["wind_speed"] is None
-
-    served.stop()
-    view.wait("line/error", lambda error: error["active"])
-    lost = operator.ask("device/read", {"device": "slave-1"})
-    assert (lost["status"], lost["error"]["code"], lost["data"]["error"]) == ("failed", "line_error", "port_lost")
-
-
-def _silence(line: SimulatedLine, slave: int) -> None:
-    for sensor in line.sensors:
-        if sensor.slave == slave:
-            sensor.powered = False
-
-
-def test_a_trace_tells_frames_until_it_ends_by_itself_or_is_cancelled(operator: Operator) -> None:
-    topic = f"{BASE}/trace"
-    assert operator.ask("line/trace", {"for": "400ms"})["data"] == {"for": 0.4}
-    operator.listener.wait_for(topic, 4)
-    eventually(_stands_still(operator.listener, topic), "the trace ends by itself")
-    for each in operator.listener.on(topic):
-        check("trace", each.payload.decode())
-    texts = [json.loads(each.payload)["text"] for each in operator.listener.on(topic)]
-    assert "slave-1: read 2 registers at 0x0001 of slave 1" in texts
-
-    operator.ask("line/trace", {"for": "10m"})
-    operator.listener.wait_for(topic, len(texts) + 2)
-    assert operator.ask("line/cancel")["data"] == {"cancelled": ["trace"]}
-    eventually(_stands_still(operator.listener, topic), "the trace is cancelled")
-    assert operator.ask("line/cancel")["data"] == {"cancelled": []}
-
-
-def _stands_still(listener: Listener, topic: str) -> Callable[[], bool]:
-    """Return the claim that telemetry went on twenty times since a topic was heard last."""
-
-    def still() -> bool:
-        heard = [each.topic for each in list(listener.heard) if each.topic == topic or each.topic.endswith("telemetry")]
-        return topic not in heard[-20:]
-
-    return still
 
 
 def test_config_reload_tells_what_it_did_and_a_broken_file_changes_nothing(operator: Operator, site: Site) -> None:
@@ -285,13 +157,13 @@ def test_config_reload_tells_what_it_did_and_a_broken_file_changes_nothing(opera
 
 def test_a_request_that_runs_when_the_daemon_ends_is_answered(site: Site, mosquitto: Mosquitto) -> None:
     served = site.line((1,))
-    tell(served, lambda line: _silence(line, 1))
+    tell(served, lambda line: silence(line, 1))
     operator = operator_of(site, mosquitto, slaves=[{"id": 1, "response_timeout": "10s"}])
     operator.send("device/read", {"id": "r", "device": "slave-1"})
     operator.send("device/read", {"id": "r", "device": "slave-1"}, correlation=b"repeat")
     operator.settled()
     assert operator.run.ends(signal.SIGTERM) == 0
-    heard = [each for each in operator.responses if _id(each) == "r"]
+    heard = [each for each in operator.responses if id_of(each) == "r"]
     assert codes(heard) == ["cancelled", "cancelled"]
 
 
@@ -305,9 +177,9 @@ def test_by_3_1_1_a_request_is_told_apart_by_its_id(site: Site, mosquitto: Mosqu
         payload = json.dumps({"id": number, **({"device": "slave-1"} if number == 0 else {})})
         command = ["mosquitto_pub", "-V", "mqttv311", "-p", str(mosquitto.port), "-q", "1"]
         subprocess.run([*command, "-t", f"{BASE}/request/{name}", "-m", payload], check=True, timeout=20)
-    eventually(lambda: any(_id(each) == 0 for each in operator.responses), "the reading, which waits for the line")
+    eventually(lambda: any(id_of(each) == 0 for each in operator.responses), "the reading, which waits for the line")
     heard = operator.settled()
-    assert {_id(each): code for each, code in zip(heard, codes(heard), strict=True)} == {
+    assert {id_of(each): code for each, code in zip(heard, codes(heard), strict=True)} == {
         "kept": "retained",
         0: None,
         1: None,

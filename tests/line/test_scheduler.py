@@ -8,12 +8,9 @@ from math import inf
 
 import pytest
 
-from lfs10d.line.device import LEARNED_MOST, Health, PollRules
-from lfs10d.line.devices import START_PATIENT
-from lfs10d.line.jobs.job import Continue, Hold, Requeue
-from lfs10d.line.scheduler import Rest, Scheduler
-from lfs10d.modbus.outcome import LateAnswer
-from lfs10d.modbus.request import ReadRegisters
+from lfs10d.line.device import PollRules
+from lfs10d.line.jobs.job import Hold, Requeue
+from lfs10d.line.scheduler import Rest
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.reading import Fault, FaultCode, Purpose
 from tests.support.schedules import GONE, RTU, T9600, TAKES, Rig, Task, asking, spec
@@ -40,31 +37,6 @@ def test_an_outcome_without_a_question_is_a_mistake() -> None:
         rig.scheduler.on_outcome(rig.outcome(asking(1)), 1.0)
 
 
-def test_requests_go_before_polls_and_jobs_in_their_share_too() -> None:
-    rig = Rig(spec(1, 0.0))
-    rig.run(0.1)
-    rig.scheduler.submit(Task(asking(7), share=0.3), rig.now)
-    rig.scheduler.submit(Task(asking(8)), rig.now)
-    rig.asked.clear()
-    rig.run(rig.now + 0.1)
-    assert rig.asked[:3] == [8, 7, 1]
-
-
-def test_a_job_in_its_share_leaves_the_rest_to_the_polls() -> None:
-    rig = Rig(spec(1, 0.0))
-    words = [word for _ in range(1000) for word in (asking(7), Requeue(0.0))]
-    rig.scheduler.submit(Task(*words, share=0.3), 0.0)
-    rig.run(20.0)
-    assert rig.asked.count(7) / len(rig.asked) == pytest.approx(0.3, abs=0.03)
-
-
-def test_a_job_that_has_nothing_to_ask_is_over_and_its_slave_ids_are_free() -> None:
-    rig = Rig(spec(1, 0.0))
-    rig.scheduler.submit(Task(excludes=frozenset({1})), 0.0)
-    rig.run(0.1)
-    assert set(rig.asked) == {1}
-
-
 def test_another_interval_is_another_grid_of_the_same_device() -> None:
     rig = Rig(spec(1, 1.0))
     rig.run(5.5)
@@ -72,39 +44,6 @@ def test_another_interval_is_another_grid_of_the_same_device() -> None:
     rig.replace(spec(1, 0.25))
     assert rig.scheduler.devices["slave-1"] is device
     assert len(rig.run(10.5)) == 20
-
-
-def test_a_slice_of_a_job_is_not_interrupted() -> None:
-    rig = Rig(spec(1, 0.0))
-    rig.run(0.1)
-    rig.scheduler.submit(Task(asking(7), Continue(), asking(8), Continue(), asking(9), share=0.1), rig.now)
-    rig.asked.clear()
-    rig.run(rig.now + 0.2)
-    assert rig.asked[:4] == [7, 8, 9, 1]
-
-
-def test_others_are_polled_while_a_job_rests_and_it_may_be_woken() -> None:
-    rig = Rig(spec(1, 0.0))
-    resting, asleep = Task(Hold(0.5), asking(7)), Task(Hold(), asking(8))
-    rig.scheduler.submit(resting, 0.0)
-    rig.scheduler.submit(asleep, 0.0)
-    rig.run(0.4)
-    assert set(rig.asked) == {1}
-    rig.run(0.6)
-    assert set(rig.asked) == {1, 7}
-    rig.scheduler.wake(asleep, rig.now)
-    rig.scheduler.wake(resting, rig.now)
-    assert rig.ask() == asking(8)
-    assert rig.scheduler.purpose is Purpose.SCAN
-
-
-def test_a_slave_id_that_a_job_excludes_is_polled_by_nobody_else() -> None:
-    rig = Rig(spec(1, 0.1), spec(2, 0.1))
-    rig.scheduler.submit(Task(Hold(1.0), asking(1), excludes=frozenset({1})), 0.0)
-    rig.run(0.99)
-    assert set(rig.asked) == {2}
-    rig.run(3.0)
-    assert {1, 2} == set(rig.asked[-5:])
 
 
 def test_a_poll_that_must_leave_its_slave_alone_does_not_hold_up_others() -> None:
@@ -121,79 +60,6 @@ def test_a_poll_that_must_leave_its_slave_alone_does_not_hold_up_others() -> Non
     assert first.failed_attempts == (FaultCode.TIMEOUT,)
     assert first.at > lost + 0.8
     assert sum(reading.device == "slave-2" and reading.at < lost + 0.8 for reading in readings) > 20
-
-
-def test_one_that_is_offline_is_probed_and_back_on_its_grid() -> None:
-    rig = Rig(spec(1, 0.5), spec(2, 0.5))
-    rig.run(2.0)
-    rig.dead = {1}
-    readings = rig.run(30.0)
-    assert [reading.probe for reading in readings if reading.device == "slave-1"][-3:] == [True, True, True]
-    rig.dead = set()
-    back = [reading for reading in rig.run(50.0) if reading.device == "slave-1"]
-    assert back[0].probe
-    assert back[0].online
-    assert len(back) > 10
-    assert sum(reading.overruns for reading in back) <= 1
-
-
-def test_one_that_is_silent_after_another_is_asked_twice_at_its_first_poll_and_three_polls_are_made_at_once() -> None:
-    rig = Rig(spec(1, 10.0), spec(2, 10.0))
-    rig.dead = {1, 2}
-    readings = rig.run(3.3)
-    assert rig.asked == [1, 2, 2, 1, 2, 1, 2]
-    assert [(reading.device, reading.online, reading.probe) for reading in readings] == [
-        ("slave-1", False, False), ("slave-2", False, False)
-    ] * 3  # fmt: skip
-    assert [readings[-2].at, readings[-1].at] == pytest.approx([2.4, 3.4])
-
-
-def test_with_many_silent_at_the_start_none_is_waited_for_long() -> None:
-    dead = range(1, START_PATIENT + 2)
-    rig = Rig(*(spec(slave, 100.0) for slave in dead))
-    rig.dead = set(dead)
-    readings = rig.run(0.4 * len(dead) + 1.0)
-    at = [reading.at for reading in readings if reading.at > 0.4 * len(dead)]
-    assert [later - earlier for earlier, later in pairwise(at)] == pytest.approx([0.2] * (len(at) - 1))
-
-
-def test_one_that_answers_badly_is_polled_on_its_grid_though_it_is_offline() -> None:
-    rig = Rig(spec(1, 1.0), spec(2, 1.0), rules=PollRules(retries=0))
-    rig.run(0.5)
-    rig.dead = {2}
-    rig.run(8.5)
-    device = rig.scheduler.devices["slave-2"]
-    assert (device.health, device.doubtful) == (Health.OFFLINE, True)
-    rig.dead, rig.garbage = set(), {2}
-    while device.doubtful:
-        rig.run(rig.now + 0.1)
-    found = rig.now
-    readings = [reading for reading in rig.run(found + 20.0) if reading.device == "slave-2"]
-    assert len(readings) == pytest.approx(20, abs=1)
-    assert not any(reading.online or reading.probe or reading.overruns for reading in readings[1:])
-    rig.dead, rig.garbage = {2}, set()
-    rig.run(rig.now + 1.5)
-    assert device.doubtful
-
-
-def test_late_answers_are_learned_whoever_asked_but_not_what_is_later_than_any_time_out() -> None:
-    rig = Rig(spec(1), spec(2))
-    ask = rig.ask()
-    assert ask is not None
-    wind = ReadRegisters(2, 0x0001, 2)
-    late = [LateAnswer(wind, 0.4), LateAnswer(wind, 7.0), LateAnswer(replace(wind, slave=9), 0.4)]
-    rig.settle(ask, late)
-    assert rig.scheduler.devices["slave-2"].response_times.p99 == 0.4
-    assert rig.scheduler.devices["slave-1"].response_times.p99 == 0.005
-
-
-def test_the_answer_of_an_unknown_slave_teaches_nothing() -> None:
-    rig = Rig(spec(1, 10.0))
-    rig.run(0.5)
-    rig.scheduler.submit(Task(asking(9)), rig.now)
-    rig.run(1.0)
-    assert rig.asked[-1] == 9
-    assert len(rig.scheduler.devices["slave-1"].response_times) == 1
 
 
 def test_another_rate_forgets_what_was_learned_and_another_gap_does_not() -> None:
@@ -295,35 +161,6 @@ def test_a_requested_poll_does_not_disturb_the_one_in_progress() -> None:
     assert sum(1 + reading.overruns for reading in readings if not reading.requests) == pytest.approx(6, abs=1)
 
 
-def test_a_line_without_devices_carries_out_jobs() -> None:
-    rig = Rig()
-    rig.scheduler = Scheduler(T9600, 0.0)
-    rig.scheduler.submit(Task(asking(7)), 0.0)
-    assert rig.run(1.0) == []
-    assert rig.asked == [7]
-
-
-def test_jobs_and_requested_polls_outlast_a_change_of_what_is_polled() -> None:
-    rig = Rig(spec(1, 100.0), spec(2, 100.0))
-    rig.run(1.0)
-    rig.scheduler.submit(rig.poll_of("slave-1", 5), rig.now)
-    rig.scheduler.submit(Task(asking(7)), rig.now)
-    rig.replace(spec(1, 100.0))
-    rig.asked.clear()
-    assert [reading.requests for reading in rig.run(2.0)] == [(5,)]
-    assert rig.asked == [1, 7]
-
-
-def test_a_job_that_probes_has_the_share_of_probes_while_somebody_answers() -> None:
-    rig = Rig(spec(1, 0.0))
-    job = Task(*[word for _ in range(2000) for word in (asking(7), Requeue(0.0))], share=0.3)
-    job.purpose = Purpose.PROBE
-    rig.run(0.5)
-    rig.scheduler.submit(job, rig.now)
-    rig.run(100.0)
-    assert rig.asked.count(7) / len(rig.asked) < 0.06
-
-
 def test_while_the_port_is_lost_nothing_is_told_of_a_device_that_is_gone() -> None:
     rig = Rig(spec(1), spec(2))
     stale = rig.poll_of("slave-2")
@@ -349,37 +186,6 @@ def test_when_the_port_is_back_what_a_lost_job_excluded_is_free_and_jobs_are_car
     assert rig.asked == [7, 1]
 
 
-def test_a_single_dead_device_is_probed_and_the_line_rests_until_then() -> None:
-    rig = Rig(spec(1, 0.5), rules=PollRules(offline_after=1))
-    rig.dead = {1}
-    *_, first = rig.run(1.7)  # three polls at once
-    decision = rig.scheduler.next(rig.now)
-    assert not first.online
-    assert isinstance(decision, Rest)
-    assert decision.until == pytest.approx(2.6, abs=0.1)
-    rig.now = decision.until
-    ask = rig.ask()
-    assert ask is not None
-    device = rig.scheduler.devices["slave-1"]
-    assert rig.scheduler.purpose is Purpose.PROBE
-    assert (device.polling, device.last_asked) == (True, rig.now)
-    (reading,) = rig.settle(ask)
-    assert reading.probe
-    assert not device.polling
-
-
-def test_the_line_rests_until_the_share_of_a_job_allows() -> None:
-    rig = Rig()
-    rig.scheduler.submit(Task(*[word for _ in range(9) for word in (asking(7), Requeue(0.0))], share=0.01), 0.0)
-    while (ask := rig.ask()) is not None:
-        rig.settle(ask)
-    decision = rig.scheduler.next(rig.now)
-    assert isinstance(decision, Rest)
-    assert rig.now < decision.until < rig.now + 10.0
-    rig.now = decision.until
-    assert rig.ask() is not None
-
-
 def test_a_requested_poll_that_is_tried_again_goes_before_others_that_are_due() -> None:
     rig = Rig(spec(1, 100.0), spec(2, 1.0))
     rig.run(1.5)
@@ -403,80 +209,9 @@ def test_a_requested_poll_whose_device_goes_while_it_is_on_the_line_is_over_then
     assert poll.at == rig.now
 
 
-def test_one_never_heard_that_is_silent_after_another_is_asked_twice_though_somebody_answers() -> None:
-    rig = Rig(spec(1, 100.0), spec(2, 100.0), spec(3, 100.0))
-    rig.dead = {2, 3}
-    rig.run(0.7)
-    assert rig.asked == [1, 2, 3, 3, 2]
-
-
-def test_one_that_answered_before_is_not_asked_again_at_once_for_the_silence_of_another() -> None:
-    rig = Rig(spec(1, 1.0), spec(2, 1.0), spec(3, 1.0), rules=PollRules(retries=0))
-    rig.run(1.9)
-    rig.dead = {2, 3}
-    rig.asked.clear()
-    rig.run(2.9)
-    assert rig.asked == [1, 2, 3]
-
-
-def test_what_takes_exactly_the_longest_time_out_is_learned() -> None:
-    rig = Rig(spec(1))
-    ask = rig.ask()
-    assert ask is not None
-    rig.settle(ask, [LateAnswer(ReadRegisters(1, 0x0001, 2), LEARNED_MOST)])
-    assert rig.scheduler.devices["slave-1"].response_times.p99 == LEARNED_MOST
-
-
-def test_a_refusal_teaches_nothing_about_time_nor_does_an_answer_without_one() -> None:
-    rig = Rig(spec(1))
-    ask = rig.ask()
-    assert ask is not None
-    refused = replace(rig.outcome(ask), answer=None, fault=Fault(FaultCode.EXCEPTION, "refused", 2))
-    rig.scheduler.on_outcome(refused, 0.1)
-    rig.now = 1.0
-    ask = rig.ask()
-    assert ask is not None
-    rig.scheduler.on_outcome(replace(rig.outcome(ask), turnaround=None), 1.1)
-    assert len(rig.scheduler.devices["slave-1"].response_times) == 0
-
-
 def test_grids_of_slow_devices_lie_two_exchanges_apart() -> None:
     rig = Rig(spec(1, 100.0), spec(2, 100.0))
     assert rig.scheduler.devices["slave-2"].due == pytest.approx(2 * T9600.exchange(8, 9))
-
-
-@pytest.mark.parametrize(("purpose", "share"), [(Purpose.SCAN, 0.3), (Purpose.CHANGE, 0.2)])
-def test_a_change_pays_half_as_much_again_on_a_crowded_line(purpose: Purpose, share: float) -> None:
-    rig = Rig(spec(1, 0.0))
-    rig.run(0.5)
-    job = Task(*[word for _ in range(1000) for word in (asking(7), Requeue(0.0))], share=0.3)
-    job.purpose = purpose
-    rig.scheduler.submit(job, rig.now)
-    rig.asked.clear()
-    rig.run(20.0)
-    assert rig.asked.count(7) / len(rig.asked) == pytest.approx(share, abs=0.03)
-
-
-def test_a_change_pays_nothing_for_others_where_there_are_none() -> None:
-    rig = Rig()
-    job = Task(*[word for _ in range(1000) for word in (asking(7), Requeue(0.0))], share=0.3)
-    job.purpose = Purpose.CHANGE
-    rig.scheduler.submit(job, 0.0)
-    rig.run(20.0)
-    assert len(rig.asked) * (TAKES + T9600.gap) / 20.0 == pytest.approx(0.3, abs=0.03)
-
-
-def test_those_probed_in_turn_after_the_first_answer_are_asked_twice_where_they_follow_a_silent_one() -> None:
-    rig = Rig(*(spec(slave, 100.0) for slave in (1, 2, 3)), rules=PollRules(offline_after=1, retries=0))
-    rig.run(1.0)
-    rig.dead = {1, 2, 3}
-    rig.run(150.0)
-    rig.dead = {2, 3}
-    while not rig.scheduler.devices["slave-1"].online:
-        rig.run(rig.now + 0.01)
-    rig.asked.clear()
-    rig.run(rig.now + 0.65)
-    assert rig.asked in ([2, 3, 3], [3, 2, 2])
 
 
 def test_a_slave_is_asked_no_sooner_than_its_rest_allows_and_others_have_the_line_meanwhile() -> None:

@@ -8,7 +8,10 @@ from collections.abc import Iterator
 
 import pytest
 
+from lfs10d.modbus.port import SerialPort
+from lfs10d.modbus.port_settings import PortSettings
 from tests.support.far_end import FarEnd
+from tests.support.pending_lines import Line
 
 
 @pytest.fixture
@@ -20,3 +23,17 @@ def far_end() -> Iterator[FarEnd]:
     os.close(slave)
     yield end
     end.close()
+
+
+@pytest.fixture
+def port(far_end: FarEnd) -> Iterator[SerialPort]:
+    """Give an open port."""
+    opened = SerialPort(PortSettings(far_end.path))
+    opened.open()
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def line() -> Line:
+    return Line()

@@ -8,80 +8,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.outcome import LateAnswer
-from lfs10d.modbus.pending import EQUALS_KEPT, PendingRequests
+from lfs10d.modbus.pending import EQUALS_KEPT
 from lfs10d.modbus.request import ReadRegisters, Request, WriteRegister
 from lfs10d.reading import Fault, FaultCode
 from tests.support.outcomes import ended
+from tests.support.pending_lines import PLAIN, RTU, WHO, WIND, Line
 
-RTU = Codec(Framing.RTU)
-WIND, WHO = ReadRegisters(1, 0x0001, 2), ReadRegisters(1, 0x0005, 1)
 WHERE = ReadRegisters(1, 0x0004, 1)
 """Of the shape of `WHO`."""
 OTHER = ReadRegisters(2, 0x0001, 2)
 EXCHANGE = 0.02
 """s between two requests at least: no two were ever sent at the same moment."""
-PLAIN = ended(WIND, fault=Fault(FaultCode.TIMEOUT, "no answer"))
-
-
-class Line:
-    """An `PendingRequests` and what happens on its line."""
-
-    def __init__(self) -> None:
-        self.pending = PendingRequests()
-
-    def silent(self, request: Request, at: float, code: FaultCode = FaultCode.TIMEOUT, *late: Request) -> None:
-        self._settle(request, at, fault=Fault(code, ""), late=late)
-
-    def answered(self, request: Request, at: float, *late: Request) -> None:
-        self._settle(request, at, answer=(7,), fault=None, answered=True, late=late)
-
-    def begun(self, request: Request, at: float) -> None:
-        self._settle(request, at, fault=Fault(FaultCode.CRC, ""), answered=True)
-
-    def refused(self, request: Request, at: float, *, ambiguous: bool) -> None:
-        self._settle(request, at, fault=Fault(FaultCode.EXCEPTION, "", 2), answered=True, ambiguous=ambiguous)
-
-    def _settle(
-        self,
-        request: Request,
-        at: float,
-        *,
-        late: tuple[Request, ...] = (),
-        answer: tuple[int, ...] | None = None,
-        fault: Fault | None,
-        answered: bool = False,
-        ambiguous: bool = False,
-    ) -> None:
-        told = tuple(LateAnswer(each, 0.3) for each in late)
-        outcome = replace(
-            PLAIN,
-            request=request,
-            sent_end=at,
-            late=told,
-            answer=answer,
-            fault=fault,
-            answered=answered,
-            ambiguous=ambiguous,
-        )
-        self.pending.on_outcome(outcome, RTU, 0.2, at + 0.2)
-
-    def waiting(self, slave: int = 1) -> list[Request]:
-        return [each.request for each in self.pending.earlier(slave)]
-
-    def free(self, request: Request, now: float) -> bool:
-        """Whether a value may be asked now."""
-        if self.pending.left_alone_until(request.slave, now) is not None:
-            return False
-        if self.pending.confusable(request, RTU):
-            return False
-        return self.pending.lingering_until(request, RTU, now) is None
-
-
-@pytest.fixture
-def line() -> Line:
-    return Line()
 
 
 def test_an_answer_leaves_nothing_pending(line: Line) -> None:
@@ -318,51 +256,3 @@ def test_a_slave_that_is_answered_for_twice_is_left_alone() -> None:
     line.silent(WIND, 1.0)
     line.pending.leave_alone(1, 0.2)
     assert line.pending.left_alone_until(1, 1.1) == 2.0
-
-
-# -- what is asked next
-
-
-def test_what_cannot_be_mistaken_is_asked_at_once() -> None:
-    line = Line()
-    assert line.pending.next_request(WIND, RTU, 0.0, barrier=WHO, timeout=0.2) is WIND
-    assert line.pending.next_request(WIND, RTU, 0.0, barrier=WHO, timeout=0.2, barrier_first=True) is WHO
-
-
-def test_the_barrier_goes_before_what_could_be_mistaken() -> None:
-    line = Line()
-    line.silent(WIND, 0.0)
-    assert line.pending.next_request(WIND, RTU, 0.3, barrier=WHO, timeout=0.2) is WHO
-    assert line.pending.next_request(WHO, RTU, 0.3, barrier=WIND, timeout=0.2) is WHO
-
-
-def test_a_slave_without_a_barrier_is_left_alone_until_nothing_is_pending() -> None:
-    line = Line()
-    line.silent(WIND, 0.0)
-    until = line.pending.next_request(WIND, RTU, 0.3, barrier=None, timeout=0.2)
-    assert isinstance(until, float)
-    assert until > 0.9
-    assert line.pending.next_request(WHO, RTU, 0.4, barrier=None, timeout=0.2) == until
-    assert line.pending.next_request(WIND, RTU, until, barrier=None, timeout=0.2) is WIND
-
-
-def test_what_is_left_alone_long_enough_already_is_asked() -> None:
-    line = Line()
-    line.silent(WIND, 0.0)
-    assert line.pending.next_request(WIND, RTU, 9.0, barrier=None, timeout=0.2) is WIND
-
-
-def test_after_the_barrier_what_lingers_is_waited_for() -> None:
-    line = Line()
-    line.silent(WIND, 0.0)
-    line.answered(WHO, 0.3)
-    until = line.pending.next_request(WIND, RTU, 0.4, barrier=WHO, timeout=0.2)
-    assert isinstance(until, float)
-    assert 0.4 < until < 1.2
-
-
-def test_a_write_is_not_held_back_by_a_write_that_may_still_be_answered() -> None:
-    line = Line()
-    write = WriteRegister(1, 5, 7)
-    line.silent(write, 0.0)
-    assert line.pending.next_request(write, RTU, 0.3, barrier=WHO, timeout=0.2) is write

@@ -4,99 +4,17 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, cast
+from typing import cast
 
 import pytest
 
 from lfs10d.mqtt.connection import Connection
-from lfs10d.mqtt.discovery import TAKEN_IN, Discovery
-from lfs10d.mqtt.messages import Filter, Incoming
-from lfs10d.mqtt.topics import Topics
+from lfs10d.mqtt.discovery import TAKEN_IN
+from lfs10d.mqtt.messages import Incoming
 from lfs10d.telemetry.homeassistant.search import QUIET
-from lfs10d.telemetry.publication import Publication
-from tests.support.virtual_loop import Loop
+from tests.support.discoveries import ALL, LINE, MAST, STATUS, Site, payload
 
-LINE = "homeassistant/device/lfs10d_lfs10d_a/config"
-MAST = "homeassistant/device/lfs10d_lfs10d_a_mast/config"
 OLD = "homeassistant/device/lfs10d_lfs10d_a_old/config"
-ALL = "homeassistant/device/+/config"
-STATUS = "homeassistant/status"
-
-
-def payload(*components: str, **more: object) -> dict[str, object]:
-    """Return a payload of the daemon at lfs10d/a with these sensors."""
-    return {
-        "availability": [{"topic": "lfs10d/a/availability"}],
-        "components": {name: {"platform": "sensor", "name": name} for name in components},
-        **more,
-    }
-
-
-class Site:
-    """A discovery and its broker; `published` are topics and payloads in order."""
-
-    def __init__(self) -> None:
-        self.loop = Loop()
-        self.published: list[tuple[str, Any]] = []
-        self.subscribed: list[str] = []
-        self.unsubscribed: list[str] = []
-        self.out = True
-        self.kept: list[set[str]] = []
-        self.discovery = Discovery(Topics("lfs10d/a"), self._publish, is_out=lambda: self.out, chance=lambda: 0.5)
-
-    def remember(self, *prefixes: str) -> None:
-        """Take up the life of a daemon that announced something under these prefixes."""
-        self.discovery.remember(frozenset(prefixes), lambda kept: self.kept.append(set(kept)))
-
-    def _publish(self, publications: Iterable[Publication]) -> None:
-        for each in publications:
-            assert each.retain
-            assert each.qos == 1
-            self.published.append((Topics("lfs10d/a").full(each.topic), each.payload))
-
-    def subscribe(self, filters: Sequence[Filter]) -> int:
-        self.subscribed += [each.topic for each in filters]
-        return len(self.subscribed)
-
-    def unsubscribe(self, topics: Sequence[str]) -> None:
-        self.unsubscribed += topics
-
-    def do(self, action: Callable[[], object]) -> None:
-        """Call something in the loop."""
-        self.loop.call_soon(action)
-        self.loop.drain()
-
-    def wait(self, seconds: float) -> None:
-        """Let time pass."""
-        self.loop.clock.now += seconds
-        self.loop.drain()
-
-    def configure(self, wanted: Mapping[str, dict[str, object]], prefix: str = "homeassistant") -> None:
-        self.do(lambda: self.discovery.configure(prefix, wanted))
-
-    def connect(self, *retained: tuple[str, dict[str, object]]) -> None:
-        """Connect to a broker that retains these payloads, and let it tell them."""
-        self.do(lambda: self.discovery.begin(cast("Connection", self)))
-        for topic, content in retained:
-            self.arrive(topic, json.dumps(content).encode(), retained=True)
-        self.wait(QUIET + 0.01)
-
-    def arrive(self, topic: str, content: bytes, *, retained: bool = False) -> None:
-        self.do(lambda: self.discovery.on_message(Incoming(topic, content, retained=retained)))
-
-    def news(self) -> list[tuple[str, Any]]:
-        """Return what was published since it was called before."""
-        found, self.published = self.published, []
-        return found
-
-
-@pytest.fixture
-def site() -> Iterator[Site]:
-    """Give a site."""
-    made = Site()
-    yield made
-    made.loop.close()
 
 
 def test_all_is_announced_after_each_connect_once_the_broker_was_asked(site: Site) -> None:
@@ -175,105 +93,6 @@ def test_what_an_earlier_life_left_is_taken_back(site: Site) -> None:
     assert (topic, stub["components"]["scan"]) == (LINE, {"platform": "sensor"})
     site.wait(TAKEN_IN)
     assert site.news() == [(LINE, payload("load"))]
-
-
-def test_switched_off_while_it_was_down_all_is_cleared_the_line_last(site: Site) -> None:
-    site.remember("homeassistant")
-    site.configure({})
-    site.connect((LINE, payload("load")))
-    assert site.subscribed == [LINE, ALL]  # only where the line is still there the others are looked for
-    assert site.news() == []
-    for topic in (LINE, MAST):
-        site.arrive(topic, json.dumps(payload("x")).encode(), retained=True)
-    site.wait(QUIET)
-    assert site.news() == [(MAST, None), (LINE, None)]
-    assert site.unsubscribed == [LINE, ALL]
-    assert site.kept == []
-
-    site.do(site.discovery.lost)
-    site.connect()
-    assert site.kept == [set()]  # nothing is left: the next connect does not ask
-    site.do(site.discovery.lost)
-    site.subscribed.clear()
-    site.connect()
-    assert (site.subscribed, site.news()) == ([], [])
-
-
-def test_nothing_is_read_or_published_where_it_was_never_on(site: Site) -> None:
-    """A broker may end the connection for a subscription that it does not permit."""
-    site.remember()
-    site.configure({})
-    site.connect()
-    assert (site.subscribed, site.unsubscribed, site.news(), site.kept) == ([], [], [], [])
-    assert site.discovery.republish() == 0
-
-
-def test_another_prefix_while_it_was_down_clears_what_is_left_under_the_old(site: Site) -> None:
-    site.remember("ha", "homeassistant")
-    site.configure({LINE: payload("load")})
-    old = "ha/device/lfs10d_lfs10d_a/config"
-    site.connect()
-    assert site.subscribed == [ALL, STATUS, old]
-    site.arrive(old, json.dumps(payload("load")).encode(), retained=True)
-    site.wait(QUIET)
-    assert site.subscribed[-1] == "ha/device/+/config"
-    site.arrive(old, json.dumps(payload("load")).encode(), retained=True)
-    site.wait(QUIET)
-    assert site.news() == [(old, None), (LINE, payload("load"))]
-    assert site.kept == []
-    site.do(site.discovery.lost)
-    site.connect()
-    site.wait(QUIET)
-    assert site.kept == [{"homeassistant"}]
-
-
-def test_what_the_broker_does_not_show_is_not_forgotten(site: Site) -> None:
-    site.remember("homeassistant")
-    site.configure({})
-    site.do(lambda: site.discovery.begin(cast("Connection", site)))
-    site.do(lambda: site.discovery.subscribed(1, (0x87,)))
-    site.wait(100)
-    assert site.kept == []
-
-
-def test_what_is_announced_is_kept_before_it_is_published(site: Site) -> None:
-    site.remember()
-    site.configure({LINE: payload("load")})
-    assert (site.kept, site.news()) == ([{"homeassistant"}], [])
-
-
-def test_switched_off_and_on_while_connected(site: Site) -> None:
-    site.configure({LINE: payload("load"), MAST: payload("wind")})
-    site.connect()
-    site.news()
-    site.configure({})
-    assert site.news() == [(MAST, None), (LINE, None)]
-    assert site.unsubscribed[-1] == STATUS
-    site.wait(QUIET)
-    site.configure({LINE: payload("load")})
-    assert site.subscribed[-2:] == [ALL, STATUS]
-    site.wait(QUIET)
-    assert site.news() == [(LINE, payload("load"))]
-
-
-def test_another_prefix_moves_all(site: Site) -> None:
-    site.configure({LINE: payload("load")})
-    site.connect()
-    site.news()
-    site.configure({"ha/device/lfs10d_lfs10d_a/config": payload("load")}, prefix="ha")
-    assert site.news() == [(LINE, None)]
-    assert site.unsubscribed[-1] == STATUS
-    assert site.subscribed[-2:] == ["ha/device/+/config", "ha/status"]
-    site.wait(QUIET)
-    assert site.subscribed[-1] == LINE  # is nothing left there?
-    site.wait(QUIET)
-    assert site.news() == [("ha/device/lfs10d_lfs10d_a/config", payload("load"))]
-
-
-def test_what_goes_while_the_broker_is_away_is_cleared(site: Site) -> None:
-    site.configure({LINE: payload("load"), MAST: payload("wind")})
-    site.configure({LINE: payload("load")})
-    assert site.news() == [(MAST, None)]
 
 
 def test_home_assistants_birth_message_has_all_announced_anew_soon(site: Site) -> None:

@@ -16,7 +16,7 @@ from lfs10d.mqtt.topics import Topics
 from lfs10d.outbox.backlog import HISTORY_AFTER
 from lfs10d.outbox.outbox import IN_FLIGHT_MOST, Outbox
 from lfs10d.telemetry.publication import STATE, Publication, PublicationKind, Sample, device_topic, retained
-from tests.mqtt.test_sender import ONLINE, in_virtual_time
+from tests.support.senders import ONLINE, in_virtual_time
 
 PACKET = 1200
 ROUND_TRIP = 0.5

@@ -12,8 +12,8 @@ import pytest
 from lfs10d.mqtt.messages import Incoming
 from lfs10d.mqtt.settings import Version
 from lfs10d.system.secret import Secret
-from tests.mqtt.test_uplink import B, Site, running, until
 from tests.support.brokers import Mosquitto
+from tests.support.uplinks import B, Site, running, until
 
 PASSWORD = "correct-horse"  # noqa: S105 - of a broker in this test
 

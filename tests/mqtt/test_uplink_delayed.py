@@ -9,9 +9,9 @@ import pytest
 
 from lfs10d.outbox import backlog
 from lfs10d.telemetry import publication
-from tests.mqtt.test_uplink import B, Site, online, running, sample, until
 from tests.support.brokers import Listener, Mosquitto
 from tests.support.delaying_proxy import delaying
+from tests.support.uplinks import B, Site, online, running, sample, until
 
 DEVICES = [f"d{number:02}" for number in range(32)]
 ROUND_TRIP = 0.2

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import math
-import struct
-from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
 
 import pytest
 
@@ -14,18 +10,8 @@ from lfs10d.simulator.faults import FaultKind
 from lfs10d.simulator.registers import Blueprint
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.signals import Signal
-from lfs10d.simulator.wire import Format, unseal
-from tests.support.simulated import Bench
-
-Maker = Callable[..., Bench]
-
-WIND, RATE, ID = 1, 4, 5
-
-
-def wind_in(body: bytes | None) -> float:
-    assert body is not None
-    (speed,) = struct.unpack(">f", body[3:])
-    return float(speed)
+from lfs10d.simulator.wire import Format
+from tests.support.sensor_values import ID, RATE, Maker, wind_in
 
 
 def test_a_well_sensor_sends_the_value_that_the_log_tells(bench: Maker) -> None:
@@ -82,89 +68,6 @@ def test_a_request_of_another_length_is_ignored(bench: Maker) -> None:
     assert bench(Sensor(1)).exchange(bytes.fromhex("01 03 00 01 00 02 00")) is None
 
 
-def test_a_new_id_is_obeyed_after_an_echo_from_the_old_place(bench: Maker) -> None:
-    line = bench(Sensor(1))
-    assert line.write(1, ID, 9) == bytes.fromhex("01 06 00 05 00 09")
-    assert line.id_of(1) is None
-    assert line.id_of(9) == 9
-
-
-def test_a_new_rate_is_obeyed_after_an_echo_at_the_old_one(bench: Maker) -> None:
-    line = bench(Sensor(1))
-    assert line.write(1, RATE, 2) is not None
-    assert line.read(1) is None
-    assert line.line.sensor(1).format == Format(19200)
-
-
-def test_a_rate_written_anew_changes_nothing(bench: Maker) -> None:
-    line = bench(Sensor(1))
-    line.write(1, RATE, 1)
-    assert line.id_of(1) == 1
-
-
-def test_one_that_obeys_at_once_echoes_from_the_new_place(bench: Maker) -> None:
-    line = bench(Sensor(1))
-    line.line.sensor(1).add_fault("at_once")
-    assert line.write(1, ID, 9) == bytes.fromhex("09 06 00 05 00 09")
-    assert line.write(9, RATE, 2) is None
-    assert line.heard  # the echo, at 19200: noise
-
-
-def test_power_cycle_needing_ones_read_new_and_answer_at_the_old_place(bench: Maker) -> None:
-    line = bench(Sensor(1))
-    sensor = line.line.sensor(1)
-    sensor.add_fault("power_cycle")
-    line.write(1, ID, 9)
-    assert line.id_of(1) == 9
-    assert line.id_of(9) is None
-    sensor.power_cycle()
-    assert line.id_of(9) == 9
-
-
-def test_one_that_stores_but_ignores_never_obeys(bench: Maker) -> None:
-    line = bench(Sensor(1))
-    sensor = line.line.sensor(1)
-    sensor.add_fault("stores_but_ignores")
-    line.write(1, ID, 9)
-    sensor.power_cycle()
-    assert line.id_of(1) == 9
-    assert line.id_of(9) is None
-
-
-@pytest.mark.parametrize("reads", ["old", "new"])
-@pytest.mark.parametrize("answer", ["echo", "exception"])
-def test_the_dip_switch_wins_in_every_variant(bench: Maker, reads: str, answer: str) -> None:
-    line = bench(Sensor(1))
-    sensor = line.line.sensor(1)
-    sensor.add_fault("dip_locked", answer=answer, reads=reads, code=3)
-    echo = bytes.fromhex("01 06 00 05 00 09")
-    assert line.write(1, ID, 9) == (echo if answer == "echo" else bytes.fromhex("01 86 03"))
-    assert line.id_of(1) == (9 if reads == "new" else 1)
-    sensor.power_cycle()
-    assert line.id_of(1) == 1
-    line.write(1, RATE, 2)
-    assert sensor.format.baudrate == 19200  # the switch sets the id only
-
-
-def test_a_lost_echo_does_not_undo_the_write(bench: Maker) -> None:
-    line = bench(Sensor(1))
-    line.line.sensor(1).add_fault("echo_losing")
-    assert line.write(1, ID, 9) is None
-    assert line.id_of(9) == 9
-    assert line.exchange(bytes.fromhex("09 06 00 03 00 01")) == bytes.fromhex("09 86 02")
-
-
-def test_slow_flash_is_silent_after_the_echo_of_a_change_only(bench: Maker) -> None:
-    line = bench(Sensor(1))
-    line.line.sensor(1).add_fault("slow_flash", delay=3.0)
-    assert line.write(1, ID, 1) is not None
-    assert line.id_of(1) == 1
-    assert line.write(1, ID, 9) is not None
-    assert line.id_of(9) is None
-    line.listen(3.0)
-    assert line.id_of(9) == 9
-
-
 def test_silence_begins_and_ends_when_told(bench: Maker) -> None:
     line = bench(Sensor(1))
     line.line.sensor(1).silent_from(2.0, 3.0)
@@ -192,18 +95,6 @@ def test_without_power_nothing_answers(bench: Maker) -> None:
     assert line.id_of(1) is None
     sensor.power_up()
     assert line.id_of(1) == 1
-
-
-def test_a_scheduled_power_cut_makes_it_obey_what_was_stored(bench: Maker) -> None:
-    line = bench(Sensor(1))
-    sensor = line.line.sensor(1)
-    sensor.add_fault("power_cycle")
-    sensor.add_fault("power_cut", first=5.0, last=6.0)
-    line.write(1, ID, 9)
-    line.reach(5.0)
-    assert line.id_of(1) is None
-    line.reach(6.0)
-    assert line.id_of(9) == 9
 
 
 def test_one_that_hangs_is_silent_after_an_exception_until_the_next_power_cycle(bench: Maker) -> None:
@@ -278,127 +169,6 @@ def test_a_wildcard_answers_255_too(bench: Maker) -> None:
     line.line.sensor(1).add_fault("wildcard")
     assert line.id_of(255) == 1
     assert line.id_of(254) is None
-
-
-@pytest.mark.parametrize(
-    ("kind", "holds"),
-    [
-        ("nan", math.isnan),
-        ("infinite", math.isinf),
-        ("out_of_range", lambda speed: speed == 1e6),
-        ("subnormal", lambda speed: 0 < speed < 1e-40),
-    ],
-)
-def test_a_broken_value_is_sent_as_such(bench: Maker, kind: str, holds: Callable[[float], bool]) -> None:
-    line = bench(Sensor(1))
-    line.line.sensor(1).add_fault(kind)
-    assert holds(wind_in(line.read(1)))
-    assert line.answer.values == ()
-
-
-def test_a_stuck_sensor_repeats_its_value(bench: Maker) -> None:
-    line = bench(Sensor(1))
-    line.line.sensor(1).add_fault("stuck")
-    assert wind_in(line.read(1)) == wind_in(line.read(1))
-
-
-def test_a_refusal_has_the_code_it_was_given(bench: Maker) -> None:
-    line = bench(Sensor(1))
-    line.line.sensor(1).add_fault("exception", code=6)
-    assert line.read(1) == bytes.fromhex("01 83 06")
-
-
-@pytest.mark.parametrize(
-    ("kind", "particulars", "first"),
-    [
-        ("wrong_id", {}, "02 03 04"),
-        ("wrong_id", {"value": 77}, "4D 03 04"),
-        ("wrong_function", {}, "01 04 04"),
-        ("wrong_count", {}, "01 03 06"),
-        ("wrong_echo", {}, "01 03 04"),
-    ],
-)
-def test_a_wrong_answer_has_a_right_check(bench: Maker, kind: str, particulars: dict[str, int], first: str) -> None:
-    line = bench(Sensor(1))
-    line.line.sensor(1).add_fault(kind, **particulars)
-    body = line.read(1)
-    assert body is not None
-    assert body[:3] == bytes.fromhex(first)
-    assert len(body) == 3 + body[2]
-    assert not line.answer.believable
-
-
-def test_a_wrong_echo_carries_another_value(bench: Maker) -> None:
-    line = bench(Sensor(1))
-    line.line.sensor(1).add_fault("wrong_echo")
-    line.line.sensor(1).add_fault("wrong_count")
-    assert line.write(1, ID, 1) == bytes.fromhex("01 06 00 05 00 00")
-
-
-@pytest.mark.parametrize("framing", ["rtu", "ascii"])
-def test_a_noisy_answer_never_passes_its_check(bench: Maker, framing: str) -> None:
-    line = bench(Sensor(1, framing=framing), framing=framing)  # type: ignore[arg-type]  # a literal
-    line.line.sensor(1).add_fault("noisy")
-    for _ in range(200):
-        assert line.read(1) is None
-        assert line.heard
-    assert not line.answer.believable
-
-
-@pytest.mark.parametrize(
-    ("kind", "particulars", "lengths"),
-    [
-        ("garbage", {}, {9}),
-        ("garbage", {"length": 30}, {30}),
-        ("truncated", {"length": 4}, {4}),
-        ("truncated", {}, set(range(1, 9))),
-    ],
-)
-def test_a_spoilt_answer_has_the_length_it_was_given(
-    bench: Maker, kind: str, particulars: dict[str, int], lengths: set[int]
-) -> None:
-    line = bench(Sensor(1))
-    line.line.sensor(1).add_fault(kind, **particulars)
-    seen = set()
-    for _ in range(100):
-        assert line.read(1) is None
-        seen.add(len(line.heard))
-    assert seen == lengths
-
-
-@pytest.mark.parametrize(("kind", "part"), [("leading_noise", slice(5, None)), ("trailing_noise", slice(9))])
-def test_noise_around_an_answer_leaves_it_whole(bench: Maker, kind: str, part: slice) -> None:
-    line = bench(Sensor(1))
-    line.line.sensor(1).add_fault(kind, length=5)
-    line.read(1)
-    assert len(line.heard) == 14
-    assert unseal(line.heard[part]) is not None
-    assert line.answer.believable
-
-
-def test_a_late_answer_comes_into_the_next_request(bench: Maker) -> None:
-    line = bench(Sensor(1), Sensor(2))
-    line.line.sensor(1).add_fault("late", delay=0.2)
-    assert line.read(1, wait=0.1) is None
-    assert line.read(2, wait=0.05) is not None
-    line.listen(0.1)
-    assert unseal(line.heard) is not None
-    assert line.line.log[0].answers[0].believable
-
-
-def test_bytes_can_come_with_pauses(bench: Maker) -> None:
-    line = bench(Sensor(1))
-    line.line.sensor(1).add_fault("slow_bytes", delay=0.002)
-    line.read(1)
-    ends = line.answer.burst.ends
-    assert {after - before for before, after in pairwise(ends)} <= {3_041_666, 3_041_667}
-
-
-def test_a_fault_shows_at_its_rate(bench: Maker) -> None:
-    line = bench(Sensor(1))
-    line.line.sensor(1).add_fault("silent", 0.3)
-    answers = sum(line.id_of(1) is not None for _ in range(300))
-    assert 170 < answers < 250
 
 
 def test_other_devices_are_just_data(bench: Maker) -> None:

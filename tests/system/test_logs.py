@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-import gc
 import logging
 import os
 import re
-import sys
-import threading
-import warnings
-from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -18,47 +12,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lfs10d.system.logs import (
-    LIMIT,
-    DescriptorHandler,
     LineFormatter,
     Style,
     escape,
-    install,
     is_journal,
     likes_colour,
     shortened,
     style_of,
 )
-
-WHEN = 1_795_298_022.003
-"""2026-11-21T21:53:42.003Z."""
-
-
-def record(
-    words: str = "slave 3 is offline",
-    *arguments: object,
-    level: int = logging.WARNING,
-    name: str = "lfs10d.line.poller",
-    error: BaseException | None = None,
-) -> logging.LogRecord:
-    """Return a record as the logging package would make it."""
-    trouble = None if error is None else (type(error), error, error.__traceback__)
-    made = logging.LogRecord(name, level, __file__, 1, words, arguments, trouble)
-    made.created = WHEN
-    return made
-
-
-def fail(error: ValueError) -> None:
-    """Raise it."""
-    raise error
-
-
-def raised(words: str = "no such\nregister") -> ValueError:
-    """Return an error with a traceback."""
-    made = ValueError(words)
-    with suppress(ValueError):
-        fail(made)
-    return made
+from tests.support.log_records import raised, record
 
 
 @pytest.mark.parametrize(
@@ -221,178 +183,3 @@ def test_a_faulty_log_call_is_told_as_it_is() -> None:
     line = LineFormatter(Style.BARE).format(record("%d slaves", "two"))
 
     assert line.startswith("warning %d slaves ('two',) (")
-
-
-@pytest.fixture
-def pipe() -> Iterator[tuple[int, int]]:
-    """Give both ends of a pipe, the end to write to in second place."""
-    ends = os.pipe()
-    yield ends
-    for end in ends:
-        try:
-            os.close(end)
-        except OSError:
-            continue  # the test closed it
-
-
-def handler_on(descriptor: int) -> DescriptorHandler:
-    """Return a handler of bare lines."""
-    handler = DescriptorHandler(descriptor)
-    handler.setFormatter(LineFormatter(Style.BARE))
-    return handler
-
-
-def test_each_record_is_a_line(pipe: tuple[int, int]) -> None:
-    handler = handler_on(pipe[1])
-
-    handler.handle(record("one"))
-    handler.handle(record("two\nlines", level=logging.INFO))
-
-    assert os.read(pipe[0], 4096) == b"warning one\ninfo two\\nlines\n"
-    assert handler.dropped == 0
-
-
-def test_a_line_too_long_for_one_write_loses_its_middle(pipe: tuple[int, int]) -> None:
-    handler_on(pipe[1]).handle(record("begin" + "x" * 10_000 + "end"))
-
-    line = os.read(pipe[0], 20_000)
-
-    assert len(line) <= LIMIT
-    assert line.startswith(b"warning beginxxx")
-    assert line.endswith(b"xxxend\n")
-
-
-def test_a_reader_who_stops_costs_records_and_is_told_how_many(pipe: tuple[int, int]) -> None:
-    handler = handler_on(pipe[1])
-    for _ in range(100):
-        handler.handle(record("x" * 4000))
-    lost = handler.dropped
-    assert lost > 0
-
-    os.read(pipe[0], 1_000_000)
-    handler.handle(record("again"))
-
-    assert os.read(pipe[0], 4096).decode() == (
-        f"warning {lost} log records were lost: standard error was not read\nwarning again\n"
-    )
-    assert handler.dropped == 0
-
-
-def test_a_reader_who_is_gone_costs_records_and_nothing_else(pipe: tuple[int, int]) -> None:
-    os.close(pipe[0])
-    handler = handler_on(pipe[1])
-
-    for _ in range(3):
-        handler.handle(record())
-
-    assert handler.dropped == 3
-
-
-def test_a_closed_descriptor_costs_records_and_nothing_else(pipe: tuple[int, int]) -> None:
-    os.close(pipe[1])
-    handler = handler_on(pipe[1])
-
-    handler.handle(record())
-
-    assert handler.dropped == 1
-
-
-def test_a_full_disk_costs_records_and_nothing_else() -> None:
-    fd = os.open("/dev/full", os.O_WRONLY)
-    handler = handler_on(fd)
-
-    handler.handle(record())
-
-    assert handler.dropped == 1
-    os.close(fd)
-
-
-def test_a_negative_descriptor_costs_records_and_nothing_else() -> None:
-    handler = handler_on(-1)
-
-    handler.handle(record())
-
-    assert handler.dropped == 1
-
-
-@pytest.fixture
-def logging_restored(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Put the logging of the process back as it was."""
-    monkeypatch.setattr(threading, "excepthook", threading.excepthook)
-    monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
-    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
-    monkeypatch.delenv("JOURNAL_STREAM", raising=False)
-    root, ours = logging.getLogger(), logging.getLogger("lfs10d")
-    before = root.handlers[:], root.level, ours.level
-    yield
-    logging.captureWarnings(capture=False)
-    root.handlers[:], root_level, our_level = before
-    root.setLevel(root_level)
-    ours.setLevel(our_level)
-
-
-@pytest.mark.usefixtures("logging_restored")
-def test_installed_logging_tells_us_by_level_and_others_from_warning_on(pipe: tuple[int, int]) -> None:
-    install("info", "text", descriptor=pipe[1])
-
-    logging.getLogger("lfs10d.modbus").debug("frame")
-    logging.getLogger("lfs10d.modbus").info("port open")
-    logging.getLogger("paho").info("chatter")
-    logging.getLogger("paho").warning("trouble")
-
-    lines = os.read(pipe[0], 4096).decode().splitlines()
-    assert [line.partition("Z ")[2] for line in lines] == ["info port open", "warning paho: trouble"]
-
-
-@pytest.mark.usefixtures("logging_restored")
-def test_installed_again_it_takes_the_place_of_the_first(pipe: tuple[int, int]) -> None:
-    install("error", "text", descriptor=pipe[1])
-    install("debug", "journal", descriptor=pipe[1])
-
-    logging.getLogger("lfs10d").debug("frame", exc_info=raised())
-
-    line = os.read(pipe[0], 4096)
-    assert line.startswith(b"<7>frame: ValueError: no such\\nregister | Traceback")
-    assert line.count(b"\n") == 1
-
-
-@pytest.mark.usefixtures("logging_restored")
-def test_under_the_journal_lines_have_a_priority_by_themselves(
-    pipe: tuple[int, int], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    status = os.fstat(pipe[1])
-    monkeypatch.setenv("JOURNAL_STREAM", f"{status.st_dev}:{status.st_ino}")
-    install("info", descriptor=pipe[1])
-
-    logging.getLogger("lfs10d").error("broken")
-
-    assert os.read(pipe[0], 4096) == b"<3>broken\n"
-
-
-@pytest.mark.usefixtures("logging_restored")
-def test_what_nobody_caught_is_one_line_too(pipe: tuple[int, int]) -> None:
-    install("info", "journal", descriptor=pipe[1])
-
-    class Spiteful:
-        def __del__(self) -> None:
-            raise ValueError("in a destructor")
-
-    thread = threading.Thread(target=fail, args=(ValueError("in a thread"),), name="line")
-    thread.start()
-    thread.join()
-    Spiteful()
-    gc.collect()
-
-    first, second = os.read(pipe[0], 4096).decode().splitlines()
-    assert first == "<3>the thread line ended: ValueError: in a thread"
-    assert second.startswith("<3>")
-    assert second.endswith("ValueError: in a destructor")
-
-
-@pytest.mark.usefixtures("logging_restored")
-def test_a_thread_that_is_gone_already_is_told_without_its_name(pipe: tuple[int, int]) -> None:
-    install("info", "journal", descriptor=pipe[1])
-
-    threading.excepthook(threading.ExceptHookArgs((ValueError, ValueError("late"), None, None)))
-
-    assert os.read(pipe[0], 4096) == b"<3>the thread unknown ended: ValueError: late\n"

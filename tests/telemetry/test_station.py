@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import cast
 
@@ -12,21 +11,16 @@ import pytest
 from lfs10d.reading import Exchanged, FaultCode, PortChanged, Purpose, UartCounted, UartCounters
 from lfs10d.system.clock import Instant
 from lfs10d.telemetry.contract import outbound
-from lfs10d.telemetry.publication import BacklogStats, Payload, PublicationKind
+from lfs10d.telemetry.publication import BacklogStats, Payload
 from lfs10d.telemetry.station import Station
 from tests.support.stations import (
     DAEMON,
     LINE,
-    LINE_TOPICS,
-    LOCKED,
     LOST,
     ONE_VALUE,
     THIRD,
-    TIMEOUT,
     TWO_VALUES,
     WALL,
-    ail,
-    failed,
     fields,
     good,
     instant,
@@ -143,92 +137,6 @@ def test_the_cycle_is_measured_per_device() -> None:
     assert fields(shown(running, "line/stats", 3), "cycle_s") == (0.8,)
 
 
-# -- the port -----------------------------------------------------------------------------------------------------
-
-
-def test_an_opened_port_is_shown_and_no_error() -> None:
-    running = station()
-    assert topics(running.on_event(PortChanged(1, None), instant(1))) == ["line/state"]
-    assert fields(shown(running, "line/state"), "open") == (True,)
-
-
-def test_a_lost_port_is_one_error_of_the_line_at_once() -> None:
-    running = station()
-    running.on_event(PortChanged(1, None), instant(1))
-    assert topics(running.on_event(PortChanged(2, LOST), instant(2))) == ["line/state", "line/error"]
-    assert fields(shown(running, "line/error"), "code", "message", "since") == (
-        "port_lost",
-        "absent: plug it in",
-        round((WALL + 2) * 1000),
-    )
-    assert fields(shown(running, "line/stats"), "errors") == ({"port_lost": 1},)
-
-
-def test_another_fault_of_the_port_changes_the_error() -> None:
-    running = station()
-    running.on_event(PortChanged(1, LOST), instant(1))
-    assert topics(running.on_event(PortChanged(2, LOCKED), instant(2))) == ["line/error"]
-    assert fields(shown(running, "line/error"), "code", "also") == ("port_busy", [])
-
-
-def test_the_same_fault_of_the_port_again_is_nothing_new() -> None:
-    running = station()
-    running.on_event(PortChanged(1, LOST), instant(1))
-    assert running.on_event(PortChanged(2, LOST), instant(2)) == []
-
-
-def test_when_every_device_ails_and_the_port_goes_one_error_is_left() -> None:
-    running = station()
-    assert "device/a/error" in ail(running, "a")
-    assert "device/b/error" in ail(running, "b")
-    published = running.on_event(PortChanged(3, LOST), instant(3))
-    assert topics(published) == ["line/error", "device/a/error", "device/b/error"]
-    for device in ("a", "b"):
-        running.on_event(failed(device, 3, LOST), instant(3))
-        assert fields(shown(running, f"device/{device}/error"), "active", "last_code") == (False, "timeout")
-        assert fields(shown(running, f"device/{device}/state"), "error") == ("port_lost",)
-    assert fields(shown(running, "line/error"), "active") == (True,)
-
-
-def test_the_loss_of_the_port_is_no_poll_and_one_loss_for_the_line() -> None:
-    running = station()
-    running.on_event(PortChanged(1, LOST), instant(1))
-    for device in ("a", "b"):
-        running.on_event(failed(device, 1, LOST), instant(1))
-    assert fields(shown(running, "line/stats", 10), "errors", "polls_per_s") == ({"port_lost": 1}, 0.0)
-    assert fields(shown(running, "device/a/stats"), "polls", "errors") == (0, {"port_lost": 1})
-
-
-def test_when_the_port_is_back_the_line_is_fine_and_devices_ail_by_the_same_rule() -> None:
-    running = station()
-    ail(running)
-    running.on_event(PortChanged(3, LOST), instant(3))
-    running.on_event(failed("a", 3, LOST), instant(3))
-    assert topics(running.on_event(PortChanged(4, None), instant(4))) == ["line/state", "line/error"]
-    assert fields(shown(running, "line/error"), "active", "last_code") == (False, "port_lost")
-    assert "device/a/error" not in topics(running.on_event(failed("a", 5, TIMEOUT), instant(5)))
-    assert "device/a/error" in topics(running.on_event(failed("a", 6, TIMEOUT), instant(6)))
-
-
-def test_a_pause_is_a_lost_port_without_an_error() -> None:
-    running = station()
-    running.on_event(PortChanged(0, None), instant(0))
-    ail(running)
-    assert topics(running.on_activity("paused", instant(2))) == ["line/state", "device/a/error"]
-    assert topics(running.on_event(PortChanged(2, LOST), instant(2))) == ["line/state"]
-    running.on_event(failed("a", 2, LOST), instant(2))
-    assert fields(shown(running, "line/error"), "active") == (False,)
-    assert fields(shown(running, "line/stats"), "errors") == ({"timeout": 2},)
-    assert topics(running.on_activity("polling", instant(9))) == ["line/state"]
-    assert topics(running.on_event(PortChanged(9, None), instant(9))) == ["line/state"]
-
-
-def test_a_pause_takes_an_error_of_the_port_back() -> None:
-    running = station()
-    running.on_event(PortChanged(1, LOCKED), instant(1))
-    assert topics(running.on_activity("paused", instant(2))) == ["line/state", "line/error"]
-
-
 # -- other facts --------------------------------------------------------------------------------------------------
 
 
@@ -318,113 +226,6 @@ def test_a_state_that_waits_is_published_when_its_time_comes() -> None:
     assert running.due() == 30.0
 
 
-# -- configuration ------------------------------------------------------------------------------------------------
-
-
-def test_the_same_configuration_again_says_nothing() -> None:
-    assert station().configure(LINE, [ONE_VALUE, TWO_VALUES], instant(1)) == []
-
-
-def test_an_added_device_is_announced_with_all_its_topics() -> None:
-    running = station()
-    published = running.configure(LINE, [ONE_VALUE, TWO_VALUES, THIRD], instant(1))
-    assert topics(published) == [
-        "event",
-        *(f"device/c/{leaf}" for leaf in ("state", "config", "availability", "error", "stats")),
-        "devices",
-    ]
-    assert fields(published[0].payload, "type", "device", "slave") == ("device_added", "c", 4)
-    assert published[0].kind is PublicationKind.EVENT
-    assert fields(published[1].payload, "quality", "seq", "error") == ("bad", 0, "starting")
-
-
-def test_of_a_removed_device_every_topic_is_cleared() -> None:
-    running = station()
-    published = running.configure(LINE, [ONE_VALUE], instant(1))
-    cleared = {each.topic for each in published if each.payload is None}
-    assert cleared == {f"device/b/{leaf}" for leaf in ("state", "config", "availability", "error", "stats", "wind")}
-    assert all(each.retain for each in published if each.payload is None)
-    (event,) = [each for each in published if each.topic == "event"]
-    assert fields(event.payload, "type", "device", "slave") == ("device_removed", "b", 3)
-    assert published[-1].payload == [ONE_VALUE.entry()]
-    assert running.topics() == LINE_TOPICS | {
-        f"device/a/{leaf}" for leaf in ("state", "config", "availability", "error", "stats")
-    }
-
-
-def test_a_renamed_device_is_one_removed_and_one_added() -> None:
-    published = station().configure(LINE, [ONE_VALUE, replace(TWO_VALUES, name="fan")], instant(1))
-    types = [fields(each.payload, "type")[0] for each in published if each.topic == "event"]
-    assert types == ["device_removed", "device_added"]
-
-
-def test_the_key_of_a_sample_is_not_used_twice_when_a_device_comes_back() -> None:
-    running = station()
-    running.on_event(good("a", 1), instant(1))
-    running.on_event(good("a", 2), instant(2))
-    running.configure(LINE, [TWO_VALUES], instant(3))
-    running.configure(LINE, [TWO_VALUES, ONE_VALUE], instant(4))
-    assert fields(shown(running, "device/a/state"), "seq") == (0,)
-    assert fields(running.on_event(good("a", 5), instant(5))[0].payload, "seq") == (3,)
-
-
-def test_a_changed_option_changes_config_and_list() -> None:
-    running = station()
-    slower = replace(ONE_VALUE, interval=5.0)
-    published = running.configure(LINE, [slower, TWO_VALUES], instant(1))
-    assert topics(published) == ["device/a/config", "devices"]
-
-
-def test_a_changed_time_out_is_no_matter_of_the_list() -> None:
-    published = station().configure(LINE, [replace(ONE_VALUE, response_timeout=0.5), TWO_VALUES], instant(1))
-    assert topics(published) == ["device/a/config"]
-
-
-def test_disabling_is_one_sample_and_then_none() -> None:
-    running = station()
-    running.on_event(good("a", 1), instant(1))
-    published = running.configure(LINE, [replace(ONE_VALUE, enabled=False), TWO_VALUES], instant(2))
-    assert topics(published) == [
-        "device/a/config",
-        "device/a/telemetry",
-        "device/a/state",
-        "device/a/availability",
-        "devices",
-    ]
-    assert fields(published[1].payload, "error", "seq") == ("disabled", 2)
-    assert running.on_event(good("a", 2.1), instant(2.1)) == []
-
-
-def test_a_device_on_another_profile_starts_anew_but_for_its_numbers() -> None:
-    running = station()
-    running.on_event(good("a", 1), instant(1))
-    turned = replace(ONE_VALUE, profile="ld-e", value_names=("displacement",), units={"displacement": "1"})
-    published = running.configure(LINE, [turned, TWO_VALUES], instant(2))
-    assert "event" not in topics(published)
-    state = published[0].payload
-    assert "wind_speed" not in cast("Mapping[str, object]", state)
-    assert fields(state, "displacement", "seq") == (None, 0)
-    answer = replace(good("a", 3), values={"displacement": 53493})
-    assert fields(running.on_event(answer, instant(3))[0].payload, "seq", "displacement") == (2, 53493)
-
-
-def test_another_rate_is_shown_and_its_gaps_are_measured_anew() -> None:
-    running = station()
-    running.on_event(Exchanged(1, 1, 1, 0.0037, 2, Purpose.POLL, None, b"", b""), instant(1))
-    faster = replace(LINE, baudrate=19200, gap_required=0.0018229)
-    assert topics(running.configure(faster, [ONE_VALUE, TWO_VALUES], instant(2))) == ["line/state"]
-    stats = shown(running, "line/stats")
-    assert fields(stats, "gap_required_us", "gap_us") == (1822.9, {"min": None, "p50": None, "p99": None})
-
-
-def test_another_port_keeps_the_gaps() -> None:
-    running = station()
-    running.on_event(Exchanged(1, 1, 1, 0.0037, 2, Purpose.POLL, None, b"", b""), instant(1))
-    moved = replace(LINE, port="/dev/ttyUSB1")
-    assert topics(running.configure(moved, [ONE_VALUE, TWO_VALUES], instant(2))) == ["line/state"]
-    assert fields(shown(running, "line/stats"), "gap_us") == ({"min": 3700.0, "p50": 3700.0, "p99": 3700.0},)
-
-
 # -- what a live view shows ---------------------------------------------------------------------------------------
 
 
@@ -484,29 +285,11 @@ def test_what_is_told_late_is_dated_when_it_happened() -> None:
     assert fields(shown(running, "line/error", 11), "cleared") == (1_795_298_011_000,)
 
 
-def test_while_the_port_is_lost_no_failure_is_held_against_a_device() -> None:
-    running = station()
-    running.on_event(PortChanged(0, LOST), instant(0))
-    assert "device/a/error" not in ail(running, since=1)
-    assert fields(shown(running, "device/a/error"), "active") == (False,)
-
-
 def test_everything_that_changes_at_once_is_told() -> None:
     running = station(ONE_VALUE, TWO_VALUES, THIRD)
     told = topics(running.configure(LINE, [replace(THIRD, label="x")], instant(1)))
     assert {"device/a/state", "device/b/state", "device/c/config", "devices"} <= set(told)
     assert told.count("event") == 2
-
-
-def test_another_pace_of_states_is_taken_up_by_a_reload() -> None:
-    slow = replace(ONE_VALUE, state_every=600.0)
-    running = station(slow)
-    running.on_event(good("a", 1.0), instant(1.0))
-    running.on_event(good("a", 2.0), instant(2.0))
-    assert running.due() == 30.0
-    running.configure(LINE, [replace(slow, state_every=5.0)], instant(3.0))
-    assert running.due() == 8.0
-    assert [each.topic for each in running.tick(instant(8.0))] == ["device/a/state"]
 
 
 # -- the wind -----------------------------------------------------------------------------------------------------

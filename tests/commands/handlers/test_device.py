@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from lfs10d import profiles
 from lfs10d.command import Command
 from lfs10d.commands.handlers.device import NewDevice
 from lfs10d.commands.handlers.registry import HANDLERS
 from lfs10d.commands.reads import ReadResult
 from lfs10d.config.changes import Place
 from lfs10d.config.changes_file import FILE_NAME
-from lfs10d.config.models import SlaveConfig
 from lfs10d.line.jobs.ping import Ping
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Fault, FaultCode
 from tests.support.context import Ask, Asked, FakeContext
+from tests.support.device_requests import own_profile, slave
 
 GOOD = {"device": "mast-top", "wind_speed": 12.5, "error": None}
 BAD = {"device": "mast-top", "wind_speed": None, "error": "timeout"}
@@ -84,15 +82,6 @@ def test_a_device_whose_id_is_another_s_cannot_be_asked(ask: Ask, fake: FakeCont
     answer = ask("device/read", '{"device":"tower"}')
     assert (answer.status, answer.code) == ("failed", "line_error")
     assert answer.message.startswith("tower cannot be asked: slave id 9 is taken by roof")
-
-
-def slave(fake: FakeContext, name: str) -> SlaveConfig:
-    """Return a device as it holds after a restart."""
-    fake.disk.power_cut()
-    fake.start()
-    found = fake.holding.now.slave(name)
-    assert found is not None
-    return found
 
 
 # -- device/add
@@ -182,12 +171,6 @@ def test_what_cannot_be_added_is_rejected_before_anybody_is_asked(
     assert (fake.done, fake.told) == ([], [])
 
 
-def own_profile(fake: FakeContext) -> None:
-    """Put a profile beside the configuration that wants to be polled slowly."""
-    text = (Path(profiles.__file__).parent / "ld-e.yaml").read_text()
-    fake.file.with_name("own.yaml").write_text(text.replace("name: ld-e", "name: own") + "\nmin_interval: 500ms\n")
-
-
 def test_a_profile_beside_the_configuration_can_be_used_and_nothing_of_another_file_is_told(
     ask: Ask, fake: FakeContext
 ) -> None:
@@ -222,112 +205,3 @@ def test_of_two_that_are_added_at_once_one_is(fake: FakeContext, asked: Asked) -
 
     fake.ping = slow  # type: ignore[method-assign]  # asked while this one waits
     assert asked("device/add", slave=9, name="second") == ("rejected", ("address_in_use", "slave"))
-
-
-# -- device/remove
-
-
-def test_what_is_removed_is_gone_after_a_restart(asked: Asked, fake: FakeContext) -> None:
-    assert asked("device/remove", device="mast-top") == ("ok", {"device": "mast-top", "slave": 2})
-    (told,) = fake.told
-    assert (told["request"], told["device"], told["to"]) == ("device/remove", "mast-top", None)
-    fake.disk.power_cut()
-    fake.start()
-    assert fake.context.devices == ("slave-3",)
-    assert asked("device/remove", device="mast-top") == ("rejected", ("unknown_device", "device"))
-
-
-def test_what_was_added_and_cannot_be_polled_now_can_be_removed(asked: Asked, fake: FakeContext) -> None:
-    own_profile(fake)
-    asked("device/add", slave=9, profile="own.yaml", probe=False)
-    fake.file.with_name("own.yaml").unlink()
-    fake.start()
-    assert "slave-9" not in fake.context.devices
-    assert asked("device/add", slave=9, probe=False) == ("rejected", ("invalid_param", "name"))
-    assert asked("device/remove", device="slave-9") == ("ok", {"device": "slave-9", "slave": None})
-    assert fake.holding.now.changes.count == 0
-
-
-# -- device/options
-
-
-@pytest.mark.parametrize(
-    ("wanted", "old", "new"),
-    [
-        ({"interval": "250ms"}, {"interval": 1.0}, {"interval": 0.25}),
-        ({"interval": 0}, {"interval": 1.0}, {"interval": 0.0}),
-        ({"enabled": False}, {"enabled": True}, {"enabled": False}),
-        ({"label": "Top"}, {"label": None}, {"label": "Top"}),
-        ({"response_timeout": "50ms"}, {"response_timeout": "auto"}, {"response_timeout": 0.05}),
-        (
-            {"label": "Top", "interval": 5},
-            {"interval": 1.0, "label": None},
-            {"interval": 5.0, "label": "Top"},
-        ),
-    ],
-)
-def test_options_are_changed_and_told_from_and_to(
-    asked: Asked, fake: FakeContext, wanted: dict[str, Any], old: dict[str, Any], new: dict[str, Any]
-) -> None:
-    assert asked("device/options", device="mast-top", id=7, **wanted) == ("ok", {"from": old, "to": new})
-    assert fake.told == [{"request": "device/options", "id": 7, "device": "mast-top", "from": old, "to": new}]
-    held = slave(fake, "mast-top").model_dump()
-    assert {key: "auto" if held[key] is None and key == "response_timeout" else held[key] for key in new} == new
-
-
-def test_options_that_hold_already_are_no_change(asked: Asked, fake: FakeContext) -> None:
-    data = {"interval": 1.0, "label": None, "response_timeout": "auto"}
-    wanted = {"interval": "1s", "label": None, "response_timeout": "auto"}
-    assert asked("device/options", device="mast-top", **wanted) == ("ok", {"from": data, "to": data})
-    assert (fake.done, fake.told) == ([], [])
-
-
-def test_options_of_what_was_added_can_be_changed(asked: Asked, fake: FakeContext) -> None:
-    asked("device/add", slave=9, probe=False)
-    assert asked("device/options", device="slave-9", interval=5)[0] == "ok"
-    assert slave(fake, "slave-9").interval == 5.0
-
-
-@pytest.mark.parametrize(
-    ("parameters", "code", "param"),
-    [
-        ({"device": "mast-top"}, "invalid_param", None),
-        ({"device": "nobody", "enabled": True}, "unknown_device", "device"),
-        ({"enabled": True}, "invalid_param", "device"),
-        ({"device": "mast-top", "interval": "19ms"}, "invalid_param", "interval"),
-        ({"device": "mast-top", "interval": None}, "invalid_param", "interval"),
-        ({"device": "mast-top", "enabled": "yes"}, "invalid_param", "enabled"),
-        ({"device": "mast-top", "label": "a\nb"}, "invalid_param", "label"),
-        ({"device": "mast-top", "response_timeout": 11}, "invalid_param", "response_timeout"),
-        ({"device": "mast-top", "name": "x"}, "invalid_param", "name"),
-        ({"device": "slow", "interval": "100ms"}, "invalid_param", "interval"),
-    ],
-)
-def test_options_that_cannot_be_are_rejected(
-    asked: Asked, fake: FakeContext, parameters: dict[str, Any], code: str, param: str | None
-) -> None:
-    own_profile(fake)
-    fake.file.write_text(fake.file.read_text() + "  - {id: 4, name: slow, profile: own.yaml}\n")
-    fake.start()
-    assert asked("device/options", **parameters) == ("rejected", (code, param))
-    assert (fake.done, fake.told) == ([], [])
-
-
-@pytest.mark.parametrize(
-    ("name", "parameters"),
-    [
-        ("device/add", {"slave": 9, "probe": False}),
-        ("device/remove", {"device": "mast-top"}),
-        ("device/options", {"device": "mast-top", "enabled": False}),
-    ],
-)
-def test_what_cannot_be_kept_is_rejected_and_not_done(
-    ask: Ask, fake: FakeContext, name: str, parameters: dict[str, Any]
-) -> None:
-    fake.disk.full = 0
-    before = fake.holding.now
-    answer = ask(name, json.dumps(parameters))
-    assert (answer.status, answer.code) == ("rejected", "storage_full")
-    assert answer.message == ("/state/changes.yaml cannot be written: no space left on device; nothing was changed")
-    assert fake.holding.now is before
-    assert (fake.done, fake.told) == ([], [])

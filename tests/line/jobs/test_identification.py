@@ -2,99 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
-
 import pytest
 
 from lfs10d.line.jobs.identification import (
     FoundDevice,
-    Identification,
-    first_read,
     rate_fits,
-    speaks,
-    spoilt,
-    strangers,
 )
-from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.request import ReadRegisters
-from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.profiles.profile import Profile
-from lfs10d.reading import Fault, FaultCode
-from tests.support.outcomes import ended
+from tests.support.identifications import (
+    EH600,
+    FULING,
+    LD_E,
+    LFS10,
+    PROFILES,
+    WIND,
+    garbled,
+    interview,
+    lfs10,
+    outcome,
+    registers,
+)
 
-CODEC = Codec(Framing.RTU)
-PROFILES = tuple(load_profile(name, relative_to=Path()) for name in builtin_names()[:4])
-LFS10, LD_E, FULING, EH600 = PROFILES
-WIND = (0x414F, 0xD70A)
-"""12.99 m/s."""
 NOT_A_NUMBER = (0x7FC0, 0x0000)
-
-
-def outcome(
-    request: ReadRegisters,
-    answer: tuple[int, ...] | None = None,
-    code: FaultCode = FaultCode.TIMEOUT,
-    *,
-    exception: int | None = None,
-    heard: bytes = b"",
-    unsolicited: int = 0,
-    ambiguous: bool = False,
-    rtt: float | None = 0.02,
-) -> Outcome:
-    """Return how an exchange ended: with an answer, an exception, or the fault `code`."""
-    fault = None
-    if exception is not None:
-        fault = Fault(FaultCode.EXCEPTION, "refused", exception)
-    elif answer is None:
-        fault, rtt = Fault(code, "failed", heard=heard), None
-    return ended(
-        request,
-        answer=answer,
-        fault=fault,
-        rtt=rtt,
-        answered=fault is None,
-        sent=CODEC.encode(request),
-        heard=heard,
-        unsolicited=unsolicited,
-        ambiguous=ambiguous,
-    )
-
-
-def interview(
-    device: Callable[[ReadRegisters], Outcome],
-    *,
-    slave: int = 3,
-    profiles: Sequence[Profile] = PROFILES,
-    first: Outcome | None = None,
-) -> tuple[FoundDevice | None, list[ReadRegisters]]:
-    """Hold an interview with a device; return what was found, and what was asked."""
-    asked: list[ReadRegisters] = []
-    steps = Identification(FoundDevice(slave, 9600), profiles, CODEC, first).steps()
-    try:
-        request = next(steps)
-        while True:
-            asked.append(request)
-            request = steps.send(device(request))
-    except StopIteration as end:
-        return end.value, asked
-
-
-def registers(content: dict[int, int]) -> Callable[[ReadRegisters], Outcome]:
-    """Return a device that has these registers and refuses others."""
-
-    def device(request: ReadRegisters) -> Outcome:
-        wanted = range(request.address, request.address + request.count)
-        if all(register in content for register in wanted):
-            return outcome(request, tuple(content[register] for register in wanted))
-        return outcome(request, exception=2)
-
-    return device
-
-
-def lfs10(slave: int = 3, wind: tuple[int, int] = WIND) -> Callable[[ReadRegisters], Outcome]:
-    return registers({1: wind[0], 2: wind[1], 4: 1, 5: slave})
 
 
 def test_an_lfs10_is_recognised_by_its_id_its_value_and_its_rate() -> None:
@@ -214,108 +145,3 @@ def test_one_silence_hides_nobody() -> None:
     finding, _ = interview(device)
     assert finding is not None
     assert (finding.profile, finding.spoilt) == (LFS10, 0)
-
-
-def garbled(times: Sequence[bool]) -> Callable[[ReadRegisters], Outcome]:
-    """Return an LFS10 whose value is garbled in these of the reads."""
-    course = iter(times)
-
-    def device(request: ReadRegisters) -> Outcome:
-        if request.address == 1 and next(course):
-            return outcome(request, code=FaultCode.CRC, heard=b"\x03\x03\x04garbled", unsolicited=0)
-        return lfs10()(request)
-
-    return device
-
-
-@pytest.mark.parametrize(
-    ("times", "spoilt_count", "duplicate"),
-    [
-        ([True] * 5, 5, True),
-        ([True, False, True, False, True], 3, True),
-        ([True, False, False, True, False], 2, False),
-        ([False], 0, False),
-    ],
-)
-def test_answers_garbled_three_times_of_five_are_two_devices(
-    times: list[bool], spoilt_count: int, *, duplicate: bool
-) -> None:
-    finding, _ = interview(garbled(times))
-    assert finding is not None
-    assert (finding.profile, finding.spoilt, finding.duplicate) == (LFS10, spoilt_count, duplicate)
-    assert finding.tries == (5 if spoilt_count else 0)
-
-
-def test_a_second_frame_behind_the_right_one_is_another_device() -> None:
-    def device(request: ReadRegisters) -> Outcome:
-        answer = lfs10()(request).answer
-        return outcome(request, answer, unsolicited=9 if request.address == 1 else 0)
-
-    finding, _ = interview(device)
-    assert finding is not None
-    assert (finding.duplicate, dict(finding.values)) == (True, {"wind_speed": 12.99})
-
-
-def noise(count: int) -> Callable[[ReadRegisters], Outcome]:
-    """Return an empty id at which so many of the first answers are noise, the others silence."""
-    left = iter(range(count))
-
-    def device(request: ReadRegisters) -> Outcome:
-        if next(left, None) is None:
-            return outcome(request)
-        return outcome(request, code=FaultCode.MALFORMED, heard=b"\x99")
-
-    return device
-
-
-def test_noise_alone_is_a_device_only_if_it_hardly_ever_fails_to_come() -> None:
-    assert interview(noise(3), profiles=[LFS10])[0] is None
-    finding, _ = interview(noise(4), profiles=[LFS10])
-    assert finding == FoundDevice(3, 9600, spoilt=4, tries=5, duplicate=True)
-
-
-def test_an_answer_that_may_be_an_older_ones_is_not_believed() -> None:
-    def device(request: ReadRegisters) -> Outcome:
-        return outcome(request, lfs10()(request).answer, ambiguous=True) if request.address == 5 else outcome(request)
-
-    finding, _ = interview(device, profiles=[LFS10])
-    assert finding is not None
-    assert (finding.answers, finding.profile, finding.id_register) == (True, None, None)
-
-
-def test_rtt_is_the_middle_one() -> None:
-    times = iter([0.5, 0.02, 0.03])
-    finding, _ = interview(lambda asked: outcome(asked, exception=2, rtt=next(times)), profiles=PROFILES[:3])
-    assert finding is not None
-    assert finding.rtt == 0.03
-
-
-def test_a_wrong_frame_of_the_slave_is_an_answer_and_no_noise() -> None:
-    request = ReadRegisters(3, 1, 2)
-    longer = CODEC.wrap(bytes((3, 3, 6, 0, 0, 0, 0, 0, 0)))
-    wrong = outcome(request, code=FaultCode.MALFORMED, heard=longer, unsolicited=11)
-    assert speaks(wrong, CODEC)
-    assert not spoilt(wrong, CODEC)
-    finding, _ = interview(lambda asked: outcome(asked, code=FaultCode.MALFORMED, heard=longer), profiles=[LD_E])
-    assert finding == FoundDevice(3, 9600, answers=True)
-
-
-def test_our_own_echo_is_no_answer() -> None:
-    request = ReadRegisters(3, 5, 1)
-    assert not speaks(outcome(request, heard=CODEC.encode(request)), CODEC)
-
-
-def test_strangers_are_other_slaves_whose_right_frames_came() -> None:
-    request = ReadRegisters(3, 5, 1)
-    other = CODEC.wrap(bytes((7, 3, 2, 0, 7)))
-    assert strangers(outcome(request, code=FaultCode.WRONG_SLAVE, heard=other), CODEC) == {7}
-    assert strangers(outcome(request, (3,)), CODEC) == frozenset()
-
-
-def test_an_exception_with_a_frame_behind_it_is_spoilt() -> None:
-    assert spoilt(outcome(ReadRegisters(3, 5, 1), exception=2, unsolicited=5), CODEC)
-    assert not spoilt(outcome(ReadRegisters(3, 5, 1), exception=2, unsolicited=4), CODEC)
-
-
-def test_without_an_id_register_the_first_values_are_the_first_read() -> None:
-    assert first_read(LD_E, 4) == ReadRegisters(4, 0x1004, 2)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import shutil
 import sqlite3
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,43 +10,12 @@ import pytest
 
 from lfs10d.outbox.losses import Loss
 from lfs10d.outbox.store.database import Limits
-from lfs10d.outbox.store.row import DamagedError
 from lfs10d.outbox.store.sample_file import SampleFile, runs
-from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry.publication import Sample
 from lfs10d.telemetry.wind.record import WindRecord
 from tests.support.outbox_items import record
 from tests.support.rows import BOOT, ROOMY, START, entries, sample
-
-NOW = START + 60_000
-
-
-@pytest.fixture
-def path(tmp_path: Path) -> Path:
-    """Give the path of a file that is not there yet."""
-    return tmp_path / "backlog.db"
-
-
-@pytest.fixture
-def file(path: Path) -> Iterator[SampleFile]:
-    """Give a new file."""
-    opened = SampleFile(path, boot=BOOT, limits=ROOMY)
-    yield opened
-    opened.close()
-
-
-def keep(file: SampleFile, *samples: Sample, shift: int = START) -> tuple[Loss, ...]:
-    return file.append(entries(*samples, shift=shift), losses=file.losses, now=NOW, mono=NOW - START)
-
-
-def kept(file: SampleFile) -> list[Sample]:
-    return [row.sample for row in file.read(0, 1_000_000)]
-
-
-def reopened(file: SampleFile, path: Path, *, boot: str = BOOT, limits: Limits = ROOMY) -> SampleFile:
-    file.close()
-    return SampleFile(path, boot=boot, limits=limits)
-
+from tests.support.sample_files import NOW, keep, kept, reopened
 
 # In and out
 
@@ -130,141 +97,6 @@ def test_runs_of_numbers() -> None:
     assert list(runs([9, 1, 2, 3, 5, 6])) == [(1, 3), (5, 6), (9, 9)]
 
 
-# Limits
-
-
-@pytest.mark.parametrize("size", [1_000_000, 2_000_000])
-def test_file_and_log_never_take_more_than_the_limit_and_the_oldest_goes_exactly_declared(
-    path: Path, size: int
-) -> None:
-    file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, size=size))
-    lost: list[Loss] = []
-    largest = 0
-    for start in range(1, 70_001, 1000):
-        lost += keep(file, *(sample(seq) for seq in range(start, start + 1000)))
-        largest = max(largest, sum(each.stat().st_size for each in path.parent.iterdir()))
-    left = [each.seq for each in kept(file)]
-    file.close()
-    assert largest <= size
-    assert left == list(range(left[0], 70_001))
-    assert len(left) > size / 100
-    declared = [seq for loss in lost for seq in range(loss.from_seq, loss.to_seq + 1)]
-    assert declared == list(range(1, left[0]))
-    assert sum(loss.count for loss in lost) == len(declared)
-
-
-def test_what_is_too_old_is_evicted_and_declared(path: Path) -> None:
-    file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, age=10_000))
-    keep(file, *(sample(seq) for seq in range(1, 1001)))
-    lost = file.append(entries(sample(1001)), losses=(), now=START + 910_500, mono=START + 910_500 - START)
-    assert lost == (Loss("a", BOOT, 1, 900, 900),)
-    assert file.losses == lost
-    assert [each.seq for each in kept(file)] == list(range(901, 1002))
-    file.close()
-
-
-DAY = 86_400_000
-WEEK = 7 * DAY
-
-
-@pytest.mark.parametrize("clock", ["unsynced", "unknown"])
-@pytest.mark.parametrize("after", ["unsynced", "unknown", "synced"])
-def test_a_gateway_that_began_400_days_back_loses_nothing_when_its_clock_is_set(
-    path: Path, clock: ClockState, after: ClockState
-) -> None:
-    file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, age=WEEK))
-    back = START - 400 * DAY
-    keep(file, *(sample(seq, clock=clock, ts=back + 1000 * seq) for seq in range(1, 101)), shift=back)
-    assert file.append(entries(sample(101, clock=after)), losses=(), now=START + 101_000, mono=101_000) == ()
-    assert file.rows == 101
-    file.close()
-
-
-@pytest.mark.parametrize("clock", ["unsynced", "unknown", "synced"])
-def test_within_a_boot_age_is_monotonic_whatever_the_wall_clock_says(path: Path, clock: ClockState) -> None:
-    file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, age=10_000))
-    keep(file, *(sample(seq, clock=clock) for seq in range(1, 1001)))
-    lost = file.append(entries(sample(1001, clock=clock)), losses=(), now=START - 400 * DAY, mono=910_500)
-    assert lost == (Loss("a", BOOT, 1, 900, 900),)
-    file.close()
-
-
-@pytest.mark.parametrize(
-    ("clock", "now", "lost"),
-    [
-        ("synced", "synced", 1),
-        ("synced", "unknown", 0),
-        ("synced", "unsynced", 0),
-        ("unknown", "synced", 0),
-        ("unsynced", "synced", 0),
-    ],
-)
-def test_of_an_earlier_boot_the_age_is_known_where_the_clock_was_synchronised_then_and_is_now(
-    path: Path, clock: ClockState, now: ClockState, lost: int
-) -> None:
-    file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, age=10_000))
-    keep(file, sample(1, boot="k0000001", clock=clock))
-    evicted = file.append(entries(sample(1, clock=now)), losses=(), now=START + 10**9, mono=1000)
-    assert sum(loss.count for loss in evicted) == lost
-    file.close()
-
-
-def test_what_is_older_than_a_sample_that_is_too_old_is_too_old_itself(path: Path) -> None:
-    """Where the clock is never synchronised, what earlier boots left goes with this boot's own."""
-    file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, age=10_000))
-    keep(file, sample(1, boot="k0000001", clock="unknown"), sample(1, clock="unknown"))
-    lost = file.append(entries(sample(2, clock="unknown")), losses=(), now=START, mono=50_000)
-    assert lost == (Loss("a", "k0000001", 1, 1, 1), Loss("a", BOOT, 1, 1, 1))
-    file.close()
-
-
-def test_what_is_under_way_stays_and_what_was_delivered_is_no_loss(path: Path) -> None:
-    file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, age=1000))
-    keep(file, *(sample(seq) for seq in range(1, 7)))
-    ids = [row.id for row in file.read(0, 6)]
-    lost = file.append(
-        entries(sample(7)),
-        losses=(),
-        now=START + 10**6,
-        mono=START + 10**6 - START,
-        beyond=ids[1],
-        delivered=frozenset({ids[3]}),
-    )
-    assert lost == (Loss("a", BOOT, 3, 3, 1), Loss("a", BOOT, 5, 6, 2))
-    assert [each.seq for each in kept(file)] == [1, 2, 7]
-    file.close()
-
-
-def test_what_is_only_repeated_is_no_loss(path: Path) -> None:
-    file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, age=1000))
-    file.append(entries(sample(1), repeated=True), losses=(), now=NOW, mono=NOW - START)
-    assert file.append(entries(sample(2)), losses=(), now=START + 10**6, mono=START + 10**6 - START) == ()
-    assert [each.seq for each in kept(file)] == [2]
-    file.close()
-
-
-def test_other_limits_hold_from_the_next_sample_on(file: SampleFile) -> None:
-    keep(file, *(sample(seq) for seq in range(1, 4)))
-    file.limit(replace(ROOMY, age=1000))
-    assert file.append(entries(sample(4)), losses=(), now=START + 10**6, mono=START + 10**6 - START) == (
-        Loss("a", BOOT, 1, 3, 3),
-    )
-
-
-# Losses
-
-
-def test_losses_are_kept_across_a_restart_until_they_are_declared(file: SampleFile, path: Path) -> None:
-    losses = (Loss("a", "k0000001", 1, 5, 5), Loss("b", BOOT, 2, 9, 3))
-    file.append(entries(sample(1)), losses=losses, now=NOW, mono=NOW - START)
-    other = reopened(file, path)
-    assert other.losses == losses
-    other.delete([], losses=losses[1:])
-    again = reopened(other, path)
-    assert again.losses == losses[1:]
-    again.close()
-
-
 # The clock
 
 
@@ -308,139 +140,6 @@ def test_a_transaction_that_fails_leaves_no_trace(file: SampleFile, path: Path) 
     other = reopened(file, path)
     assert [each.seq for each in kept(other)] == [1]
     other.close()
-
-
-# Samples that were changed
-
-
-@pytest.mark.parametrize(
-    "statement",
-    [
-        "UPDATE sample SET seq = seq + 1",
-        "UPDATE sample SET value = x'00000000'",
-        "UPDATE sample SET at = at + 1",
-        "UPDATE sample SET rtt = 5",
-        "UPDATE sample SET series = 99",
-        "DELETE FROM further",
-    ],
-)
-def test_a_sample_that_was_changed_is_never_read(file: SampleFile, path: Path, statement: str) -> None:
-    keep(file, sample(1, values={"x": 1.5, "y": 2.5}))
-    file.close()
-    db = sqlite3.connect(path)
-    db.execute(statement)
-    db.commit()
-    db.close()
-    other = SampleFile(path, boot=BOOT, limits=ROOMY)
-    with pytest.raises(DamagedError):
-        other.read(0, 9)
-    other.close()
-
-
-# Cut anywhere
-
-
-class Written:
-    """A store's file as it lay on the disk, with what was committed when: `(bytes of the log, samples)`."""
-
-    def __init__(self, folder: Path) -> None:
-        self.path = folder / "backlog.db"
-        self.log = folder / "backlog.db-wal"
-        file = SampleFile(self.path, boot=BOOT, limits=ROOMY)
-        self.committed = [(0, 0)]
-        self.samples: list[Sample] = []
-        for _ in range(12):
-            batch = [sample(len(self.samples) + number) for number in range(1, 61)]
-            keep(file, *batch)
-            self.samples += batch
-            self.committed.append((self.log.stat().st_size, len(self.samples)))
-        self.file, self.wal = self.path.read_bytes(), self.log.read_bytes()
-        file.close()
-
-    def opened(self, folder: Path, file: bytes, wal: bytes) -> list[Sample] | None:
-        """Return what a store finds in copies cut like this, None where it must put them aside."""
-        shutil.rmtree(folder, ignore_errors=True)
-        folder.mkdir()
-        path = folder / "backlog.db"
-        path.write_bytes(file)
-        (folder / "backlog.db-wal").write_bytes(wal)
-        try:
-            store = SampleFile(path, boot=BOOT, limits=ROOMY)
-        except (DamagedError, sqlite3.DatabaseError):
-            return None
-        try:
-            return kept(store)
-        except (DamagedError, sqlite3.DatabaseError):
-            return None
-        finally:
-            store.close()
-
-
-@pytest.fixture
-def written(tmp_path: Path) -> Written:
-    """Give a file with twelve commits in its log."""
-    folder = tmp_path / "written"
-    folder.mkdir()
-    return Written(folder)
-
-
-def scattered(count: int, below: int) -> list[int]:
-    """Return numbers that follow no pattern of the file."""
-    return [number * 2_654_435_761 % below for number in range(1, count + 1)]
-
-
-FRAME = 24 + 4096
-"""Bytes of a frame of the log; its header has 32 (https://www.sqlite.org/walformat.html)."""
-
-
-def test_a_log_cut_at_any_frame_holds_what_was_committed_before_and_nothing_else(
-    written: Written, tmp_path: Path
-) -> None:
-    frames = range(32, len(written.wal) + 1, FRAME)
-    assert len(frames) > 24
-    for cut in [0, *frames]:
-        found = written.opened(tmp_path / "copy", written.file, written.wal[:cut])
-        committed = max(count for size, count in written.committed if size <= cut)
-        assert found == written.samples[:committed], f"cut at {cut}"
-
-
-def test_a_log_cut_at_any_byte_or_with_flipped_bits_never_holds_a_wrong_sample(
-    written: Written, tmp_path: Path
-) -> None:
-    for cut in scattered(60, len(written.wal)):
-        found = written.opened(tmp_path / "copy", written.file, written.wal[:cut])
-        assert found == written.samples[: max(count for size, count in written.committed if size <= cut)]
-        flipped = bytearray(written.wal)
-        flipped[cut] ^= 1 << cut % 8
-        found = written.opened(tmp_path / "copy", written.file, bytes(flipped))
-        assert found is None or found == written.samples[: len(found)]
-
-
-def test_a_file_cut_at_any_byte_is_put_aside_or_never_holds_a_wrong_sample(written: Written, tmp_path: Path) -> None:
-    """With its log beside it and, brought into the file, without."""
-    whole = tmp_path / "whole"
-    assert written.opened(whole, written.file, written.wal) == written.samples
-    merged = (whole / "backlog.db").read_bytes()
-    pages = range(0, len(merged), 4096)
-    aside = 0
-    for cut in [*pages, *scattered(60, len(merged)), *(page - 1 for page in pages if page)]:
-        for file, wal in ((merged[:cut], b""), (written.file[:cut], written.wal), (merged[:cut], written.wal)):
-            found = written.opened(tmp_path / "copy", file, wal)
-            aside += found is None
-            assert found is None or found == written.samples[: len(found)], f"cut at {cut}"
-    assert aside > 60
-
-
-def test_a_file_with_flipped_bits_never_holds_a_wrong_sample(written: Written, tmp_path: Path) -> None:
-    whole = tmp_path / "whole"
-    written.opened(whole, written.file, written.wal)
-    merged = (whole / "backlog.db").read_bytes()
-    known = {each.seq: each for each in written.samples}
-    for place in scattered(200, len(merged)):
-        flipped = bytearray(merged)
-        flipped[place] ^= 1 << place % 8
-        for each in written.opened(tmp_path / "copy", bytes(flipped), b"") or []:
-            assert each == known[each.seq]
 
 
 # Records

@@ -1,0 +1,134 @@
+"""Answers that are wrong, late, broken, noisy or refused, at their rate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from itertools import pairwise
+
+import pytest
+
+from lfs10d.simulator.sensor import Sensor
+from lfs10d.simulator.wire import unseal
+from tests.support.sensor_values import ID, Maker, wind_in
+
+
+@pytest.mark.parametrize(
+    ("kind", "holds"),
+    [
+        ("nan", math.isnan),
+        ("infinite", math.isinf),
+        ("out_of_range", lambda speed: speed == 1e6),
+        ("subnormal", lambda speed: 0 < speed < 1e-40),
+    ],
+)
+def test_a_broken_value_is_sent_as_such(bench: Maker, kind: str, holds: Callable[[float], bool]) -> None:
+    line = bench(Sensor(1))
+    line.line.sensor(1).add_fault(kind)
+    assert holds(wind_in(line.read(1)))
+    assert line.answer.values == ()
+
+
+def test_a_stuck_sensor_repeats_its_value(bench: Maker) -> None:
+    line = bench(Sensor(1))
+    line.line.sensor(1).add_fault("stuck")
+    assert wind_in(line.read(1)) == wind_in(line.read(1))
+
+
+def test_a_refusal_has_the_code_it_was_given(bench: Maker) -> None:
+    line = bench(Sensor(1))
+    line.line.sensor(1).add_fault("exception", code=6)
+    assert line.read(1) == bytes.fromhex("01 83 06")
+
+
+@pytest.mark.parametrize(
+    ("kind", "particulars", "first"),
+    [
+        ("wrong_id", {}, "02 03 04"),
+        ("wrong_id", {"value": 77}, "4D 03 04"),
+        ("wrong_function", {}, "01 04 04"),
+        ("wrong_count", {}, "01 03 06"),
+        ("wrong_echo", {}, "01 03 04"),
+    ],
+)
+def test_a_wrong_answer_has_a_right_check(bench: Maker, kind: str, particulars: dict[str, int], first: str) -> None:
+    line = bench(Sensor(1))
+    line.line.sensor(1).add_fault(kind, **particulars)
+    body = line.read(1)
+    assert body is not None
+    assert body[:3] == bytes.fromhex(first)
+    assert len(body) == 3 + body[2]
+    assert not line.answer.believable
+
+
+def test_a_wrong_echo_carries_another_value(bench: Maker) -> None:
+    line = bench(Sensor(1))
+    line.line.sensor(1).add_fault("wrong_echo")
+    line.line.sensor(1).add_fault("wrong_count")
+    assert line.write(1, ID, 1) == bytes.fromhex("01 06 00 05 00 00")
+
+
+@pytest.mark.parametrize("framing", ["rtu", "ascii"])
+def test_a_noisy_answer_never_passes_its_check(bench: Maker, framing: str) -> None:
+    line = bench(Sensor(1, framing=framing), framing=framing)  # type: ignore[arg-type]  # a literal
+    line.line.sensor(1).add_fault("noisy")
+    for _ in range(200):
+        assert line.read(1) is None
+        assert line.heard
+    assert not line.answer.believable
+
+
+@pytest.mark.parametrize(
+    ("kind", "particulars", "lengths"),
+    [
+        ("garbage", {}, {9}),
+        ("garbage", {"length": 30}, {30}),
+        ("truncated", {"length": 4}, {4}),
+        ("truncated", {}, set(range(1, 9))),
+    ],
+)
+def test_a_spoilt_answer_has_the_length_it_was_given(
+    bench: Maker, kind: str, particulars: dict[str, int], lengths: set[int]
+) -> None:
+    line = bench(Sensor(1))
+    line.line.sensor(1).add_fault(kind, **particulars)
+    seen = set()
+    for _ in range(100):
+        assert line.read(1) is None
+        seen.add(len(line.heard))
+    assert seen == lengths
+
+
+@pytest.mark.parametrize(("kind", "part"), [("leading_noise", slice(5, None)), ("trailing_noise", slice(9))])
+def test_noise_around_an_answer_leaves_it_whole(bench: Maker, kind: str, part: slice) -> None:
+    line = bench(Sensor(1))
+    line.line.sensor(1).add_fault(kind, length=5)
+    line.read(1)
+    assert len(line.heard) == 14
+    assert unseal(line.heard[part]) is not None
+    assert line.answer.believable
+
+
+def test_a_late_answer_comes_into_the_next_request(bench: Maker) -> None:
+    line = bench(Sensor(1), Sensor(2))
+    line.line.sensor(1).add_fault("late", delay=0.2)
+    assert line.read(1, wait=0.1) is None
+    assert line.read(2, wait=0.05) is not None
+    line.listen(0.1)
+    assert unseal(line.heard) is not None
+    assert line.line.log[0].answers[0].believable
+
+
+def test_bytes_can_come_with_pauses(bench: Maker) -> None:
+    line = bench(Sensor(1))
+    line.line.sensor(1).add_fault("slow_bytes", delay=0.002)
+    line.read(1)
+    ends = line.answer.burst.ends
+    assert {after - before for before, after in pairwise(ends)} <= {3_041_666, 3_041_667}
+
+
+def test_a_fault_shows_at_its_rate(bench: Maker) -> None:
+    line = bench(Sensor(1))
+    line.line.sensor(1).add_fault("silent", 0.3)
+    answers = sum(line.id_of(1) is not None for _ in range(300))
+    assert 170 < answers < 250

@@ -1,0 +1,12 @@
+"""A configuration file's entries, with what holds where they say nothing."""
+
+from __future__ import annotations
+
+USUAL = {
+    "interval": 1.0,
+    "enabled": True,
+    "label": None,
+    "response_timeout": None,
+    "profile": "lfs10",
+    "checksum": None,
+}
