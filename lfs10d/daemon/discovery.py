@@ -41,7 +41,7 @@ def discovery_payloads(config: Config, profiles: Mapping[str, Profile]) -> dict[
 
 def _device(config: Config, slave: SlaveConfig, profile: Profile) -> DiscoveredDevice:
     values = tuple(_value(value) for value in profile.values)
-    wind = wind_info(config.wind, profile)
+    wind = wind_info(config, profile)
     return DiscoveredDevice(
         name=slave.name,
         label=slave.label,

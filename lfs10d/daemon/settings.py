@@ -11,7 +11,7 @@ from lfs10d import __version__
 from lfs10d.config.effective import Effective
 from lfs10d.config.live_config import LiveConfig
 from lfs10d.config.models import Config, LineConfig
-from lfs10d.config.sections import StoreConfig, WindConfig
+from lfs10d.config.sections import StoreConfig
 from lfs10d.daemon.boot import Boot
 from lfs10d.line.budget import request_gap, timing_of
 from lfs10d.line.device import FIRST_TIMEOUTS
@@ -85,13 +85,13 @@ def device_infos(config: Config, profiles: Mapping[str, Profile]) -> tuple[Devic
             offline_after=config.poll.offline_after,
             calibration={name: entry.model_dump() for name, entry in slave.calibration.items()},
             state_every=config.mqtt.state_every,
-            wind=wind_info(config.wind, profiles[slave.profile]),
+            wind=wind_info(config, profiles[slave.profile]),
         )
         for slave in config.slaves
     )
 
 
-def wind_info(config: WindConfig, profile: Profile) -> WindInfo | None:
+def wind_info(config: Config, profile: Profile) -> WindInfo | None:
     """Return the wind statistics of a device of this profile; None where it measures no wind, or in an unknown unit."""
     speed = profile.first_of("wind_speed")
     if speed is not None and speed.unit not in METRES_PER_SECOND:
@@ -104,7 +104,7 @@ def wind_info(config: WindConfig, profile: Profile) -> WindInfo | None:
         direction=None if direction is None else direction.name,
         unit=None if speed is None else speed.unit,
     )
-    return WindInfo(values, config.every, config.records)
+    return WindInfo(values, config.wind.every, config.wind.records, config.mqtt.hold)
 
 
 def conflict_readings(conflicts: Mapping[str, str], at: float) -> list[Reading]:

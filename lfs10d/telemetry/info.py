@@ -82,12 +82,13 @@ class WindValues:
 class WindInfo:
     """Wind statistics as configured: of which values, published every `every` s, with records of `records` s.
 
-    `records` is 0 where there are none.
+    `records` is 0 where there are none. `hold` is how long in s a reading may wait for others to go with it.
     """
 
     values: WindValues
     every: float
     records: float
+    hold: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

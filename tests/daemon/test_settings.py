@@ -96,6 +96,6 @@ def test_a_device_has_wind_statistics_of_the_first_values_of_their_classes_in_a_
     )
     config = load(file)
     sonic, lfs10, inverter = (each.wind for each in device_infos(config.config, config.profiles))
-    assert sonic == WindInfo(values, every=60.0, records=3600.0)
-    assert lfs10 == WindInfo(WindValues("wind_speed", None, "m/s"), every=60.0, records=3600.0)
+    assert sonic == WindInfo(values, every=60.0, records=3600.0, hold=0.02)
+    assert lfs10 == WindInfo(WindValues("wind_speed", None, "m/s"), every=60.0, records=3600.0, hold=0.02)
     assert inverter is None

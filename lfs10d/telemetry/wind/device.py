@@ -8,6 +8,9 @@ Rules
 3. A disabled device's figures run out and are then published no more; it has no record of a span in which it was
    disabled all the time.
 4. What waits in a long record is added up now and then, before it is forgotten.
+5. A reading comes later than it was measured: it may wait for others, or until it is known to be the right answer. So
+   figures are of the latest time by which no reading can be missing: that of the newest one, or a moment ago. That is
+   their `ts`, and they are those of all samples up to then.
 """
 
 from __future__ import annotations
@@ -53,8 +56,8 @@ LOOK_EVERY: Final = 1000
 ADDED_UP_AFTER: Final = LONG + MINUTE
 """Milliseconds of a long record after which they are added up; a little less than what is kept."""
 
-SETTLED_AFTER: Final = 1000
-"""Milliseconds after which no value from before can come any more."""
+LATE: Final = 500
+"""Milliseconds by which a reading comes late at most, but for what it waits for others (`mqtt.hold`)."""
 
 _RUNNING_OUT: Final = (
     ("coverage_2m", SHORT, ("mean_2m", "direction_2m")),
@@ -72,6 +75,7 @@ class DeviceWind:
         "_added",
         "_added_until",
         "_hold",
+        "_late",
         "_look_at",
         "_next_at",
         "_samples",
@@ -90,6 +94,7 @@ class DeviceWind:
         self.line_boot = line_boot
         self._settings = settings
         self._hold = _hold(info)
+        self._late = _late(settings)
         self._wind = MeasuredWind(settings.values)
         self._next_at = at + _milliseconds(settings.every)
         self._look_at: float = inf
@@ -110,30 +115,41 @@ class DeviceWind:
         held_until = self._wind.held_until
         if at < held_until < self._look_at:
             self._look_at = held_until
-        return self._look_at
+        return self._look_at + self._late
 
     def due(self, moment: WindMoment) -> float:
         """Return when `tick` is wanted next, in ms."""
         record = inf if self._spans is None else min(self._spans.due(moment.shift), self._added_until + ADDED_UP_AFTER)
-        return min(self._next_at, self._look_at, record)
+        return min(self._next_at, self._late + min(self._look_at, record))
 
     def tick(self, moment: WindMoment) -> list[Publication]:
         """Return what is due."""
-        published = self._records(moment)
+        known = self._known(moment)
+        published = self._records(known)
         at, held_until = moment.at, self._wind.held_until
-        if at < held_until:
+        if known.at < held_until:
             self._look_at = held_until
         if self._next_at <= at:
             every = _milliseconds(self._settings.every)
             self._next_at += every * ((at - self._next_at) // every + 1)
             if self.info.enabled or self._samples:
-                published.append(self.publication(moment, refresh=True))
-        elif self._look_at <= at:
-            published += self._look(moment)
+                published.append(self._publication(known, refresh=True))
+        elif self._look_at <= known.at:
+            published += self._look(known)
         return published
 
-    def publication(self, moment: WindMoment, *, refresh: bool = False) -> Publication:
+    def publication(self, moment: WindMoment) -> Publication:
         """Return the topic `wind` as it is now."""
+        return self._publication(self._known(moment))
+
+    def _known(self, moment: WindMoment) -> WindMoment:
+        """Return the latest moment up to which all readings are known (rule 5); of a disabled device none counts."""
+        if not self.info.enabled:
+            return moment
+        before = moment.at - max(self._wind.newest, moment.at - self._late)
+        return WindMoment(moment.at - before, moment.ts - before, moment.clock)
+
+    def _publication(self, moment: WindMoment, *, refresh: bool = False) -> Publication:
         figures = self._figures(moment)
         ts = moment.ts
         line, boot = self.line_boot
@@ -153,7 +169,7 @@ class DeviceWind:
         """
         before, self.info = self.info, info
         records, self._settings = self._settings.records, settings
-        self._hold = _hold(info)
+        self._hold, self._late = _hold(info), _late(settings)
         self._next_at = min(self._next_at, moment.at + _milliseconds(settings.every))
         if settings.records != records:
             self._spans = _spans(settings, moment.at)
@@ -188,7 +204,7 @@ class DeviceWind:
     def _look(self, moment: WindMoment) -> list[Publication]:
         """Return the topic `wind` if a figure that was shown is valid no longer."""
         shown = self._shown
-        published = self.publication(moment)
+        published = self._publication(moment)
         if any(self._shown[name] is None and shown.get(name) is not None for name in self._shown):
             return [published]
         self._shown = shown
@@ -207,10 +223,9 @@ class DeviceWind:
             if self.info.enabled or self._wind.samples(totals):
                 published.append(self._record(totals, span.end, span.to, moment))
             self._added_until = max(span.end, self._added_until)
-        until = moment.at - SETTLED_AFTER
         if moment.at - self._added_until >= ADDED_UP_AFTER:
-            self._added.add(self._wind.totals(self._added_until, until))
-            self._added_until = until
+            self._added.add(self._wind.totals(self._added_until, moment.at))
+            self._added_until = moment.at
         return published
 
     def _record(self, totals: WindTotals, end: int, to: int, moment: WindMoment) -> Publication:
@@ -246,6 +261,10 @@ def _milliseconds(seconds: float) -> int:
 
 def _hold(info: DeviceInfo) -> int:
     return _milliseconds(max(HOLD_INTERVALS * info.interval, HOLD_LEAST))
+
+
+def _late(settings: WindInfo) -> int:
+    return LATE + _milliseconds(settings.hold)
 
 
 def _spans(settings: WindInfo, at: int) -> RecordSpans | None:

@@ -70,7 +70,7 @@ class WindTotals:
 class MeasuredWind:
     """The wind at a device with these values; `on_values` takes good ones alone."""
 
-    __slots__ = ("_direction", "_factor", "_inputs", "_speed", "values")
+    __slots__ = ("_direction", "_factor", "_inputs", "_speed", "newest", "values")
 
     def __init__(self, values: WindValues) -> None:
         self.values = values
@@ -79,12 +79,15 @@ class MeasuredWind:
         self._direction = DirectionSeries()
         inputs = ((values.speed, self._speed), (values.direction, self._direction))
         self._inputs = tuple((name, series) for name, series in inputs if name is not None)
+        self.newest = 0
+        """When the newest values were measured; 0: there are none."""
 
     def on_values(self, values: Mapping[str, Value | None], ages: Mapping[str, float], at: int, hold: int) -> None:
         """Take what was measured at `at`, but for values with an age, which are of an earlier poll.
 
         Each value holds until the next, for `hold` at most.
         """
+        self.newest = max(at, self.newest)
         for name, series in self._inputs:
             value = values.get(name)
             if type(value) in _NUMBERS and name not in ages:

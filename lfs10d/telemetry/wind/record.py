@@ -16,9 +16,6 @@ from lfs10d.telemetry.publication import HISTORY, RECORD, Sample, device_of, dev
 EVEN_WITHIN: Final = 1000
 """Milliseconds by which a clock that is slewed may be away from where the record before ended."""
 
-CLOSED_AFTER: Final = 500
-"""Milliseconds after its end at which a record is made: by then the last sample of it is known."""
-
 _SUFFIX: Final = f"/{RECORD}"
 """Ends the source of records: no name of a device has a slash."""
 
@@ -43,13 +40,13 @@ class RecordSpans:
         """When the span that runs began, as far as it is not recorded."""
 
     def due(self, shift: int) -> int:
-        """Return when the span that runs can be recorded; `shift` is the wall clock less the other, in ms."""
-        return self._next(shift).end + CLOSED_AFTER
+        """Return when the span that runs is over; `shift` is the wall clock less the other, in ms."""
+        return self._next(shift).end
 
     def take(self, now: int, shift: int) -> Span | None:
         """Return the span that is over, None where none is; the next one begins."""
         span = self._next(shift)
-        if now < span.end + CLOSED_AFTER:
+        if now < span.end:
             return None
         self.begin = span.end
         return span

@@ -9,11 +9,13 @@ from math import sin
 from typing import cast
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from lfs10d.telemetry.contract import check
 from lfs10d.telemetry.info import DeviceInfo, WindInfo
 from tests.support.naive_wind import Good, Naive
-from tests.support.winds import ANEMOMETER, MIDNIGHT, SONIC, VANE, Weather, reading, silence, weather
+from tests.support.winds import ANEMOMETER, MIDNIGHT, SONIC, TEN_MINUTES, VANE, Weather, reading, silence, weather
 
 Speed = Callable[[float], float]
 
@@ -78,10 +80,10 @@ def test_single_failed_polls_make_no_gap() -> None:
 def test_above_1_s_it_is_undersampled_and_holds_for_two_intervals() -> None:
     line = weather(replace(ANEMOMETER, interval=5.0))
     line.run(100, gusty, every=5.0)
-    line.run(120)
+    line.run(121)
     newest = line.newest("wind")
     assert (newest["undersampled"], newest["gust_10m"]) == (True, None)
-    assert newest["coverage_2m"] == round((105 + 0) / 120, 4)
+    assert newest["coverage_2m"] == round(105 / 120, 4)
 
 
 # -- records ------------------------------------------------------------------------------------------------------
@@ -232,3 +234,45 @@ def test_a_live_view_shows_what_was_published_last() -> None:
     line.run(75, lambda _: 6.0)
     shown = cast("dict[str, object]", line.station.snapshot("a")["wind"])
     assert (shown["mean_2m"], shown["gust_10m"]) == (6.0, 6.0)
+
+
+# -- readings that come late ------------------------------------------------------------------------------------------
+
+
+@settings(max_examples=20)
+@given(delays=st.lists(st.floats(0.0, 0.7), min_size=20, max_size=20), silent=st.booleans())
+def test_figures_are_of_all_samples_up_to_the_time_that_the_message_says_however_late_these_came(
+    delays: list[float], *, silent: bool
+) -> None:
+    line, values, handed_over = weather(with_wind(ANEMOMETER, records=60.0, hold=0.2)), list[Good](), 0.0
+    for place in range(1, 700):
+        if silent and place % 100 < 20:
+            continue
+        at = place * 0.25 - 0.0004
+        handed_over = max(handed_over, at + delays[place % len(delays)])  # those of one device stay in order
+        line.run(handed_over)
+        line.station.on_reading(reading("a", at, wind_speed=gusty(at)), line.instant(handed_over))
+        values.append((line.instant(at).ts(), gusty(at), 2000))
+    naive = Naive(values)
+    assert len(line.all("wind")) >= 17
+    assert len(line.all("record")) == 2
+    for each in line.all("wind"):
+        ts = cast("int", each["ts"])
+        known = naive.measured(ts - TEN_MINUTES + 1, ts + 1)
+        assert each["samples_10m"] == len(known)
+        assert each["max_10m"] == max((value for _, value, _ in known), default=None)
+        assert each["coverage_10m"] == pytest.approx(naive.covered(ts - TEN_MINUTES, ts) / TEN_MINUTES, abs=1e-4)
+    for each in line.all("record"):
+        assert each["samples"] == len(naive.measured(cast("int", each["from"]), cast("int", each["to"])))
+
+
+def test_a_message_says_the_time_of_the_newest_sample_or_that_of_a_moment_ago() -> None:
+    line = weather(with_wind(ANEMOMETER, hold=0.1))
+    line.station.on_reading(reading("a", 9.8, wind_speed=5.0), line.instant(9.9))
+    line.run(10.5)
+    assert times(line, "wind") == [pytest.approx(9.8, abs=0.001)]
+    line.run(20.5)
+    assert times(line, "wind")[1:] == [pytest.approx(20 - 0.6, abs=0.01)]
+    line.station.on_reading(reading("a", 30.0, wind_speed=5.0), line.instant(30.0))
+    [burst] = line.station.burst("a", line.instant(29.99))
+    assert cast("dict[str, object]", burst.payload)["ts"] == line.instant(30.0).ts()

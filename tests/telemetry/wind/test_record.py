@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from lfs10d.telemetry.contract import check
 from lfs10d.telemetry.wind.record import (
-    CLOSED_AFTER,
     DIRECTION_NAMES,
     EVEN_WITHIN,
     RECORD_NAMES,
@@ -49,15 +48,15 @@ def test_the_first_span_begins_with_the_measuring_and_ends_with_the_next_full_ti
     spans = RecordSpans(LENGTH, 5000)
     shift = MIDNIGHT + 200_000
     end = 400_000
-    assert spans.due(shift) == end + CLOSED_AFTER
-    assert spans.take(end + CLOSED_AFTER - 1, shift) is None
-    assert spans.take(end + CLOSED_AFTER, shift) == Span(5000, end, MIDNIGHT + LENGTH)
-    assert spans.take(end + CLOSED_AFTER, shift) is None
+    assert spans.due(shift) == end
+    assert spans.take(end - 1, shift) is None
+    assert spans.take(end, shift) == Span(5000, end, MIDNIGHT + LENGTH)
+    assert spans.take(end, shift) is None
 
 
 def test_after_a_stop_of_the_process_every_span_that_went_by_is_recorded() -> None:
     spans = RecordSpans(LENGTH, 0)
-    taken = [spans.take(3 * LENGTH + CLOSED_AFTER, MIDNIGHT) for _ in range(4)]
+    taken = [spans.take(3 * LENGTH, MIDNIGHT) for _ in range(4)]
     assert [None if span is None else (span.begin, span.to) for span in taken] == [
         (0, MIDNIGHT + LENGTH),
         (LENGTH, MIDNIGHT + 2 * LENGTH),
@@ -70,7 +69,7 @@ def test_a_clock_set_far_ahead_makes_no_records_of_times_that_never_were() -> No
     spans = RecordSpans(LENGTH, 0)
     years = 6 * 365 * 86_400_000
     assert spans.take(300_000, years) is None
-    span = spans.take(LENGTH + CLOSED_AFTER, years)
+    span = spans.take(LENGTH, years)
     assert span == Span(0, LENGTH, years + LENGTH)
 
 
@@ -79,14 +78,14 @@ def test_what_is_not_recorded_when_the_clock_is_set_belongs_to_the_spans_of_the_
     ahead = MIDNIGHT + 480_000  # after 5 min the clock is set 8 min ahead
     assert spans.take(300_000, ahead) == Span(0, 120_000, MIDNIGHT + LENGTH)
     assert spans.take(300_000, ahead) is None
-    assert spans.due(ahead) == 720_000 + CLOSED_AFTER
+    assert spans.due(ahead) == 720_000
 
 
 def test_a_clock_set_back_over_a_full_time_repeats_its_span_with_what_came_since() -> None:
     spans = RecordSpans(LENGTH, 0)
-    assert spans.take(LENGTH + CLOSED_AFTER, MIDNIGHT) is not None
+    assert spans.take(LENGTH, MIDNIGHT) is not None
     back = MIDNIGHT - 60_000
-    assert spans.take(LENGTH + 60_000 + CLOSED_AFTER, back) == Span(LENGTH, LENGTH + 60_000, MIDNIGHT + LENGTH)
+    assert spans.take(LENGTH + 60_000, back) == Span(LENGTH, LENGTH + 60_000, MIDNIGHT + LENGTH)
 
 
 @pytest.mark.parametrize("slewed", [-300, -1, 0, 1, 300])
