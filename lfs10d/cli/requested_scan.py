@@ -22,6 +22,7 @@ from lfs10d.cli.render.scan_progress import REPORT_EVERY, progress_bar, span
 from lfs10d.errors import FailedError
 from lfs10d.mqtt.messages import Filter, Incoming
 from lfs10d.profiles.library import builtin_names, load_profile
+from lfs10d.profiles.profile import Profile
 from lfs10d.schema.quantities import duration_text
 from lfs10d.system.logs import escape
 from lfs10d.telemetry.publication import EVENT
@@ -96,10 +97,17 @@ def row(entry: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _what(entry: Mapping[str, Any]) -> str:
-    profile = entry.get("profile")
-    if not isinstance(profile, str):
-        return "unknown device"
-    return load_profile(profile, relative_to=Path()).title if profile in builtin_names() else profile
+    name = entry.get("profile")
+    return _title(name) if isinstance(name, str) else "unknown device"
+
+
+def _builtin(name: object) -> Profile | None:
+    return load_profile(str(name), relative_to=Path()) if name in builtin_names() else None
+
+
+def _title(name: str) -> str:
+    profile = _builtin(name)
+    return name if profile is None else profile.title
 
 
 def _remarks(entry: Mapping[str, Any]) -> Iterator[str]:
@@ -109,8 +117,12 @@ def _remarks(entry: Mapping[str, Any]) -> Iterator[str]:
         yield "DUPLICATE? garbled answers: two sensors with this id?"
     if entry.get("suspect") is True:
         yield "SUSPECT: others answer too, so it may be no sensor of its own"
-    if entry.get("id") == scan_findings.FACTORY_ID and isinstance(entry.get("profile"), str):
+    slave = entry.get("id")
+    if isinstance(slave, int) and scan_findings.is_factory_id(slave, _builtin(entry.get("profile"))):
         yield "the factory id"
+    others = entry.get("alternatives")
+    if isinstance(others, list) and others:
+        yield scan_findings.may_also_be([_title(str(name)) for name in others])
 
 
 # Progress

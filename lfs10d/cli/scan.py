@@ -19,7 +19,7 @@ from lfs10d.cli.port_holder import instead
 from lfs10d.cli.render import scan_findings, troubleshooting
 from lfs10d.cli.render.scan_progress import view
 from lfs10d.errors import FailedError, PortBusyError, PortError
-from lfs10d.line.jobs.identification import FoundDevice
+from lfs10d.line.jobs.identification import FoundDevice, by_evidence
 from lfs10d.line.jobs.scan import Scan
 from lfs10d.line.jobs.scan_ids import ids_of
 from lfs10d.line.jobs.scan_plan import FIRST_TIMEOUT, ScanPlan
@@ -115,7 +115,7 @@ def command(
     own = {file: load_profile(file, relative_to=Path()) for file in profiles}
     if not given("rates"):
         rates = tuple(dict.fromkeys((*rates, *(rate for each in own.values() for rate in each.rates))))
-    known = (*own.values(), *(load_profile(name, relative_to=Path()) for name in builtin_names()))
+    known = (*own.values(), *by_evidence(load_profile(name, relative_to=Path()) for name in builtin_names()))
     search = ScanPlan(
         ids,
         tuple(line.timing(rate) for rate in rates),

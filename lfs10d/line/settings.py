@@ -9,6 +9,7 @@ from lfs10d.config.loader import LoadedConfig
 from lfs10d.config.models import Config, LineConfig, PollConfig, SlaveConfig
 from lfs10d.line.budget import request_gap, timing_of
 from lfs10d.line.device import DeviceSpec, PollRules
+from lfs10d.line.jobs.identification import by_evidence
 from lfs10d.line.jobs.register_access import Target
 from lfs10d.line.jobs.scan_plan import ScanPlan
 from lfs10d.modbus.bus import LineRules
@@ -82,7 +83,7 @@ def scan_plan(loaded: LoadedConfig, ids: tuple[int, ...], rates: tuple[int, ...]
     checksums = {spec.codec.checksum for spec in device_specs(loaded.config, loaded.profiles)}
     codec = Codec(Framing(line.framing), checksums.pop() if len(checksums) == 1 else Checksum.CRC)
     own = tuple(profile for word, profile in loaded.profiles.items() if word not in builtin)
-    known = (*own, *(load_profile(name, relative_to=Path()) for name in builtin))
+    known = (*own, *by_evidence(load_profile(name, relative_to=Path()) for name in builtin))
     ascii_line = line.framing == Framing.ASCII.value
     profiles = tuple(
         each for each in known

@@ -15,6 +15,10 @@ MOST_BITS = 2000
 """Bits of one read (Modbus Application Protocol V1.1b3, sections 6.1 and 6.2)."""
 
 
+NO_VALUE_NOW = (FaultCode.UNAVAILABLE, FaultCode.NOT_FINITE)
+"""Why a value of a device may be missing that is what it seems to be."""
+
+
 @dataclass(frozen=True, slots=True)
 class Block:
     """One read: `count` registers (or bits) from `address`, and the values that lie in them.
@@ -57,9 +61,10 @@ class Block:
         return None
 
     def decode(self, registers: tuple[int, ...]) -> dict[str, Published] | Fault:
-        """Return every value by name that is available, or the first fault but `unavailable`.
+        """Return every value by name that the device has now, or the first fault that shows another device.
 
-        So a device is recognised. Where no value is available, that is the fault.
+        So a device is recognised. Of several values some may be unavailable, or not finite as a direction in calm often
+        is. Where there is no value at all, the first fault is returned whatever it is.
         """
         values: dict[str, Published | None] = {}
         faults: dict[str, Fault] = {}
@@ -67,9 +72,7 @@ class Block:
         if fault is not None:
             return fault
         there = {name: value for name, value in values.items() if value is not None}
-        wrong = [fault for fault in faults.values() if fault.code is not FaultCode.UNAVAILABLE]
-        if not there:
-            wrong += faults.values()
+        wrong = [fault for fault in faults.values() if not there or fault.code not in NO_VALUE_NOW]
         return wrong[0] if wrong else there
 
 

@@ -275,9 +275,20 @@ class Profile(Facts):
         """Return the reads of one poll, neighbouring values together; the same objects every time."""
         return self._blocks
 
+    @property
+    def main_read(self) -> Block:
+        """The read that brings the first value, which is the primary one."""
+        name = self.values[0].name
+        return next(block for block in self._blocks if any(value.name == name for value in block.values))
+
     def batched(self, values: Iterable[Value]) -> tuple[Block, ...]:
         """Return the reads that bring some of its values."""
         return batch(values, self.most_words, self.may_skip)
+
+    def without_optional(self, block: Block) -> tuple[Block, ...]:
+        """Return the reads of a block's other values; none where it has optional ones only, or none of them."""
+        required = [value for value in block.values if not value.optional]
+        return self.batched(required) if len(required) < len(block.values) else ()
 
     def decode(self, block: Block, registers: tuple[int, ...]) -> dict[str, Published] | Fault:
         """Return the values of `block` that are available, or the first fault: `not_finite` or `out_of_range`."""

@@ -19,6 +19,7 @@ FOUND = {
     "duplicate": False,
     "device": "mast-top",
     "profile": "lfs10",
+    "alternatives": [],
     "rtt_ms": 18.2,
 }
 ANY = st.recursive(st.none() | st.booleans() | st.integers() | st.text(), st.lists, max_leaves=4)
@@ -43,6 +44,16 @@ ANY = st.recursive(st.none() | st.booleans() | st.integers() | st.text(), st.lis
             ("1", "9600", "18 ms", "unknown device", "SUSPECT: others answer too, so it may be no sensor of its own"),
         ),
         ({**FOUND, "profile": "wind-vane", "device": None}, ("3", "9600", "18 ms", "wind-vane", "")),
+        (
+            {**FOUND, "id": 144, "device": None, "profile": "ecowitt-wn90lp", "alternatives": ["own", "renke-rs-fxjt"]},
+            (
+                "144",
+                "9600",
+                "18 ms",
+                "ecowitt WN90LP compact weather station",
+                "the factory id; or own or Renke RS-FXJT-N01 wind vane: its answers do not tell which",
+            ),
+        ),
         ({}, ("None", "None", "-", "unknown device", "")),
     ],
 )

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from lfs10d.line.device import PollRules
+from lfs10d.line.jobs.identification import by_evidence
 from lfs10d.line.jobs.scan import Scan
 from lfs10d.line.jobs.scan_plan import ScanPlan
 from lfs10d.modbus.frames import Codec, Framing
@@ -17,7 +18,7 @@ from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from tests.support.lines import Rig, Rigs
 
-PROFILES = tuple(load_profile(name, relative_to=Path()) for name in builtin_names()[:4])
+PROFILES = by_evidence(load_profile(name, relative_to=Path()) for name in builtin_names())
 WIRE = 0.0314
 """s that one poll takes at 9600 baud with 5 ms of turnaround."""
 

@@ -105,6 +105,17 @@ def test_one_bad_value_makes_the_whole_block_a_fault() -> None:
     assert block.decode((7, 11)) == Fault(FaultCode.OUT_OF_RANGE, "b 11 is outside 0..10")
 
 
+def test_a_value_that_is_not_finite_leaves_the_others_of_its_device() -> None:
+    """A direction in calm is often NaN; of a single value it is the fault of the read."""
+    nan = (0x7FC0, 0x0000)
+    (block,) = batch([value("speed", 1), value("direction", 2, type="float32", word_order="high_first")], 5)
+    assert block.decode((7, *nan)) == {"speed": 7}
+    (alone,) = batch([value("direction", 2, type="float32", word_order="high_first")], 5)
+    fault = alone.decode(nan)
+    assert isinstance(fault, Fault)
+    assert fault.code is FaultCode.NOT_FINITE
+
+
 def test_another_number_of_registers_than_asked_is_malformed() -> None:
     (block,) = batch([value("a", 1)], 5)
     assert block.decode((1, 2)) == Fault(FaultCode.MALFORMED, "2 registers came, 1 were asked")

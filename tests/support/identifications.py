@@ -8,6 +8,7 @@ from pathlib import Path
 from lfs10d.line.jobs.identification import (
     FoundDevice,
     Identification,
+    by_evidence,
 )
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.outcome import Outcome
@@ -18,8 +19,9 @@ from lfs10d.reading import Fault, FaultCode
 from tests.support.outcomes import ended
 
 CODEC = Codec(Framing.RTU)
-PROFILES = tuple(load_profile(name, relative_to=Path()) for name in builtin_names()[:4])
-LFS10, LD_E, FULING, EH600 = PROFILES
+BUILTIN = {name: load_profile(name, relative_to=Path()) for name in builtin_names()}
+PROFILES = by_evidence(BUILTIN.values())
+LFS10, LD_E, FULING, EH600 = (BUILTIN[name] for name in ("lfs10", "ld-e", "fuling-dzb", "eh600"))
 WIND = (0x414F, 0xD70A)
 """12.99 m/s."""
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from lfs10d.line.jobs.identification import FoundDevice
+from lfs10d.line.jobs.identification import FoundDevice, by_evidence
 from lfs10d.line.jobs.scan import Scan
 from lfs10d.line.jobs.scan_plan import ScanPlan
 from lfs10d.line.poller import Poller
@@ -21,7 +21,8 @@ from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.port import SimulatedPort, VirtualClock, run
 from lfs10d.simulator.sensor import Sensor
 
-PROFILES = tuple(load_profile(name, relative_to=Path()) for name in builtin_names()[:4])
+BUILTIN = {name: load_profile(name, relative_to=Path()) for name in builtin_names()}
+PROFILES = by_evidence(BUILTIN.values())
 RTU = Codec(Framing.RTU)
 ALL = range(1, 256)
 LONGEST = 400.0

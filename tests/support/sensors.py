@@ -48,8 +48,8 @@ class Mimic:
     codes: dict[int, int] = field(default_factory=lambda: dict(RATE_CODES))
     """The rate of each content of its rate register."""
 
-    def read(self, request: ReadRegisters) -> tuple[int, ...]:
-        """Return the registers."""
+    def read(self, request: ReadRegisters) -> tuple[int, ...] | int:
+        """Return the registers, or the exception with which it refuses this read."""
         if request.address == 1:
             return self.wind
         true = {4: {rate: code for code, rate in self.codes.items()}[self.baudrate], 5: self.slave}

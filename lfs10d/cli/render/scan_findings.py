@@ -15,6 +15,7 @@ import click
 from lfs10d.cli.options import LineOptions
 from lfs10d.cli.render.table import columns
 from lfs10d.modbus.frames import EXCEPTION_NAMES, Framing
+from lfs10d.profiles.profile import Profile
 from lfs10d.reading import NOTHING, Value
 from lfs10d.schema.quantities import duration_text
 
@@ -26,7 +27,6 @@ RIGHT = (0, 1, 2)
 
 DEFAULT_PROFILE = "lfs10"
 DEFAULT_BAUDRATE = 9600
-FACTORY_ID = 1
 ILLEGAL_FUNCTION = 1
 """The exception of a device that does not know the function (Modbus Application Protocol V1.1b3, section 7)."""
 BY_ID = Path("/dev/serial/by-id")
@@ -101,9 +101,26 @@ def remarks(finding: FoundDevice) -> Iterator[str]:
     elif finding.suspect:
         yield "SUSPECT: others answer too, so it may be no sensor of its own"
     elif other is not None:
-        yield f"its id register holds {other}: is the DIP switch set?"
-    if finding.slave == FACTORY_ID and finding.profile is not None:
+        yield f"its id register holds {other}{_lock(finding.profile)}"
+    if is_factory_id(finding.slave, finding.profile):
         yield "the factory id"
+    if finding.alternatives:
+        yield may_also_be([profile.title for profile in finding.alternatives])
+
+
+def _lock(profile: Profile | None) -> str:
+    lock = None if profile is None or profile.slave_id is None else profile.slave_id.locked_by
+    return "" if lock is None else f": is the {lock} set?"
+
+
+def is_factory_id(slave: int, profile: Profile | None) -> bool:
+    """Whether a device is where new ones of its profile are, so that the next one will share its id."""
+    return profile is not None and profile.factory is not None and profile.factory.id == slave
+
+
+def may_also_be(names: Sequence[str]) -> str:
+    """Return the remark that a device answers as others do too."""
+    return f"or {' or '.join(names)}: its answers do not tell which"
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +156,11 @@ def snippet(
     for finding in findings:
         obstacle = _obstacle(finding, baudrate)
         entry = _entry(finding, options, asked)
-        yield f"  - {entry}" if obstacle is None else f"  # - {entry}    {obstacle}"
+        if obstacle is not None:
+            yield f"  # - {entry}    {obstacle}"
+            continue
+        others = ", ".join(_word(profile, asked) for profile in finding.alternatives)
+        yield f"  - {entry}    # or profile {others}: look at the device" if others else f"  - {entry}"
     yield "mqtt: {host: localhost}"
 
 
@@ -163,13 +184,18 @@ def _entry(finding: FoundDevice, options: LineOptions, asked: ScanRequest) -> st
     fields = [f"id: {finding.slave}"]
     profile = finding.profile
     if profile is not None and profile.name != DEFAULT_PROFILE:
-        file = asked.files.get(profile.name)
-        fields.append(f"profile: {profile.name if file is None else json.dumps(file)}")  # JSON's text is YAML's too
+        fields.append(f"profile: {_word(profile, asked)}")
     if profile is not None and options.framing is Framing.RTU and asked.checksum != profile.checksum:
         fields.append(f"checksum: {asked.checksum}")
     if options.timeout is not None:
         fields.append(f"response_timeout: {duration_text(options.timeout)}")
     return str(finding.slave) if len(fields) == 1 else f"{{{', '.join(fields)}}}"
+
+
+def _word(profile: Profile, asked: ScanRequest) -> str:
+    """Return how a configuration names a profile: the built-in one's name, or the file in quotes."""
+    file = asked.files.get(profile.name)
+    return profile.name if file is None else json.dumps(file)  # JSON's text is YAML's too
 
 
 def _obstacle(finding: FoundDevice, baudrate: int) -> str | None:
@@ -195,6 +221,7 @@ def plain(finding: FoundDevice, calibrated: Mapping[str, Value | None] = NOTHING
         "rtt_ms": None if finding.rtt is None else round(finding.rtt * 1e3, 1),
         "profile": None if profile is None else profile.name,
         "title": None if profile is None else profile.title,
+        "alternatives": [each.name for each in finding.alternatives],
         "values": dict(finding.values),
         "calibrated": dict(calibrated),
         "units": {} if profile is None else {name: profile.units[name] for name in finding.values},

@@ -115,6 +115,7 @@ def _told(finding: FoundDevice, context: Context) -> dict[str, Any]:
         "duplicate": finding.duplicate,
         "device": name,
         "profile": None if finding.profile is None else finding.profile.name,
+        "alternatives": [profile.name for profile in finding.alternatives],
         "rtt_ms": None if finding.rtt is None else round(finding.rtt * 1e3, 1),
     }
 
@@ -127,6 +128,7 @@ async def _add(done: Scan, context: Context, command: Command) -> dict[str, list
         now = context.config.now
         profile = finding.profile
         doubtful = finding.suspect or finding.duplicate or finding.baudrate != now.config.line.baudrate
+        doubtful = doubtful or bool(finding.alternatives)  # as another profile its values would be wrong
         if profile is None or doubtful or _known(finding, context) is not None:
             continue
         own = now.loaded.profiles

@@ -2,23 +2,31 @@
 
 Rules
 -----
-1. Profiles are tried in order; each by the register of its slave id, where it has one, and its first read. What was
-   answered once is not asked again. Nothing is ever written.
-2. A profile fits that reads believable values. One with a register of its slave id fits only if all agree: that
-   register holds a possible id, the values are believable, and the register of the rate, where it has one, holds one
-   of its codes. Where the profile names registers that tell the device from others (`identify`), they must hold what
-   it says. Values that collide do not disagree, where the id is the right one: then two such devices share it.
+1. Profiles are tried in order; each by the register of its slave id, where it has one, and the read that brings its
+   first value. What was answered once is not asked again. Nothing is ever written.
+2. A profile fits that reads believable values; optional ones may be absent. One with a register of its slave id fits
+   only if all agree: that register holds a possible id, the values are believable, and the register of the rate, where
+   it has one, holds one of its codes. Where the profile names registers that tell the device from others (`identify`),
+   they must hold what it says. Values that collide do not disagree, where the id is the right one: then two such
+   devices share it.
 3. An answer is any right frame of the slave, an exception too. Silence is asked again, `SILENCES` times in all.
 4. Where bytes came that make no right frame, or a second frame behind the right one, the read is repeated, `TRIES`
    times in all. Spoilt `SPOILT` times, two devices probably share the id (`ALL_SPOILT` where no right answer came).
+5. After a profile that fits, those are tried that could be the same device: none after one by `identify`; after one by
+   the register of its slave id the others that have it in the same place; after one by its values alone all.
+6. Of several that fit the device is that for which most speaks: `identify`, then its own id in the register of the
+   slave id, then more registers of values, then the order. The others that the answers do not exclude are its
+   `alternatives`; one by `identify` has none.
 """
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from enum import IntEnum
 from typing import TypeAlias
 
+from lfs10d.line.read_plan import ILLEGAL_ADDRESS
 from lfs10d.modbus.frames import Codec
 from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.request import READ_HOLDING_REGISTERS, ReadRegisters
@@ -35,6 +43,7 @@ ALL_SPOILT = 4
 SILENCES = 3
 """Silent so many times, a slave is given up."""
 
+_NO_ANSWER = Fault(FaultCode.TIMEOUT, "no answer")
 _EXCEPTION_BODY = 3
 """Slave, function, code: the body of the shortest answer (Modbus Application Protocol V1.1b3, section 7)."""
 
@@ -47,9 +56,10 @@ class FoundDevice:
     """What is at one slave id at one rate.
 
     `answers`: a right frame came; without it only bytes that make none. `rtt` in s is the middle one of the
-    answers'. `profile` is the one that fits, with the `values` it read. `id_register` is what the slave says its id
-    is, `exception` the code of its last refusal. `spoilt` of `tries` repeated reads were spoilt; `duplicate`: two
-    devices probably share the id. `suspect`: it may be no device of its own; see `lfs10d.line.jobs.scan`.
+    answers'. `profile` is the one that fits best, with the `values` it read; `alternatives` are others that its answers
+    do not exclude. `id_register` is what the slave says its id is, `exception` the code of its last refusal. `spoilt`
+    of `tries` repeated reads were spoilt; `duplicate`: two devices probably share the id. `suspect`: it may be no
+    device of its own; see `lfs10d.line.jobs.scan`.
     """
 
     slave: int
@@ -57,6 +67,7 @@ class FoundDevice:
     answers: bool = False
     rtt: float | None = None
     profile: Profile | None = None
+    alternatives: tuple[Profile, ...] = ()
     values: Mapping[str, Value] = field(default_factory=dict)
     id_register: int | None = None
     exception: int | None = None
@@ -107,15 +118,47 @@ def rate_fits(profile: Profile, code: int | None, baudrate: int) -> bool:
     return code is not None and (baudrate not in profile.baudrate.codes or code in profile.baudrate.codes.values())
 
 
+def by_evidence(profiles: Iterable[Profile]) -> tuple[Profile, ...]:
+    """Return profiles in the order in which they are to be tried: those whose values alone speak for them come last."""
+    return tuple(sorted(profiles, key=lambda profile: profile.slave_id is None and not profile.identify))
+
+
 def first_read(profile: Profile, slave: int) -> ReadRegisters:
     """Return what a device of this profile is asked first: its id, or else its first values."""
     if profile.slave_id is not None:
         return ReadRegisters(slave, profile.slave_id.register, 1, READ_HOLDING_REGISTERS)
-    return _read_of(profile.reads()[0], slave)
+    return _read_of(profile.main_read, slave)
 
 
 def _read_of(block: Block, slave: int) -> ReadRegisters:
     return ReadRegisters(slave, block.address, block.count, block.function)
+
+
+class _Evidence(IntEnum):
+    """What speaks for a profile, the least first."""
+
+    VALUES = 0
+    OTHER_ID = 1
+    OWN_ID = 2
+    IDENTITY = 3
+
+
+@dataclass(frozen=True, slots=True)
+class _Fit:
+    """A profile that fits: the values it read from so many registers, and what the register of its slave id holds."""
+
+    profile: Profile
+    evidence: _Evidence
+    words: int
+    values: Mapping[str, Value]
+    id_register: int | None
+
+    def may_also_be(self, other: Profile) -> bool:
+        """Whether another profile could fit the same device (rule 5)."""
+        if self.evidence is _Evidence.IDENTITY:
+            return False
+        own, its = self.profile.slave_id, other.slave_id
+        return own is None or (its is not None and its.register == own.register)
 
 
 class Identification:
@@ -133,10 +176,12 @@ class Identification:
 
     def steps(self) -> IdentificationSteps:
         """Ask until it is clear who is there."""
+        fits: list[_Fit] = []
         for profile in self._profiles:
-            if (yield from self._fits(profile)):
-                self._note(profile=profile)
-                break
+            if all(fit.may_also_be(profile) for fit in fits) and (fit := (yield from self._fit(profile))) is not None:
+                fits.append(fit)
+        if fits:
+            self._choose(fits)
         if not self._profiles:
             yield from self._hear(ReadRegisters(self._slave, 0, 1))
         rtts = sorted(self._rtts)
@@ -147,29 +192,58 @@ class Identification:
     def _note(self, **changes: object) -> None:
         self._found = replace(self._found, **changes)  # type: ignore[arg-type]  # replace checks the names
 
-    def _fits(self, profile: Profile) -> Generator[ReadRegisters, Outcome, bool]:
-        sure, number = False, None
+    def _choose(self, fits: Sequence[_Fit]) -> None:
+        """Note the profile for which most speaks, and the others (rule 6)."""
+        best = max(fits, key=lambda fit: (fit.evidence, fit.words))  # the first of equals
+        sure = best.evidence is _Evidence.IDENTITY
+        others = () if sure else tuple(fit.profile for fit in fits if fit is not best)
+        self._note(profile=best.profile, alternatives=others, values=best.values, id_register=best.id_register)
+
+    def _fit(self, profile: Profile) -> Generator[ReadRegisters, Outcome, _Fit | None]:
+        evidence, number = _Evidence.VALUES, None
         if profile.slave_id is not None:
             said = yield from self._hear(first_read(profile, self._slave))
             if said is None or said.answer is None:
-                return False
+                return None
             (number,) = said.answer
             if not profile.ids[0] <= number <= profile.ids[1]:
-                return False
-            sure = number == self._slave
+                return None
+            evidence = _Evidence.OWN_ID if number == self._slave else _Evidence.OTHER_ID
         if not (yield from self._identified(profile)):
-            return False
-        block = profile.reads()[0]
-        outcome = yield from self._hear(_read_of(block, self._slave))
-        values: Mapping[str, Value] | Fault = {}
-        if outcome is not None and outcome.answer is not None:
-            values = profile.decode(block, outcome.answer)
-        elif outcome is not None or not (sure and self._found.duplicate):
-            return False
+            return None
+        words, values = yield from self._values(profile, evidence)
         if isinstance(values, Fault) or not (yield from self._rate_agrees(profile)):
-            return False
-        self._note(values=values, id_register=number)
-        return True
+            return None
+        return _Fit(profile, _Evidence.IDENTITY if profile.identify else evidence, words, values, number)
+
+    def _values(
+        self, profile: Profile, evidence: _Evidence
+    ) -> Generator[ReadRegisters, Outcome, tuple[int, Mapping[str, Value] | Fault]]:
+        """Read its first values; return from how many registers, and the values or why they are not believed."""
+        words, values = 0, dict[str, Value]()
+        left = [profile.main_read]
+        while left:
+            block = left.pop(0)
+            outcome = yield from self._hear(_read_of(block, self._slave))
+            if outcome is None and evidence is _Evidence.OWN_ID and self._found.duplicate:
+                continue  # two such devices, whose values collide
+            if outcome is None or outcome.answer is None:
+                absent = (
+                    outcome is not None
+                    and outcome.fault is not None
+                    and outcome.fault.exception_code == ILLEGAL_ADDRESS
+                )
+                instead = profile.without_optional(block) if absent else ()
+                if not instead:
+                    return 0, _NO_ANSWER
+                left.extend(instead)
+                continue
+            read = profile.decode(block, outcome.answer)
+            if isinstance(read, Fault):
+                return 0, read
+            words += block.count
+            values |= read
+        return words, values
 
     def _identified(self, profile: Profile) -> Generator[ReadRegisters, Outcome, bool]:
         for each in profile.identify:

@@ -4,7 +4,7 @@ Rules
 -----
 1. *Recognised*: the register of the slave id has answered with the id of the request, the registers of `identify` and
    of the rate (where the profile has them) hold what they can hold, and every value that is available has answered in
-   range each time it was read.
+   range each time it was read. Optional registers may be absent, but not all values.
 2. *One alone*: the value is read three times, and behind each read a silent slave id is read, so that the line is
    listened to for 0.2, 0.2 and 0.6 s. Two sensors share the id where any of these answers collides, is followed by
    another or by bytes that no longer come when the silent id alone is read, or is impossible (not in range, no finite
@@ -26,6 +26,7 @@ from itertools import pairwise
 
 from lfs10d.line.jobs.identification import rate_fits
 from lfs10d.line.jobs.procedure import Step
+from lfs10d.line.read_plan import ILLEGAL_ADDRESS
 from lfs10d.modbus.outcome import Outcome
 from lfs10d.profiles.blocks import Block
 from lfs10d.profiles.values import Value
@@ -87,10 +88,9 @@ def recognise(
         if reply.register not in each.holds:
             held = "does not answer" if reply.register is None else f"holds 0x{reply.register:04X}"
             return Recognition(f"its register 0x{each.register:04X} {held}, which is not this device")
-    for block in profile.reads():
-        found = yield from _values_fit(block, endpoint, query)
-        if found.why is not None or found.spoilt:
-            return found
+    found = yield from _all_values_fit(endpoint, query)
+    if found.why is not None or found.spoilt:
+        return found
     if profile.baudrate is None:
         return Recognition()
     return (yield from _rate_fits(profile.baudrate.register, endpoint, query))
@@ -112,8 +112,29 @@ def _timeouts(query: IdentityQuery) -> tuple[float | None, ...]:
     return (None, 2 * query.timeout, PATIENT)
 
 
-def _values_fit(block: Block, endpoint: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, Recognition]:
-    """Read a block of values `READS` times; the first answer that is none of such a device decides."""
+def _all_values_fit(endpoint: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, Recognition]:
+    """Read every value; optional ones that it refuses are absent, as long as it has others."""
+    found = Recognition(f"it refuses all its values (exception {ILLEGAL_ADDRESS:02X})")
+    blocks = list(query.profile.reads())
+    while blocks:
+        block = blocks.pop(0)
+        fit, refused = yield from _values_fit(block, endpoint, query)
+        if refused == ILLEGAL_ADDRESS and any(value.optional for value in block.values):
+            blocks[:0] = query.profile.without_optional(block)
+            continue
+        if fit.why is not None or fit.spoilt:
+            return fit
+        found = fit
+    return found
+
+
+def _values_fit(
+    block: Block, endpoint: Endpoint, query: IdentityQuery
+) -> Generator[Step, Outcome, tuple[Recognition, int | None]]:
+    """Read a block of values `READS` times; the first answer that is none of such a device decides.
+
+    The second is the exception with which it was refused.
+    """
     spoilt = answered = 0
     exception: int | None = None
     for timeout in _timeouts(query):
@@ -125,13 +146,13 @@ def _values_fit(block: Block, endpoint: Endpoint, query: IdentityQuery) -> Gener
         answered += 1
         values = block.decode(reply.words)
         if isinstance(values, Fault):
-            return Recognition(values.message)
+            return Recognition(values.message), None
     if spoilt >= READS:
-        return Recognition(spoilt=True)
+        return Recognition(spoilt=True), None
     if answered:
-        return Recognition()
+        return Recognition(), None
     how = "does not answer for" if exception is None else f"refuses (exception {exception:02X})"
-    return Recognition(f"it {how} its values at 0x{block.address:04X}")
+    return Recognition(f"it {how} its values at 0x{block.address:04X}"), exception
 
 
 def look_for_twins(endpoint: Endpoint, silent: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, Look]:
@@ -143,11 +164,15 @@ def look_for_twins(endpoint: Endpoint, silent: Endpoint, query: IdentityQuery) -
 
 
 def _read_and_listen(endpoint: Endpoint, silent: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, Look]:
-    value = next((each for each in query.profile.values if not each.is_text), query.profile.values[0])
-    block = next(block for block in query.profile.reads() if value in block.values)
+    value, block = _number_in(query.profile.reads())
     numbers: list[float] = []
     for window in LISTENING:
         look = yield from _measured(value, block, endpoint, query)
+        if isinstance(look, Look) and look.exception == ILLEGAL_ADDRESS and not numbers:
+            instead = query.profile.without_optional(block)
+            if instead:  # an optional register is absent
+                value, block = _number_in(instead)
+                look = yield from _measured(value, block, endpoint, query)
         if isinstance(look, Look):
             return look
         numbers.append(look)
@@ -157,6 +182,12 @@ def _read_and_listen(endpoint: Endpoint, silent: Endpoint, query: IdentityQuery)
         if not received.silent:
             return (yield from _whose(silent, query))
     return (yield from _take_turns(value, block, numbers, endpoint, query))
+
+
+def _number_in(blocks: Sequence[Block]) -> tuple[Value, Block]:
+    """Return the first number of these reads, and the read that brings it; where all is text, the first value."""
+    places = [(value, block) for block in blocks for value in block.values]
+    return next((place for place in places if not place[0].is_text), places[0])
 
 
 def _whose(silent: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, Look]:

@@ -13,7 +13,10 @@ from lfs10d.line.jobs.identification import FoundDevice
 from lfs10d.modbus.frames import Framing
 from lfs10d.profiles.library import load_profile
 
-LFS10, LD_E = (load_profile(name, relative_to=Path()) for name in ("lfs10", "ld-e"))
+LFS10, LD_E, STATION = (load_profile(name, relative_to=Path()) for name in ("lfs10", "ld-e", "ecowitt-wn90lp"))
+VANE, CUPS, PR_3000 = (
+    load_profile(name, relative_to=Path()) for name in ("renke-rs-fxjt", "renke-rs-fsjt", "pr-3000-fsjt")
+)
 RTU = LineOptions("/dev/ttyUSB0", "none", 8, 1, Framing.RTU, None)
 
 
@@ -77,7 +80,20 @@ def test_what_it_is_is_told_as_far_as_it_is_known(finding: FoundDevice, text: st
         ),
         (sensor(250, suspect=True), ["SUSPECT: others answer too, so it may be no sensor of its own"]),
         (FoundDevice(255, 9600, suspect=True, id_register=2), ["SUSPECT: probably sensor 2, which answers 255 too"]),
-        (FoundDevice(3, 9600, id_register=7), ["its id register holds 7: is the DIP switch set?"]),
+        (FoundDevice(3, 9600, id_register=7), ["its id register holds 7"]),
+        (FoundDevice(3, 9600, profile=LFS10, id_register=7), ["its id register holds 7: is the DIP switch set?"]),
+        (FoundDevice(3, 9600, profile=CUPS, id_register=7), ["its id register holds 7"]),
+        (FoundDevice(144, 9600, profile=STATION), ["the factory id"]),
+        (FoundDevice(1, 9600, profile=STATION), []),
+        (
+            FoundDevice(3, 9600, profile=VANE, alternatives=(CUPS, PR_3000)),
+            [
+                (
+                    "or Renke RS-FSJT-N01 wind speed sensor or PR-3000-FSJT / SN-3000-FSJT wind speed sensor: its "
+                    "answers do not tell which"
+                )
+            ],
+        ),
     ],
 )
 def test_remarks_tell_what_a_newcomer_should_know(finding: FoundDevice, texts: list[str]) -> None:
@@ -165,3 +181,15 @@ def test_a_calibrated_device_is_shown_raw_and_calibrated() -> None:
     assert what(sensor(3), {"wind_speed": None}) == "LFS10 wind speed sensor, 5.5 m/s, calibrated out of range"
     found = plain(sensor(3), {"wind_speed": 5.63})
     assert (found["values"], found["calibrated"]) == ({"wind_speed": 5.5}, {"wind_speed": 5.63})
+
+
+def test_what_answers_cannot_tell_apart_is_named_beside_the_entry_and_in_json() -> None:
+    own = VANE.model_copy(update={"name": "own"})
+    finding = FoundDevice(3, 9600, answers=True, profile=VANE, alternatives=(CUPS, own), values={"sector": 3})
+    entry = next(
+        text for text in snippet([finding], RTU, asked=ScanRequest(files={"own": "my vane.yaml"})) if "id: 3" in text
+    )
+    assert (
+        entry == '  - {id: 3, profile: renke-rs-fxjt}    # or profile renke-rs-fsjt, "my vane.yaml": look at the device'
+    )
+    assert plain(finding)["alternatives"] == ["renke-rs-fsjt", "own"]

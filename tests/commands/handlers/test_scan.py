@@ -60,13 +60,18 @@ def found(slave: int, baudrate: int = 9600, **facts: Any) -> FoundDevice:  # noq
 
 
 def test_each_who_was_found_is_told_with_what_is_known_of_it(asked: Asked, fake: FakeContext) -> None:
-    fake.findings = (found(2), found(3, 19200), found(4, profile=None, duplicate=True), found(255))
+    fake.findings = (
+        found(2, alternatives=(LD_E,)),
+        found(3, 19200),
+        found(4, profile=None, duplicate=True),
+        found(255),
+    )
     status, data = asked("line/scan")
     assert status == "ok"
     first, strange, last, other = data["found"]
     assert first == {
         "id": 2, "baudrate": 9600, "known": True, "suspect": False, "duplicate": False,
-        "device": "mast-top", "profile": "lfs10", "rtt_ms": 21.3,
+        "device": "mast-top", "profile": "lfs10", "alternatives": ["ld-e"], "rtt_ms": 21.3,
     }  # fmt: skip
     assert (strange["profile"], strange["duplicate"], strange["known"]) == (None, True, False)
     assert (last["suspect"], last["known"]) == (True, False)
@@ -94,9 +99,10 @@ def test_who_is_new_recognised_and_beyond_doubt_is_added_as_by_device_add(asked:
         found(7, profile=None),
         found(8, duplicate=True),
         found(9, 19200),
+        found(10, alternatives=(LD_E,)),
         found(250),
     )
-    fake.at = {5, 6}
+    fake.at = {5, 6, 10}
     status, data = asked("line/scan", add=True, id="s")
     assert status == "ok"
     assert [(each["device"], each["slave"], each["profile"]) for each in data["added"]] == [

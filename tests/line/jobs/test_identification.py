@@ -117,12 +117,16 @@ def test_other_devices_are_recognised_by_their_values(profile: Profile, content:
 def test_a_device_that_refuses_everything_is_there_but_unknown() -> None:
     finding, asked = interview(registers({}))
     assert finding == FoundDevice(3, 9600, answers=True, rtt=0.02, exception=2)
-    assert len(asked) == len(PROFILES)
+    assert {(read.address, read.count) for read in asked} == {
+        (profile.slave_id.register, 1) if profile.slave_id else (profile.reads()[0].address, profile.reads()[0].count)
+        for profile in PROFILES
+    }
+    assert len(asked) == len(set(asked)), "what was asked once is not asked again"
 
 
 def test_profiles_whose_ids_it_cannot_have_are_not_tried() -> None:
     _, asked = interview(registers({}), slave=250)
-    assert asked == [ReadRegisters(250, 5, 1)]
+    assert asked == [ReadRegisters(250, register, 1) for register in (5, 0x07D0, 0x1000)]
     finding, asked = interview(registers({0: 7}), slave=250, profiles=[LD_E])
     assert asked == [ReadRegisters(250, 0, 1)]
     assert finding == FoundDevice(250, 9600, answers=True, rtt=0.02)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import pytest
 
+from lfs10d.line.jobs.identification import FoundDevice
+from lfs10d.profiles.library import builtin_names
 from lfs10d.simulator.registers import blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
-from tests.support.scans import ALL, PROFILES, by_id, found_ids, ill, line_of, scanned
+from tests.support.scans import ALL, BUILTIN, PROFILES, by_id, found_ids, ill, line_of, scanned
 
 # -- who is found
 
@@ -72,10 +74,35 @@ def test_a_sensor_whose_value_is_no_number_is_found_as_an_unknown_device() -> No
     assert (finding.answers, finding.profile, dict(finding.values)) == (True, None, {})
 
 
-def test_every_built_in_device_is_recognised() -> None:
-    line = line_of(*(Sensor(10 + place, blueprint=blueprint_of(each)) for place, each in enumerate(PROFILES)))
-    found = by_id(scanned(line, range(1, 20)).scan)
-    assert [found[10 + place].profile for place in range(len(PROFILES))] == list(PROFILES)
+def test_every_built_in_device_is_recognised_or_told_with_what_cannot_be_told_from_it() -> None:
+    """Small numbers are directions and wind speeds alike; devices 40 and 41 lack a register that is optional."""
+    names = builtin_names()
+    line = line_of(
+        *(Sensor(10 + place, blueprint=blueprint_of(BUILTIN[name])) for place, name in enumerate(names)),
+        Sensor(40, blueprint=blueprint_of(BUILTIN["pr-3000-fsjt"])),
+        Sensor(41, blueprint=blueprint_of(BUILTIN["ecowitt-wn90lp"])),
+    )
+    sensors = {sensor.slave: sensor for sensor in line.sensors}
+    sensors[40].add_fault("absent", values=("wind_force",))
+    sensors[41].add_fault("absent", values=("rain_counter",))
+    found = by_id(scanned(line, range(1, 50)).scan)
+    told = {str(names[slave - 10] if slave < 30 else slave): _names(finding) for slave, finding in found.items()}
+    sure = {name: [name] for name in ("lfs10", "ld-e", "fuling-dzb", "eh600", "ecowitt-wn90lp", "dfrobot-sen0483")}
+    assert told == {
+        **sure,
+        "renke-rs-fxjt": ["renke-rs-fxjt", "renke-rs-fsjt", "pr-3000-fsjt"],
+        "renke-rs-fsjt": ["renke-rs-fsjt", "pr-3000-fsjt"],
+        "pr-3000-fsjt": ["pr-3000-fsjt", "renke-rs-fsjt"],
+        "dfrobot-sen0482": ["dfrobot-sen0482", "dfrobot-sen0483"],
+        "40": ["renke-rs-fsjt", "pr-3000-fsjt"],
+        "41": ["ecowitt-wn90lp"],
+    }
+
+
+def _names(finding: FoundDevice) -> list[str]:
+    """Return the profile of a finding and its alternatives by name."""
+    assert finding.profile is not None
+    return [finding.profile.name, *(profile.name for profile in finding.alternatives)]
 
 
 def test_an_echoing_adapter_hides_nobody_and_invents_nobody() -> None:

@@ -172,7 +172,7 @@ class Changing(Mimic):
 
     reads = 0
 
-    def read(self, request: ReadRegisters) -> tuple[int, ...]:
+    def read(self, request: ReadRegisters) -> tuple[int, ...] | int:
         self.reads += request.address == 1
         return (0x4974, 0x2400) if request.address == 1 and self.reads > READS else super().read(request)
 

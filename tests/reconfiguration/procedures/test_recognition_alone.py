@@ -36,7 +36,7 @@ class Blowing(Mimic):
     def blow(self, numbers: Iterable[float]) -> None:
         self._numbers: Iterator[float] = iter(numbers)
 
-    def read(self, request: ReadRegisters) -> tuple[int, ...]:
+    def read(self, request: ReadRegisters) -> tuple[int, ...] | int:
         return words(next(self._numbers)) if request.address == 1 else super().read(request)
 
 
