@@ -22,9 +22,10 @@ from lfs10d.cli.client import parsed
 from lfs10d.commands.message import LARGEST
 from lfs10d.schema.fields import Name
 from lfs10d.web import metrics
-from lfs10d.web.actions import Answer
+from lfs10d.web.actions import DEEPEST_DATA, Answer
 from lfs10d.web.connection import LARGEST_HEAD
 from lfs10d.web.guard import HEADER, HEADERS, HostList, Token, Verdict, cookies_of, same_origin, set_cookie
+from lfs10d.web.pruned import pruned
 from lfs10d.web.viewers import Viewers
 
 BODY_WITHIN: Final = 10.0
@@ -77,6 +78,7 @@ class _Guard:
         if scope["type"] != "http":
             return
         named = [value.decode("latin-1") for name, value in scope["headers"] if name == b"host"]
+        kinds = {name for name, _ in scope["headers"]}
         server = scope.get("server")
 
         async def guarded(message: Message) -> None:
@@ -94,6 +96,8 @@ class _Guard:
             app = PlainTextResponse(text, 421)
         elif sum(len(name) + len(value) for name, value in scope["headers"]) > LARGEST_HEAD:
             app = PlainTextResponse("The headers are too large.\n", 431)
+        elif {b"content-length", b"transfer-encoding"} <= kinds:  # RFC 9112, section 6.1: an attempt at smuggling
+            app = PlainTextResponse("The length of the body is given twice.\n", 400, headers={"connection": "close"})
         elif len(scope["query_string"]) > LONGEST_QUERY:
             app = PlainTextResponse("The address is too long.\n", 414)
         await app(scope, receive, guarded)
@@ -242,8 +246,8 @@ def _file(found: tuple[str, bytes, str], request: Request) -> Response:
 
 def _foreign(request: Request) -> Response | None:
     """Return the refusal of a request that does not come from our own page."""
-    headers = request.headers
-    if not same_origin(headers.get("origin"), headers.get("host")) or HEADER not in headers:
+    headers, origins = request.headers, request.headers.getlist("origin")
+    if len(origins) != 1 or not same_origin(origins[0], headers.get("host")) or HEADER not in headers:
         words = "it needs an Origin equal to the Host, and a header X-Lfs10d"
         return _problem(403, "foreign", f"this request does not come from the page itself: {words}")
     return None
@@ -261,13 +265,23 @@ async def _content(request: Request) -> dict[str, Any] | Response:
     except (TimeoutError, ClientDisconnect):
         return _problem(408, "timeout", "the request did not come to its end in time")
     content = parsed(bytes(body)) if body else {}
-    if not isinstance(content, dict):
+    if not isinstance(content, dict) or not _json(content):
         return _problem(400, "invalid_json", "the body is a JSON object with the parameters")
     return content
 
 
+def _json(content: object) -> bool:
+    """Return whether it can be written as JSON: Python also reads `NaN` and `1e999`, which nobody else does."""
+    try:
+        json.dumps(content, allow_nan=False)
+    except ValueError:
+        return False
+    return True
+
+
 def _answered(answer: Answer) -> Response:
-    return Response(json.dumps(answer.body), answer.code, media_type="application/json")
+    body = answer.body if _json(answer.body) else pruned(answer.body, DEEPEST_DATA)
+    return Response(json.dumps(body), answer.code, media_type="application/json")
 
 
 def _refused(verdict: Verdict) -> Response:

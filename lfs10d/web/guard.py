@@ -148,7 +148,7 @@ class Token:
     def _compared(self, given: str, right: Secret, client: str, now: float) -> Verdict:
         if self.limited(client, now):
             return Verdict.LIMITED
-        if self._token is not None and len(given) <= LONGEST_TOKEN and Secret(given) == right:
+        if self._token is not None and len(given) <= LONGEST_TOKEN and given.isprintable() and Secret(given) == right:
             return Verdict.RIGHT
         if client not in self._wrong and len(self._wrong) >= MOST_ADDRESSES:
             self._wrong = {each: times for each, times in self._wrong.items() if now - times[-1] < MINUTE}

@@ -9,7 +9,7 @@ import re
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Any, Final, TypeGuard
 
 from lfs10d.cli.render.live_state import LiveState, ShownDevice
 from lfs10d.web.curve import Curve, Point
@@ -166,10 +166,10 @@ class LineModel:
 
     def _draw(self, name: str, sample: object, live: LiveState) -> None:
         """Add a sample to the device's curve."""
-        if not isinstance(sample, dict) or sample.get("error") in {"starting", "disabled"}:
+        if not isinstance(sample, dict) or sample.get("error") in ("starting", "disabled"):  # it may be unhashable
             return
         ts = sample.get("ts")
-        if isinstance(ts, int) and not isinstance(ts, bool) and 0 < ts < 2**46:
+        if _is_time(ts):
             value = live.first_value(sample)
             self.curves.setdefault(name, Curve()).add(ts / 1000 + live.ahead, value)
 
@@ -183,8 +183,9 @@ class LineModel:
     def on_status(self, place: str, status: Mapping[str, Any], *, now: float) -> None:
         """Take the daemon's status file, read at `place`."""
         ts = status.get("ts")
-        if not isinstance(ts, int) or ts / 1000 == self._status_ts:
+        if not _is_time(ts) or ts / 1000 == self._status_ts:
             return
+        status = pruned(status)
         side = self._status = Side(LiveState(self.name)) if self._status is None else self._status
         side.live.on_status(status, now=now)
         self._status_ts, self._status_place = ts / 1000, place
@@ -248,6 +249,7 @@ class LineModel:
             "base": self.base,
             "known": side.live.known,
             "source": {"kind": source.kind, "words": source.words},
+            "reached": self.link.connected,
             "daemon": self.link.daemon if self.link.connected else None,
             "broker": self.broker(source),
             "info": {key: side.info.get(key) for key in _INFO_KEYS},
@@ -310,3 +312,8 @@ class LineModel:
         """Return the curve of the overview."""
         curve = self.curves.get(name)
         return [] if curve is None else curve.recent(OVERVIEW)
+
+
+def _is_time(ts: object) -> TypeGuard[int]:
+    """Return whether it may be epoch ms."""
+    return isinstance(ts, int) and not isinstance(ts, bool) and 0 < ts < 2**46

@@ -135,7 +135,7 @@ def _add_device(families: _Families, line: LineModel, side: Side, device: ShownD
     age = side.live.age(device, wall)
     sample = side.samples.get(device.name, {})
     fresh = age is not None and age <= 3 * device.interval + _OLD_AFTER
-    if sample.get("quality") in {"good", "partial"} and device.enabled and fresh:
+    if sample.get("quality") in ("good", "partial") and device.enabled and fresh:
         for name, value in device.values.items():
             unit = unit_words(device.units.get(name, ""))
             ending = f"_{unit}" if unit and not name.endswith(f"_{unit}") else ""

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from lfs10d.web import metrics
 from lfs10d.web.line_model import FRAMES_KEPT, MOST_DEVICES, LineModel, Link
 from tests.web.lines import PLACE, WALL, PublishedLine, entry, sample
 
@@ -237,3 +238,42 @@ def test_nothing_that_is_published_makes_the_whole_unreadable() -> None:
     line.publish("device/mast/telemetry", sample(2, line.wall, 5.0, units={"wind_speed": "x" * 9999}, rtt_ms=math.inf))
     json.dumps(line.model.summary(line.wall), allow_nan=False)
     json.dumps(dict(line.model.devices(None, line.wall)), allow_nan=False)
+
+
+HOSTILE_VALUES = [
+    math.inf, math.nan, 10**400, "x" * 10_000, [], {}, {"a": math.inf}, [math.nan], True, None, -1, "<script>",
+]  # fmt: skip
+HOSTILE_KEYS = (
+    "v", "seq", "ts", "boot", "wind_speed", "unit", "quality", "active", "type", "rtt_ms", "error", "errors", "units",
+    "interval", "id", "label", "name", "enabled", "percent", "code", "since", "activity", "baudrate", "open", "port",
+    "polls", "load_pct", "store", "clock", "profile", "mean_2m", "depth", "connected", "values", "alarm", "slave",
+    "online", "message", "heard",
+)  # fmt: skip
+TOPICS = (
+    "availability", "info", "devices", "line/state", "line/error", "line/stats", "event", "trace",
+    "device/mast/state", "device/mast/telemetry", "device/mast/history", "device/mast/availability",
+    "device/mast/stats", "device/mast/error", "device/mast/config", "device/mast/wind",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("value", HOSTILE_VALUES, ids=lambda value: repr(value)[:20])
+def test_nothing_that_anybody_may_publish_or_write_stops_the_page_or_is_no_json(value: object) -> None:
+    usual = {"v": 1, "seq": 5, "ts": round(WALL * 1000) + 1, "boot": "b", "wind_speed": 1.0, "quality": "good"}
+    for key in HOSTILE_KEYS:
+        for topic in TOPICS:
+            line = PublishedLine()
+            line.measure(1)
+            payload = usual | {key: value}
+            line.publish(topic, [payload] if topic in {"devices", "device/mast/history"} else payload)
+            shown = [line.model.summary(line.wall), dict(line.model.devices(None, line.wall)), list(line.model.frames)]
+            json.dumps(shown, allow_nan=False)
+            metrics.text([line.model], line.wall, openmetrics=True)
+        line = PublishedLine()
+        line.model.link.connected = False
+        for content in (usual | {key: value}, value):
+            named = content | {"name": "mast"} if isinstance(content, dict) else content
+            whole = usual | {"ts": round(line.wall * 1000), "info": content, "line": named, "broker": content}
+            line.model.on_status("/run/x", whole | {"devices": [named]}, now=0.0)
+            line.model.on_status("/run/x", usual | {"ts": value, "devices": content}, now=0.0)
+            json.dumps([line.model.summary(line.wall), dict(line.model.devices(None, line.wall))], allow_nan=False)
+            line.wall += 1.0
