@@ -67,6 +67,7 @@ class LineActions:
     """The requests to one line; `login` is asked for at each."""
 
     login: Callable[[], Login | None]
+    client: Callable[[Login], CommandClient] = CommandClient
     records: deque[RequestRecord] = field(default_factory=lambda: deque(maxlen=RECORDS_KEPT))
     mounting: Mounting | None = None
     _count: int = 0
@@ -100,7 +101,7 @@ class LineActions:
             return self._problem(404, "line/adopt", "unknown_line", "there is no such line")
         if self.mounting is not None and self.mounting.running:
             return self._problem(409, "line/adopt", "busy", "sensors are being mounted already")
-        self.mounting = Mounting(_own(login), names)
+        self.mounting = Mounting(_own(login), names, client=self.client)
         self.mounting.start()
         return Answer(200, {"status": "ok"})
 
@@ -122,10 +123,10 @@ class LineActions:
         if login is None:
             return self._problem(404, name, "unknown_line", "there is no such line")
         self._count += 1
-        record = RequestRecord(self._count, name, parameters, _now())
+        record = RequestRecord(self._count, name, pruned(parameters), _now())
         self.records.append(record)
         content = parameters if parameters.get("id") else {**parameters, "id": secrets.token_hex(6)}
-        client = CommandClient(_own(login))
+        client = self.client(_own(login))
         try:
             await client.connect()
             await client.require_daemon()

@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import secrets
 import time
+from collections.abc import Callable
 from typing import Any, Final
 
 from lfs10d.cli.adopt_loop import AdoptLoop
@@ -13,24 +14,44 @@ from lfs10d.cli.adopt_repeat import ADOPT, HEALTH_WITHIN
 from lfs10d.cli.client import CommandClient
 from lfs10d.cli.login import Login
 from lfs10d.errors import BrokerError, FailedError
+from lfs10d.web.words import answer
 
 LONGEST: Final = 2 * 3600.0
 """s after which it ends by itself: somebody may have closed the page and gone home."""
 FIRST: Final = "Plug in a sensor."
 NEXT: Final = "Plug in the next one."
+SETTING_UP: Final = "A sensor is being set up: leave it connected. This takes about 20 s."
+LONGEST_SEARCH: Final = 8.0
+"""s for the daemon to find that no new sensor is there, where it has not done so yet; later it is known better."""
+LONGER: Final = 1.5
+"""So many times the longest search: what takes longer is a sensor that answered."""
 
 
 class Mounting:
     """The requests, until all names are given or it is stopped; `words` is what the person reads now."""
 
-    def __init__(self, login: Login, names: list[str]) -> None:
+    def __init__(
+        self,
+        login: Login,
+        names: list[str],
+        *,
+        client: Callable[[Login], CommandClient] = CommandClient,
+        now: Callable[[], float] = time.monotonic,
+    ) -> None:
         self._loop = AdoptLoop(names)
         self._login = login
         self._names = names
         self._words = "Looking for the daemon ..."
         self._problem = ""
+        self._told: tuple[object, str] = (None, "")
+        """The code of the last problem, and its words: the loop tells each only once."""
         self._began = round(time.time() * 1000)
         self._task: asyncio.Task[None] | None = None
+        self._client = client
+        self._now = now
+        self._asked_at: float | None = None
+        """When the request under way was sent."""
+        self._longest_search = 0.0
 
     @property
     def running(self) -> bool:
@@ -42,11 +63,17 @@ class Mounting:
         return {
             "running": self.running,
             "began": self._began,
-            "words": self._words,
+            "words": SETTING_UP if self._found else self._words,
             "problem": self._problem,
             "names": self._names,
             "adopted": [{**each.data, "words": each.words} for each in self._loop.adopted],
         }
+
+    @property
+    def _found(self) -> bool:
+        """Whether the request under way takes so long that a sensor must have answered."""
+        limit = LONGER * self._longest_search or LONGEST_SEARCH
+        return self._asked_at is not None and self._now() - self._asked_at > limit
 
     def start(self) -> None:
         """Begin."""
@@ -60,7 +87,7 @@ class Mounting:
                 await self._task
 
     async def _run(self) -> None:
-        client = CommandClient(self._login)
+        client = self._client(self._login)
         try:
             async with asyncio.timeout(LONGEST):
                 await client.connect()
@@ -93,16 +120,34 @@ class Mounting:
         """Send one request; raises FailedError where no plugging and unplugging will mend it."""
         loop = self._loop
         if loop.uncertain and await self._check_health(client):
+            self._words, self._problem = NEXT, ""
             return
         content = dict(loop.content) if client.by_response_topic else {**loop.content, "id": secrets.token_hex(6)}
-        turn = loop.on_response(await client.request(ADOPT, content, None) or {})
+        self._asked_at = self._now()
+        try:
+            response = await client.request(ADOPT, content, None) or {}
+        finally:
+            took, self._asked_at = self._now() - self._asked_at, None
+        turn = loop.on_response(response)
         if turn.adopted is not None:
             self._words, self._problem = NEXT, ""
-        if turn.problem is not None:
-            self._problem = turn.problem
+        else:
+            self._learn(response, took, new=turn.problem is not None)
         if turn.ends:
-            raise FailedError(turn.problem or self._problem)
+            raise FailedError(self._problem)
         await asyncio.sleep(turn.pause)
+
+    def _learn(self, response: dict[str, Any], took: float, *, new: bool) -> None:
+        """Note what a response without a sensor says; its problem is shown for as long as it lasts."""
+        error = response.get("error")
+        code = error.get("code") if isinstance(error, dict) else None
+        if code == "timeout" and response.get("status") == "rejected":
+            self._problem, self._longest_search = "", max(took, self._longest_search)
+            return
+        if new:
+            self._told = (code, answer(response))
+        if code == self._told[0]:
+            self._problem = self._told[1]
 
     async def _check_health(self, client: CommandClient) -> bool:
         """Request the daemon's health; return whether it shows a sensor that was adopted meanwhile."""

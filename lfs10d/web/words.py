@@ -86,7 +86,7 @@ def answer(response: Mapping[str, Any]) -> str:
     verdict = "Nothing was changed" if response.get("status") == "rejected" else "It failed"
     parts = [
         f"{verdict}: {meaning(code)}.",
-        f"{message}." if isinstance(message, str) and message else "",
+        f"{message[0].upper()}{message[1:]}." if isinstance(message, str) and message else "",
         remedy(code),
     ]
     return " ".join(part for part in parts if part).replace("..", ".")

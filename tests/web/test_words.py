@@ -47,7 +47,7 @@ def test_an_active_error_is_explained_and_no_error_is_none() -> None:
         (
             {"status": "rejected", "error": {"code": "busy", "message": "a scan is under way"}},
             (
-                "Nothing was changed: another job is under way. a scan is under way. "
+                "Nothing was changed: another job is under way. A scan is under way. "
                 "Wait for its end, or cancel the scan; then try again."
             ),
         ),
