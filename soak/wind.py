@@ -15,7 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from typing import Any
 from bench.broker import Broker, await_claim
 from bench.programs import end
 from lfs10d.schema.quantities import seconds as duration
+from soak.wind_pandas import RollingGusts
 from soak.wind_reference import Comparison, Measured, compare_record, compare_wind
 
 INTERVALS = {"mast-250ms": 0.25, "mast-500ms": 0.5, "mast-1s": 1.0, "mast-2s": 2.0}
@@ -116,32 +117,44 @@ class Rig:
             )
 
 
-def compared(heard: Iterable[str]) -> tuple[Comparison, dict[str, int]]:
-    """Compare all that was heard, `topic payload` in each line; return how many messages of each kind there were."""
+def compared(heard: Iterable[str], *, pandas: bool = False) -> tuple[Comparison, dict[str, int]]:
+    """Compare all that was heard, `topic payload` in each line; return how many messages of each kind there were.
+
+    `pandas`: with its gusts, in place of the naive reference.
+    """
     samples: defaultdict[str, dict[int, dict[str, Any]]] = defaultdict(dict)
     messages: list[tuple[str, dict[str, Any]]] = []
-    counts: defaultdict[str, int] = defaultdict(int)
     for line in heard:
         topic, _, payload = line.partition(" ")
         leaf, content = topic.rsplit("/", 1)[1], json.loads(payload)
         if leaf in ("wind", "record"):
             messages.append((leaf, content))
-            counts[leaf] += 1
-            continue
-        for sample in content if isinstance(content, list) else [content]:
-            samples[sample["device"]][sample["seq"]] = sample
-    counts["samples"] = sum(len(each) for each in samples.values())
+        else:
+            for sample in content if isinstance(content, list) else [content]:
+                samples[sample["device"]][sample["seq"]] = sample
+    counts = Counter(leaf for leaf, _ in messages)
     measured = {}
     for device, found in samples.items():
         hold = max(HOLD_LEAST, round(2000 * INTERVALS[device]))
         good = [(each["ts"], each["wind_speed"], hold) for each in found.values() if each["quality"] == "good"]
-        counts["good"] += len(good)
+        counts.update(samples=len(found), good=len(good))
         measured[device] = Measured(good)
     made = Comparison()
+    rolling = {device: RollingGusts(each) for device, each in measured.items()} if pandas else {}
     for leaf, message in messages:
         device = message["device"]
-        compare = compare_wind if leaf == "wind" else compare_record
-        compare(made, message, measured[device], undersampled=INTERVALS[device] > 1)
+        undersampled = INTERVALS[device] > 1
+        match leaf, rolling.get(device):
+            case "wind", None:
+                compare_wind(made, message, measured[device], undersampled=undersampled)
+            case "record", None:
+                compare_record(made, message, measured[device], undersampled=undersampled)
+            case "wind", RollingGusts() as second:
+                second.compare_wind(made, message)
+            case "record", RollingGusts() as second if not undersampled:
+                second.compare_record(made, message)
+            case _:
+                pass
     return made, dict(counts)
 
 
@@ -151,6 +164,7 @@ def main() -> int:
     parser.add_argument("--for", dest="length", type=duration, default=3600.0, metavar="TIME", help="(1h)")
     parser.add_argument("--seed", type=int, default=1, help="of the recording (1)")
     parser.add_argument("--heard", type=Path, help="compare what an earlier run heard")
+    parser.add_argument("--pandas", action="store_true", help="with gusts by pandas, which is to be installed")
     options = parser.parse_args()
     folder = Path(tempfile.mkdtemp(prefix="lfs10d-wind-"))
     heard = options.heard or folder / "heard.txt"
@@ -158,7 +172,7 @@ def main() -> int:
         print(f"{options.length:g} s; everything is in {folder}", flush=True)
         Rig(folder, options.length, options.seed).run(options.length)
     with heard.open() as lines:
-        made, counts = compared(lines)
+        made, counts = compared(lines, pandas=options.pandas)
     print(f"{counts}: {made.figures} figures compared, {len(made.differences)} differences")
     for each in made.differences[:SHOWN]:
         print(each)

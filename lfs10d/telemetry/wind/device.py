@@ -112,9 +112,10 @@ class DeviceWind:
     def on_values(self, values: Mapping[str, Value | None], ages: Mapping[str, float], at: int) -> float:
         """Take the values of a good reading at `at`, as `MeasuredWind` does; return when `tick` is wanted for them."""
         self._wind.on_values(values, ages, at, self._hold)
-        held_until = self._wind.held_until
-        if at < held_until < self._look_at:
-            self._look_at = held_until
+        if self._look_at > at:  # a look that is due finds by itself how long the newest value holds
+            held_until = self._wind.held_until
+            if at < held_until < self._look_at:
+                self._look_at = held_until
         return self._look_at + self._late
 
     def due(self, moment: WindMoment) -> float:

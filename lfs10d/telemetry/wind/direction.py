@@ -7,11 +7,12 @@ holds; the standard deviation is Yamartino's (Journal of Climate and Applied Met
 from __future__ import annotations
 
 from array import array
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import asin, atan2, cos, degrees, hypot, isnan, radians, sin, sqrt
+from math import asin, atan2, cos, degrees, hypot, radians, sin, sqrt
 from typing import Final
 
-from lfs10d.telemetry.wind.series import BLOCK, HeldSeries
+from lfs10d.telemetry.wind.series import BLOCK, GAP, Edge, HeldSeries, Sums
 
 RESULTANT_LEAST: Final = 0.05
 """Length of the mean vector below which it has no direction."""
@@ -23,6 +24,8 @@ VARIABLE_BELOW: Final = 180
 """Degrees from which no extremes are reported (ICAO Annex 3, appendix 3, 4.1.5.2)."""
 
 CIRCLE: Final = 360
+SEEN_BYTES: Final = 46
+"""A bit for each whole direction, 1 to 360."""
 
 
 def compass(direction: float) -> int:
@@ -89,23 +92,22 @@ def spread(seen: int) -> Spread | None:
 
 
 class DirectionSeries(HeldSeries):
-    """The directions of one vane."""
+    """The directions of one vane. Of the sums of a block, the integrals are those of the unit vector: north, east."""
 
-    __slots__ = ("_covered", "_east", "_north", "_samples", "_seen")
+    __slots__ = ("_samples", "_seen")
 
     def __init__(self) -> None:
         super().__init__()
-        self._covered, self._north, self._east = array("d"), array("d"), array("d")
-        self._samples = array("B")
-        self._seen: list[int] = []
+        self._samples, self._seen = array("B"), bytearray()
+        """Of each block; the directions seen in it as `SEEN_BYTES`."""
 
     def vector(self, begin: int, end: int) -> Vector:
         """Return the mean vector over [begin, end)."""
-        parts = self._holding(begin, end)
-        covered, north, east = (sum(each[parts.blocks]) for each in (self._covered, self._north, self._east))
-        for first, last in parts.raw:
-            more = self._sums(first, last, begin, end)
-            covered, north, east = covered + more[0], north + more[1], east + more[2]
+        return self.vector_between(self.begin(begin), self.until(end))
+
+    def vector_between(self, begin: Edge, end: Edge) -> Vector:
+        """Return the mean vector from one moment to a later one."""
+        covered, north, east = self.between(begin, end)
         return Vector(round(covered), north, east)
 
     def samples(self, begin: int, end: int) -> int:
@@ -117,14 +119,15 @@ class DirectionSeries(HeldSeries):
         """Return the sector of what was measured within [begin, end)."""
         parts = self._measured(begin, end)
         seen = 0
-        for each in self._seen[parts.blocks]:
-            seen |= each
+        for block in range(parts.blocks.start, parts.blocks.stop):
+            seen |= int.from_bytes(self._seen[block * SEEN_BYTES : (block + 1) * SEEN_BYTES], "little")
         for first, last in parts.raw:
             seen |= self._bits(first, last)
         return spread(seen)
 
     def _good(self, first: int, last: int) -> list[float]:
-        return [value for value in self._values[first:last] if not isnan(value)]
+        scale = self._scale
+        return [value / scale for value in self._values[first:last] if value != GAP]
 
     def _bits(self, first: int, last: int) -> int:
         seen = 0
@@ -132,27 +135,23 @@ class DirectionSeries(HeldSeries):
             seen |= 1 << compass(value)
         return seen
 
-    def _sums(self, first: int, last: int, begin: int, end: int) -> tuple[float, float, float]:
-        values, times = self._held(first, last, begin, end)
-        pairs = [(radians(value), held) for value, held in zip(values, times, strict=True) if not isnan(value)]
-        north, east = sum(cos(angle) * held for angle, held in pairs), sum(sin(angle) * held for angle, held in pairs)
-        return sum(held for _, held in pairs), north, east
-
-    def _closed(self) -> int:
-        return len(self._covered)
+    def _sums(self, values: Sequence[float], held: list[int]) -> Sums:
+        """Return the time covered, and the integrals of the unit vector's north and east parts."""
+        scale = self._scale
+        pairs = [(radians(value / scale), time) for value, time in zip(values, held, strict=True) if value != GAP]
+        north, east = sum(cos(angle) * time for angle, time in pairs), sum(sin(angle) * time for angle, time in pairs)
+        return Sums(sum(time for _, time in pairs), north, east)
 
     def _close(self, first: int) -> None:
-        begin, end = (self._times[place] + self._origin for place in (first, first + BLOCK))
-        covered, north, east = self._sums(first, first + BLOCK, begin, end)
-        self._covered.append(covered)
-        self._north.append(north)
-        self._east.append(east)
         self._samples.append(len(self._good(first, first + BLOCK)))
-        self._seen.append(self._bits(first, first + BLOCK))
+        self._seen += self._bits(first, first + BLOCK).to_bytes(SEEN_BYTES, "little")
 
     def _drop(self, blocks: int) -> None:
-        for column in (self._covered, self._north, self._east, self._samples, self._seen):
-            del column[:blocks]
+        super()._drop(blocks)
+        del self._samples[:blocks], self._seen[: blocks * SEEN_BYTES]
 
-    def _start(self, value: float) -> None:
+    def _start(self, kept: float) -> None:
         """Nothing depends on it."""
+
+    def _scaled_down(self) -> None:
+        """Nothing is in parts of a degree."""

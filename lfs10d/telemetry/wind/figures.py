@@ -70,7 +70,7 @@ class WindTotals:
 class MeasuredWind:
     """The wind at a device with these values; `on_values` takes good ones alone."""
 
-    __slots__ = ("_direction", "_factor", "_inputs", "_speed", "newest", "values")
+    __slots__ = ("_direction", "_factor", "_inputs", "_leading", "_speed", "newest", "values")
 
     def __init__(self, values: WindValues) -> None:
         self.values = values
@@ -78,7 +78,9 @@ class MeasuredWind:
         self._speed = SpeedSeries()
         self._direction = DirectionSeries()
         inputs = ((values.speed, self._speed), (values.direction, self._direction))
-        self._inputs = tuple((name, series) for name, series in inputs if name is not None)
+        self._inputs = tuple((name, series.add) for name, series in inputs if name is not None)
+        self._leading = self._direction if values.speed is None else self._speed
+        """The series whose coverage is published: that of the speed, where there is one."""
         self.newest = 0
         """When the newest values were measured; 0: there are none."""
 
@@ -87,21 +89,17 @@ class MeasuredWind:
 
         Each value holds until the next, for `hold` at most.
         """
-        self.newest = max(at, self.newest)
-        for name, series in self._inputs:
+        if at > self.newest:  # noqa: PLR1730 - a call would take longer; this is done for each sample
+            self.newest = at
+        for name, add in self._inputs:
             value = values.get(name)
             if type(value) in _NUMBERS and name not in ages:
-                series.add(at, value, hold)  # type: ignore[arg-type] # a number
+                add(at, value, hold)  # type: ignore[arg-type] # a number
 
     def end(self, at: int) -> None:
         """Take that nothing holds beyond `at`: the device is no longer measured."""
         self._speed.end(at)
         self._direction.end(at)
-
-    @property
-    def _leading(self) -> SpeedSeries | DirectionSeries:
-        """The series whose coverage is published: that of the speed, where there is one."""
-        return self._direction if self.values.speed is None else self._speed
 
     @property
     def held_until(self) -> int:
@@ -134,11 +132,12 @@ class MeasuredWind:
 
     def _speeds(self, now: int, shift: int, *, undersampled: bool) -> dict[str, object]:
         speed, factor = self._speed, self._factor
-        short, before = speed.mean(now - SHORT, now), speed.mean(now - SHORT - LONG, now - SHORT)
+        until = speed.until(now)
+        short, before = speed.mean_between(speed.begin(now - SHORT), until), speed.mean(now - SHORT - LONG, now - SHORT)
         apart = round(abs(short.mean - before.mean) * factor, SPEED_DECIMALS)
         discontinuity = apart >= DISCONTINUITY and _means(short, SHORT) and _means(before, LONG)
         window = SHORT if discontinuity else LONG
-        long = short if discontinuity else speed.mean(now - LONG, now)
+        long = short if discontinuity else speed.mean_between(speed.begin(now - LONG), until)
         whole = speed.extremes(now - LONG + 1, now + 1)
         peaks = speed.extremes(now - SHORT + GUST_OVER, now + 1) if discontinuity else whole
         gust, lull = (None, None) if undersampled else (peaks.gust, peaks.lull)
@@ -169,7 +168,8 @@ class MeasuredWind:
 
     def _directions(self, now: int, mean: object) -> dict[str, object]:
         direction = self._direction
-        short, long = direction.vector(now - SHORT, now), direction.vector(now - LONG, now)
+        until = direction.until(now)
+        short, long = (direction.vector_between(direction.begin(now - each), until) for each in (SHORT, LONG))
         sector = direction.spread(now - LONG + 1, now + 1)
         variable = sector is not None and sector.degrees >= VARIABLE_FROM
         light = isinstance(mean, float) and mean * self._factor < EXTREMES_FROM

@@ -10,13 +10,14 @@ from __future__ import annotations
 from array import array
 from bisect import bisect_right
 from collections import deque
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import accumulate
-from math import inf, isnan, sqrt
+from math import inf, sqrt
 from operator import mul
-from typing import Final
+from typing import Final, NamedTuple
 
-from lfs10d.telemetry.wind.series import BLOCK, HeldSeries
+from lfs10d.telemetry.wind.series import BLOCK, GAP, SCALE, Edge, HeldSeries, Sums
 
 GUST_OVER: Final = 3000
 """Milliseconds of a gust's mean (WMO-No. 8)."""
@@ -49,8 +50,7 @@ class Mean:
         self.covered = covered
 
 
-@dataclass(frozen=True, slots=True)
-class Peak:
+class Peak(NamedTuple):
     """A gust or lull, and when its mean ended (ms)."""
 
     speed: float
@@ -77,95 +77,100 @@ class Extremes:
             self.lull = other.lull
 
 
-def _column() -> array[float]:
-    return array("d")
+class _Found(NamedTuple):
+    """`samples` values and the greatest of them; the greatest and least mean of 3 s, and the entries they end with.
+
+    Without one they are -inf and inf.
+    """
+
+    samples: int
+    greatest: float
+    gust: float
+    gust_place: int
+    lull: float
+    lull_place: int
+
+    def with_later(self, other: _Found) -> _Found:
+        """Return what is found in both; of equal gusts the later counts."""
+        gust = other if other.gust >= self.gust else self
+        lull = other if other.lull <= self.lull else self
+        return _Found(
+            self.samples + other.samples,
+            max(self.greatest, other.greatest),
+            gust.gust,
+            gust.gust_place,
+            lull.lull,
+            lull.lull_place,
+        )
 
 
-@dataclass(slots=True)
-class _Blocks:
-    """What each block sums up to, one column per figure; without a gust -inf, without a lull inf."""
-
-    covered: array[float] = field(default_factory=_column)
-    first: array[float] = field(default_factory=_column)
-    second: array[float] = field(default_factory=_column)
-    samples: array[float] = field(default_factory=_column)
-    greatest: array[float] = field(default_factory=_column)
-    gust: array[float] = field(default_factory=_column)
-    gust_at: array[float] = field(default_factory=_column)
-    lull: array[float] = field(default_factory=_column)
-    lull_at: array[float] = field(default_factory=_column)
-
-    @property
-    def columns(self) -> tuple[array[float], ...]:
-        """All of them, in this order."""
-        return (
-            self.covered, self.first, self.second, self.samples, self.greatest,
-            self.gust, self.gust_at, self.lull, self.lull_at,
-        )  # fmt: skip
+_NONE: Final = _Found(0, -inf, -inf, 0, inf, 0)
 
 
 class SpeedSeries(HeldSeries):
     """The speeds of one anemometer."""
 
-    __slots__ = ("_blocks", "_zero")
+    __slots__ = ("_greatest", "_gusts", "_gusts_at", "_lulls", "_lulls_at", "_samples", "_zero")
 
     def __init__(self) -> None:
         super().__init__()
-        self._blocks = _Blocks()
-        self._zero = 0.0
+        self._zero: float = 0
         """What speeds are counted from in sums of squares: near the mean these lose no digits."""
+        self._samples, self._greatest = array("B"), array("d")
+        self._gusts, self._gusts_at = array("d"), array("B")
+        self._lulls, self._lulls_at = array("d"), array("B")
+        """Of each block; gusts and lulls with their place in it, -inf and inf where there is none."""
 
     def mean(self, begin: int, end: int) -> Mean:
         """Return the mean over [begin, end)."""
-        parts = self._holding(begin, end)
-        blocks = self._blocks
-        covered, one, two = (sum(each[parts.blocks]) for each in (blocks.covered, blocks.first, blocks.second))
-        for first, last in parts.raw:
-            more = self._sums(first, last, begin, end)
-            covered, one, two = covered + more[0], one + more[1], two + more[2]
+        return self.mean_between(self.begin(begin), self.until(end))
+
+    def mean_between(self, begin: Edge, end: Edge) -> Mean:
+        """Return the mean from one moment to a later one."""
+        covered, one, two = self.between(begin, end)
         if not covered:
             return Mean()
-        return Mean(round(covered), self._zero + one / covered, max(0.0, two - one * one / covered))
+        scale = self._scale
+        mean = (self._zero + one / covered) / scale
+        return Mean(round(covered), mean, max(0.0, two - one * one / covered) / (scale * scale))
 
     def extremes(self, begin: int, end: int) -> Extremes:
         """Return what was measured, and the gusts that were taken, within [begin, end)."""
         parts = self._measured(begin, end)
-        (head, *tail), found = parts.raw, Extremes()
-        found.add(self._scan(*head))
-        if tail:
-            found.add(self._of_blocks(parts.blocks))
-            found.add(self._scan(*tail[0]))
-        return found
+        found = self._scan(*parts.raw[0])
+        if len(parts.raw) > 1:
+            found = found.with_later(self._of_blocks(parts.blocks)).with_later(self._scan(*parts.raw[1]))
+        return Extremes(
+            found.samples,
+            found.greatest if found.samples else None,
+            None if found.gust == -inf else Peak(found.gust, self._times[found.gust_place] + self._origin),
+            None if found.lull == inf else Peak(found.lull, self._times[found.lull_place] + self._origin),
+        )
 
     def newest_gust(self) -> float | None:
         """Return the mean of 3 s that was taken at the newest value, None where it was none."""
         last = len(self._times)
-        gust = self._scan(last - 1, last).gust if last else None
-        return None if gust is None else gust.speed
+        gust = self._scan(last - 1, last).gust
+        return None if gust == -inf else gust
 
-    def _sums(self, first: int, last: int, begin: int, end: int) -> tuple[float, float, float]:
-        """Return time covered, and the integrals of the speed and of its square, counted from `_zero`."""
-        values, held = self._held(first, last, begin, end)
+    def _sums(self, values: Sequence[float], held: list[int]) -> Sums:
+        """Return time covered, and the integrals of the speed as it is kept and of its square, counted from `_zero`."""
+        if GAP in values:
+            held = [0 if value == GAP else time for value, time in zip(values, held, strict=True)]
         zero = self._zero
         apart = [value - zero for value in values]
         weighted = list(map(mul, apart, held))
-        one = sum(weighted)
-        if isnan(one):  # a gap is not a number
-            held = [0 if isnan(value) else time for value, time in zip(apart, held, strict=True)]
-            apart = [0.0 if isnan(value) else value for value in apart]
-            weighted = list(map(mul, apart, held))
-            one = sum(weighted)
-        return sum(held), one, sum(map(mul, weighted, apart))
+        return Sums(sum(held), sum(weighted), sum(map(mul, weighted, apart)))
 
-    def _scan(self, first: int, last: int) -> Extremes:
+    def _scan(self, first: int, last: int) -> _Found:
         """Return the extremes of these entries; a gust may reach back to entries before them."""
-        if first >= last:
-            return Extremes()
+        if first >= last or first < 0:
+            return _NONE
         start = bisect_right(self._times, self._times[first] - GUST_OVER, 0, first)
         times, values = self._times[start:last].tolist(), self._values[start:last].tolist()
-        sums = list(accumulate(values, initial=0.0))
-        if isnan(sums[-1]):
-            return self._scan_gaps(first - start, times, values)
+        if GAP in values:
+            return self._scan_gaps(start, first, times, values)
+        sums = list(accumulate(values, initial=0))
         gusts, places, oldest = [], [], 0
         for place in range(first - start, last - start):
             until = times[place] - GUST_OVER
@@ -174,78 +179,71 @@ class SpeedSeries(HeldSeries):
             count = place + 1 - oldest
             if count >= GUST_LEAST:
                 gusts.append((sums[place + 1] - sums[oldest]) / count)
-                places.append(place)
-        return self._found(last - first, max(values[first - start :]), gusts, [times[place] for place in places])
+                places.append(start + place)
+        return self._found(last - first, max(values[first - start :]), gusts, places)
 
-    def _scan_gaps(self, first: int, times: list[int], values: list[float]) -> Extremes:
-        """Return the extremes of the entries from `first` on, where there are gaps among them or before them."""
-        gusts, ends, good, window = [], [], [], deque[float]()
-        since = deque[int]()
+    def _scan_gaps(self, start: int, first: int, times: list[int], values: Sequence[float]) -> _Found:
+        """Return the extremes of the entries from `first` on, where there are gaps among them or before them.
+
+        Times and values are those from the entry `start` on.
+        """
+        gusts, places, good, window = [], [], [], deque[int]()
         whole_from = 0  # the window has no gap between its values if its oldest entry is none before this one
         for place, (at, value) in enumerate(zip(times, values, strict=True)):
-            while since and times[since[0]] <= at - GUST_OVER:
-                since.popleft()
+            while window and times[window[0]] <= at - GUST_OVER:
                 window.popleft()
-            if isnan(value):
+            if value == GAP:
                 whole_from = place
                 continue
-            since.append(place)
-            window.append(value)
-            if place < first:
+            window.append(place)
+            if start + place < first:
                 continue
             good.append(value)
-            if len(window) >= GUST_LEAST and since[0] >= whole_from:
-                gusts.append(sum(window) / len(window))
-                ends.append(at)
-        return self._found(len(good), max(good, default=-inf), gusts, ends)
+            if len(window) >= GUST_LEAST and window[0] >= whole_from:
+                gusts.append(sum(values[window[0] : place + 1]) / len(window))
+                places.append(start + place)
+        return self._found(len(good), max(good, default=-inf), gusts, places)
 
-    def _found(self, samples: int, greatest: float, gusts: list[float], ends: list[int]) -> Extremes:
+    def _found(self, samples: int, greatest: float, gusts: list[float], places: list[int]) -> _Found:
+        scale = self._scale
         if not gusts:
-            return self._extremes(samples, greatest, (-inf, 0), (inf, 0))
-        gust, lull = max(gusts), min(gusts)
-        last, origin = len(gusts) - 1, self._origin
+            return _Found(samples, greatest / scale, -inf, 0, inf, 0)
+        gust, lull, last = max(gusts), min(gusts), len(gusts) - 1
         backwards = gusts[::-1]  # of equal ones the later counts
-        return self._extremes(
-            samples,
-            greatest,
-            (gust, ends[last - backwards.index(gust)] + origin),
-            (lull, ends[last - backwards.index(lull)] + origin),
-        )
+        gust_at, lull_at = places[last - backwards.index(gust)], places[last - backwards.index(lull)]
+        return _Found(samples, greatest / scale, gust / scale, gust_at, lull / scale, lull_at)
 
-    def _of_blocks(self, which: slice) -> Extremes:
-        blocks = self._blocks
-        gusts, lulls = blocks.gust[which], blocks.lull[which]
+    def _of_blocks(self, which: slice) -> _Found:
+        gusts, lulls, last = self._gusts[which], self._lulls[which], which.stop - 1
         gust, lull = max(gusts), min(lulls)
-        gust_at = blocks.gust_at[which][len(gusts) - 1 - gusts[::-1].index(gust)]
-        lull_at = blocks.lull_at[which][len(lulls) - 1 - lulls[::-1].index(lull)]
-        return self._extremes(
-            int(sum(blocks.samples[which])), max(blocks.greatest[which]), (gust, int(gust_at)), (lull, int(lull_at))
+        gust_block, lull_block = last - gusts[::-1].index(gust), last - lulls[::-1].index(lull)
+        return _Found(
+            sum(self._samples[which]),
+            max(self._greatest[which]),
+            gust,
+            gust_block * BLOCK + self._gusts_at[gust_block],
+            lull,
+            lull_block * BLOCK + self._lulls_at[lull_block],
         )
-
-    def _extremes(self, samples: int, greatest: float, gust: tuple[float, int], lull: tuple[float, int]) -> Extremes:
-        return Extremes(
-            samples,
-            greatest if samples else None,
-            None if gust[0] == -inf else Peak(*gust),
-            None if lull[0] == inf else Peak(*lull),
-        )
-
-    def _closed(self) -> int:
-        return len(self._blocks.covered)
 
     def _close(self, first: int) -> None:
-        begin, end = (self._times[place] + self._origin for place in (first, first + BLOCK))
         found = self._scan(first, first + BLOCK)
-        covered, one, two = self._sums(first, first + BLOCK, begin, end)
-        gust, lull = found.gust or Peak(-inf, 0), found.lull or Peak(inf, 0)
-        greatest = -inf if found.greatest is None else found.greatest
-        figures = (covered, one, two, found.samples, greatest, gust.speed, gust.at, lull.speed, lull.at)
-        for column, figure in zip(self._blocks.columns, figures, strict=True):
-            column.append(figure)
+        self._samples.append(found.samples)
+        self._greatest.append(found.greatest)
+        self._gusts.append(found.gust)
+        self._gusts_at.append(max(0, found.gust_place - first))
+        self._lulls.append(found.lull)
+        self._lulls_at.append(max(0, found.lull_place - first))
 
     def _drop(self, blocks: int) -> None:
-        for column in self._blocks.columns:
+        super()._drop(blocks)
+        for column in (self._samples, self._greatest, self._gusts, self._gusts_at, self._lulls, self._lulls_at):
             del column[:blocks]
 
-    def _start(self, value: float) -> None:
-        self._zero = value
+    def _start(self, kept: float) -> None:
+        self._zero = kept
+
+    def _scaled_down(self) -> None:
+        self._zero /= SCALE
+        self._first = array("d", [each / SCALE for each in self._first])
+        self._second = array("d", [each / SCALE**2 for each in self._second])

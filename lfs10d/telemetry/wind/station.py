@@ -22,6 +22,9 @@ class WindStation:
         self._last_seqs: dict[str, int] = {}
         """Number of the last record of each device that was removed."""
         self._devices: dict[str, DeviceWind] = {}
+        self._dues: dict[str, float] = {}
+        """When each device wants `tick`, in ms."""
+        self._shift = 0
         self._due_at = inf
         self.due = inf
         """Monotonic time at which `tick` is wanted next."""
@@ -34,20 +37,33 @@ class WindStation:
             return
         at = self._clock.at(reading.at, now)
         look_at = device.on_values(reading.values, reading.ages, at)
-        if look_at < self._due_at:
-            self._set_due(look_at, at, reading.at)
+        if look_at < self._dues[reading.device]:
+            self._dues[reading.device] = look_at
+            if look_at < self._due_at:
+                self._set_due(look_at, at, reading.at)
 
     def tick(self, now: Instant) -> list[Publication]:
         """Return what time alone makes due."""
         moment = self._clock.moment(now)
-        published = [each for device in self._devices.values() for each in device.tick(moment)]
-        self._look(moment, now)
+        if moment.shift != self._shift:  # the clock was set: records end at another time
+            self._look(moment, now)
+        at, dues, published = moment.at, self._dues, []
+        for name in [name for name, due in dues.items() if due <= at]:
+            device = self._devices[name]
+            published += device.tick(moment)
+            dues[name] = device.due(moment)
+        self._set_due(min(dues.values(), default=inf), at, now.mono)
         return published
 
     def burst(self, device: str, now: Instant) -> list[Publication]:
         """Return the retained topic of a device; nothing where it measures no wind."""
-        wind = self._devices.get(device)
-        return [] if wind is None else [wind.publication(self._clock.moment(now))]
+        wind, moment = self._devices.get(device), self._clock.moment(now)
+        if wind is None:
+            return []
+        published = wind.publication(moment)
+        self._dues[device] = wind.due(moment)
+        self._set_due(min(self._dues.values()), moment.at, now.mono)
+        return [published]
 
     def topics(self) -> list[str]:
         """Return the retained topics."""
@@ -85,8 +101,9 @@ class WindStation:
         return {} if wind is None else {"wind": wind.snapshot()}
 
     def _look(self, moment: WindMoment, now: Instant) -> None:
-        due_at = min((device.due(moment) for device in self._devices.values()), default=inf)
-        self._set_due(due_at, moment.at, now.mono)
+        self._dues = {name: device.due(moment) for name, device in self._devices.items()}
+        self._shift = moment.shift
+        self._set_due(min(self._dues.values(), default=inf), moment.at, now.mono)
 
     def _set_due(self, due_at: float, at: int, mono: float) -> None:
         """Take when `tick` is wanted, in ms; at the monotonic time `mono` it is `at`, rounded."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from array import array
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.telemetry.wind.series import BLOCK, REACH
+from lfs10d.telemetry.wind.series import BLOCK, REACH, HeldSeries
 from lfs10d.telemetry.wind.speed import Extremes, Mean, Peak, SpeedSeries
 from tests.support.naive_wind import Good, Naive
 
@@ -158,13 +159,37 @@ def test_times_go_on_over_the_32_bits_in_which_they_are_kept() -> None:
     assert filled.extremes(begin, begin + STEP * 400).samples == 400
 
 
-def test_memory_is_bounded_and_small_whatever_the_wind_does() -> None:
-    filled, _ = four_hertz([place / 1000 for place in range(40_000)])
+def columns(of: HeldSeries) -> list[array[int] | array[float] | bytearray]:
+    names = [name for kind in type(of).__mro__[:-1] for name in getattr(kind, "__slots__", ())]
+    return [column for name in names if isinstance(column := getattr(of, name), array | bytearray)]
+
+
+@pytest.mark.parametrize(("thousandths", "most"), [(10, 9.9), (1 / 3, 13.9)])
+def test_memory_is_bounded_and_small_whatever_the_wind_does(thousandths: float, most: float) -> None:
+    filled, _ = four_hertz([place * thousandths / 1000 for place in range(40_000)])
     kept = REACH // STEP
-    assert len(filled._times) <= kept + 5 * BLOCK + 1
-    columns = (filled._values, *filled._blocks.columns)
-    size = len(filled._times) * filled._times.itemsize + sum(len(column) * column.itemsize for column in columns)
-    assert size < 15 * (kept + 5 * BLOCK)
+    assert len(filled._times) <= kept + 3 * BLOCK + 1
+    size = sum(len(column) * memoryview(column).itemsize for column in columns(filled))
+    assert size < most * (kept + 3 * BLOCK)
+
+
+def test_a_value_that_is_no_whole_hundred_thousandth_changes_no_figure_of_those_before() -> None:
+    speeds = [round(8 + 3 * math.sin(place / 9), 2) for place in range(500)]
+    values = [(T + STEP * place + (9000 if place > 200 else 0), speed, HOLD) for place, speed in enumerate(speeds)]
+    filled, naive, end = series(values), Naive(values), values[-1][0]
+    before = filled.mean(T, end), filled.extremes(T, end + 1)
+    filled.add(end + STEP, math.pi, HOLD)
+    assert (filled.mean(T, end), filled.extremes(T, end + 1)) == before
+    assert filled.extremes(end, end + STEP + 1).samples == 2
+    assert filled.extremes(end + 1, end + STEP + 1).greatest == math.pi
+    compare(filled, Naive([*values, (end + STEP, math.pi, HOLD)]), T + 1000, end + STEP)
+    assert naive.values == values
+
+
+@pytest.mark.parametrize("value", [20_000.0, 1e300])
+def test_a_value_beyond_32_bits_is_kept_as_it_is(value: float) -> None:
+    filled = series([(T, 1.0, HOLD), (T + 1000, value, HOLD)])
+    assert filled.extremes(T, T + 2000).greatest == value
 
 
 # -- sums of windows ----------------------------------------------------------------------------------------------
@@ -190,6 +215,8 @@ def test_of_equal_gusts_the_later_counts() -> None:
     assert found == Extremes(2, 3.0, Peak(3.0, 2), Peak(3.0, 2))
     found.add(Extremes(1, 2.0, Peak(2.0, 3), Peak(4.0, 3)))
     assert found == Extremes(3, 3.0, Peak(3.0, 2), Peak(3.0, 2))
+    found.add(Extremes(1, 4.0, None, None))
+    assert found == Extremes(4, 4.0, Peak(3.0, 2), Peak(3.0, 2))
 
 
 # -- a naive reference ----------------------------------------------------------------------------------------------

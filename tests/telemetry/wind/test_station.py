@@ -202,3 +202,19 @@ def test_a_device_that_stays_the_same_takes_other_times() -> None:
     line.run(100, gusty)
     assert line.station.configure([with_wind(ANEMOMETER, every=1.0)], line.instant(100)) == []
     assert line.station.due <= 101.01
+
+
+def test_after_a_burst_each_device_is_watched_as_before() -> None:
+    line = weather()
+    line.run(4, gusty)
+    line.station.burst("a", line.instant(4))
+    line.run(9)
+    assert times(line, "wind") == [pytest.approx(6, abs=0.01)]
+    assert line.newest("wind")["gust_3s"] is None
+
+
+def test_only_what_is_due_is_looked_at() -> None:
+    others = [with_wind(replace(ANEMOMETER, name=name), every=every) for name, every in (("b", 7.0), ("c", 3600.0))]
+    line = weather(ANEMOMETER, *others)
+    line.run(30.5)
+    assert [each.topic.split("/")[1] for each in line.published] == ["b", "a", "b", "a", "b", "b", "a"]
