@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-oldest coverage check format docs bench integrations soak deb screens clean
+.PHONY: help demo test test-oldest coverage check format docs bench integrations soak deb deb-same screens clean
 
 help: ## Print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -76,6 +76,9 @@ soak: $(VENV)/.dev ## Account for every sample under faults: FOR=12h SEED=7
 
 deb: $(VENV)/.demo ## Build the Debian package into dist/: SUITE=trixie or SUITE=bookworm
 	packaging/build-deb $(or $(SUITE),trixie)
+
+deb-same: $(VENV)/.demo ## Build the Debian package twice and compare the bytes: SUITE=trixie or SUITE=bookworm
+	packaging/same-bytes $(or $(SUITE),trixie)
 
 screens: $(VENV)/.dev ## Write a screenshot of every state of the page to screens/ (needs chromium)
 	$(BIN)/python -m tests.web.screens screens
