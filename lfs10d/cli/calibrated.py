@@ -55,13 +55,16 @@ class Calibrations:
 
 
 NONE = Calibrations({}, 0)
+UNFINISHED = "line.port"
+"""What is wrong with a file that does not name its port yet, as the sample: it cannot be about this port."""
 
 
 def calibrations_of(port: str, file: Path) -> Calibrations:
     """Return the calibrations that a configuration has for the line at `port`; called by a verb.
 
     Raises ConfigError if a person named the file and it is not valid. Prints on standard error what cannot be known
-    and why; then raw values alone are shown. A file that nobody named and that is not there has no calibration.
+    and why; then raw values alone are shown. A file that nobody named, and that is not there or does not name a port
+    yet, has no calibration.
     """
     named = click.get_current_context().get_parameter_source("config") is click.core.ParameterSource.COMMANDLINE
     calibrations, trouble = _found(port, file, named=named)
@@ -76,7 +79,8 @@ def _found(port: str, file: Path, *, named: bool) -> tuple[Calibrations, str | N
     except ConfigError as error:
         if named:
             raise
-        return NONE, None if _absent(file) else str(error.problems[0])
+        unfinished = _absent(file) or any(problem.path == UNFINISHED for problem in error.problems)
+        return NONE, None if unfinished else str(error.problems[0])
     line = loaded.config.line
     if os.path.realpath(line.port) != os.path.realpath(port):
         return NONE, f"{file} is for another port, {line.port}" if named else None

@@ -59,7 +59,8 @@ def command() -> None:
 def install(*, user: bool, instance: str | None) -> int:
     """Write the units and a sample configuration, and start the service if it is configured.
 
-    Nothing that a person changed is overwritten.
+    Nothing that a person changed is overwritten. Without --instance other lines and the page are restarted where they
+    run, so that after an upgrade all run the new version.
     """
     installation, places = _installation(), _places(user=user)
     if not user:
@@ -77,26 +78,12 @@ def install(*, user: bool, instance: str | None) -> int:
     if install_sample(file):
         click.echo(f"{file} written: a sample")
     places.call("daemon-reload")
-    unit = _unit(instance)
-    manager = "systemctl --user" if user else "sudo systemctl"
-    try:
-        load(file)
-    except ConfigError as error:
-        click.echo(f"Not started, for the configuration is not complete:\n{error}")
-        click.echo(f"Then: {manager} enable --now {unit}")
-        return 0
-    places.call("enable", "--quiet", unit)
-    click.echo(f"Starting {unit} ...")
-    try:
-        places.call("restart", unit)
-    except FailedError as error:
-        journal = "journalctl --user -u" if user else "journalctl -u"
-        click.echo(f"lfs10d: {error}\nThe reason: {journal} {unit} -n 20", err=True)
-        return EXIT_FAILED
-    click.echo(f"{unit} runs. Watch it: lfs10d watch{'' if file == SERVICE_FILE else f' -c {file}'}")
-    if user:
-        click.echo("It ends with your last session, unless: sudo loginctl enable-linger $USER")
-    return 0
+    others = places.running_beside_the_main_unit() if instance is None else []
+    well = _start(file, _unit(instance), places)
+    for other in others:
+        click.echo(f"{other} runs too: restarting it ...")
+        well = _restarted(other, places) and well
+    return 0 if well else EXIT_FAILED
 
 
 @command.command("print", short_help="Print the unit as it would be written.", epilog=EXAMPLES)
@@ -134,6 +121,35 @@ def remove(*, user: bool, instance: str | None) -> int:
     places.call("daemon-reload")
     click.echo(f"Configuration and state stay: {places.configurations}, {_state(user=user)}")
     return 0
+
+
+def _start(file: Path, unit: str, places: ServicePlaces) -> bool:
+    """Enable and start a unit if its configuration is complete; False where it does not start."""
+    try:
+        load(file)
+    except ConfigError as error:
+        manager = "systemctl --user" if places.user else "sudo systemctl"
+        click.echo(f"Not started, for the configuration is not complete:\n{error}")
+        click.echo(f"Then: {manager} enable --now {unit}")
+        return True
+    places.call("enable", "--quiet", unit)
+    click.echo(f"Starting {unit} ...")
+    if not _restarted(unit, places):
+        return False
+    click.echo(f"{unit} runs. Watch it: lfs10d watch{'' if file == SERVICE_FILE else f' -c {file}'}")
+    if places.user:
+        click.echo("It ends with your last session, unless: sudo loginctl enable-linger $USER")
+    return True
+
+
+def _restarted(unit: str, places: ServicePlaces) -> bool:
+    try:
+        places.call("restart", unit)
+    except FailedError as error:
+        journal = "journalctl --user -u" if places.user else "journalctl -u"
+        click.echo(f"lfs10d: {error}\nThe reason: {journal} {unit} -n 20", err=True)
+        return False
+    return True
 
 
 def _installation() -> Installation:

@@ -36,7 +36,7 @@ class Installation:
         prefix = self.lasting
         try:
             template = shipped(f"systemd/{name}", self.prefix).read_text(encoding="utf-8")
-            text = for_installation(template, prefix / "bin/lfs10d", prefix / "share/doc/lfs10d/README.md")
+            text = for_installation(template, prefix / "bin/lfs10d", prefix / "share/doc/lfs10d")
             return marked(text if configurations is None else for_user(text, configurations), self.version)
         except (OSError, ValueError) as error:
             raise FailedError(str(error)) from None
@@ -63,8 +63,14 @@ class ServicePlaces:
     systemctl: Sequence[str]
     user: bool = False
 
-    def call(self, *arguments: str) -> None:
-        """Call systemctl; raises FailedError with what it says."""
+    def running_beside_the_main_unit(self) -> list[str]:
+        """Return the units of further lines, and of the page, that run. Raises FailedError."""
+        words = ("list-units", "--plain", "--no-legend", "--state=active,activating,reloading")
+        listed = self.call(*words, "lfs10d@*.service", "lfs10d-web.service")
+        return [line.split()[0] for line in listed.splitlines() if line.strip()]
+
+    def call(self, *arguments: str) -> str:
+        """Call systemctl and return its output; raises FailedError with what it says."""
         command = [*self.systemctl, *arguments]
         try:
             done = subprocess.run(command, check=False, capture_output=True, text=True)  # noqa: S603  # our own words
@@ -75,6 +81,7 @@ class ServicePlaces:
         if done.returncode:
             said = " ".join(done.stderr.split()) or f"exit code {done.returncode}"
             raise FailedError(f"{' '.join(command)}: {said}")
+        return done.stdout
 
 
 def install_units(installation: Installation, places: ServicePlaces) -> list[str]:

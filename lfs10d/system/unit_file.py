@@ -8,7 +8,8 @@ from pathlib import PurePath
 
 PROGRAM = "/opt/lfs10d/bin/lfs10d"
 """The program in the units as they are shipped."""
-DOCUMENTATION = "/opt/lfs10d/share/doc/lfs10d/README.md"
+DOCUMENTATION = "/opt/lfs10d/share/doc/lfs10d"
+"""The folder of the documentation in them."""
 CONFIGURATION = "/etc/lfs10d/"
 
 _MARK = re.compile(r"# Written by `lfs10d service install` \((?P<version>\S+), (?P<check>[0-9a-f]{16})\)\.[^\n]*\n")
@@ -24,7 +25,7 @@ _PLAIN_PATH = re.compile(r"[A-Za-z0-9/._+@,:-]+")
 
 
 def for_installation(template: str, program: PurePath, documentation: PurePath) -> str:
-    """Return a shipped unit with this installation's program and documentation.
+    """Return a shipped unit with this installation's program and its folder of documentation.
 
     Raises ValueError for a path that a unit's command lines cannot carry as it is.
     """

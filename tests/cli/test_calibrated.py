@@ -107,6 +107,13 @@ def test_a_file_that_was_named_must_be_valid(file: Path, capsys: pytest.CaptureF
     assert capsys.readouterr().err == ""
 
 
+def test_the_sample_that_does_not_name_a_port_yet_is_no_trouble(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """As it lies in /etc/lfs10d when somebody installs and scans for the first time."""
+    file.write_text((Path(__file__).parents[2] / "config/lfs10d.sample.yaml").read_text())
+    assert called(file, named=False) == NONE
+    assert capsys.readouterr().err == ""
+
+
 def test_a_file_that_cannot_be_looked_at_is_not_taken_for_absent(
     file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

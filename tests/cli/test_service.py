@@ -16,6 +16,9 @@ from lfs10d.cli.service_files import Installation, ServicePlaces
 from lfs10d.errors import FailedError
 
 SYSTEMCTL = """#!/bin/sh
+case "$*" in
+  list-units*) cat {folder}/running 2>/dev/null; exit 0 ;;
+esac
 echo "$*" >> {asked}
 case "$*" in *restart*) [ ! -e {folder}/broken ] || {{ echo 'Job failed.' >&2; exit 1; }} ;; esac
 """
@@ -99,6 +102,38 @@ def test_what_is_configured_is_enabled_and_started(words: str, name: str, unit: 
     assert call(f"install {words}") == 0
     assert system.asked() == ["daemon-reload", f"enable --quiet {unit}", f"restart {unit}"]
     assert (system.places.configurations / f"{name}.yaml").read_text() == COMPLETE
+
+
+RUNNING = """\
+lfs10d@roof.service loaded active running lfs10d: RS485 wind sensors to MQTT (roof)
+lfs10d-web.service  loaded active running lfs10d: the live page and figures for Prometheus
+"""
+
+
+@pytest.mark.parametrize(
+    ("configured", "words", "restarted"),
+    [
+        (True, "", ["lfs10d.service", "lfs10d@roof.service", "lfs10d-web.service"]),
+        (False, "", ["lfs10d@roof.service", "lfs10d-web.service"]),
+        (True, "--instance lfs10d", ["lfs10d@lfs10d.service"]),
+    ],
+)
+def test_after_an_upgrade_all_that_runs_runs_the_new_version(
+    system: System, words: str, restarted: list[str], *, configured: bool
+) -> None:
+    """Another line is not interrupted by the installation of one instance."""
+    if configured:
+        system.configured()
+    (system.folder / "running").write_text(RUNNING)
+    assert call(f"install {words}") == 0
+    assert [each.removeprefix("restart ") for each in system.asked() if "restart" in each] == restarted
+
+
+def test_a_further_line_that_does_not_start_again_is_told(system: System, capsys: pytest.CaptureFixture[str]) -> None:
+    (system.folder / "running").write_text(RUNNING)
+    (system.folder / "broken").touch()
+    assert call("install") == 1
+    assert "The reason: journalctl -u lfs10d@roof.service -n 20" in capsys.readouterr().err
 
 
 def test_a_service_that_does_not_start_fails_and_says_where_the_reason_is(

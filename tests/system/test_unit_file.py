@@ -10,17 +10,18 @@ from lfs10d.system.unit_file import for_installation, for_user, is_unchanged, ma
 
 UNITS = Path(__file__).parents[2] / "systemd"
 BOTH = ("lfs10d.service", "lfs10d@.service")
+ALL = (*BOTH, "lfs10d-web.service")
 PROGRAM = PurePosixPath("/opt/pipx/venvs/lfs10d/bin/lfs10d")
-README = PurePosixPath("/opt/pipx/venvs/lfs10d/share/doc/lfs10d/README.md")
+PAGES = PurePosixPath("/opt/pipx/venvs/lfs10d/share/doc/lfs10d")
 
 
 def text_of(unit: str) -> str:
     return (UNITS / unit).read_text()
 
 
-@pytest.mark.parametrize("unit", BOTH)
+@pytest.mark.parametrize("unit", ALL)
 def test_a_unit_names_this_installation_and_is_otherwise_the_shipped_one(unit: str) -> None:
-    made = for_installation(text_of(unit), PROGRAM, README)
+    made = for_installation(text_of(unit), PROGRAM, PAGES)
     assert "/opt/lfs10d" not in made
     assert made.replace("/opt/pipx/venvs/lfs10d/", "/opt/lfs10d/") == text_of(unit)
 
@@ -28,7 +29,7 @@ def test_a_unit_names_this_installation_and_is_otherwise_the_shipped_one(unit: s
 @pytest.mark.parametrize("bad", ["/opt/a b/bin/lfs10d", "/opt/100%/bin/lfs10d", "/opt/'/bin/lfs10d"])
 def test_a_path_that_a_command_line_cannot_carry_is_refused(bad: str) -> None:
     with pytest.raises(ValueError, match="a unit cannot carry this path"):
-        for_installation(text_of(BOTH[0]), PurePosixPath(bad), README)
+        for_installation(text_of(BOTH[0]), PurePosixPath(bad), PAGES)
     with pytest.raises(ValueError, match="a unit cannot carry this path"):
         for_user(text_of(BOTH[0]), PurePosixPath(bad))
 
