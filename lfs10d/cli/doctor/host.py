@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import statistics
@@ -13,7 +14,7 @@ from pathlib import Path
 from typing import Final
 
 from lfs10d.cli.doctor.finding import Finding, fail, ok, warn
-from lfs10d.cli.doctor.port import Root
+from lfs10d.cli.doctor.port import Root, there
 from lfs10d.system.clock_step import ClockState
 
 SLOW_SYNC: Final = 0.2
@@ -26,6 +27,12 @@ SECTOR: Final = 512
 LONG_ENOUGH: Final = 3600.0
 """s since the boot, before which a rate of writing says little."""
 CLOCK_SLACK: Final = 86400.0
+REFUSED: Final[Mapping[int, str]] = {
+    errno.ENOSPC: "make room: df -h; large folders: sudo du -xh --max-depth=2 /var | sort -h | tail",
+    errno.EDQUOT: "make room, or raise the quota",
+    errno.EROFS: "a failing SD card is made read-only: dmesg; else sudo mount -o remount,rw, and see /etc/fstab",
+}
+"""What to do where a write is refused, by errno. Until then samples are published, and there is no backlog."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +47,8 @@ class DiskState:
     wanted: int
     sync: float | None = None
     written: float | None = None
+    refused: int = 0
+    """The errno with which a write was refused, 0 where none was tried or it went well."""
 
 
 def clock(state: ClockState, now: float, installed: float) -> Iterator[Finding]:
@@ -63,18 +72,24 @@ def clock(state: ClockState, now: float, installed: float) -> Iterator[Finding]:
 def look_at_disk(folder: Path, wanted: int, root: Root | None = None) -> DiskState:
     """Return how the state directory's disk is; writes and removes a small file there if it may."""
     root = root or Root()
-    existing = next(each for each in (folder, *folder.parents) if each.exists())
-    writable = folder.is_dir() and os.access(folder, os.W_OK)
+    existing = next(each for each in (folder, *folder.parents) if there(each))
+    writable = existing == folder and folder.is_dir() and os.access(folder, os.W_OK)
     device = _device(existing)
+    refused = errno.EROFS if os.statvfs(existing).f_flag & os.ST_RDONLY else 0
+    sync = _sync_time(folder) if writable and not refused else None
+    if isinstance(sync, OSError):
+        refused = sync.errno or errno.EIO
+        sync = None
     return DiskState(
         folder=folder,
         device=device,
-        exists=folder.is_dir(),
+        exists=os.path.lexists(folder),
         writable=writable,
         free=shutil.disk_usage(existing).free,
         wanted=wanted,
-        sync=_sync_time(folder) if writable else None,
+        sync=sync,
         written=_written_a_day(device, root),
+        refused=refused,
     )
 
 
@@ -82,10 +97,10 @@ def _device(path: Path) -> str:
     """Return the name of the block device that holds a path, such as mmcblk0p2; "" where it is none."""
     number = path.stat().st_dev
     link = Path(f"/sys/dev/block/{os.major(number)}:{os.minor(number)}")
-    return link.resolve().name if link.exists() else ""
+    return link.resolve().name if there(link) else ""
 
 
-def _sync_time(folder: Path) -> float | None:
+def _sync_time(folder: Path) -> float | OSError:
     probe = folder / f".doctor-{os.getpid()}"
     took = []
     try:
@@ -99,8 +114,8 @@ def _sync_time(folder: Path) -> float | None:
                 os.close(descriptor)
                 probe.unlink()
             took.append(time.monotonic() - began)
-    except OSError:
-        return None
+    except OSError as error:
+        return error
     return statistics.median(took)
 
 
@@ -117,7 +132,13 @@ def _written_a_day(device: str, root: Root) -> float | None:
 def disk(state: DiskState) -> Iterator[Finding]:
     """Yield what is to be said of the disk."""
     where = str(state.folder)
-    if state.sync is not None and state.sync >= STUCK_SYNC:
+    if state.refused:
+        yield fail(
+            "disk",
+            f"{where} cannot be written: {os.strerror(state.refused).lower()}",
+            REFUSED.get(state.refused, "is the disk or SD card failing? dmesg, and journalctl -k -p err"),
+        )
+    elif state.sync is not None and state.sync >= STUCK_SYNC:
         yield fail("disk", f"{where}: a write takes {state.sync:.1f} s", "the disk or SD card is failing: replace it")
     elif state.sync is not None and state.sync >= SLOW_SYNC:
         yield warn("disk", f"{where}: a write takes {state.sync:.1f} s", "is the SD card worn, or the disk busy?")

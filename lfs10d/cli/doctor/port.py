@@ -23,6 +23,8 @@ SERVICE_GROUP: Final = "dialout"
 """The unit's SupplementaryGroups=."""
 RUNNING: Final = frozenset({"ModemManager", "brltty"})
 """Programs that open serial ports by themselves."""
+CONTAINER_MARKS: Final = (".dockerenv", "run/.containerenv", "run/systemd/container")
+"""Of docker; of podman and buildah; of LXC, systemd-nspawn and others (systemd's CONTAINER_INTERFACE)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,11 +66,19 @@ class Root:
             return ""
 
 
+def there(path: Path) -> bool:
+    """Tell whether a path is there; False where one may not look, as below the state of a DynamicUser service."""
+    try:
+        return path.exists()
+    except OSError:
+        return False
+
+
 def look(port: str, root: Root | None = None) -> PortState:
     """Return what the system says of a port; nothing is opened."""
     root = root or Root()
     programs = set(_programs(root))
-    container = any((root.path / mark).exists() for mark in (".dockerenv", "run/.containerenv"))
+    container = any(there(root.path / mark) for mark in CONTAINER_MARKS)
     path = root.path / port.lstrip("/")
     try:
         device = path.resolve(strict=True)
@@ -86,7 +96,7 @@ def look(port: str, root: Root | None = None) -> PortState:
         lasting=_lasting(device, root),
         group=_group(status.st_gid),
         group_may_use=status.st_mode & READ_WRITE == READ_WRITE,
-        driver=(sys_device / "driver").resolve().name if (sys_device / "driver").exists() else "",
+        driver=(sys_device / "driver").resolve().name if there(sys_device / "driver") else "",
         usb_id=_usb_id(sys_device, root),
         latency_ms=int(latency) if latency.isdecimal() else None,
         holder="" if found is None else str(found),
@@ -137,7 +147,7 @@ def _console(name: str, root: Root) -> str:
     """Return why the port is a console: the kernel's, or a login's."""
     names = {name}
     alias = root.path / "dev/serial0"
-    if alias.exists() and alias.resolve().name == name:
+    if there(alias) and alias.resolve().name == name:
         names.add("serial0")
     for word in root.read("proc/cmdline").split():
         match = re.fullmatch(r"console=(\w+)(?:,.*)?", word)
@@ -155,7 +165,9 @@ def judge(state: PortState, *, service: bool) -> Iterator[Finding]:
     if not state.device:
         if state.container:
             yield fail(
-                "port", f"{state.path} is not in this container", "pass it in: --device, see docs/installation.md"
+                "port",
+                f"{state.path} is not in this container",
+                "pass it in (podman, docker: --device): see docs/installation.md",
             )
         else:
             yield fail("port", f"{state.path} is absent", "is the adapter plugged in? ls -l /dev/serial/by-id")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -52,6 +54,9 @@ def test_a_synchronised_clock_is_well() -> None:
         (replace(GOOD_DISK, free=10**6), "warn", "1 MB are free"),
         (replace(GOOD_DISK, writable=False), "warn", "cannot be written by you"),
         (replace(GOOD_DISK, written=50e9), "warn", "50 GB a day"),
+        (replace(GOOD_DISK, refused=errno.ENOSPC), "fail", "cannot be written: no space left on device"),
+        (replace(GOOD_DISK, writable=False, refused=errno.EROFS), "fail", "cannot be written: read-only file system"),
+        (replace(GOOD_DISK, refused=errno.EIO), "fail", "cannot be written: input/output error"),
     ],
 )
 def test_a_disk_in_trouble_is_named(state: DiskState, level: str, text: str) -> None:
@@ -74,6 +79,35 @@ def test_a_directory_is_tried_and_nothing_is_left_there(tmp_path: Path) -> None:
     absent = look_at_disk(tmp_path / "not/yet", 1000, Root(tmp_path / "none"))
     assert (absent.exists, absent.writable, absent.sync, absent.written) == (False, False, None, None)
     assert absent.free > 0
+
+
+def test_a_folder_that_one_may_not_look_into_is_no_trouble(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a person without sudo finds the state of a service with DynamicUser: a link into a closed folder."""
+    link = tmp_path / "lfs10d"
+    link.symlink_to(tmp_path / "private/lfs10d")
+    stat = Path.stat
+
+    def closed(path: Path, *, follow_symlinks: bool = True) -> os.stat_result:
+        if path == link and follow_symlinks:
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return stat(path, follow_symlinks=follow_symlinks)
+
+    monkeypatch.setattr(Path, "stat", closed)
+    seen = look_at_disk(link, 1000, Root(tmp_path / "none"))
+    assert (seen.exists, seen.writable, seen.sync, seen.refused) == (True, False, None, 0)
+    assert "cannot be written by you" in only(list(disk(seen))).text
+
+
+def test_a_disk_that_refuses_a_write_is_not_told_to_be_well(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As a full one does: the folder has the right mode, and a write fails."""
+
+    def full(descriptor: int, data: bytes) -> int:
+        raise OSError(errno.ENOSPC, f"{descriptor} {len(data)}")
+
+    monkeypatch.setattr(os, "write", full)
+    seen = look_at_disk(tmp_path, 1000, Root(tmp_path / "none"))
+    assert (seen.writable, seen.sync, seen.refused) == (True, None, errno.ENOSPC)
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(

@@ -124,6 +124,12 @@ def test_the_system_s_files_are_read(system: System) -> None:
     assert (seen.running, seen.container, seen.is_device) == (frozenset({"ModemManager"}), True, False)
 
 
+@pytest.mark.parametrize("mark", [".dockerenv", "run/.containerenv", "run/systemd/container"])
+def test_every_kind_of_container_is_known(mark: str, system: System) -> None:
+    system.file(mark, "systemd-nspawn")
+    assert system.look("/dev/ttyUSB9") == PortState("/dev/ttyUSB9", container=True)
+
+
 def test_a_port_that_is_not_there_is_told_apart(system: System) -> None:
     system.file("proc/17/comm", "brltty\n")
     assert system.look("/dev/ttyUSB9") == PortState("/dev/ttyUSB9", running=frozenset({"brltty"}))
