@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-oldest coverage check format docs bench integrations soak deb deb-same screens clean
+.PHONY: help demo test test-oldest test-newer coverage check format docs bench integrations soak deb deb-same screens clean
 
 help: ## Print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -46,6 +46,15 @@ $(OLDEST)/.installed: pyproject.toml tests/oldest.py
 
 test-oldest: $(OLDEST)/.installed ## Run the tests of the lowest dependency versions
 	$(OLDEST)/bin/python -m pytest -q -n 3 --dist load $(TESTED_OLDEST)
+
+# With another Python than that of .venv, in an environment of its own: what needs no other program, and is quick.
+NEWER := $(VENV)/newer
+TESTED_NEWER := tests/schema tests/config tests/modbus tests/profiles tests/telemetry tests/outbox tests/commands tests/reconfiguration
+
+test-newer: ## Run the pure tests with another Python: PYTHON=python3.13
+	@$(PYTHON) -m venv --clear $(NEWER)
+	@$(NEWER)/bin/pip install --quiet --editable . 'pytest>=8.3,<10' 'pytest-xdist>=3.6.1,<4' 'hypothesis>=6.112,<7'
+	$(NEWER)/bin/python -m pytest -q -n 2 --dist loadfile -m 'not long' $(TESTED_NEWER)
 
 # Fails below 100 % of lines and branches.
 coverage: $(VENV)/.dev ## Check that pure modules are covered by their own tests
