@@ -53,7 +53,7 @@ GUST_INTERVAL: Final = 1.0
 LOOK_EVERY: Final = 1000
 """Milliseconds between two looks at figures that run out, at least."""
 
-ADDED_UP_AFTER: Final = LONG + MINUTE
+ADDED_UP_AFTER: Final = LONG + MINUTE // 2
 """Milliseconds of a long record after which they are added up; a little less than what is kept."""
 
 LATE: Final = 500

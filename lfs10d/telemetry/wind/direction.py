@@ -10,7 +10,7 @@ from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import asin, atan2, cos, degrees, hypot, radians, sin, sqrt
-from typing import Final
+from typing import ClassVar, Final
 
 from lfs10d.telemetry.wind.series import BLOCK, GAP, Edge, HeldSeries, Sums
 
@@ -95,6 +95,9 @@ class DirectionSeries(HeldSeries):
     """The directions of one vane. Of the sums of a block, the integrals are those of the unit vector: north, east."""
 
     __slots__ = ("_samples", "_seen")
+
+    reach: ClassVar[int] = 660_000
+    """The last 10 min, and what a record may still want of the minute before."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -13,13 +13,13 @@ from array import array
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from operator import sub
-from typing import Final, NamedTuple
+from typing import ClassVar, Final, NamedTuple
 
 BLOCK: Final = 32
 """Entries that are summed up together: a window has at most two blocks of which only a part lies in it."""
 
 REACH: Final = 720_000
-"""Milliseconds that are kept: the last 2 min, and the 10 min before them."""
+"""Milliseconds that are kept at most: the last 2 min, and the 10 min before them."""
 
 SCALE: Final = 100_000
 """Parts of a unit in which values are whole numbers."""
@@ -76,6 +76,9 @@ class HeldSeries:
         "held_until",
         "newest",
     )
+
+    reach: ClassVar[int] = REACH
+    """Milliseconds that are kept."""
 
     def __init__(self) -> None:
         self._times = array("I")
@@ -150,7 +153,7 @@ class HeldSeries:
 
     def _resume(self, at: int, kept: float) -> None:
         """Note the gap before a value; where nothing before it is in any window the series begins with it."""
-        if self._times and at - REACH <= self.held_until:
+        if self._times and at - self.reach <= self.held_until:
             self._times.append(self.held_until - self._origin)
             self._values.append(GAP)
             if len(self._times) > self._close_at:
@@ -173,7 +176,7 @@ class HeldSeries:
         self._first.append(sums.first)
         self._second.append(sums.second)
         self._close(first)
-        blocks = max(0, bisect_right(self._times, at - REACH - self._origin) - 1) // BLOCK
+        blocks = max(0, bisect_right(self._times, at - self.reach - self._origin) - 1) // BLOCK
         if blocks * BLOCK >= _DROPPED_AT_ONCE:
             self._drop(blocks)
         self._close_at = (self._closed + 1) * BLOCK
