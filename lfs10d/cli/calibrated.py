@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from lfs10d.cli import config_option
 from lfs10d.cli.effective_file import with_changes
 from lfs10d.config.effective import Effective
 from lfs10d.config.loader import load
+from lfs10d.config.models import SlaveConfig
 from lfs10d.daemon.state_directory import state_directory
 from lfs10d.errors import ConfigError, StateError
 from lfs10d.profiles.profile import Profile
@@ -27,10 +28,24 @@ def calibration_option(function: Callable[..., Any]) -> Callable[..., Any]:
 
 @dataclass(frozen=True, slots=True)
 class Calibrations:
-    """The calibrated profiles of one line by slave id, each at the line's rate."""
+    """What the configuration knows of a line's slaves, by the slave id that each has now, at the line's rate.
+
+    `profiles` are the calibrated ones, `raw` the same that show values without calibration. `slaves` are all of them
+    whose place is known.
+    """
 
     profiles: Mapping[int, Profile]
     baudrate: int
+    raw: Mapping[int, Profile] = field(default_factory=dict)
+    slaves: Mapping[int, SlaveConfig] = field(default_factory=dict)
+
+    def read_as(self, slave: int, baudrate: int, profile: Profile) -> Profile:
+        """Return the profile by which a device is read so that its raw values are judged as the daemon judges them.
+
+        That is the contract's order: the calibration first, then the range.
+        """
+        known = self.raw.get(slave)
+        return profile if known is None or baudrate != self.baudrate or known.plain != profile else known
 
     def of(
         self, slave: int, baudrate: int, profile: Profile | None, raw: Mapping[str, Value | None]
@@ -84,28 +99,25 @@ def _found(port: str, file: Path, *, named: bool) -> tuple[Calibrations, str | N
     line = loaded.config.line
     if os.path.realpath(line.port) != os.path.realpath(port):
         return NONE, f"{file} is for another port, {line.port}" if named else None
-    if not any(slave.calibration for slave in loaded.config.slaves):
-        return NONE, None
     directory = state_directory(file, line.name, chosen=None, environment=os.environ)
     try:
         return _by_place(with_changes(loaded, directory, chosen=False))
     except StateError as error:
+        if not any(slave.calibration for slave in loaded.config.slaves):
+            return NONE, None
         return NONE, f"{error}; so it is not known which sensor has which slave id now (call it as root)"
 
 
 def _by_place(now: Effective) -> tuple[Calibrations, str | None]:
     """Return the calibrations by where their devices are; a device that is to be looked for has no place."""
-    profiles: dict[int, Profile] = {}
-    unsure: list[str] = []
-    for slave in now.polled.slaves:
-        if not slave.calibration:
-            continue
-        if len(now.places[slave.name]) > 1:
-            unsure.append(slave.name)
-        else:
-            profiles[slave.id] = now.loaded.profiles[slave.profile].calibrated(slave.certificates)
+    sure = {slave.id: slave for slave in now.polled.slaves if len(now.places[slave.name]) == 1}
+    unsure = [slave.name for slave in now.polled.slaves if slave.calibration and slave.id not in sure]
+    plain = {slave.id: (now.loaded.profiles[slave.profile], slave.certificates) for slave in sure.values()}
+    plain = {each: known for each, known in plain.items() if known[1]}
     trouble = f"the daemon has not found out yet which slave id {', '.join(unsure)} has" if unsure else None
-    return Calibrations(profiles, now.config.line.baudrate), trouble
+    profiles = {each: profile.calibrated(certificates) for each, (profile, certificates) in plain.items()}
+    raw = {each: profile.calibrated(certificates, shows_raw=True) for each, (profile, certificates) in plain.items()}
+    return Calibrations(profiles, now.config.line.baudrate, raw, sure), trouble
 
 
 def _absent(file: Path) -> bool:

@@ -134,7 +134,7 @@ class _ReadOptions:
         return DeviceSpec(
             name=f"slave-{self.slave}",
             slave=self.slave,
-            profile=self.profile,
+            profile=self.calibrations.read_as(self.slave, self.baudrate, self.profile),
             codec=self.codec,
             interval=max(interval, self.profile.min_interval),
             response_timeout=self.line.timeout,

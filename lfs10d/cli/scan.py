@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import shlex
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -116,17 +117,19 @@ def command(
     if not given("rates"):
         rates = tuple(dict.fromkeys((*rates, *(rate for each in own.values() for rate in each.rates))))
     known = (*own.values(), *by_evidence(load_profile(name, relative_to=Path()) for name in builtin_names()))
+    calibrations = calibrations_of(line.port, options["config"])
     search = ScanPlan(
         ids,
         tuple(line.timing(rate) for rate in rates),
         Codec(line.framing, Checksum(checksum)),
         tuple(each for each in known if line.framing.value in each.framings and checksum in each.checksums),
         timeout=line.timeout or FIRST_TIMEOUT,
+        read_as=calibrations.read_as,
     )
     if not search.profiles:
         raise click.UsageError(f"none of these profiles speaks {line.framing.value}")
     asked = scan_findings.ScanRequest(checksum, {profile.name: file for file, profile in own.items()})
-    result = _Result(Scan(search), line, asked, calibrations_of(line.port, options["config"]))
+    result = _Result(Scan(search), line, asked, calibrations)
     code = _scan(result, as_json=as_json)
     if not result.opened:
         return code
@@ -140,13 +143,19 @@ def command(
 
 
 def _write(file: Path, result: _Result) -> None:
-    text = "\n".join(scan_findings.snippet(result.scan.found, result.line, asked=result.asked))
+    asked = replace(result.asked, files={name: _seen_from(file, each) for name, each in result.asked.files.items()})
+    text = "\n".join(scan_findings.snippet(result.scan.found, result.line, asked=asked, known=result.calibrations))
     try:
         with file.open("x", encoding="utf-8") as new:
             new.write(f"# What lfs10d scan found.\n{text}\n")
     except OSError as error:
         raise FailedError(f"{file} cannot be written: {error.strerror}") from None
     click.echo(f"{file} written. Look at it, then: lfs10d check -c {shlex.quote(str(file))}", err=True)
+
+
+def _seen_from(file: Path, profile: str) -> str:
+    """Return the path of a profile as a configuration in `file` names it: relative to its folder."""
+    return profile if profile in builtin_names() else os.path.relpath(profile, file.absolute().parent)
 
 
 @dataclass(slots=True)
@@ -184,7 +193,7 @@ class _Result:
         if found and not written:
             click.echo()
             click.echo("# To poll them, save this as lfs10d.yaml, then: lfs10d run -c lfs10d.yaml")
-            for text in scan_findings.snippet(found, self.line, asked=self.asked):
+            for text in scan_findings.snippet(found, self.line, asked=self.asked, known=self.calibrations):
                 click.echo(text)
         if found and not self.scan.noise.ids:
             return

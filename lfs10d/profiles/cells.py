@@ -72,6 +72,8 @@ class Cell:
     modulo: float | None = None
     calibration: Calibration | None = None
     """Applied to the profile's number before it wraps and before its range is judged."""
+    shows_raw: bool = False
+    """Whether the number without calibration is returned of one that is believed with it."""
 
     def decode(self, registers: tuple[int, ...]) -> Value | Fault:
         """Return the value, or why there is none: `unavailable`, `not_finite` or `out_of_range` (a tiny float too)."""
@@ -84,6 +86,7 @@ class Cell:
 
     def believed(self, number: Number) -> Number | Fault:
         """Return a number of the profile as it is published, calibrated, or why it is not."""
+        raw = number
         if self.calibration is not None:
             number = self.calibration.apply(number)
             if abs(number) == inf:
@@ -92,7 +95,7 @@ class Cell:
             number = self._wrapped(number)
         if (self.low is not None and number < self.low) or (self.high is not None and number > self.high):
             return self._outside(number)
-        return number
+        return raw if self.shows_raw else number
 
     def _content(self, registers: tuple[int, ...]) -> int:
         first = registers[self.offset]

@@ -203,15 +203,16 @@ class Profile(Facts):
         """Batch the values once; reads and decoding are on the path of every poll."""
         self._blocks = batch(self.values, self.most_words, self.may_skip)
 
-    def calibrated(self, calibration: Mapping[str, tuple[Number, Number]]) -> Profile:
+    def calibrated(self, calibration: Mapping[str, tuple[Number, Number]], *, shows_raw: bool = False) -> Profile:
         """Return the profile of a device with certificates: scale and offset by value name; itself where there is none.
 
-        Names that it does not have are passed over.
+        Names that it does not have are passed over. `shows_raw`: see `Value.calibrated`.
         """
         if not calibration:
             return self
         values = tuple(
-            value.calibrated(*calibration[value.name]) if value.name in calibration else value for value in self.values
+            value.calibrated(*calibration[value.name], shows_raw=shows_raw) if value.name in calibration else value
+            for value in self.values
         )
         profile = self.model_copy(update={"values": values})
         profile._blocks = batch(profile.values, profile.most_words, profile.may_skip)  # noqa: SLF001 - its own copy

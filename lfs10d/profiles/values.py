@@ -100,6 +100,7 @@ class Value(Registered):
     )
 
     _calibration: Calibration | None = PrivateAttr(None)
+    _shows_raw: bool = PrivateAttr(default=False)
 
     # A field's validator sees those fields above it that have no error, so that each problem is found at once.
 
@@ -232,9 +233,13 @@ class Value(Registered):
         """Whether it is a wind speed: by its name, or by its device class."""
         return WIND_SPEED in (self.name, self.device_class)
 
-    def calibrated(self, scale: Number, offset: Number) -> Value:
-        """Return the value of a device whose certificate says `number * scale + offset`; a wind speed of 0 stays 0."""
+    def calibrated(self, scale: Number, offset: Number, *, shows_raw: bool = False) -> Value:
+        """Return the value of a device whose certificate says `number * scale + offset`; a wind speed of 0 stays 0.
+
+        `shows_raw`: its range is that of the calibrated number, and what is shown is the one without calibration.
+        """
         value = self.model_copy()
+        value._shows_raw = shows_raw  # noqa: SLF001 - its own copy
         value._calibration = Calibration(scale, offset, keeps_zero=self.is_wind_speed)  # noqa: SLF001 - its own copy
         return value
 
@@ -260,4 +265,5 @@ class Value(Registered):
             unavailable=frozenset(bits_of(each, self.type, width) for each in self.unavailable),
             modulo=self.modulo,
             calibration=self._calibration,
+            shows_raw=self._shows_raw,
         )

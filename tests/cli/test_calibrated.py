@@ -13,6 +13,7 @@ from lfs10d.config.changes import Changes, DeviceChange, Place, Verified
 from lfs10d.config.changes_file import ChangesFile
 from lfs10d.errors import ConfigError
 from lfs10d.profiles.library import load_profile
+from lfs10d.reading import Fault
 from lfs10d.system.disk import Disk
 
 LFS10 = load_profile("lfs10", relative_to=Path())
@@ -59,6 +60,31 @@ def test_only_a_slave_with_a_calibration_has_calibrated_values(file: Path, *, na
 def test_a_value_is_what_the_daemon_would_publish(file: Path, raw: float | None, calibrated: float | None) -> None:
     """Rest stays rest; out of the profile's range, or without a raw value, there is none."""
     assert speed(called(file), 3, raw) == {"wind_speed": calibrated}
+
+
+def test_a_raw_value_is_judged_by_the_range_of_the_calibrated_one(file: Path) -> None:
+    """The profile's range is 0 to 100 m/s, the certificate's scale 1.01 and its offset 0.06."""
+    cell = called(file).read_as(3, 19200, LFS10).values[0].cell(1)
+    assert cell.believed(98.9) == 98.9
+    fault = cell.believed(99.5)
+    assert isinstance(fault, Fault)
+    assert fault.message == "wind_speed 100.555 m/s is outside 0..100 m/s"
+    file.write_text(TEXT.replace("scale: 1.01, offset: 0.06", "scale: 0.9, offset: 1"))
+    assert called(file).read_as(3, 19200, LFS10).values[0].cell(1).believed(105.0) == 105.0
+    assert called(file).of(3, 19200, LFS10, {"wind_speed": 105.0}) == {"wind_speed": 95.5}
+
+
+def test_where_nothing_is_calibrated_a_device_is_read_by_its_profile(file: Path) -> None:
+    found, other = called(file), load_profile("ld-e", relative_to=Path())
+    assert found.read_as(4, 19200, LFS10) is LFS10
+    assert found.read_as(3, 9600, LFS10) is LFS10
+    assert found.read_as(3, 19200, other) is other
+
+
+def test_every_slave_whose_place_is_known_is_there(file: Path) -> None:
+    assert {slave: each.name for slave, each in called(file).slaves.items()} == {3: "top", 4: "slave-4"}
+    save(file, Verified(Place(7, 19200), file=3))
+    assert {slave: each.name for slave, each in called(file).slaves.items()} == {7: "top", 4: "slave-4"}
 
 
 def test_a_calibration_is_of_one_place_and_one_kind_of_device(file: Path) -> None:

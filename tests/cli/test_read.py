@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -19,8 +20,9 @@ from lfs10d.profiles.library import load_profile
 from lfs10d.reading import Exchanged, Fault, FaultCode, Purpose
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
-from lfs10d.simulator.registers import blueprint_of
+from lfs10d.simulator.registers import LFS10, blueprint_of
 from lfs10d.simulator.sensor import Sensor
+from lfs10d.simulator.signals import Signal
 from lfs10d.simulator.wire import Format
 from tests.support.verbs import AtTerminal, Lfs10d
 
@@ -73,6 +75,35 @@ def test_a_calibrated_slave_is_shown_raw_and_calibrated(lfs10d: Lfs10d, sensors:
     assert (found["values"], found["calibrated"]) == ({"wind_speed": 12.99}, {"wind_speed": 13.22896})
     table = lfs10d("scan", sensors.path, "--ids=2", "--baudrate=9600", "-c", "own.yaml").stdout
     assert "LFS10 wind speed sensor, 12.99 m/s, calibrated 13.22896 m/s" in table
+
+
+@pytest.mark.parametrize(
+    ("raw", "scale", "shown"), [(105.0, 0.9, "wind_speed   105.0 m/s, calibrated 94.5 m/s"), (99.5, 1.013, None)]
+)
+def test_the_range_is_that_of_the_calibrated_value(
+    lfs10d: Lfs10d, sensors: PtyLine, tmp_path: Path, raw: float, scale: float, shown: str | None
+) -> None:
+    """As the daemon judges it (docs/configuration.md): 105 m/s raw are 94.5 m/s, and 99.5 m/s raw more than 100."""
+    wide = replace(LFS10, signals=(Signal(1, name="wind_speed", low=0, high=200),))
+    sensors.line.add(Sensor(2, blueprint=wide, source=lambda _: raw))
+    (tmp_path / "own.yaml").write_text(
+        f"line: {{port: {sensors.path}}}\nmqtt: {{host: localhost}}\n"
+        f"slaves: [{{id: 2, name: top, calibration: {{wind_speed: {{scale: {scale}}}}}}}]\n"
+    )
+    done = lfs10d("read", sensors.path, "2", "-c", "own.yaml")
+    scanned = lfs10d("scan", sensors.path, "--ids=2", "--baudrate=9600", "-c", "own.yaml", "--write", "new.yaml").stdout
+    if shown is None:
+        assert done.returncode == 1
+        assert "wind_speed 100.7935 m/s is outside 0..100 m/s" in done.stderr
+        assert "unknown device" in scanned
+        return
+    assert done.returncode == 0, done.stderr
+    assert shown in done.stdout
+    assert "LFS10 wind speed sensor, 105.0 m/s, calibrated 94.5 m/s" in scanned
+    assert (
+        "{id: 2, name: top, calibration: {wind_speed: {scale: 0.9, offset: 0.0}}}"
+        in (tmp_path / "new.yaml").read_text()
+    )
 
 
 def test_another_device_at_another_rate_is_read_by_its_profile(

@@ -167,3 +167,9 @@ def test_a_part_and_its_words_fit_the_type(data: dict[str, Any], wrong: list[tup
 
 def test_the_bytes_of_any_register_may_be_swapped() -> None:
     assert decoded(Value.model_validate(VALUE | {"byte_order": "little"}), 0x1234) == 0x3412
+
+
+def test_a_raw_number_is_shown_where_the_calibrated_one_is_believed() -> None:
+    value = Value.model_validate(VALUE | {"range": [0, 10]}).calibrated(0.5, 0, shows_raw=True)
+    assert decoded(value, 20) == 20
+    assert decoded(value, 21).message == "level 10.5 m is outside 0..10 m"

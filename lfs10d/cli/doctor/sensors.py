@@ -118,7 +118,7 @@ def _spec(loaded: LoadedConfig, slave: SlaveConfig, profile: Profile) -> DeviceS
     return DeviceSpec(
         name=slave.name,
         slave=slave.id,
-        profile=profile,
+        profile=profile.calibrated(slave.certificates),
         codec=codec,
         interval=max(0.5, profile.min_interval),
         response_timeout=None,

@@ -5,15 +5,17 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from lfs10d.cli.calibrated import NONE, Calibrations
 from lfs10d.cli.options import LineOptions
 from lfs10d.cli.render.table import columns
+from lfs10d.config.models import SlaveConfig
 from lfs10d.modbus.frames import EXCEPTION_NAMES, Framing
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import NOTHING, Value
@@ -27,6 +29,7 @@ RIGHT = (0, 1, 2)
 
 DEFAULT_PROFILE = "lfs10"
 DEFAULT_BAUDRATE = 9600
+DEFAULT_INTERVAL = 1.0
 ILLEGAL_FUNCTION = 1
 """The exception of a device that does not know the function (Modbus Application Protocol V1.1b3, section 7)."""
 BY_ID = Path("/dev/serial/by-id")
@@ -135,9 +138,16 @@ AS_USUAL = ScanRequest()
 
 
 def snippet(
-    findings: Sequence[FoundDevice], options: LineOptions, by_id: Path = BY_ID, asked: ScanRequest = AS_USUAL
+    findings: Sequence[FoundDevice],
+    options: LineOptions,
+    by_id: Path = BY_ID,
+    asked: ScanRequest = AS_USUAL,
+    known: Calibrations = NONE,
 ) -> Iterator[str]:
-    """Yield a configuration file that polls what was found; what cannot be polled as it is stands in comments."""
+    """Yield a configuration file that polls what was found; what cannot be polled as it is stands in comments.
+
+    What the configuration says already of a slave (`known`) is kept: its name, label, times and calibration.
+    """
     baudrate = usual_rate(findings)
     yield "line:"
     yield f"  port: {lasting_name(options.port, by_id)}"
@@ -155,7 +165,7 @@ def snippet(
     yield "slaves:" if usable else "slaves: []"
     for finding in findings:
         obstacle = _obstacle(finding, baudrate)
-        entry = _entry(finding, options, asked)
+        entry = _entry(finding, options, asked, known)
         if obstacle is not None:
             yield f"  # - {entry}    {obstacle}"
             continue
@@ -180,16 +190,40 @@ def lasting_name(port: str, by_id: Path = BY_ID) -> str:
     return next(lasting, os.path.abspath(port))  # noqa: PTH100  # resolve() would follow links that may be meant
 
 
-def _entry(finding: FoundDevice, options: LineOptions, asked: ScanRequest) -> str:
+def _entry(finding: FoundDevice, options: LineOptions, asked: ScanRequest, known: Calibrations) -> str:
+    slave = known.slaves.get(finding.slave) if finding.baudrate == known.baudrate else None
     fields = [f"id: {finding.slave}"]
+    if slave is not None and slave.name != f"slave-{finding.slave}":
+        fields.append(f"name: {slave.name}")
+    if slave is not None and slave.label is not None:
+        fields.append(f"label: {json.dumps(slave.label)}")
     profile = finding.profile
     if profile is not None and profile.name != DEFAULT_PROFILE:
         fields.append(f"profile: {_word(profile, asked)}")
     if profile is not None and options.framing is Framing.RTU and asked.checksum != profile.checksum:
         fields.append(f"checksum: {asked.checksum}")
+    if slave is not None:
+        fields.extend(_kept(slave, () if profile is None else profile.value_names))
     if options.timeout is not None:
         fields.append(f"response_timeout: {duration_text(options.timeout)}")
+    elif slave is not None and slave.response_timeout is not None:
+        fields.append(f"response_timeout: {duration_text(slave.response_timeout)}")
     return str(finding.slave) if len(fields) == 1 else f"{{{', '.join(fields)}}}"
+
+
+def _kept(slave: SlaveConfig, values: Collection[str]) -> Iterator[str]:
+    """Yield what is configured of a slave and holds for what was found there, which has these values."""
+    if slave.interval != DEFAULT_INTERVAL:
+        yield f"interval: {duration_text(slave.interval) if slave.interval else 0}"
+    if slave.request_gap:
+        yield f"request_gap: {duration_text(slave.request_gap)}"
+    certificates = [
+        f"{name}: {{scale: {entry.scale!r}, offset: {entry.offset!r}}}"
+        for name, entry in slave.calibration.items()
+        if name in values
+    ]
+    if certificates:
+        yield f"calibration: {{{', '.join(certificates)}}}"
 
 
 def _word(profile: Profile, asked: ScanRequest) -> str:

@@ -196,8 +196,8 @@ class Identification:
         """Note the profile for which most speaks, and the others (rule 6)."""
         best = max(fits, key=lambda fit: (fit.evidence, fit.words))  # the first of equals
         sure = best.evidence is _Evidence.IDENTITY
-        others = () if sure else tuple(fit.profile for fit in fits if fit is not best)
-        self._note(profile=best.profile, alternatives=others, values=best.values, id_register=best.id_register)
+        others = () if sure else tuple(fit.profile.plain for fit in fits if fit is not best)
+        self._note(profile=best.profile.plain, alternatives=others, values=best.values, id_register=best.id_register)
 
     def _fit(self, profile: Profile) -> Generator[ReadRegisters, Outcome, _Fit | None]:
         evidence, number = _Evidence.VALUES, None

@@ -218,7 +218,8 @@ class Scan:
         self, slave: int, baudrate: int, timeout: float, first: Outcome | None
     ) -> Generator[Ask, Outcome, None]:
         plan = self.plan
-        steps = Identification(FoundDevice(slave, baudrate), plan.profiles, plan.codec, first).steps()
+        profiles = tuple(plan.read_as(slave, baudrate, profile) for profile in plan.profiles)
+        steps = Identification(FoundDevice(slave, baudrate), profiles, plan.codec, first).steps()
         try:
             request = next(steps)
             while True:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from lfs10d.line.jobs.identification import first_read
@@ -16,6 +17,10 @@ LAST_TIMEOUT = 1.0
 """How long the last id of a round is waited for, in s: the longest learned time-out of a poll."""
 RESERVED_FROM = 248
 """The first id that Modbus reserves (Modbus over Serial Line V1.02, section 2.2); 255 may be a wildcard."""
+
+
+def _as_it_is(_slave: int, _baudrate: int, profile: Profile) -> Profile:
+    return profile
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +38,8 @@ class ScanPlan:
     line_rate: int | None = None
     share: float = 1.0
     timeout: float = FIRST_TIMEOUT
+    read_as: Callable[[int, int, Profile], Profile] = _as_it_is
+    """By which profile a slave at a rate is read to find out whether it is of this one: one with its calibration."""
 
     @property
     def rounds(self) -> tuple[tuple[LineTiming, tuple[int, ...]], ...]:

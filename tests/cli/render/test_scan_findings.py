@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from lfs10d.cli.calibrated import Calibrations
 from lfs10d.cli.options import LineOptions
 from lfs10d.cli.render.scan_findings import ScanRequest, lasting_name, plain, remarks, row, snippet, usual_rate, what
 from lfs10d.config.loader import load
+from lfs10d.config.models import SlaveConfig
 from lfs10d.line.jobs.identification import FoundDevice
 from lfs10d.modbus.frames import Framing
 from lfs10d.profiles.library import load_profile
@@ -193,3 +196,39 @@ def test_what_answers_cannot_tell_apart_is_named_beside_the_entry_and_in_json() 
         entry == '  - {id: 3, profile: renke-rs-fxjt}    # or profile renke-rs-fsjt, "my vane.yaml": look at the device'
     )
     assert plain(finding)["alternatives"] == ["renke-rs-fsjt", "own"]
+
+
+def configured(**more: Any) -> Calibrations:  # noqa: ANN401 - keys of a slave
+    """Return what a configuration knows of slave 3 at 9600 baud."""
+    return Calibrations({}, 9600, slaves={3: SlaveConfig.model_validate({"id": 3, "name": "mast-top", **more})})
+
+
+CERTIFICATE = {"wind_speed": {"scale": 1.013, "offset": -0.06}}
+
+
+def test_what_is_configured_of_a_slave_is_kept_in_what_is_written(tmp_path: Path) -> None:
+    more = {"label": "Mast: 10 m", "interval": "250ms", "request_gap": "50ms", "calibration": CERTIFICATE}
+    known = configured(**more, response_timeout="300ms")
+    file = tmp_path / "site.yaml"
+    file.write_text("\n".join(snippet([sensor(3), sensor(4)], RTU, tmp_path, known=known)))
+    first, second = load(file).config.slaves
+    assert (first.name, first.label, first.interval, first.request_gap) == ("mast-top", "Mast: 10 m", 0.25, 0.05)
+    assert (first.response_timeout, first.certificates) == (0.3, {"wind_speed": (1.013, -0.06)})
+    assert (second.name, second.calibration) == ("slave-4", {})
+
+
+@pytest.mark.parametrize(
+    ("finding", "entry"),
+    [
+        (sensor(3, 19200), "  - 3"),
+        (FoundDevice(3, 9600, answers=True, profile=LD_E), "  - {id: 3, name: mast-top, profile: ld-e, interval: 0}"),
+        (sensor(5), "  - 5"),
+    ],
+)
+def test_what_is_configured_elsewhere_or_of_another_kind_is_not_kept(finding: FoundDevice, entry: str) -> None:
+    assert entry in list(snippet([finding], RTU, known=configured(interval=0, calibration=CERTIFICATE)))
+
+
+def test_a_slave_of_which_nothing_is_configured_is_written_as_its_id() -> None:
+    known = Calibrations({}, 9600, slaves={3: SlaveConfig.model_validate({"id": 3, "name": "slave-3"})})
+    assert "  - 3" in list(snippet([sensor(3)], RTU, known=known))

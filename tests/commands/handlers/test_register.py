@@ -86,6 +86,13 @@ def test_one_register_is_read_where_no_count_is_given(ask: Ask, fake: FakeContex
     assert fake.done == [(None, ReadRegisters(88, 0, 1))]
 
 
+def test_a_device_that_knows_function_16_only_is_written_by_it(ask: Ask, fake: FakeContext) -> None:
+    fake.file.with_name("vane.yaml").write_text(VANE + "write_function: 16\n")
+    fake.start()
+    assert told(ask, "write", device="vane", address=16, value=600).status == "ok"
+    assert fake.done == [("vane", WriteRegister(5, 16, 600, 16))]
+
+
 def test_a_setting_is_written_and_everybody_told_from_what_to_what(ask: Ask, fake: FakeContext) -> None:
     answer = ask("register/write", '{"id":"w1","device":"vane","address":16,"value":600}')
     place = {"device": "vane", "slave": 5, "address": 16}

@@ -44,3 +44,8 @@ def test_the_last_id_of_a_round_is_waited_for_longer() -> None:
 
 def test_the_first_question_is_for_the_id_register() -> None:
     assert search((9,)).opening(9) == ReadRegisters(9, 0x0005, 1)
+
+
+def test_a_device_is_read_by_the_profile_it_is_tried_for_unless_the_plan_knows_its_calibration() -> None:
+    plan = ScanPlan((3,), (LineTiming.of(9600),), Codec(Framing.RTU), (LFS10,))
+    assert plan.read_as(3, 9600, LFS10) is LFS10

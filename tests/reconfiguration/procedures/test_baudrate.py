@@ -22,7 +22,7 @@ from lfs10d.reconfiguration.procedures.baudrate import (
     restore_rate,
 )
 from lfs10d.reconfiguration.procedures.readdress import ECHO_READS
-from tests.support.sensors import Pretence
+from tests.support.sensors import LFS10, Pretence
 
 UP = (9600, 19200)
 BARE = """
@@ -58,6 +58,16 @@ def test_sensors_that_obey_are_moved_one_after_the_other(pretence: Pretence) -> 
     assert report == BaudrateReport(BaudrateEnding.MOVED, {"s1": 19200, "s2": 19200})
     assert pretence.writes == [WriteRegister(1, 4, 2), WriteRegister(2, 4, 2)]
     assert pretence.awaited == [WriteRates()]
+
+
+def test_sensors_that_know_function_16_only_are_written_by_it(pretence: Pretence) -> None:
+    profile = LFS10.model_copy(update={"write_function": 16})
+    pretence.sensor(1)
+    pretence.sensor(2, manner="stores")
+    sensors = tuple(RateSensor(f"s{slave}", slave, pretence.query(profile)) for slave in (1, 2))
+    assert pretence.carry_out(change_rate(RateWish(sensors, *UP), lambda: True)).ended is not BaudrateEnding.MOVED
+    assert {write.function for write in pretence.writes} == {16}
+    assert {(write.slave, write.value) for write in pretence.writes} >= {(1, 2), (2, 2), (1, 1)}, "and moved back by it"
 
 
 def test_a_line_without_sensors_is_moved_at_once(pretence: Pretence) -> None:

@@ -29,7 +29,7 @@ from lfs10d.reconfiguration.procedures.readdress import (
     verify,
     write,
 )
-from tests.support.sensors import Pretence
+from tests.support.sensors import LFS10, Pretence
 
 OLD, NEW = Endpoint(slave=3, baudrate=9600), Endpoint(slave=9, baudrate=9600)
 WISH = ReaddressWish(OLD, 9, (9600, 19200))
@@ -47,6 +47,14 @@ def test_a_sensor_that_obeys_is_written_once_and_found_at_its_new_id(pretence: P
     assert carried_out(pretence) == ReaddressReport(ReaddressEnding.MOVED, 9)
     assert pretence.writes == [WriteRegister(3, 5, 9)]
     assert pretence.awaited == [IdWrite(OLD, NEW, 3)]
+
+
+def test_a_sensor_that_knows_function_16_only_is_written_by_it(pretence: Pretence) -> None:
+    pretence.sensor(3)
+    profile = LFS10.model_copy(update={"write_function": 16})
+    steps = readdress(WISH, pretence.query(profile), lambda: True)
+    assert pretence.carry_out(steps) == ReaddressReport(ReaddressEnding.MOVED, 9)
+    assert pretence.writes == [WriteRegister(3, 5, 9, 16)]
 
 
 @pytest.mark.parametrize(
