@@ -86,7 +86,7 @@ EVENTS: Final[Mapping[EventType, EventPage]] = {
             "key": "slaves.mast-top.interval",
             "device": "mast-top",
             "lost": 0.25,
-            "message": "the file says something else now",
+            "message": "the file has another value now",
         },
     ),
     "change_conflict": EventPage(

@@ -106,7 +106,7 @@ def command(config: Path, state_dir: Path | None, *, merged: bool, as_json: bool
 def _refuse_conflicts(now: Effective, file: Path) -> None:
     """Raise FailedError where no file can say what holds: it would give one slave id to two devices."""
     for name, why in now.conflicts.items():
-        raise FailedError(f"{file}: no file can say what holds now: {name} is not polled, for {why}")
+        raise FailedError(f"{file}: no file can express the effective configuration: {name} is not polled, for {why}")
 
 
 def _warnings(now: Effective) -> Iterator[str]:

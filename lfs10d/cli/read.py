@@ -90,7 +90,7 @@ def command(**values: Any) -> int:  # noqa: ANN401  # twelve options; `_ReadOpti
     config = values.pop("config")
     profile = load_profile(values.pop("profile_name"), relative_to=Path())
     if line.framing.value not in profile.framings:
-        raise click.UsageError(f"profile {profile.name} does not speak {line.framing.value}")
+        raise click.UsageError(f"profile {profile.name} does not support {line.framing.value}")
     first, last = profile.ids
     if not first <= values["slave"] <= last:
         raise click.UsageError(f"profile {profile.name} has ids {first} to {last}, not {values['slave']}")

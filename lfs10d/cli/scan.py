@@ -127,7 +127,7 @@ def command(
         read_as=calibrations.read_as,
     )
     if not search.profiles:
-        raise click.UsageError(f"none of these profiles speaks {line.framing.value}")
+        raise click.UsageError(f"none of these profiles supports {line.framing.value}")
     asked = scan_findings.ScanRequest(checksum, {profile.name: file for file, profile in own.items()})
     result = _Result(Scan(search), line, asked, calibrations)
     code = _scan(result, as_json=as_json)

@@ -166,7 +166,7 @@ class Watch:
             if not self._live.known or status.ts > self._heard_at:
                 words = f"NOT LIVE: the daemon wrote {status.path} {age_text(max(0.0, age))} ago and no more ({why})"
                 return status.live, DataSource(words, alive=False)
-        return self._live, DataSource(f"NOT LIVE: these are the last values heard ({why})", alive=False)
+        return self._live, DataSource(f"NOT LIVE: these are the last values received ({why})", alive=False)
 
     def _arrived(self, message: Incoming) -> None:
         relative = self._client.topics.relative(message.topic)

@@ -178,7 +178,7 @@ def _kept(
 
 
 def _says(entry: Values, key: str) -> str:
-    return "the file says something else now" if key in entry else "the file's own was taken out"
+    return "the file has another value now" if key in entry else "the file's own was taken out"
 
 
 def _dropped(name: str, key: str, lost: object, message: str) -> DroppedChange:

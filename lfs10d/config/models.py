@@ -75,7 +75,7 @@ class LineConfig(Section):
     databits: Annotated[int, Choice((8, 7))] = Field(8, description="Data bits of each character; 7 with ascii only.")
     stopbits: Annotated[int, Choice((1, 2))] = Field(1, description="Stop bits of each character.")
     framing: Annotated[Literal["rtu", "ascii"], Choice(("rtu", "ascii"))] = Field(
-        "rtu", description="Modbus framing, one for the whole line. LFS10 and EH600 speak rtu only."
+        "rtu", description="Modbus framing, one for the whole line. LFS10 and EH600 support rtu only."
     )
     extra_gap: Annotated[float, Duration(0, 1)] = Field(
         0.0, description="Added to the 3.5 characters of silence before each request."

@@ -71,7 +71,7 @@ def silent(timeout: float, *, own: bool = False) -> Diagnosis:
 def late(latency: float) -> Diagnosis:
     """Judge that only the answer to an earlier request came, `latency` s after that."""
     since = milliseconds(latency)
-    return Diagnosis(FaultCode.LATE, f"only the answer to an earlier request came, {since} after it was asked")
+    return Diagnosis(FaultCode.LATE, f"only the answer to an earlier request came, {since} after that request")
 
 
 def babble(waited_for: float) -> Diagnosis:
@@ -91,7 +91,7 @@ def changed_echo() -> Diagnosis:
 
 def displaced(slave: int) -> Diagnosis:
     """Judge that an answer came which may be another master's."""
-    message = f"another master asked slave {slave} at the same time: no answer tells which of the two it is for"
+    message = f"another master sent a request to slave {slave} at the same time: the answer may be for either"
     return Diagnosis(FaultCode.COLLISION, message)
 
 
@@ -103,7 +103,9 @@ def twice(found: Twice) -> str:
     )
 
 
-UNDECIDED = "two answers came to one request: a second sensor with this id, or a repeater; none tells which is whose"
+UNDECIDED = (
+    "two answers came to one request: a second sensor with this id, or a repeater; which is whose cannot be decided"
+)
 RUN_INTO = "broken bytes came right behind the answer: noise, or another answer by a second sensor with this id"
 
 
@@ -167,7 +169,9 @@ def _judge(request: Request, body: bytes) -> Diagnosis:
     asked = len(body) == _REQUEST_BODY and function in READS
     if slave != request.slave:
         if asked:
-            return Diagnosis(FaultCode.WRONG_SLAVE, f"a request to slave {slave} was heard: is there a second master?")
+            return Diagnosis(
+                FaultCode.WRONG_SLAVE, f"a request to slave {slave} was received: is there a second master?"
+            )
         return Diagnosis(FaultCode.WRONG_SLAVE, f"slave {slave} answered in place of slave {request.slave}")
     if function != request.function:
         wrong = f"slave {slave} answered function {function:02X} in place of {request.function:02X}"
@@ -175,7 +179,7 @@ def _judge(request: Request, body: bytes) -> Diagnosis:
     if not isinstance(request, ReadRegisters):
         told = f"slave {slave} confirmed another write: {data.hex(' ').upper()}"
     elif asked:
-        told = f"a request to slave {slave} was heard in place of its answer: an echo, or a second master"
+        told = f"a request to slave {slave} was received in place of its answer: an echo, or a second master"
         return Diagnosis(FaultCode.COLLISION, told)
     else:
         came, announced = max(0, len(data) - 1), sum(data[:1])

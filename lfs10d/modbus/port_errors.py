@@ -101,7 +101,7 @@ def _words(code: int, facts: PortErrorFacts) -> str:
             f"permission denied to the user {facts.user}, and no group may use it: give it to the group dialout by a "
             'udev rule (GROUP="dialout", MODE="0660") and be a member of it'
         )
-    words = _ADVICE.get(code, "cannot be used ({reason}): look at `dmesg` for what its driver says")
+    words = _ADVICE.get(code, "cannot be used ({reason}): see its driver's messages in `dmesg`")
     return words.format(reason=os.strerror(code), user=facts.user, group=facts.group)
 
 

@@ -245,7 +245,7 @@ class Connection:
         events = self._events
         self.abandon()
         if events is not None:
-            message = f"{self._settings.place}: connected, but says nothing: is mqtt.port that of an MQTT broker?"
+            message = f"{self._settings.place}: connected, but no reply comes: is mqtt.port that of an MQTT broker?"
             events.ended(Disconnect(DisconnectReason.WRONG_VERSION, message))
 
     def _cancel_connack(self) -> None:

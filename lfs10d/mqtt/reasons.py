@@ -32,7 +32,7 @@ CERTIFICATE_ALERTS = ("certificate", "unknown ca", "access denied", "handshake f
 _REASONS = {
     0x81: "the broker calls our packet malformed",
     0x82: "the broker sees a protocol error",
-    UNSUPPORTED_VERSION: "the broker does not speak this version of MQTT: set mqtt.version",
+    UNSUPPORTED_VERSION: "the broker does not support this version of MQTT: set mqtt.version",
     0x85: "the broker refuses our client id: set mqtt.client_id",
     0x86: "wrong user name or password: check mqtt.username and mqtt.password_file",
     0x87: "not authorized: check mqtt.username and mqtt.password_file, and the ACL of the broker",
@@ -133,7 +133,7 @@ def gone(
 def _words_of_loss(cause: BaseException | str | None) -> str:
     match cause:
         case None:
-            return "the broker closed it and did not say why"
+            return "the broker closed it without giving a reason"
         case ssl.SSLError():
             return f"TLS: {_reason_of_tls(cause)}"
         case OSError(strerror=str(said)):

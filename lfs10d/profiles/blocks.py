@@ -50,7 +50,7 @@ class Block:
         Return a fault, and take nothing, where the answer has another length than asked for.
         """
         if len(registers) != self.answer:
-            return Fault(FaultCode.MALFORMED, f"{len(registers)} registers came, {self.answer} were asked")
+            return Fault(FaultCode.MALFORMED, f"{len(registers)} registers came, {self.answer} were requested")
         for cell in self.cells:
             value = cell.decode(registers)
             if isinstance(value, Fault):

@@ -168,11 +168,14 @@ class Cell:
 
     def _nothing(self, content: int) -> Fault:
         held = f"0x{content:0{4 * self.words}X}"
-        return Fault(FaultCode.UNAVAILABLE, f"{self.name} is not available: the device says {held}")
+        return Fault(FaultCode.UNAVAILABLE, f"{self.name} is not available: the device sent {held}")
 
     def _unknown(self, content: int) -> Fault:
         known = ", ".join(map(str, self.texts or ()))
-        return Fault(FaultCode.OUT_OF_RANGE, f"{self.name} holds {content}, which has no word; known are {known}")
+        return Fault(
+            FaultCode.OUT_OF_RANGE,
+            f"{self.name} holds {content}, which the profile's map does not name; known are {known}",
+        )
 
     def _not_finite(self, bits: int) -> Fault:
         what = "not a number (NaN)" if isnan(float_of(bits, self.type)) else "infinite"

@@ -20,7 +20,7 @@ class Barrier(Registered):
     """A read whose answer has another shape than any poll's, so that a late answer cannot pass for it."""
 
     function: Literal[3, 4] = Field(3, description="3 reads holding registers, 4 input registers.")
-    count: Annotated[int, Whole(1, MOST_WORDS)] = Field(description="Registers that it asks for.")
+    count: Annotated[int, Whole(1, MOST_WORDS)] = Field(description="Registers that it reads.")
 
 
 class IdRegister(Registered):

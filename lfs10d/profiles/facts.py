@@ -134,8 +134,8 @@ class Facts(BaseModel):
 class Fact(Facts):
     """Something the maker states: `source` is where, `unverified` that nobody has seen it on hardware."""
 
-    source: Sentence | None = Field(None, description="Where the maker says so.")
-    unverified: bool = Field(default=False, description="Nobody has seen it on hardware or in the source documents.")
+    source: Sentence | None = Field(None, description="Where the maker states it.")
+    unverified: bool = Field(default=False, description="Not verified on hardware or in the source documents.")
     notes: Sentence | None = Field(None, description="What else a person should know.")
 
 

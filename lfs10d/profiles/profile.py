@@ -65,7 +65,7 @@ class Profile(Facts):
 
     name: Annotated[str, Name()] = Field(description="What to call it, of a-z 0-9 _ -.")
     title: Sentence = Field(description="What it is, for people.")
-    manufacturer: Sentence | None = Field(None, description="Who makes it, for Home Assistant.")
+    manufacturer: Sentence | None = Field(None, description="The manufacturer, for Home Assistant.")
     model: Sentence | None = Field(None, description="Its model, for Home Assistant; the title where it is not given.")
     sources: Annotated[tuple[Sentence, ...], Field(strict=False)] = Field((), description="The maker's documents.")
     ids: Annotated[tuple[SlaveId, SlaveId], Field(strict=False), AfterValidator(_ids)] = Field(
@@ -79,7 +79,7 @@ class Profile(Facts):
         ("crc",), description="crc, sum or both; the first unless a slave's `checksum` says otherwise."
     )
     max_words: Annotated[int, Whole(1, MOST_WORDS)] = Field(
-        MOST_WORDS, description="Registers that one read may ask for."
+        MOST_WORDS, description="Registers that one read may request."
     )
     ascii_max_data: Annotated[int, Whole(3, 252)] | None = Field(
         None, description="Data bytes that one ascii answer may have."
@@ -92,7 +92,8 @@ class Profile(Facts):
         0, description="Registers without a name that one read may span between two values."
     )
     write_function: Literal[6, 16] = Field(
-        6, description="6, or 16 for a device that knows no other: settings, slave id and baud rate are written by it."
+        6,
+        description="6, or 16 for a device that supports no other: settings, slave id and baud rate are written by it.",
     )
     busy_exceptions: Annotated[tuple[Annotated[int, Whole(1, 255)], ...], Field(strict=False)] = Field(
         BUSY_EXCEPTIONS, description="Exception codes that mean: ask again later."
@@ -101,7 +102,7 @@ class Profile(Facts):
     slave_id: IdRegister | None = Field(None, description="Where its slave id is set.")
     baudrate: RateRegister | None = Field(None, description="Where its baud rate is set.")
     identify: Annotated[tuple[Identity, ...], Field(strict=False)] = Field(
-        (), description="Registers that tell it from other devices; a scan reads them."
+        (), description="Registers that distinguish it from other devices; a scan reads them."
     )
     values: Annotated[tuple[Value, ...], Field(strict=False)] = Field(
         description="What it measures, the most important first."
@@ -111,7 +112,7 @@ class Profile(Facts):
     )
     barrier: Barrier | None = Field(None, description="A read of another length than any poll's.")
     run_commands: Annotated[tuple[Register, ...], Field(strict=False)] = Field(
-        (), description="Registers that set something going; never written, whatever a request says."
+        (), description="Registers that trigger an action; never written, whatever a request asks."
     )
     provenance: dict[str, Sentence] = Field({}, description="Where a plain key's fact comes from, by key.")
     notes: Annotated[tuple[Sentence, ...], Field(strict=False)] = Field((), description="What else to know.")

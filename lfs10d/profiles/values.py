@@ -96,7 +96,7 @@ class Value(Registered):
     precision: Annotated[int, Whole(0, 9)] | None = Field(None, description="Decimals on a display.")
     device_class: Annotated[str, Word()] | None = Field(None, description="Home Assistant's word for its kind.")
     interval: Annotated[float, Duration(0.02, 86400)] | None = Field(
-        None, description="How often it is asked, where that is more rarely than the device."
+        None, description="How often it is polled, where that is less often than the device."
     )
 
     _calibration: Calibration | None = PrivateAttr(None)

@@ -263,7 +263,7 @@ def new_slave(change: OpenChange) -> SlaveConfig | None:
 def _unfit(profile: Profile, line: LineConfig) -> str | None:
     """Return why no new sensor of a profile can be adopted on a line; None if one can."""
     if profile.slave_id is None:
-        return f"profile {profile.name} does not say how its slave id is set"
+        return f"profile {profile.name} does not define how its slave id is set"
     if line.framing not in profile.framings:
         return f"it does not support {line.framing}"
     at_factory = profile.factory is not None and profile.factory.baudrate == line.baudrate

@@ -44,7 +44,7 @@ class Readdress:
         profile = now.loaded.profiles[slave.profile]
         first, last = profile.ids
         if profile.slave_id is None:
-            return rejected("not_allowed", f"{device}: profile {profile.name} does not say how its slave id is set")
+            return rejected("not_allowed", f"{device}: profile {profile.name} does not define how its slave id is set")
         if not first <= to <= last:
             return rejected("invalid_param", f"to: must be {first} to {last} for {profile.name}", param="to")
         if device in now.conflicts:

@@ -77,7 +77,7 @@ _ERRORS: Mapping[ReaddressEnding, tuple[ErrorCode, str]] = {
         "not_verified",
         (
             "since the write {device} answers neither at slave id {old}, where it was last, nor at {to}; "
-            "both are asked until it is found"
+            "both are tried until it is found"
         ),
     ),
 }

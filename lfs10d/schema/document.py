@@ -275,7 +275,7 @@ class _NodeReader:
             self.report(node, path, f"the tag {quoted(node.tag)} is not known; leave it out")
             return _UNREAD
         if FORMS[word].fullmatch(text) is None:
-            self.report(node, path, f"{quoted(text)} is not what its tag says; leave the tag out")
+            self.report(node, path, f"{quoted(text)} does not match its tag; leave the tag out")
             return _UNREAD
         return self.plain(node, word, text, path)
 

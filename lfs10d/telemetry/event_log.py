@@ -15,7 +15,7 @@ from lfs10d.schema.quantities import duration_text
 from lfs10d.telemetry.publication import ERROR, Publication, device_of
 
 _MISSING: Final[Mapping[FaultCode, str]] = {
-    FaultCode.UNAVAILABLE: "the device says that it has none now",
+    FaultCode.UNAVAILABLE: "the device reports no value now",
     FaultCode.NOT_FINITE: "it is NaN or infinite",
     FaultCode.OUT_OF_RANGE: "the number is impossible",
     FaultCode.EXCEPTION: "the device refuses it",
@@ -60,7 +60,9 @@ class EventLog:
         if frames and isinstance(event, Exchanged):
             heard = event.heard.hex(" ") or "nothing"
             fault = f": {event.fault}" if event.fault else ""
-            return [LogEntry(logging.DEBUG, f"slave {event.slave}: sent {event.sent.hex(' ')}, heard {heard}{fault}")]
+            return [
+                LogEntry(logging.DEBUG, f"slave {event.slave}: sent {event.sent.hex(' ')}, received {heard}{fault}")
+            ]
         return []
 
     def _learned_rest(self, reading: Reading) -> list[LogEntry]:

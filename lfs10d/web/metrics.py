@@ -65,7 +65,7 @@ def openmetrics_wanted(accept: str) -> bool:
 def text(lines: Iterable[LineModel], wall: float, *, openmetrics: bool) -> str:
     """Return the figures of these lines; `wall` is now, epoch seconds of this machine."""
     families = _Families()
-    families.of("lfs10d_build_info", "gauge", "The version of lfs10d that tells these figures.").add(
+    families.of("lfs10d_build_info", "gauge", "The version of lfs10d that serves these metrics.").add(
         1, version=__version__
     )
     for line in lines:

@@ -124,7 +124,7 @@ def test_what_does_not_fit_the_file_any_more_is_told() -> None:
     result = CliRunner().invoke(command, ["-c", "lfs10d.yaml"], catch_exceptions=False)
     assert result.exit_code == 0
     lost, conflict = result.stderr.splitlines()
-    assert lost.startswith("lfs10d: slaves.slave-2.interval: the file says something else now")
+    assert lost.startswith("lfs10d: slaves.slave-2.interval: the file has another value now")
     assert conflict.startswith("lfs10d: roof: slave id 9 is taken by nine")
 
 

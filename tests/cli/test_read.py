@@ -296,7 +296,7 @@ def test_a_port_held_by_the_daemon_is_69_and_says_what_to_type(
         (["2", "--baudrate", "9601"], "'9601' is not one of 1200"),
         (["2", "--interval", "often"], "is not a duration"),
         (["2", "--interval", "1ms"], "must be 50ms or more"),
-        (["2", "--framing", "ascii"], "profile lfs10 does not speak ascii"),
+        (["2", "--framing", "ascii"], "profile lfs10 does not support ascii"),
         (["250", "--profile", "ld-e"], "profile ld-e has ids 1 to 247, not 250"),
     ],
 )

@@ -253,11 +253,9 @@ def test_what_needs_a_restart_waits_for_it_whatever_requests_change(site: Site) 
 
 
 def test_news_is_words_for_people() -> None:
-    news = News(
-        [DroppedChange("slaves.a.label", "a", "Top", "the file says something else now")], ["roof: cannot hold"]
-    )
+    news = News([DroppedChange("slaves.a.label", "a", "Top", "the file has another value now")], ["roof: cannot hold"])
     assert news.messages == [
-        "slaves.a.label: the file says something else now: the change made by request is dropped",
+        "slaves.a.label: the file has another value now: the change made by request is dropped",
         "roof: cannot hold",
     ]
 

@@ -159,7 +159,7 @@ def test_options_apply_at_once_and_a_person_s_edit_wins_over_them(
     view.wait("info", lambda info: info["changes"] == 1)
     (lost,) = events(view, "change_dropped")
     assert (lost["key"], lost["device"], lost["lost"]) == ("slaves.slave-1.interval", "slave-1", 0.5)
-    run.says("slaves.slave-1.interval: the file says something else now")
+    run.says("slaves.slave-1.interval: the file has another value now")
     site.write(slaves=[{"id": 1, "interval": "300ms", "label": "One"}, 2])
     run.reload()
     view.wait("info", lambda info: info["changes"] == 0)

@@ -33,7 +33,7 @@ def framed(*bodies: str) -> bytes:
     [
         (WIND, "040304414FD70A", FaultCode.WRONG_SLAVE, "slave 4 answered in place of slave 3"),
         (WIND, "048302", FaultCode.WRONG_SLAVE, "slave 4 answered in place of slave 3"),
-        (WIND, "040300010002", FaultCode.WRONG_SLAVE, "a request to slave 4 was heard: is there a second master?"),
+        (WIND, "040300010002", FaultCode.WRONG_SLAVE, "a request to slave 4 was received: is there a second master?"),
         (WIND, "030404414FD70A", FaultCode.WRONG_FUNCTION, "slave 3 answered function 04 in place of 03"),
         (WIND, "034104414FD70A", FaultCode.WRONG_FUNCTION, "slave 3 answered function 41 in place of 03"),
         (WIND, "038602", FaultCode.WRONG_FUNCTION, "slave 3 answered function 06 in place of 03"),
@@ -44,14 +44,14 @@ def framed(*bodies: str) -> bytes:
             WIND,
             "030300010002",
             FaultCode.COLLISION,  # the contract's new word for a second master
-            "a request to slave 3 was heard in place of its answer: an echo, or a second master",
+            "a request to slave 3 was received in place of its answer: an echo, or a second master",
         ),
         (BITS, "030101FF", FaultCode.MALFORMED, "slave 3 sent 1 data bytes, announced as 1, in place of 2"),
         (
             BITS,
             "030100000009",
             FaultCode.COLLISION,
-            "a request to slave 3 was heard in place of its answer: an echo, or a second master",
+            "a request to slave 3 was received in place of its answer: an echo, or a second master",
         ),
         (SEVERAL, "031000050002", FaultCode.MALFORMED, "slave 3 confirmed another write: 00 05 00 02"),
         (MOVE, "030600050008", FaultCode.MALFORMED, "slave 3 confirmed another write: 00 05 00 08"),
@@ -91,7 +91,7 @@ def test_the_other_faults_have_words() -> None:
     assert diagnosis.silent(0.2, own=True).message == (
         "no answer in 200 ms but our own request came back: does the adapter echo?"
     )
-    assert diagnosis.late(0.5504).message == "only the answer to an earlier request came, 550.4 ms after it was asked"
+    assert diagnosis.late(0.5504).message == "only the answer to an earlier request came, 550.4 ms after that request"
     assert diagnosis.babble(0.2).message == (
         "the line did not fall silent in 200 ms, nothing was sent: a second master, a babbling device or noise"
     )
@@ -189,7 +189,7 @@ def test_two_bytes_are_several() -> None:
 
 def test_a_request_to_read_input_registers_is_a_request_too() -> None:
     found = diagnosis.stranger(WIND, RTU, framed("040400010002"))
-    assert found == (FaultCode.WRONG_SLAVE, "a request to slave 4 was heard: is there a second master?")
+    assert found == (FaultCode.WRONG_SLAVE, "a request to slave 4 was received: is there a second master?")
 
 
 def test_another_write_is_told_in_capital_digits() -> None:
@@ -235,7 +235,7 @@ def test_whatever_was_heard_there_is_one_verdict_in_words_that_can_be_printed(
 def test_what_another_master_may_have_asked_for_is_a_collision() -> None:
     found = diagnosis.displaced(3)
     assert found.code is FaultCode.COLLISION
-    assert "another master asked slave 3" in found.message
+    assert "another master sent a request to slave 3" in found.message
 
 
 def test_a_second_answer_is_told_with_its_delay() -> None:

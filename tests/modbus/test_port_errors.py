@@ -32,7 +32,7 @@ FACTS = PortErrorFacts(user="wind", group="dialout")
         (errno.ENOTTY, "is no serial port"),
         (errno.EINVAL, "is no path of a device"),
         (errno.ENAMETOOLONG, "is no path of a device"),
-        (errno.EMFILE, "cannot be used (Too many open files): look at `dmesg`"),
+        (errno.EMFILE, "cannot be used (Too many open files): see its driver's messages in `dmesg`"),
     ],
 )
 def test_each_cause_has_its_words_and_what_to_do(code: int, words: str) -> None:

@@ -143,9 +143,9 @@ def test_a_payload_of_any_size_comes_cut_is_acknowledged_and_followed_by_the_nex
     [
         (b"\x30\x02\x00\x09", "the connection is lost: Received malformed packet: "),
         (b"\x00\x00", "the connection is lost: Error: Unrecognised command 0"),
-        (b"", "the connection is lost: the broker closed it and did not say why"),
+        (b"", "the connection is lost: the broker closed it without giving a reason"),
         (b"\xe0\x01\x87", "not authorized: check mqtt.username"),
-        (b"\xe0\x00", "the connection is lost: the broker closed it and did not say why"),
+        (b"\xe0\x00", "the connection is lost: the broker closed it without giving a reason"),
     ],
 )
 def test_why_a_connection_ended_is_reported(serving: Serving, bytes_said: bytes, words: str) -> None:

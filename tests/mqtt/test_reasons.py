@@ -106,7 +106,7 @@ def test_why_it_ended_is_always_reported() -> None:
     endings = [gone("broker b:1", left=False, accepted=True, cause=cause) for cause in causes]
     assert {ended.ending for ended in endings} == {DisconnectReason.LOST}
     assert [ended.message.removeprefix("broker b:1: the connection is lost: ") for ended in endings] == [
-        "the broker closed it and did not say why",
+        "the broker closed it without giving a reason",
         "connection reset by peer",
         "connection timed out",
         "no answer to a ping",

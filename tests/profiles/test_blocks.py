@@ -118,7 +118,7 @@ def test_a_value_that_is_not_finite_leaves_the_others_of_its_device() -> None:
 
 def test_another_number_of_registers_than_asked_is_malformed() -> None:
     (block,) = batch([value("a", 1)], 5)
-    assert block.decode((1, 2)) == Fault(FaultCode.MALFORMED, "2 registers came, 1 were asked")
+    assert block.decode((1, 2)) == Fault(FaultCode.MALFORMED, "2 registers came, 1 were requested")
 
 
 LETTERS = {

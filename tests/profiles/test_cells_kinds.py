@@ -111,7 +111,7 @@ def test_faults_say_what_the_device_says() -> None:
     )
     nothing = value.cell(7).decode((0xFFFF,))
     assert isinstance(nothing, Fault)
-    assert nothing.message == "level is not available: the device says 0xFFFF"
+    assert nothing.message == "level is not available: the device sent 0xFFFF"
 
 
 def test_what_is_unavailable_leaves_the_other_values_of_a_read_alone() -> None:

@@ -90,7 +90,7 @@ def test_an_lfs10_is_not_recognised_as_another_profile(bench: Bench) -> None:
         ("eh600", 9600, "profile eh600 has no factory settings"),
         ("renke.yaml", 57600, "it cannot be set to the 57600 baud of this line"),
         ("fixed.yaml", 9600, "it cannot be set to the 9600 baud of this line"),
-        ("mute.yaml", 4800, "profile mute does not say how its slave id is set"),
+        ("mute.yaml", 4800, "profile mute does not define how its slave id is set"),
         ("ascii.yaml", 4800, "it does not support rtu"),
     ],
 )

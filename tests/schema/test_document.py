@@ -159,7 +159,7 @@ def test_aliases_cannot_nest_deeper_than_lists() -> None:
             ['f:1:4: a: the tag "tag:yaml.org,2002:python/object:os.sy..." is not known; leave it out'],
         ),
         ("a: !mine [1]", ['f:1:4: a: the tag "!mine" is not known; leave it out']),
-        ("a: !!int x", ['f:1:4: a: "x" is not what its tag says; leave the tag out']),
+        ("a: !!int x", ['f:1:4: a: "x" does not match its tag; leave the tag out']),
         ("a: " + "9" * 5000, ["f:1:4: a: has too many digits"]),
         ('a: "\\ud800"', ["f:1:4: a: holds half a character (a surrogate); write it whole"]),
     ],

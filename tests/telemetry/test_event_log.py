@@ -12,7 +12,7 @@ from lfs10d.telemetry.event_log import EventLog
 from lfs10d.telemetry.publication import Publication, PublicationKind, Sample, device_topic, retained
 
 PORT = "/dev/ttyUSB0"
-NONE_NOW = "the device says that it has none now"
+NONE_NOW = "the device reports no value now"
 
 
 def a_sample(*, good: bool, device: str = "mast") -> Publication:
@@ -96,8 +96,8 @@ def test_a_port_that_is_freed_on_request_is_no_warning() -> None:
 @pytest.mark.parametrize(
     ("heard", "fault", "words"),
     [
-        (b"\x01\x03", FaultCode.MALFORMED, "slave 1: sent 01 03 00, heard 01 03: malformed"),
-        (b"", None, "slave 1: sent 01 03 00, heard nothing"),
+        (b"\x01\x03", FaultCode.MALFORMED, "slave 1: sent 01 03 00, received 01 03: malformed"),
+        (b"", None, "slave 1: sent 01 03 00, received nothing"),
     ],
 )
 def test_frames_are_told_at_debug_where_they_are_wanted(heard: bytes, fault: FaultCode | None, words: str) -> None:

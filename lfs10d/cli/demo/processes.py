@@ -66,7 +66,7 @@ class Child:
     def last_words(self) -> str:
         """Return the last line it wrote."""
         lines = self.log.read_text(errors="replace").split("\n") if self.log.exists() else []
-        return next((escape(line.strip()) for line in reversed(lines) if line.strip()), "it said nothing")
+        return next((escape(line.strip()) for line in reversed(lines) if line.strip()), "it printed nothing")
 
 
 class Children:

@@ -25,7 +25,7 @@ def remarks(broker: Broker, page: Page | None) -> tuple[str, ...]:
         *(
             ()
             if broker.speaks == NEWEST
-            else (f"{broker.name} knows no newer MQTT; with mosquitto installed this is MQTT {NEWEST}.",)
+            else (f"{broker.name} supports no newer MQTT; with mosquitto installed this is MQTT {NEWEST}.",)
         ),
         *(f"{sensor.name} {sensor.remark}" for sensor in SENSORS if sensor.remark is not None),
         *seen,

@@ -66,7 +66,7 @@ def clock(state: ClockState, now: float, installed: float) -> Iterator[Finding]:
             "clock", "not synchronised: samples are marked unsynced", "timedatectl; sudo timedatectl set-ntp true"
         )
     else:
-        yield warn("clock", "nobody knows whether it is synchronised", "install systemd-timesyncd or chrony")
+        yield warn("clock", "it is not known whether it is synchronised", "install systemd-timesyncd or chrony")
 
 
 def look_at_disk(folder: Path, wanted: int, root: Root | None = None) -> DiskState:

@@ -217,9 +217,9 @@ def _holder(state: PortState) -> Iterator[Finding]:
     if state.held_by_daemon:
         yield ok("port", f"held by the daemon: {state.holder}")
     elif state.holder:
-        yield fail("port", f"{state.holder} holds {state.path}", "end that program: only one may speak on the line")
+        yield fail("port", f"{state.holder} holds {state.path}", "end that program: only one program may use the line")
     else:
-        yield ok("port", "nobody holds it")
+        yield ok("port", "no other program holds it")
 
 
 def _programs_that_grab(state: PortState) -> Iterator[Finding]:

@@ -96,9 +96,9 @@ async def _sensors(file: Path, loaded: LoadedConfig, login: Login, seen: port.Po
         live, source = watch.best()
     except (BrokerError, FailedError) as error:
         if seen.held_by_daemon:
-            return [warn("sensors", f"a daemon holds the port, and cannot be asked: {error}", "see broker, above")]
+            return [warn("sensors", f"a daemon holds the port and does not reply: {error}", "see broker, above")]
         if not seen.is_device or seen.holder:
-            return [fail("sensors", "cannot be asked", "see port, above")]
+            return [fail("sensors", "cannot be read", "see port, above")]
         return await asyncio.to_thread(sensors.by_asking, loaded)
     finally:
         await watch.disconnect()

@@ -27,7 +27,7 @@ ADVICE: Final[Mapping[str, str]] = {
     "crc": "noise or two sensors of one id: termination, shield, ground; unplug one and look again",
     "malformed": "noise or two sensors of one id: termination, shield, ground; unplug one and look again",
     "wrong_slave": "two sensors have this id, or the adapter mixes frames",
-    "collision": "a second master, or another program, speaks on this line",
+    "collision": "a second master, or another program, sends on this line",
     "duplicate_id": "two sensors have this id: unplug one, then lfs10d request device/readdress",
     "wrong_rate": "sensors answer at another rate: set line.baudrate to it",
     "config_conflict": "the file and the last verified place differ: lfs10d config",
@@ -154,7 +154,7 @@ def answers(specs: Sequence[DeviceSpec], readings: Mapping[str, Reading], port: 
         message = "no answer" if reading is None or reading.fault is None else reading.fault.message
         yield fail("sensor", f"{spec.name} (slave id {spec.slave}): {code}: {message}", ADVICE.get(code, OTHERWISE))
     if good:
-        yield ok("sensors", f"{len(good)} of {len(specs)} answer well (asked now; no daemon runs)")
+        yield ok("sensors", f"{len(good)} of {len(specs)} reply well (read now; no daemon runs)")
     else:
         yield fail(
             "sensors",

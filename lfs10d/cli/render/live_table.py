@@ -109,7 +109,7 @@ def _state(device: ShownDevice, moment: _Moment, *, stale: bool) -> str:
         lacking = ", ".join(f"{escape(name)} {escape(code)}" for name, code in device.errors.items())
         return f"partial: {lacking}" if lacking else "good"
     if device.error is None:
-        return "not heard yet"
+        return "no reply yet"
     trouble = in_words(device.error)
     if not device.online and device.error not in OF_THE_LINE:
         trouble = f"offline: {trouble}"

@@ -37,7 +37,7 @@ _MEANING = {
     FaultCode.EXCEPTION: "The device is there and understood the request, but refuses it.",
     FaultCode.OUT_OF_RANGE: "The device replies, but with an impossible value.",
     FaultCode.NOT_FINITE: "The device replies, but its value is not a number.",
-    FaultCode.UNAVAILABLE: "The device replies, but says itself that it has no value now.",
+    FaultCode.UNAVAILABLE: "The device replies, but reports that it has no value now.",
     FaultCode.STARTING: "The device has not been polled yet.",
     FaultCode.DISABLED: "The device is disabled in the configuration.",
     FaultCode.OVERRUN: "The poll was not made in time: the line is full.",

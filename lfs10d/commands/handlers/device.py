@@ -142,8 +142,8 @@ async def _ping(slave: int, profile: Profile, context: Context) -> None:
     if ping.answered:
         return
     if ping.fault is None:
-        raise refuse("line_error", f"slave {slave} could not be asked: the port is lost")
-    heard = f" (heard {ping.fault.heard.hex(' ').upper()})" if ping.fault.heard else ""
+        raise refuse("line_error", f"slave {slave} could not be probed: the port is lost")
+    heard = f" (received {ping.fault.heard.hex(' ').upper()})" if ping.fault.heard else ""
     message = f"slave {slave} does not answer: {ping.fault.message}{heard}; with probe false it is added all the same"
     raise refuse("timeout", message)
 
@@ -201,10 +201,10 @@ async def read(parameters: OneDevice, context: Context, _: Command) -> Result:
         return unknown_device(device, context.devices)
     conflict = context.config.now.conflicts.get(device)
     if conflict is not None:
-        return failed("line_error", f"{device} cannot be asked: {conflict}")
+        return failed("line_error", f"{device} cannot be polled: {conflict}")
     result = await context.line.read(device)
     if result is None:
-        return failed("line_error", f"{device} was removed or changed before it could be asked")
+        return failed("line_error", f"{device} was removed or changed before it could be polled")
     fault = result.fault
     if fault is None:
         return ok(result.sample)

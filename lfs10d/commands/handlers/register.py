@@ -43,7 +43,7 @@ class OnePlace(Parameters):
 
     device: Annotated[str, Name()] | None = Field(None, description="The device, by its name.")
     slave: Annotated[int, Whole(0, 255)] | None = Field(
-        None, description="Or its slave id, 1 to 255; nobody need be configured there."
+        None, description="Or its slave id, 1 to 255; no device need be configured there."
     )
     address: Annotated[int, Whole(0, REGISTERS - 1)] = Field(description="The (first) register, as on the wire.")
 
@@ -113,10 +113,10 @@ def _target(parameters: OnePlace, now: Effective) -> tuple[SlaveConfig | None, i
             device = known_device(name, now)
             conflict = now.conflicts.get(name)
             if conflict is not None:
-                raise refuse("line_error", f"{name} cannot be asked: {conflict}")
+                raise refuse("line_error", f"{name} cannot be accessed: {conflict}")
             return device, device.id
         case (None, 0):
-            raise refuse("not_allowed", "slave 0 is everybody: nothing is ever sent to it", param="slave")
+            raise refuse("not_allowed", "slave 0 is the broadcast address: nothing is ever sent to it", param="slave")
         case (None, int(slave)):
             return next((each for each in now.polled.slaves if each.id == slave), None), slave
         case (None, None):

@@ -76,7 +76,7 @@ class WhomToFind(Parameters):
     )
     add: Annotated[bool, Flag()] = Field(
         default=False,
-        description="Poll, as by `device/add`, who is new, recognised, at the rate of the line, and beyond doubt.",
+        description="Add, as by `device/add`, each device that is new, recognised, at the line's rate and not suspect.",
     )
 
 

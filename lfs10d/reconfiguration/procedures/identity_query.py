@@ -66,7 +66,7 @@ class IdentityQuery:
         self, profile: Profile, codec: Codec, pending: PendingRequests, clock: ProcedureClock, *, line_rate: int
     ) -> None:
         if profile.slave_id is None:
-            raise ValueError(f"profile {profile.name} knows no register of the slave id")
+            raise ValueError(f"profile {profile.name} defines no register of the slave id")
         self.profile = profile
         self.codec = codec
         self.clock = clock

@@ -30,7 +30,7 @@ def test_without_its_extra_the_page_is_named_with_what_to_do() -> None:
 def test_a_broker_of_mqtt_3_1_1_is_named_with_what_shows_mqtt_5() -> None:
     text = "\n".join(remarks(Broker("amqtt", "3.1.1", 18830), PAGE))
     assert "amqtt (MQTT 3.1.1, 127.0.0.1:18830)" in text
-    assert "amqtt knows no newer MQTT; with mosquitto installed this is MQTT 5." in text
+    assert "amqtt supports no newer MQTT; with mosquitto installed this is MQTT 5." in text
 
 
 def test_no_remark_is_wider_than_a_terminal() -> None:

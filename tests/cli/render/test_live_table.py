@@ -122,7 +122,7 @@ def test_one_that_just_came_or_went_is_marked_for_five_seconds(online: bool, mar
         (entry("a", 2, alarm={"active": True, "code": "duplicate_id"}), "duplicate_id, two sensors answer"),
         (entry("a", 2, alarm={**AN_HOUR_AGO, "code": "duplicate_id"}), "duplicate_id, two sensors answer; since 20:53"),
         (entry("a", 2, alarm=AN_HOUR_AGO), "good"),
-        (bad("a", 2, None), "not heard yet"),
+        (bad("a", 2, None), "no reply yet"),
         (bad("a", 2, "starting"), "starting, not polled yet"),
         (bad("a", 2, alarm={"active": False, "code": None}), "offline: timeout, no answer"),
         (bad("a", 2, alarm=AN_HOUR_AGO), "offline: timeout, no answer; since 20:53"),

@@ -40,7 +40,7 @@ def test_a_pipe_gets_the_remarks_once_then_a_line_for_each_change(capsys: pytest
     printed = capsys.readouterr().out.splitlines()
     assert printed[0] == "# a remark"
     assert printed.count("# live from broker here") == 1
-    assert sum("  mast  2  -  not heard yet" in each for each in printed) == 1
+    assert sum("  mast  2  -  no reply yet" in each for each in printed) == 1
 
 
 def test_json_has_neither_remarks_nor_headings(capsys: pytest.CaptureFixture[str]) -> None:

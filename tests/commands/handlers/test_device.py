@@ -81,7 +81,7 @@ def test_a_device_whose_id_is_another_s_cannot_be_asked(ask: Ask, fake: FakeCont
     fake.start()
     answer = ask("device/read", '{"device":"tower"}')
     assert (answer.status, answer.code) == ("failed", "line_error")
-    assert answer.message.startswith("tower cannot be asked: slave id 9 is taken by roof")
+    assert answer.message.startswith("tower cannot be polled: slave id 9 is taken by roof")
 
 
 # -- device/add
@@ -115,8 +115,8 @@ NOISE = Fault(FaultCode.CRC, "the check is wrong", heard=b"\x09\x03")
     ("fault", "code", "message"),
     [
         (SILENCE, "timeout", "slave 9 does not answer: no answer in 1000 ms; with probe false"),
-        (NOISE, "timeout", "slave 9 does not answer: the check is wrong (heard 09 03); with probe false"),
-        (None, "line_error", "slave 9 could not be asked: the port is lost"),
+        (NOISE, "timeout", "slave 9 does not answer: the check is wrong (received 09 03); with probe false"),
+        (None, "line_error", "slave 9 could not be probed: the port is lost"),
     ],
 )
 def test_where_nobody_answers_nothing_is_added_and_what_was_heard_is_told(

@@ -221,7 +221,7 @@ def test_a_device_whose_id_is_another_ones_now_is_not_asked(
     assert (answer.status, answer.code, answer.message) == (
         "rejected",
         "line_error",
-        "vane cannot be asked: its id is that of motor",
+        "vane cannot be accessed: its id is that of motor",
     )
     assert fake.done == []
 

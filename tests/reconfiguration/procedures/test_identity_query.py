@@ -36,7 +36,7 @@ WITHOUT_RATE = parse_profile(NARROW, "narrow.yaml")
 
 
 def test_a_profile_without_a_register_of_the_id_cannot_be_asked(pretence: Pretence) -> None:
-    with pytest.raises(ValueError, match="profile ld-e knows no register of the slave id"):
+    with pytest.raises(ValueError, match="profile ld-e defines no register of the slave id"):
         pretence.query(load_profile("ld-e", relative_to=Path()))
 
 
