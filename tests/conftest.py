@@ -7,11 +7,14 @@ set) and is skipped elsewhere, with one line that says what to install.
 
 Where several workers share the tests, files with tests marked `long` begin first, so that none is waited for in the
 end; the others are mixed by a hash of their names, so that those that wait and those that compute go on side by side.
+Every worker collects all tests. In a new clone pytest rewrites the assertions of each file first, which takes half a
+minute: each worker begins in another folder, and finds written what the others have done.
 """
 
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Iterator
 from hashlib import sha256
 from pathlib import Path
@@ -24,6 +27,20 @@ from tests.support.brokers import Authority, Mosquitto, path_of
 
 settings.register_profile("ours", max_examples=int(os.environ.get("LFS10D_EXAMPLES", "100")), deadline=None)
 settings.load_profile("ours")  # without a deadline: a busy machine is no failure
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Let each worker collect the folders in an order of its own; what is found is sorted afterwards."""
+    number = re.fullmatch(r"gw(\d+)", os.environ.get("PYTEST_XDIST_WORKER", ""))
+    if number is not None and config.args == ["tests"]:
+        entries = sorted(f"tests/{each.name}" for each in Path("tests").iterdir() if _collected(each))
+        workers = int(os.environ["PYTEST_XDIST_WORKER_COUNT"])
+        begin = len(entries) * int(number[1]) // workers
+        config.args = entries[begin:] + entries[:begin]
+
+
+def _collected(path: Path) -> bool:
+    return (path.is_dir() and path.name != "__pycache__") or path.match("test_*.py")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
