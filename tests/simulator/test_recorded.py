@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -106,6 +109,18 @@ def test_spreadsheets_write_it_in_their_ways(delimiter: str) -> None:
                                       '4:3: "nan" is no number; write 4.2, or nothing for no value']),
         (f"{WIND}0,1e99\n", ['2:3: "1e99" is no number; write 4.2, or nothing for no value']),
         ("time;wind_speed\n0;4,2\n", ['2:3: "4,2" is no number; write 4.2, or nothing for no value']),
+        ("time;wind_speed\r\n0;4.2\r\n1;x\r\n", ['3:3: "x" is no number; write 4.2, or nothing for no value']),
+        (f"{WIND}0,1\r1,x\r", ['3:3: "x" is no number; write 4.2, or nothing for no value']),
+        (f"{WIND}0,1\x0c\n1,2\u2028\n2,x\n", ['4:3: "x" is no number; write 4.2, or nothing for no value']),
+        (f"{WIND}0,1\n1,calm\n2,inf\n2,3\n", ['3:3: "calm" is no number; write 4.2, or nothing for no value',
+                                              '4:3: "inf" is no number; write 4.2, or nothing for no value',
+                                              '5:1: the time "2" is not after that of the row before']),
+        (f"{WIND}1795298022003,1\n",
+         ['2:1: "1795298022003" is no time; write it in seconds, or as 2026-11-21T12:00:00Z']),
+        (f"{WIND}0,1\n1e300,1\n", ['3:1: "1e300" is no time; write it as in the first row']),
+        (f"{WIND}1926-01-01T00:00Z,1\n2026-11-21T12:00Z,1\n",
+         ['3:1: the time "2026-11-21T12:00Z" is over 100 years after the first']),
+        (f"{WIND}0,\x1b[31m\n", ['2:3: "\\u001b[31m" is no number; write 4.2, or nothing for no value']),
     ],
 )  # fmt: skip
 def test_every_error_has_its_place(text: str, expected: list[str]) -> None:
@@ -114,7 +129,9 @@ def test_every_error_has_its_place(text: str, expected: list[str]) -> None:
 
 def test_a_file_of_another_kind_is_no_flood_of_errors() -> None:
     rows = "".join(f"{n},x\n" for n in range(1000))
-    assert len(problems(WIND + rows)) == recorded.MOST_PROBLEMS
+    found = problems(WIND + rows)
+    assert len(found) == recorded.MOST_PROBLEMS
+    assert found[0].startswith("w.csv:2:3: ")
 
 
 def test_a_file_is_read_with_and_without_byte_order_mark(tmp_path: Path) -> None:
@@ -130,9 +147,31 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path: Path, monkeypatch: pytest
     file.write_bytes(b"time,wind_speed\n0,1 \xb0\n")
     with pytest.raises(ConfigError, match=r"w\.csv:2:5: byte 0xb0 is not UTF-8; save the file as UTF-8"):
         load_recording(file, DEVICES)
+    file.write_bytes(b"\xef\xbb\xbftime,wind_speed\n0,1 \xb0\n")
+    with pytest.raises(ConfigError, match=r"w\.csv:2:5: byte 0xb0 is not UTF-8; save the file as UTF-8"):
+        load_recording(file, DEVICES)
+    file.write_bytes("time,wind_speed\n0,1\n".encode("utf-16"))
+    with pytest.raises(ConfigError, match=r"w\.csv:1:1: byte 0xff is not UTF-8; save the file as UTF-8"):
+        load_recording(file, DEVICES)
+    with pytest.raises(ConfigError, match=r": cannot be read: Is a directory"):
+        load_recording(tmp_path, DEVICES)
     monkeypatch.setattr(recorded, "LARGEST_FILE", 3)
     with pytest.raises(ConfigError, match=r"w\.csv:1:1: the file is too large"):
         load_recording(file, DEVICES)
+
+
+def test_millions_of_rows_take_little_more_than_their_numbers(tmp_path: Path) -> None:
+    file = tmp_path / "w.csv"
+    file.write_text("time,wind_speed,wind_direction\n" + "".join(f"{n / 4},4.2,{n % 360}\n" for n in range(100_000)))
+    program = (
+        "import sys, resource; from pathlib import Path; from lfs10d.simulator.recorded import load_recording\n"
+        "before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
+        f"load_recording(Path({str(file)!r}), {{1: ['wind_speed', 'wind_direction']}})\n"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    kilobytes = int(done.stdout)
+    assert kilobytes < 25_000  # the numbers are 2.4 MB, the file 2 MB; an object for each cell would be 80 MB
 
 
 def test_the_sensors_of_a_line_play_it() -> None:
@@ -147,7 +186,7 @@ def test_the_sensors_of_a_line_play_it() -> None:
 
 
 def test_a_time_without_a_value_reads_as_nan_and_what_is_out_of_range_as_it_is() -> None:
-    column = RecordedValue((0, SECOND), (None, 250.0), 2 * SECOND)
+    column = RecordedValue((0, SECOND), (math.nan, 250.0), 2 * SECOND)
     memory = Memory(LFS10, {"wind_speed": column})
     request = bytes.fromhex("01 03 00 01 00 02")
     answer, measured = memory.read(request, "rtu", Unique(), 0, {})
@@ -158,7 +197,7 @@ def test_a_time_without_a_value_reads_as_nan_and_what_is_out_of_range_as_it_is()
 
 def test_a_bit_without_a_value_stays_as_it_was() -> None:
     door = Blueprint("door", (Signal(0, "bool", name="open", function=READ_COILS),), functions=frozenset({READ_COILS}))
-    memory = Memory(door, {"open": RecordedValue((0, SECOND), (1.0, None), 2 * SECOND)})
+    memory = Memory(door, {"open": RecordedValue((0, SECOND), (1.0, math.nan), 2 * SECOND)})
     request = bytes.fromhex("01 01 00 00 00 01")
     assert memory.read(request, "rtu", Unique(), 0, {}) == (bytes.fromhex("01 01 01 01"), (("open", True),))
     assert memory.read(request, "rtu", Unique(), SECOND, {}) == (bytes.fromhex("01 01 01 01"), (("open", None),))
