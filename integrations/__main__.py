@@ -11,15 +11,17 @@ import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from integrations import recipes
+from integrations import databases, recipes
 from integrations.rig import Missing, Rig
 
 RECIPES: Mapping[str, Callable[[Rig], str]] = {
     "python": recipes.python,
     "prometheus": recipes.prometheus,
+    "grafana": recipes.grafana,
     "victoriametrics": recipes.victoriametrics,
-    "postgresql": recipes.postgresql,
-    "telegraf": recipes.telegraf,
+    "postgresql": databases.postgresql,
+    "timescaledb": databases.timescaledb,
+    "telegraf": databases.telegraf,
     "weewx": recipes.weewx,
     "node-red": recipes.node_red,
 }

@@ -1,12 +1,14 @@
-"""One function per recipe of docs/integrations: follows the page on the rig's line, and returns what was seen."""
+"""One function per recipe of docs/integrations: follows the page on the rig's line, and returns what was seen.
+
+The databases have a module of their own.
+"""
 
 from __future__ import annotations
 
 import json
-import os
 import re
-import shutil
 import sqlite3
+import subprocess
 import sys
 import time
 import urllib.parse
@@ -15,9 +17,17 @@ from pathlib import Path
 from typing import Any, Final
 
 from bench.broker import free_port
-from integrations.rig import FILES, PLACES, Missing, Rig, program
+from integrations.rig import FILES, PLACES, Rig, program
 
-__all__ = ["PLACES", "node_red", "postgresql", "prometheus", "python", "telegraf", "victoriametrics", "weewx"]
+__all__ = [
+    "PLACES",
+    "grafana",
+    "node_red",
+    "prometheus",
+    "python",
+    "victoriametrics",
+    "weewx",
+]
 
 AWAY: Final = 15.0
 """Seconds without a broker: it answers again before its subscribers are back."""
@@ -26,7 +36,8 @@ AFTER: Final = 25.0
 HOLES: Final = "SELECT device, max(seq) - min(seq) + 1 - count(*), count(*) FROM wind GROUP BY device ORDER BY device"
 
 
-def _away(rig: Rig) -> None:
+def away(rig: Rig) -> None:
+    """Kill the broker for a while, and wait until the past is in."""
     time.sleep(10)
     rig.kill_broker()
     time.sleep(AWAY)
@@ -34,12 +45,17 @@ def _away(rig: Rig) -> None:
     time.sleep(AFTER)
 
 
+def page(port: int, path: str, **query: str) -> str:
+    """Return what a server of ours answers."""
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}{path}?{urllib.parse.urlencode(query)}", timeout=5) as answer:
+        text: str = answer.read().decode()
+    return text
+
+
 def _asked(port: int, query: str) -> list[Any]:
-    """Return the result of a query in Prometheus' language."""
-    address = f"http://127.0.0.1:{port}/api/v1/query?query={urllib.parse.quote(query)}"
+    """Return the result of a query in Prometheus' language; nothing while the server does not answer."""
     try:
-        with urllib.request.urlopen(address, timeout=5) as answer:
-            result: list[Any] = json.load(answer)["data"]["result"]
+        result: list[Any] = json.loads(page(port, "/api/v1/query", query=query))["data"]["result"]
     except OSError:
         return []
     return result
@@ -49,7 +65,7 @@ def python(rig: Rig) -> str:
     """Run subscriber.py while the broker is killed; nothing is missing."""
     file = rig.folder / "wind.db"
     store = rig.start(sys.executable, str(FILES / "subscriber.py"), "127.0.0.1", str(rig.broker_port), str(file))
-    _away(rig)
+    away(rig)
     rig.end(store)
     database = sqlite3.connect(file)
     rows = database.execute(HOLES).fetchall()
@@ -73,16 +89,48 @@ def prometheus(rig: Rig) -> str:
     folder, port = _scrape(rig), free_port()
     rig.call(promtool, "test", "rules", str(folder / "prometheus-alerts-test.yml"))
     rig.call(promtool, "check", "config", str(folder / "prometheus.yml"))
-    running = rig.start(
-        *(server, f"--config.file={folder / 'prometheus.yml'}", f"--storage.tsdb.path={folder / 'data'}"),
-        f"--web.listen-address=127.0.0.1:{port}",
-    )
-    speed = "lfs10d_device_wind_speed_meters_per_second"
-    rig.until(lambda: len(_asked(port, speed)) == 2, "two wind speeds are stored")
+    running = _prometheus(rig, server, folder, port)
     alerts = 'ALERTS{alertname="WindSensorSilent",alertstate="firing",device="slave-4"}'
     rig.until(lambda: _asked(port, alerts), "the alert of the silent sensor", 120)
     rig.end(running)
     return f"Prometheus {rig.call(server, '--version').split()[2]}: rules tested, two speeds stored, slave-4 alerted"
+
+
+def _prometheus(rig: Rig, server: str, folder: Path, port: int) -> subprocess.Popen[bytes]:
+    """Start a Prometheus and wait until it has two wind speeds."""
+    running = rig.start(
+        *(server, f"--config.file={folder / 'prometheus.yml'}", f"--storage.tsdb.path={folder / f'data-{port}'}"),
+        f"--web.listen-address=127.0.0.1:{port}",
+    )
+    speed = "lfs10d_device_wind_speed_meters_per_second"
+    rig.until(lambda: len(_asked(port, speed)) == 2, "two wind speeds are stored")
+    return running
+
+
+def grafana(rig: Rig) -> str:
+    """Ask Prometheus every query of the dashboard, as Grafana would with all lines and sensors chosen."""
+    folder, port = _scrape(rig), free_port()
+    running = _prometheus(rig, program("prometheus", "Debian"), folder, port)
+    dashboard = json.loads((FILES / "grafana-dashboard.json").read_text())
+    answers = 0
+    for panel in dashboard["panels"]:
+        for target in panel["targets"]:
+            query = target["expr"].replace("$line", ".+").replace("$device", ".+")
+            rig.until(lambda query=query: _asked(port, query), f"{panel['title']}: {query}", 120)  # type: ignore[misc]  # a default
+            rows = _asked(port, query)
+            answers += len(rows)
+            if panel["type"] == "stat":
+                assert {row["metric"]["device"] for row in rows} == {"slave-2", "mast-top"}, rows
+    for choice in dashboard["templating"]["list"][1:]:
+        found = re.fullmatch(r"label_values\((.*), (\w+)\)", choice["query"]["query"])
+        assert found, choice
+        match = {"match[]": found[1].replace("$line", ".+")}
+        values = json.loads(page(port, f"/api/v1/label/{found[2]}/values", **match))["data"]
+        assert values, choice
+    rig.end(running)
+    return (
+        f"Prometheus answers the {len(dashboard['panels'])} panels with {answers} series (Grafana itself was not run)"
+    )
 
 
 def victoriametrics(rig: Rig) -> str:
@@ -98,75 +146,6 @@ def victoriametrics(rig: Rig) -> str:
     rig.until(lambda: len(_asked(port, query)) == 2, "two wind speeds are stored", 120)
     rig.end(running)
     return "two speeds stored"
-
-
-def _postgresql(rig: Rig) -> tuple[str, list[str]]:
-    """Start a cluster with the tables, once; return its folder and the start of each psql."""
-    folder = rig.folder / "postgresql"
-    begin = ["runuser", "-u", "postgres", "--"] if os.geteuid() == 0 else []
-    psql = [*begin, program("psql", "Debian: postgresql"), "-qAt", "-v", "ON_ERROR_STOP=1"]
-    psql += ["-h", str(folder), "-d", "wind"]
-    if not folder.exists():
-        bins = sorted(Path("/usr/lib/postgresql").glob("*/bin/initdb"))
-        if not bins:
-            raise Missing("initdb is not installed (Debian: postgresql)")
-        rig.folder.chmod(0o755)
-        folder.mkdir()
-        if begin:
-            shutil.chown(folder, "postgres")
-        rig.call(*begin, str(bins[-1]), "-D", str(folder / "data"), "-A", "trust")
-        postgres = str(bins[-1].with_name("postgres"))
-        rig.start(*begin, postgres, "-D", str(folder / "data"), "-k", str(folder), "-h", "")
-        rig.until((folder / ".s.PGSQL.5432").exists, "PostgreSQL answers")
-        time.sleep(2)
-        rig.call(*psql[:-1], "postgres", "-c", "CREATE DATABASE wind")
-        rig.call(*psql, "-f", str(_readable(rig, "postgresql.sql")))
-    return str(folder), psql
-
-
-def _readable(rig: Rig, name: str) -> Path:
-    """Return a copy that another user may read."""
-    copy = rig.folder / name
-    copy.write_text((FILES / name).read_text())
-    copy.chmod(0o644)
-    return copy
-
-
-def postgresql(rig: Rig) -> str:
-    """Make the tables; a row that comes twice is there once, and the queries answer."""
-    _, psql = _postgresql(rig)
-    row = "now(), 'try', 'line0', 'mast-top', 'k1', 1, 4.2, NULL, 'good', NULL, 'synced', 18.2"
-    for _ in range(2):
-        rig.call(*psql, "-c", f"INSERT INTO wind_in VALUES ({row})")  # noqa: S608  # a text of ours
-    assert rig.call(*psql, "-c", "SELECT count(*) FROM wind WHERE site = 'try'") == "1\n"
-    rig.call(*psql, "-c", "DELETE FROM wind WHERE site = 'try'")
-    rig.call(*psql, "-f", str(_readable(rig, "postgresql-queries.sql")))
-    return f"PostgreSQL {rig.call(*psql, '-c', 'SHOW server_version').strip()}: a row twice is one; the queries answer"
-
-
-def telegraf(rig: Rig) -> str:
-    """Fill the tables while the broker, and then Telegraf, is killed; nothing is missing or double."""
-    agent = program("telegraf", "InfluxData's packages; or `go build` of github.com/influxdata/telegraf")
-    folder, psql = _postgresql(rig)
-    environment = {
-        "LFS10D_BROKER": f"tcp://127.0.0.1:{rig.broker_port}",
-        "LFS10D_POSTGRESQL": f"host={folder} user=postgres dbname=wind",
-    }
-    command = (agent, "--config", str(FILES / "telegraf.conf"))
-    running = rig.start(*command, environment=environment, log="telegraf.log")
-    _away(rig)
-    rig.end(running, kill=True)
-    time.sleep(10)
-    running = rig.start(*command, environment=environment, log="telegraf.log")
-    rig.until(lambda: int(rig.call(*psql, "-c", "SELECT count(*) FROM wind_record") or 0), "a record is there", 90)
-    time.sleep(5)
-    rig.end(running)
-    rows = [line.split("|") for line in rig.call(*psql, "-c", HOLES).splitlines()]
-    assert len(rows) == 4, rows
-    assert {missing for _, missing, _ in rows} == {"0"}, rows
-    lines = re.findall(r"^wind_in,", (rig.folder / "telegraf.log").read_text(), re.MULTILINE)
-    count = sum(int(each) for _, _, each in rows)
-    return f"{count} samples, none missing after broker and Telegraf were killed; {len(lines)} lines of line protocol"
 
 
 def weewx(rig: Rig) -> str:

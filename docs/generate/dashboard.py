@@ -29,6 +29,8 @@ class Panel:
     unit: str = "none"
     thresholds: tuple[tuple[float | None, str], ...] = ((None, "green"),)
     description: str = ""
+    words: tuple[tuple[str, str], ...] = ()
+    """What is shown in place of a number, as in (("0", "silent"),)."""
 
 
 PANELS: Final = (
@@ -40,6 +42,7 @@ PANELS: Final = (
         5,
         "velocityms",
         ((None, "green"), (15, "orange"), (20, "red")),
+        "The value of this moment: a sensor without one is not there.",
     ),
     Panel(
         "Wind speed",
@@ -64,6 +67,7 @@ PANELS: Final = (
         ((f"lfs10d_device_online{_DEVICES}", "{{device}}"),),
         12,
         thresholds=((None, "red"), (1, "green")),
+        words=(("0", "silent"), ("1", "answers")),
     ),
     Panel(
         "Failed polls",
@@ -94,6 +98,7 @@ PANELS: Final = (
         ((f"lfs10d_mqtt_connected{_LINES}", "{{line}}"),),
         8,
         thresholds=((None, "red"), (1, "green")),
+        words=(("0", "away"), ("1", "connected")),
     ),
 )
 
@@ -111,6 +116,9 @@ def placed(panels: tuple[Panel, ...]) -> Iterator[tuple[Panel, Mapping[str, int]
 def _panel(number: int, panel: Panel, place: Mapping[str, int]) -> dict[str, Any]:
     steps = [{"value": value, "color": color} for value, color in panel.thresholds]
     defaults: dict[str, Any] = {"unit": panel.unit, "thresholds": {"mode": "absolute", "steps": steps}}
+    if panel.words:
+        words = {value: {"text": text, "index": n} for n, (value, text) in enumerate(panel.words)}
+        defaults["mappings"] = [{"type": "value", "options": words}]
     if panel.kind == "timeseries":
         defaults["custom"] = {"spanNulls": False, "lineWidth": 1, "fillOpacity": 5}
     return {
@@ -123,7 +131,15 @@ def _panel(number: int, panel: Panel, place: Mapping[str, int]) -> dict[str, Any
         "fieldConfig": {"defaults": defaults, "overrides": []},
         "options": {},
         "targets": [
-            {"refId": chr(ord("A") + n), "datasource": _SOURCE, "expr": expression, "legendFormat": legend}
+            {
+                "refId": chr(ord("A") + n),
+                "datasource": _SOURCE,
+                "expr": expression,
+                "legendFormat": legend,
+                # A stat shows the last value it gets: of a range that would be an old one, shown as if it were new.
+                "instant": panel.kind == "stat",
+                "range": panel.kind != "stat",
+            }
             for n, (expression, legend) in enumerate(panel.queries)
         ],
     }
@@ -136,7 +152,6 @@ def _choice(name: str, query: str) -> dict[str, Any]:
         "type": "query",
         "datasource": _SOURCE,
         "query": {"query": query, "refId": name},
-        "definition": query,
         "refresh": 2,
         "multi": True,
         "includeAll": True,
