@@ -94,6 +94,7 @@ def test_json_is_all_that_standard_output_carries(lfs10d: Lfs10d, sensors: PtyLi
         "rtt_ms": None,
         "profile": "lfs10",
         "title": "LFS10 wind speed sensor",
+        "alternatives": [],
         "values": None,
         "calibrated": {},
         "units": {"wind_speed": "m/s"},

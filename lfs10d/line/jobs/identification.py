@@ -14,9 +14,9 @@ Rules
    times in all. Spoilt `SPOILT` times, two devices probably share the id (`ALL_SPOILT` where no right answer came).
 5. After a profile that fits, those are tried that could be the same device: none after one by `identify`; after one by
    the register of its slave id the others that have it in the same place; after one by its values alone all.
-6. Of several that fit the device is that for which most speaks: `identify`, then its own id in the register of the
-   slave id, then more registers of values, then the order. The others that the answers do not exclude are its
-   `alternatives`; one by `identify` has none.
+6. Of several that fit the device is that for which most speaks: a person's own profile, then `identify`, then its own
+   id in the register of the slave id, then more registers of values, then the order. The others that the answers do
+   not exclude are its `alternatives`; one by `identify` has none tried after it.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from lfs10d.modbus.frames import Codec
 from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.request import READ_HOLDING_REGISTERS, ReadRegisters
 from lfs10d.profiles.blocks import Block
+from lfs10d.profiles.library import builtin_names
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Fault, FaultCode, Value
 
@@ -153,6 +154,11 @@ class _Fit:
     values: Mapping[str, Value]
     id_register: int | None
 
+    @property
+    def own(self) -> bool:
+        """Whether a person wrote the profile, for the device that is looked for."""
+        return self.profile.name not in builtin_names()
+
     def may_also_be(self, other: Profile) -> bool:
         """Whether another profile could fit the same device (rule 5)."""
         if self.evidence is _Evidence.IDENTITY:
@@ -194,7 +200,7 @@ class Identification:
 
     def _choose(self, fits: Sequence[_Fit]) -> None:
         """Note the profile for which most speaks, and the others (rule 6)."""
-        best = max(fits, key=lambda fit: (fit.evidence, fit.words))  # the first of equals
+        best = max(fits, key=lambda fit: (fit.own, fit.evidence, fit.words))  # the first of equals
         sure = best.evidence is _Evidence.IDENTITY
         others = () if sure else tuple(fit.profile.plain for fit in fits if fit is not best)
         self._note(profile=best.profile.plain, alternatives=others, values=best.values, id_register=best.id_register)

@@ -60,7 +60,7 @@ PLAIN = WN90LP.model_copy(update={"name": "plain", "identify": ()})
 
 def test_a_device_that_identifies_itself_is_no_other() -> None:
     device = registers(STATION | {0x0160: 0x0090})
-    assert named(device, profiles=[PLAIN, WN90LP]) == ["ecowitt-wn90lp"]
+    assert named(device, profiles=[PLAIN, WN90LP]) == ["plain", "ecowitt-wn90lp"], "a person's own goes first"
     assert named(device, profiles=[WN90LP, PLAIN]) == ["ecowitt-wn90lp"]
     _, asked = interview(device, profiles=[WN90LP, PLAIN, *PROFILES])
     assert [(read.address, read.count) for read in asked] == [(0x0162, 1), (0x0160, 1), (0x0165, 10), (0x0161, 1)]
@@ -109,12 +109,12 @@ def test_a_device_that_lacks_all_its_values_is_unknown() -> None:
     assert named(registers({}), profiles=[profile]) == []
 
 
-def test_a_profile_known_by_its_values_alone_gives_way_to_one_that_finds_its_id() -> None:
+def test_a_persons_own_profile_goes_before_those_that_are_included() -> None:
     value = {"name": "level", "register": 0, "type": "uint16", "unit": "m"}
     bare = Profile.model_validate({"name": "bare", "title": "Bare", "values": [value]})
-    assert named(renke(87, 5), profiles=[bare, PR_3000]) == ["pr-3000-fsjt", "bare"]
+    assert named(renke(87, 5), profiles=[bare, PR_3000]) == ["bare", "pr-3000-fsjt"]
     assert named(renke(87, 5), profiles=[PR_3000, bare]) == ["pr-3000-fsjt"], "what can be sure is not asked further"
-    assert named(renke(87, 5, slave=9), profiles=[bare, PR_3000]) == ["pr-3000-fsjt", "bare"]
+    assert named(renke(87, 5, slave=9), profiles=[bare, PR_3000]) == ["bare", "pr-3000-fsjt"]
     assert named(registers({0: 87}), profiles=[bare, PR_3000]) == ["bare"]
 
 
