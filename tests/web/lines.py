@@ -7,6 +7,8 @@ from typing import Any
 from lfs10d.web.line_model import LineModel, Link
 
 PLACE = "broker localhost:1883"
+READ = "/api/line0/request/device/read"
+"""The address of a request to it."""
 WALL = 1_800_000_000.0
 """Epoch s; the daemon's clock is right."""
 
