@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-oldest test-newer coverage check format docs bench integrations soak deb deb-same screens clean
+.PHONY: help demo test test-oldest test-newer coverage check format docs bench integrations soak deb deb-same screens page clean
 
 help: ## Print this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -89,8 +89,12 @@ deb: $(VENV)/.demo ## Build the Debian package into dist/: SUITE=trixie or SUITE
 deb-same: $(VENV)/.demo ## Build the Debian package twice and compare the bytes: SUITE=trixie or SUITE=bookworm
 	packaging/same-bytes $(or $(SUITE),trixie)
 
-screens: $(VENV)/.dev ## Write a screenshot of every state of the page to screens/ (needs chromium)
+screens: $(VENV)/.dev ## Write a screenshot of every state of the page to screens/, and check its accessibility (5 minutes; needs chromium)
 	$(BIN)/python -m tests.web.screens screens
+
+# Not in CI: two adoptions and thirty outages take minutes.
+page: $(VENV)/.dev ## Mount two sensors on a phone-sized page, and time what it shows of outages (5 minutes; needs chromium)
+	$(BIN)/python -m tests.web.live screens
 
 clean: ## Remove .venv and built files
 	rm -rf $(VENV) bench/build build dist

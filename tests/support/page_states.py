@@ -59,13 +59,15 @@ class ShownLine:
         ]  # fmt: skip
         self.publish("devices", entries)
 
-    def hour(self, speed: float = 6.0) -> None:
-        """Publish an hour of wind; of many sensors ten minutes."""
+    def hour(self, speed: float = 6.0, *, until: float = 4.0, gone: Mapping[str, float] | None = None) -> None:
+        """Publish an hour of wind, of many sensors ten minutes, `until` so long ago; each of `gone` failed since."""
         long, step = (3600, 4) if len(self.names) <= 8 else (600, 12)
         for place, name in enumerate(self.names):
+            since = (gone or {}).get(name, 0.0)
             history = [
-                self._sample(name, speed * (1 + 0.5 * math.sin(ago / 90 + place)), ago, seq=-ago)
-                for ago in range(long, 4, -step)
+                self._sample(name, value if ago > since else None, ago, seq=-ago)
+                for ago in range(long, int(until), -step)
+                for value in (speed * (1 + 0.4 * math.sin(ago / 90 + place)),)
             ]
             for start in range(0, len(history), 100):
                 self.publish(f"device/{name}/history", history[start : start + 100])
@@ -79,13 +81,13 @@ class ShownLine:
                 sample = self._sample(name, speed + 0.7 * place, ago, seq=self.seq) | more
                 self.publish(f"device/{name}/telemetry", sample, old=ago > 0)
 
-    def wind(self, speed: float = 6.0) -> None:
+    def wind(self, speed: float = 6.0, *, beaufort: int = 4) -> None:
         """Publish wind statistics of each sensor."""
         for name in self.names:
             self.publish(
                 f"device/{name}/wind",
                 {"unit": "m/s", "mean_2m": speed, "mean_10m": speed * 0.9, "gust_10m": speed * 1.7, "lull_10m": 1.1,
-                 "gust_10m_ts": self.ts(90), "max_10m": speed * 1.8, "beaufort": 4, "coverage_10m": 0.998},
+                 "gust_10m_ts": self.ts(90), "max_10m": speed * 1.8, "beaufort": beaufort, "coverage_10m": 0.998},
             )  # fmt: skip
             self.publish(f"device/{name}/stats", {"polls": 3600, "good": 3597, "errors": {"crc": 3},
                                                   "rtt_ms": {"p50": 18.2, "p95": 21.0}, "response_timeout_ms": 90.1,
@@ -96,6 +98,8 @@ class ShownLine:
         self.seq += 1
         if offline:
             self.publish(f"device/{name}/availability", "offline")
+            none = dict.fromkeys(("mean_2m", "mean_10m", "gust_10m", "lull_10m", "gust_10m_ts", "max_10m", "beaufort"))
+            self.publish(f"device/{name}/wind", none | {"unit": "m/s", "coverage_10m": 0.0})
         self.publish(f"device/{name}/telemetry", self._sample(name, None, 0.0, seq=self.seq) | {"error": code})
         self.publish(f"device/{name}/error", {"active": True, "code": code, "message": message, "since": self.ts(ago),
                                               "last": self.ts(), "count": 37, "heard": "02 03 04 41 2"})  # fmt: skip
@@ -108,11 +112,15 @@ class ShownLine:
         }  # fmt: skip
 
 
+USUAL_INTERVAL: Final = 20.0
+"""s: a screenshot of each width takes less than three of them."""
+
+
 def _line(server: PageServer, sensors: int = 8, name: str = "line0", speed: float = 6.0) -> ShownLine:
-    line = ShownLine(server, name, sensors, interval=600.0)
+    line = ShownLine(server, name, sensors, interval=USUAL_INTERVAL)
     line.hour(speed)
     line.measure(speed)
-    line.wind(speed)
+    line.wind(speed, beaufort=12 if speed > 32 else 4)
     return line
 
 
@@ -170,21 +178,32 @@ def _daemon_dead(server: PageServer) -> None:
 
 
 def _offline(server: PageServer) -> None:
-    line = _line(server)
-    line.fail("mast-4", "timeout", "no answer in 200 ms", ago=4000)
+    line = ShownLine(server, interval=USUAL_INTERVAL)
+    gone = {"mast-4": 1500.0, "mast-6": 30.0}
+    line.hour(gone=gone)
+    for name in line.names:
+        line.measure(only=name, ago=gone.get(name, 0.0))
+    line.wind()
+    line.fail("mast-4", "timeout", "no answer in 200 ms", ago=1500)
     line.fail("mast-6", "crc", "the answer's check is wrong", offline=False, ago=30)
 
 
 def _port_lost(server: PageServer) -> None:
-    line = _line(server)
+    line = ShownLine(server, interval=USUAL_INTERVAL)
+    line.hour(gone=dict.fromkeys(line.names, 65.0))
+    line.measure(ago=65)
+    line.wind()
     line.state(open=False)
     line.publish("line/error", {"active": True, "code": "port_lost", "message": "/dev/ttyUSB0 is not there",
                                 "since": line.ts(65), "count": 1})  # fmt: skip
+    for name in line.names:
+        line.fail(name, "port_lost", "/dev/ttyUSB0 is not there", ago=65)
+        line.publish(f"device/{name}/error", {"active": False, "code": None})  # masked by the line's
 
 
 def _stale(server: PageServer) -> None:
     line = ShownLine(server)
-    line.hour()
+    line.hour(until=500)
     line.measure(ago=500)
 
 
@@ -196,7 +215,7 @@ def _partial(server: PageServer) -> None:
 
 
 def _labels(server: PageServer) -> None:
-    line = ShownLine(server, sensors=4, interval=600.0)
+    line = ShownLine(server, sensors=4, interval=USUAL_INTERVAL)
     line.labels = {"mast-2": LONG, "mast-3": "מד רוח על הגג הצפוני, 10 מטר", "mast-4": HOSTILE, "mast-5": "x" * 190}
     line.devices()
     line.measure()
@@ -219,7 +238,7 @@ def _request(status: str, words: str) -> Callable[[PageServer], None]:
 def _scanning(server: PageServer) -> None:
     line = _line(server)
     line.state(activity="scanning")
-    line.publish("event", {"type": "scan_progress", "percent": 42, "remaining_s": 31, "baudrate": 9600, "slave": 108})
+    line.publish("event", {"type": "scan_progress", "percent": 42, "remaining_s": 31, "baudrate": 9600, "slave": 14})
 
 
 class _Mounting:
@@ -228,7 +247,7 @@ class _Mounting:
     running = True
 
     def shown(self) -> dict[str, Any]:
-        adopted = [{"device": "mast-top", "slave": 2, "baudrate": 9600, "words": "mast-top: slave id 2, 9600 baud"}]
+        adopted = [{"device": "mast-2", "slave": 2, "baudrate": 9600, "words": "mast-2: slave id 2, 9600 baud"}]
         return {"running": True, "began": 0, "words": "Plug in the next one.", "problem": "", "names": [],
                 "adopted": adopted}  # fmt: skip
 

@@ -85,7 +85,7 @@ class PageServer:
         return actions
 
     def close(self) -> None:
-        """End it."""
+        """End it; a second time does nothing."""
         self._server.should_exit = True
         self._thread.join(PATIENCE)
         assert not self._thread.is_alive(), "the server does not end"

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe  # type: ignore[import-untyped]  # it has no types
 from playwright.sync_api import Browser, Page, expect
 
+from lfs10d.web.site_model import Stream
 from tests.support.chromium import chromium
 from tests.support.page_states import HOSTILE, STATES, ShownLine
 from tests.support.pages import TOKEN, PageServer, serving
@@ -85,6 +87,68 @@ def test_a_phone_that_wakes_after_an_hour_shows_nothing_old_as_live(page: Page, 
     assert shown[1] == "card old"
 
 
+SEEN = """() => {
+    window.seen = [];
+    const look = () => seen.push([
+        document.getElementById("banner").textContent, document.querySelector(".card .speed").textContent,
+        document.querySelector(".card").className,
+    ]);
+    new MutationObserver(look).observe(document.body, { subtree: true, childList: true, characterData: true, attributes: true });
+}"""  # noqa: E501  # JavaScript
+"""Keeps what the page shows after each change."""
+
+
+SEE_STATE = """(state) => {
+    Object.defineProperty(document, "visibilityState", { value: state, configurable: true });
+    document.dispatchEvent(new Event("visibilitychange"));
+}"""
+"""What a browser does when its phone is put away or taken out: without a screen chromium is always visible."""
+
+
+def test_a_phone_that_is_suspended_for_an_hour_shows_its_old_number_at_no_moment_as_live(
+    page: Page, server: PageServer
+) -> None:
+    line = server.do(lambda: ShownLine(server, sensors=1, interval=3600.0))
+    server.do(lambda: line.measure(10.0))
+    page.clock.install()
+    page.goto(server.address)
+    expect(page.locator("#banner")).to_have_text("Live")
+    page.evaluate(SEEN)
+    page.evaluate(SEE_STATE, "hidden")
+    sent = server.viewers._stream.number
+    deadline = time.monotonic() + IN_TIME / 1000
+    while server.viewers._stream.number < sent + 2:  # events with the old number wait for the phone to wake
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    page.clock.fast_forward(3_600_000)
+    server.do(lambda: line.measure(20.0))
+    page.evaluate(SEE_STATE, "visible")
+    expect(page.locator(".card .speed")).to_have_text("20.0 m/s")
+    expect(page.locator(".card")).to_have_class("card")
+    expect(page.locator("#banner")).to_have_text("Live")
+    seen = page.evaluate("seen")
+    assert ["NOT LIVE: this page was asleep.", "10.0 m/s", "card old"] in seen, (
+        "before it slept: what is seen on waking"
+    )
+    hidden = seen[seen.index(["NOT LIVE: this page was asleep.", "10.0 m/s", "card old"]) :]
+    assert [each for each in hidden if each[1] == "10.0 m/s" and each[2] != "card old"] == [], seen
+
+
+def test_after_a_sleep_the_hour_has_no_hole(page: Page, server: PageServer) -> None:
+    line = server.do(lambda: ShownLine(server, sensors=1, interval=600.0))
+    server.do(lambda: line.measure(10.0))
+    page.goto(f"{server.address}/device/line0/mast-2")
+    expect(page.locator("#banner")).to_have_text("Live")
+    server.viewers._stream = Stream("another")  # as after a start of the server: nothing can be resumed
+
+    def end_streams() -> None:
+        for queue in server.viewers._queues:
+            queue.put_nowait(None)
+
+    with page.expect_request(lambda sent: "/curve/" in sent.url):
+        server.do(end_streams)
+
+
 def test_when_the_server_goes_away_the_page_says_so(page: Page, server: PageServer) -> None:
     line = server.do(lambda: ShownLine(server, sensors=1, interval=600.0))
     server.do(lambda: line.measure(10.0))
@@ -134,6 +198,70 @@ def test_the_keyboard_alone_reaches_a_sensor_and_comes_back(page: Page, server: 
     expect(page.get_by_role("heading", level=1)).to_have_text("All lines")
 
 
+def test_the_keyboard_reaches_every_control_and_its_place_is_seen(page: Page, server: PageServer) -> None:
+    server.do(lambda: STATES["line"][1](server))
+    page.goto(f"{server.address}/line/line0")
+    login(page)
+    wanted = page.locator("main button:visible, main input:visible, main select:visible, main a:visible").count()
+    places = set()
+    for _ in range(wanted + 10):
+        page.keyboard.press("Tab")
+        place, style, width, visible = page.evaluate(
+            """() => {
+                const here = document.activeElement, style = getComputedStyle(here), box = here.getBoundingClientRect();
+                const all = [...document.querySelectorAll("main button, main input, main select, main a")];
+                return [all.indexOf(here), style.outlineStyle, parseFloat(style.outlineWidth), box.bottom > 0 && box.top < innerHeight];
+            }"""  # noqa: E501  # JavaScript
+        )
+        assert place < 0 or (style == "solid" and width >= 2 and visible), place
+        places.add(place)
+    assert len(places - {-1}) == wanted
+
+
+def test_nothing_moves_by_itself_and_so_nothing_is_to_be_reduced(page: Page, server: PageServer) -> None:
+    server.do(lambda: STATES["scan-running"][1](server))
+    page.emulate_media(reduced_motion="no-preference")
+    page.goto(f"{server.address}/line/line0")
+    login(page)
+    expect(page.locator("progress")).to_be_visible()
+    assert page.evaluate("document.getAnimations().length") == 0
+
+
+def test_an_interval_is_set_beginning_with_the_present_one_and_only_one_of_two_buttons_is_offered(
+    page: Page, server: PageServer
+) -> None:
+    line = server.do(lambda: ShownLine(server, sensors=2, interval=30.0))
+    server.do(line.measure)
+    actions = server.answers("line0", {})
+    page.goto(f"{server.address}/device/line0/mast-2")
+    login(page)
+    expect(page.get_by_label("Interval")).to_have_value("30000ms")
+    page.get_by_role("button", name="Set the interval").click()
+    expect(page.get_by_text("Done.").first).to_be_visible()
+    assert actions.sent == [("device/options", {"device": "mast-2", "interval": "30000ms"})]
+    expect(page.get_by_role("button", name="Enable")).to_be_hidden()
+    page.get_by_role("button", name="Disable").focus()
+    server.do(lambda: line.devices(enabled=False))
+    expect(page.get_by_role("button", name="Enable")).to_be_focused()
+    expect(page.get_by_role("button", name="Disable")).to_be_hidden()
+
+
+def test_mounting_is_begun_by_enter_and_each_sensor_is_seen_with_its_value(page: Page, server: PageServer) -> None:
+    path, make = STATES["mounting"]
+    server.do(lambda: make(server))
+    page.goto(server.address + path)
+    login(page)
+    expect(page.locator(".mounting")).to_have_text("Plug in the next one.")
+    expect(page.locator(".mounted li")).to_contain_text("mast-2: slave id 2, 9600 baud6.0 m/sgood")
+    expect(page.get_by_label("Names, in order (or none)")).to_be_hidden()
+    server.do(lambda: server.answers("line0", {}))
+    names = page.get_by_label("Names, in order (or none)")
+    names.fill("mast-top MAST")
+    names.press("Enter")
+    expect(page.locator(".answer.bad")).to_contain_text("'MAST' is not")
+    expect(page.get_by_role("button", name="All are mounted")).to_be_hidden()
+
+
 def test_what_comes_from_a_broker_is_text_and_never_a_script(page: Page, server: PageServer) -> None:
     server.do(lambda: STATES["labels"][1](server))
     page.goto(server.address)
@@ -142,14 +270,14 @@ def test_what_comes_from_a_broker_is_text_and_never_a_script(page: Page, server:
     assert page.title() == "lfs10d"
 
 
-@pytest.mark.parametrize("state", ["offline", "offline-device", "line", "labels", "status-file"])
+@pytest.mark.parametrize("state", ["offline", "offline-device", "line", "labels", "status-file", "mounting"])
 def test_no_rule_of_accessibility_is_broken_and_nothing_scrolls_sideways(
     state: str, page: Page, server: PageServer
 ) -> None:
     path, make = STATES[state]
     server.do(lambda: make(server))
     page.goto(server.address + path)
-    if state in {"line", "offline-device"}:
+    if state in {"line", "offline-device", "mounting"}:
         login(page)
     expect(page.locator("#banner")).not_to_have_text("Connecting to the page's server ...")
     for scheme in ("light", "dark"):

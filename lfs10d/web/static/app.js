@@ -2,13 +2,13 @@
 
 import { redrawAll } from "./curve.js";
 import { devicePage } from "./device.js";
-import { setClass, setText } from "./dom.js";
+import { ageText, setClass, setText } from "./dom.js";
 import { linePage } from "./line.js";
 import { overview } from "./overview.js";
+import { old } from "./sensor.js";
 import { initSession } from "./session.js";
-import { live, silentFor, site, start } from "./stream.js";
+import { live, silentFor, site, sleeping, start } from "./stream.js";
 import { choose, chosen } from "./units.js";
-import { ageText } from "./dom.js";
 
 const root = document.getElementById("main"), banner = document.getElementById("banner"), unit = document.getElementById("unit");
 let update = () => {};
@@ -24,15 +24,22 @@ function show() {
 
 function refresh() {
   update();
-  const faults = Object.values(site.lines).reduce((count, line) => count + (line.error ? 1 : 0)
+  const lines = Object.values(site.lines), faults = lines.reduce((count, line) => count + (line.error ? 1 : 0)
     + Object.values(line.devices).filter((device) => device.fault).length, 0);
-  const away = Object.values(site.lines).filter((line) => line.source?.kind === "none").length;
   setText(document.querySelector("title"), `${faults ? `${faults} ${faults === 1 ? "fault" : "faults"} - ` : ""}lfs10d`);
-  const gone = silentFor();
-  if (live()) setText(banner, away ? `${away === 1 ? "One line is" : `${away} lines are`} not live` : "Live");
+  const gone = silentFor(), away = lines.filter((line) => line.source?.kind === "none").length;
+  if (live()) setText(banner, away ? `${away === 1 ? "One line is" : `${away} lines are`} not live` : liveWords(lines));
+  else if (sleeping()) setText(banner, "NOT LIVE: this page was asleep.");
   else setText(banner, gone === Infinity ? "Connecting to the page's server ..."
     : `NOT LIVE: nothing has come from the page's server for ${ageText(gone)}. Is the network there? It is tried again by itself.`);
   setClass(banner, "wrong", (!live() && gone !== Infinity) || away > 0);
+}
+
+function liveWords(lines) {
+  if (!lines.length) return "No line is shown";
+  const polled = lines.flatMap((line) => Object.values(line.devices).map((device) => [line, device])).filter(([, device]) => device.enabled !== false);
+  const silent = polled.filter(([line, device]) => old(line, device)).length;
+  return silent ? `Live; ${silent} of ${polled.length} sensors without a new value` : "Live";
 }
 
 document.addEventListener("click", (event) => {

@@ -36,6 +36,16 @@ export function action(text, path, parameters, { quiet = false, running } = {}) 
   return { button, box };
 }
 
+// Shows the first of two buttons or the other; who had the one on the keyboard has the other then.
+export function swap(first, other, showFirst) {
+  const [shown, hidden] = showFirst ? [first, other] : [other, first];
+  if (hidden.hidden && !shown.hidden) return;
+  const focused = document.activeElement === hidden;
+  hidden.hidden = true;
+  shown.hidden = false;
+  if (focused) shown.focus();
+}
+
 // A change that is tried first and carried out by a second click.
 export function twoSteps({ title, fields, path, parameters, describe, warning }) {
   const box = answerBox();

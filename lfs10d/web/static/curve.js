@@ -49,7 +49,7 @@ function paint(canvas) {
   pen.setTransform(scale, 0, 0, scale, 0, 0);
   pen.clearRect(0, 0, width, height);
   pen.font = "12px system-ui, sans-serif";
-  const begin = end - span, top = axis ? 16 : 3, bottom = height - (axis ? 26 : 8), left = axis ? 44 : 0;
+  const begin = end - span, top = axis ? 24 : 3, bottom = height - (axis ? 26 : 8), left = axis ? 44 : 0;
   const seen = points.filter((point) => point[0] + STEP >= begin && point[0] <= end);
   const values = seen.filter((point) => point[1] !== null);
   const least = Math.min(0, ...values.map((point) => point[2]));
@@ -97,7 +97,8 @@ function runs(points, longest) {
 function scaleOf(pen, { begin, span, width, height, left, x, y, greatest, unit, color }) {
   pen.fillStyle = color("--soft");
   const raw = greatest / 4, power = 10 ** Math.floor(Math.log10(raw));
-  const step = [1, 2, 5, 10].map((each) => each * power).find((each) => each >= raw);
+  const step = [1, 2, 2.5, 5, 10].map((each) => each * power).find((each) => each >= raw);
+  pen.fillText(shown(0, unit)[1], 2, 11);
   for (let value = 0; value <= greatest; value += step) {
     pen.fillText(shown(value, unit)[0], 2, y(value) + 4);
     pen.globalAlpha = 0.35;

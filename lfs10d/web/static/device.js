@@ -1,28 +1,29 @@
 // One sensor: the last hour, its figures, its errors, its frames, its controls.
 
-import { action, field, guarded, requestPath, twoSteps } from "./controls.js";
-import { draw, watch } from "./curve.js";
-import { facts, h, intervalText, renew, setClass, setText, timeText } from "./dom.js";
+import { action, field, guarded, requestPath, swap, twoSteps } from "./controls.js";
+import { facts, h, intervalText, renew, setText, timeText } from "./dom.js";
 import { answers, frameList, lineNotices } from "./line.js";
 import { notice } from "./overview.js";
-import { ageWords, main, old, state, windWords } from "./sensor.js";
+import { sensorFields } from "./sensor.js";
 import { now, site } from "./stream.js";
 import { shown } from "./units.js";
 
 export function devicePage(root, key, name) {
-  const label = h("p", { class: "facts", dir: "auto" }), figure = h("span"), unit = h("small"), more = h("p", { class: "more" });
-  const words = h("span"), aged = h("span", { class: "age" }), said = h("p", { class: "state" }, words, " ", aged);
+  const label = h("p", { class: "facts", dir: "auto" }), fields = sensorFields(name, { span: 3600, title: "Last hour", axis: true });
   const notices = h("div"), fault = h("div"), stats = h("div"), config = h("div"), wind = h("div"), frames = h("div"), replies = h("div");
-  const canvas = h("canvas", { class: "tall", role: "img" }), box = h("div", { class: "big" }, h("p", { class: "speed" }, figure, " ", unit), more, said);
-  let hour = [];
-  const controls = h("div");
-  watch(canvas);
+  const box = h("div", { class: "big" }, fields.speed, fields.more, fields.said), controls = h("div");
+  let hour = [], built = null;
   root.append(h("h1", {}, name), h("p", {}, h("a", { href: `/line/${encodeURIComponent(key)}`, "data-link": "" }, `Line ${key}`)), label, notices, box, fault,
-    h("h2", {}, "The last hour"), canvas, h("h2", {}, "Controls"), controls, replies,
+    h("h2", {}, "The last hour"), fields.canvas, h("h2", {}, "Controls"), controls, replies,
     h("div", { class: "columns" }, h("section", {}, h("h2", {}, "Wind"), wind), h("section", {}, h("h2", {}, "Statistics"), stats), h("section", {}, h("h2", {}, "Configuration"), config)),
     h("h2", {}, "Last frames"), frames);
-  fetch(`/api/${encodeURIComponent(key)}/curve/${encodeURIComponent(name)}`).then((response) => response.json()).then(({ points }) => { hour = points; }).catch(() => {});
-  let built = false;
+  let asked = 0;
+  // Asked for again with each whole, for a phone that slept knows only what the whole has: ten minutes.
+  const askForHour = () => {
+    asked = site.wholes;
+    fetch(`/api/${encodeURIComponent(key)}/curve/${encodeURIComponent(name)}`).then((response) => response.json()).then(({ points }) => { hour = points; }).catch(() => {});
+  };
+  askForHour();
   return () => {
     const line = site.lines[key], device = line?.devices[name];
     if (!device) {
@@ -30,32 +31,27 @@ export function devicePage(root, key, name) {
       return;
     }
     if (!built) {
-      built = true;
-      controls.replaceChildren(...guarded(() => deviceControls(key, name, () => site.lines[key]?.devices[name] ?? device)));
+      built = { update() {} };
+      controls.replaceChildren(...guarded(() => {
+        built = deviceControls(key, name, () => site.lines[key]?.devices[name] ?? device);
+        return built.elements;
+      }));
     }
+    built.update(device);
+    if (asked !== site.wholes) askForHour();
     const newest = hour.length ? hour.at(-1)[0] : 0;
     hour = [...hour, ...(device.curve ?? []).filter((point) => point[0] > newest)].slice(-900);
-    const [value, itsUnit] = main(device), [text, unitText] = shown(value, itsUnit), [kind, stateText] = state(line, device);
     setText(label, [device.label, device.id === null ? null : `id ${device.id}`].filter(Boolean).join(" · "));
-    setText(figure, text);
-    setText(unit, unitText);
-    setText(more, windWords(device));
-    setText(words, stateText);
-    setText(aged, ageWords(line, device));
-    setClass(said, "good", kind === "good");
-    setClass(said, "bad", kind === "bad");
-    setClass(box, "old", old(line, device));
+    const unitText = fields.fill(box, line, device, hour);
     renew(notices, lineNotices(line), () => lineNotices(line).map(notice));
     renew(fault, device.fault, () => device.fault ? faultBox(device.fault) : null);
     renew(stats, device.stats, () => statsTable(device.stats));
-    renew(config, [device.config, device.profile, device.id, device.interval], () => configTable(device));
+    renew(config, [device.config, device.profile, device.id, device.interval, device.enabled], () => configTable(device));
     renew(wind, [device.wind, unitText], () => windTable(device.wind));
     const own = (line.frames ?? []).filter((each) => line.line?.framing === "ascii" || Number.parseInt(each.hex, 16) === device.id || Number.parseInt(String(each.hex).slice(0, 2), 16) === device.id);
     renew(frames, own, () => frameList(own));
     const mine = (line.requests ?? []).filter((each) => each.parameters?.device === name);
     renew(replies, mine, () => answers(mine));
-    canvas.setAttribute("aria-label", `Last hour of ${name}: now ${text} ${unitText}, ${stateText}`);
-    draw(canvas, hour, { end: now() / 1000, span: 3600, unit: itsUnit, longest: 3 * (device.interval ?? 1) + 8, axis: true });
   };
 }
 
@@ -89,18 +85,27 @@ function windTable(wind) {
   return facts(rows);
 }
 
+const INTERVALS = [0.25, 0.5, 1, 2, 5, 10, 60];
+
 function deviceControls(key, name, device) {
   const path = (request) => requestPath(key, request);
   const poll = action("Poll now", path("device/read"), () => ({ device: name }));
-  const interval = h("select", {}, ["250ms", "500ms", "1s", "2s", "5s", "10s", "1m"].map((each) => h("option", { value: each, selected: each === "1s" }, each.replace(/(m?s|m)$/, " $1").replace(/ m$/, " min"))));
+  const present = device().interval ?? 1, offered = INTERVALS.includes(present) ? INTERVALS : [...INTERVALS, present].sort((a, b) => a - b);
+  const interval = h("select", {}, offered.map((each) => h("option", { value: `${Math.round(each * 1000)}ms`, selected: each === present }, intervalText(each))));
   const change = action("Set the interval", path("device/options"), () => ({ device: name, interval: interval.value }), { quiet: true });
   const enable = action("Enable", path("device/options"), () => ({ device: name, enabled: true }), { quiet: true });
   const disable = action("Disable", path("device/options"), () => ({ device: name, enabled: false }), { quiet: true });
   const trace = action("Trace for 1 min", path("line/trace"), () => ({ for: "1m" }), { quiet: true });
   const to = h("input", { type: "number", min: 1, max: 255, value: "", size: 4, inputMode: "numeric" });
-  return [
-    h("div", { class: "row" }, poll.button, field("Interval", interval), change.button, enable.button, disable.button, trace.button), poll.box, change.box, enable.box, disable.box, trace.box,
-    twoSteps({ title: "Another slave id", fields: [field("New id", to)], path: path("device/readdress"), parameters: () => ({ device: name, to: Number(to.value) }),
-      describe: () => `Change id ${device().id} to ${to.value} now`, warning: "The sensor itself will be written." }),
-  ];
+  return {
+    elements: [
+      h("div", { class: "row" }, poll.button, field("Interval", interval), change.button, enable.button, disable.button, trace.button), poll.box, change.box, enable.box, disable.box, trace.box,
+      twoSteps({ title: "Another slave id", fields: [field("New id", to)], path: path("device/readdress"), parameters: () => ({ device: name, to: Number(to.value) }),
+        describe: () => `Change id ${device().id} to ${to.value} now`, warning: "The sensor itself will be written." }),
+    ],
+    // Of the two only the one that changes anything is offered.
+    update({ enabled }) {
+      swap(enable.button, disable.button, enabled === false);
+    },
+  };
 }

@@ -33,12 +33,16 @@ export function facts(rows) {
   return h("table", {}, h("tbody", {}, shown.map(([name, value]) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, String(value))))));
 }
 
+// Figure and unit with a space that never breaks.
+export function together(figure, unit) {
+  return unit ? `${figure}\u00a0${unit}` : String(figure);
+}
+
 export function ageText(seconds) {
-  if (seconds < 10) return `${seconds.toFixed(0)} s`;
-  if (seconds < 100) return `${Math.round(seconds)} s`;
-  if (seconds < 6000) return `${Math.round(seconds / 60)} min`;
-  if (seconds < 360000) return `${Math.round(seconds / 3600)} h`;
-  return `${Math.round(seconds / 86400)} days`;
+  if (seconds < 100) return together(Math.round(seconds), "s");
+  if (seconds < 6000) return together(Math.round(seconds / 60), "min");
+  if (seconds < 360000) return together(Math.round(seconds / 3600), "h");
+  return together(Math.round(seconds / 86400), "days");
 }
 
 export function timeText(ts, now) {
@@ -51,5 +55,5 @@ export function timeText(ts, now) {
 
 export function intervalText(seconds) {
   if (seconds === 0) return "as fast as the line allows";
-  return seconds < 1 ? `${Math.round(seconds * 1000)} ms` : seconds % 60 === 0 ? `${seconds / 60} min` : `${seconds} s`;
+  return seconds < 1 ? together(Math.round(seconds * 1000), "ms") : seconds % 60 === 0 ? together(seconds / 60, "min") : together(seconds, "s");
 }

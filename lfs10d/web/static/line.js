@@ -1,7 +1,7 @@
 // One line: its state, its controls, its frames.
 
-import { action, answerBox, field, guarded, requestPath, send, tell, twoSteps } from "./controls.js";
-import { ageText, facts, h, intervalText, renew, setText, timeText } from "./dom.js";
+import { action, answerBox, field, guarded, requestPath, swap, tell, twoSteps } from "./controls.js";
+import { ageText, facts, h, renew, setText, timeText, together } from "./dom.js";
 import { notice } from "./overview.js";
 import { main, old, state } from "./sensor.js";
 import { now, site } from "./stream.js";
@@ -9,39 +9,43 @@ import { shown } from "./units.js";
 import { post } from "./session.js";
 
 export function lineFacts(line) {
-  const { port, baudrate, databits, parity, stopbits, load_pct: load, polls_per_s: polls, activity } = line.line ?? {};
+  const { port, baudrate, databits, parity, stopbits, load_pct: load, polls_per_s: polls, activity, open } = line.line ?? {};
   const words = [];
   if (port) words.push(port);
-  if (baudrate) words.push(`${baudrate} baud ${databits ?? ""}${(parity ?? "").slice(0, 1).toUpperCase()}${stopbits ?? ""}`);
+  if (baudrate) words.push(`${together(baudrate, "baud")} ${databits ?? ""}${(parity ?? "").slice(0, 1).toUpperCase()}${stopbits ?? ""}`.trim());
   if (line.source?.kind !== "none") {
-    if (typeof load === "number") words.push(`load ${Math.round(load)} %`);
-    if (typeof polls === "number") words.push(`${polls.toFixed(1)} polls/s`);
+    if (typeof load === "number" && open !== false) words.push(`load ${together(Math.round(load), "%")}`);
+    if (typeof polls === "number" && open !== false) words.push(together(polls.toFixed(1), "polls/s"));
     if (activity && activity !== "polling") words.push(activity.replaceAll("_", " "));
   }
   const broker = line.broker ?? {};
-  if (line.source?.kind === "none" && line.daemon === "offline") words.push("daemon offline");
+  if (line.source?.kind === "none" && line.reached) words.push(line.daemon === "offline" ? "daemon offline" : "no daemon");
   else words.push(broker.connected ? `broker connected${broker.waiting > 20 ? `, ${broker.waiting} samples wait` : ""}` : "broker away");
   return words.join(" · ");
+}
+
+// What is wrong between the daemon and this page: [title, what to do].
+function away(line) {
+  if (line.daemon === "offline") return ["The daemon is offline.", "Start it, or see its log: journalctl -u lfs10d."];
+  if (line.reached) return ["There is no daemon.", "Is it running, with this line.name and this mqtt.base_topic?"];
+  return ["The broker is away.", `Check the network and the broker${line.known ? "; the daemon measures on and keeps its samples" : ""}.`];
 }
 
 export function lineNotices(line) {
   const found = [];
   const source = line.source ?? { kind: "none", words: "" };
   if (source.kind === "none") {
-    const dead = line.daemon === "offline";
-    found.push({
-      title: dead ? "The daemon is offline." : line.known ? "The broker is away." : "No daemon is heard here.",
-      text: `${source.words.replace(/^not live: /, "")}. ${dead ? "Start it, or see its log: journalctl -u lfs10d." : "Check the network and the broker; the daemon measures on and keeps its samples."}`,
-    });
+    const [title, remedy] = away(line);
+    found.push({ title, text: `${cap(source.words.replace(/^not live: /, ""))} ${remedy}` });
   } else if (source.kind === "status") {
-    found.push({ title: "The broker is away.", text: `These values come from the daemon's status file. ${line.broker?.waiting ?? 0} samples wait for the broker. ${source.words.replace(/^live from /, "")}.`, mild: true });
+    found.push({ title: "The broker is away.", text: `${line.broker?.waiting ?? 0} samples wait for it. These values come from the daemon's status file: ${source.words.replace(/^live from /, "")}.`, mild: true });
   }
-  if (line.error) found.push({ title: `${cap(line.error.meaning)}`, text: `since ${timeText(line.error.since, now())}: ${line.error.message}. ${line.error.remedy}` });
+  if (line.error) found.push({ title: `${cap(line.error.meaning)}`, text: `Since ${timeText(line.error.since, now())}: ${line.error.message}. ${line.error.remedy}` });
   else if (line.line?.open === false && source.kind !== "none") found.push({ title: "The port is not open.", text: line.line.activity === "paused" ? "The line is paused, and goes on by itself." : "" });
   if (line.line?.requests === "denied") found.push({ title: "The broker lets no request through.", text: "Check its topic rules for the daemon's user.", mild: true });
   if (line.info?.clock === "unsynced" && source.kind !== "none") found.push({ title: "The gateway's clock is not set.", text: "Times of its samples are wrong until it is; ages on this page are right.", mild: true });
-  if (line.scan) found.push({ title: "A scan is under way.", text: `${Math.round(line.scan.percent ?? 0)} %`, mild: true });
-  if (line.mounting?.running) found.push({ title: "Sensors are being mounted.", text: line.mounting.words, mild: true });
+  if (line.scan) found.push({ title: "A scan is under way.", text: together(Math.round(line.scan.percent ?? 0), "%"), mild: true });
+  if (line.mounting?.running) found.push({ title: "Sensors are being mounted.", text: `${line.mounting.words} ${line.mounting.problem}`.trim(), mild: true });
   return found;
 }
 
@@ -50,10 +54,15 @@ function cap(words) {
 }
 
 export function linePage(root, key) {
-  const parts = Object.fromEntries(["notices", "facts", "sensors", "scan", "mounting", "answers", "frames", "events"].map((name) => [name, h("div")]));
+  const parts = Object.fromEntries(["notices", "facts", "sensors", "scan", "mounting", "mounted", "answers", "frames", "events"].map((name) => [name, h("div", { class: name.startsWith("mount") ? name : "" })]));
   const summary = h("p", { class: "facts" });
+  let update = () => {};
   root.append(h("h1", {}, `Line ${key}`), summary, parts.notices, h("h2", {}, "Sensors"), parts.sensors,
-    h("h2", {}, "Controls"), ...guarded(() => lineControls(key, parts)), parts.answers,
+    h("h2", {}, "Controls"), ...guarded(() => {
+      const controls = lineControls(key, parts);
+      update = controls.update;
+      return controls.elements;
+    }), parts.answers,
     h("div", { class: "columns" }, h("section", {}, h("h2", {}, "The line"), parts.facts), h("section", {}, h("h2", {}, "Events"), parts.events)),
     h("h2", {}, "Last frames"), parts.frames);
   return () => {
@@ -74,7 +83,10 @@ export function linePage(root, key) {
     renew(parts.frames, line.frames, () => frameList(line.frames ?? []));
     renew(parts.answers, line.requests, () => answers(line.requests ?? []));
     renew(parts.scan, line.scan, () => line.scan ? scanProgress(line.scan) : null);
-    renew(parts.mounting, line.mounting, () => mountingState(line.mounting));
+    renew(parts.mounting, [line.mounting?.words, line.mounting?.problem], () => mountingState(line.mounting));
+    const mounted = (line.mounting?.adopted ?? []).map((each) => [each, line.devices[each.device]]).map(([each, device]) => [each, device ? shown(...main(device)).join(" ") : "", device ? state(line, device) : ["", ""]]);
+    renew(parts.mounted, mounted, () => mountedList(key, mounted));
+    update(line);
   };
 }
 
@@ -135,8 +147,14 @@ function scanProgress(scan) {
 
 function mountingState(mounting) {
   if (!mounting) return null;
-  return [h("p", { class: "answer", role: "status" }, h("b", {}, mounting.words)), mounting.problem ? h("p", { class: "problem" }, mounting.problem) : null,
-    mounting.adopted.length ? h("ol", {}, mounting.adopted.map((each) => h("li", {}, each.words))) : null];
+  return [h("p", { class: "answer", role: "status" }, h("b", {}, mounting.words)), mounting.problem ? h("p", { class: "problem" }, mounting.problem) : null];
+}
+
+// Each with what it measures now: who turns its cups sees them turn.
+function mountedList(key, mounted) {
+  if (!mounted.length) return null;
+  return h("ol", {}, mounted.map(([each, value, [kind, words]]) => h("li", {}, h("a", { href: `/device/${encodeURIComponent(key)}/${encodeURIComponent(each.device)}`, "data-link": "" }, each.words),
+    h("p", { class: "speed" }, value), h("p", { class: `state ${kind}` }, words))));
 }
 
 function lineControls(key, parts) {
@@ -148,24 +166,35 @@ function lineControls(key, parts) {
   const ids = h("input", { value: "1-32", size: 8, inputMode: "numeric" });
   const scan = action("Scan", path("line/scan"), () => ({ ids: ids.value }), { running: "Scanning while polling goes on ..." });
   const stop = action("Cancel the scan", path("line/cancel"), () => ({}), { quiet: true });
-  const names = h("input", { placeholder: "mast-top, mast-low", size: 18, autocapitalize: "none" });
+  const names = h("input", { placeholder: "mast-top, mast-low", size: 18, autocapitalize: "none", autocomplete: "off", spellcheck: false, enterKeyHint: "go" });
   const box = answerBox();
-  const begin = h("button", { type: "button", onclick: async () => {
+  const begin = h("button", { type: "submit" }, "Mount sensors");
+  const end = h("button", { type: "button", class: "quiet", hidden: true, onclick: () => post(`/api/${encodeURIComponent(key)}/mounting/stop`, {}) }, "All are mounted");
+  const mount = async (event) => {
+    event.preventDefault();
     const given = names.value.split(/[\s,]+/).filter(Boolean);
     const [status, answer] = await post(`/api/${encodeURIComponent(key)}/mounting/start`, { names: given });
-    if (status === 200) box.hidden = true;
-    else tell(box, "lost", answer.words);
-  } }, "Mount sensors");
-  const end = h("button", { type: "button", class: "quiet", onclick: () => post(`/api/${encodeURIComponent(key)}/mounting/stop`, {}) }, "All are mounted");
+    if (status !== 200) return tell(box, "lost", answer.words);
+    box.hidden = true;
+    form.scrollIntoView();
+  };
   const rate = h("select", {}, ["9600", "19200"].map((each) => h("option", { value: each }, each)));
   const cycle = h("input", { type: "checkbox" });
   const reload = action("Read the files again", path("config/reload"), () => ({}), { quiet: true });
-  return [
-    h("fieldset", {}, h("legend", {}, "Mount one sensor after the other"), h("p", {}, "Connect one factory-new sensor at a time. Each gets a free id, the line's rate, and is polled at once."),
-      h("div", { class: "row" }, field("Names, in order (or none)", names), begin, end), box, parts.mounting),
+  const wishes = h("div", {}, h("p", {}, "Connect one factory-new sensor at a time. Each gets a free id, the line's rate, and is polled at once."), field("Names, in order (or none)", names));
+  const form = h("form", { class: "mount", onsubmit: mount }, h("fieldset", {}, h("legend", {}, "Mount sensors one by one"), parts.mounting, parts.mounted, wishes, h("div", { class: "row" }, begin, end), box));
+  const elements = [
+    form,
     h("fieldset", {}, h("legend", {}, "Look for devices"), h("div", { class: "row" }, field("Slave ids", ids), scan.button, stop.button), parts.scan, scan.box, stop.box),
-    h("fieldset", {}, h("legend", {}, "The line"), h("div", { class: "row" }, trace.button, field("For", length), pause.button, cancel.button, reload.button), trace.box, pause.box, cancel.box, reload.box),
-    twoSteps({ title: "Another baud rate for all sensors", fields: [field("To", rate), h("label", { class: "check" }, cycle, "sensors must be switched off and on")], path: path("line/baudrate"),
+    h("fieldset", {}, h("legend", {}, "The line"), h("div", { class: "row" }, field("For", length), pause.button, cancel.button, trace.button, reload.button), pause.box, cancel.box, trace.box, reload.box),
+    twoSteps({ title: "Another baud rate for all", fields: [field("To", rate), h("label", { class: "check" }, cycle, "sensors must be switched off and on")], path: path("line/baudrate"),
       parameters: () => ({ to: Number(rate.value), ...(cycle.checked ? { power_cycle: true } : {}) }), describe: () => `Move all to ${rate.value} baud now`, warning: "All sensors and the port will move; polling stops for a moment." }),
   ];
+  // What is under way can be ended, and is not begun a second time.
+  const update = (line) => {
+    wishes.hidden = line.mounting?.running === true;
+    swap(end, begin, wishes.hidden);
+    stop.button.hidden = line.line?.activity !== "scanning";
+  };
+  return { elements, update };
 }

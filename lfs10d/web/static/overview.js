@@ -1,11 +1,9 @@
 // All lines at a glance.
 
-import { draw, watch } from "./curve.js";
-import { h, renew, setClass, setText } from "./dom.js";
+import { h, renew, setText, timeText } from "./dom.js";
 import { lineFacts, lineNotices } from "./line.js";
-import { ageWords, main, old, state, windWords } from "./sensor.js";
+import { sensorFields } from "./sensor.js";
 import { now, site } from "./stream.js";
-import { shown } from "./units.js";
 
 export function overview(root) {
   const sections = new Map();
@@ -35,10 +33,11 @@ function section(key) {
     element,
     update(line) {
       setText(facts, lineFacts(line));
-      const noted = [...lineNotices(line), ...troubles(line)];
+      const noted = [...lineNotices(line), ...troubles(key, line)];
       renew(notices, noted, () => noted.map(notice));
       const order = line.order ?? [];
-      setText(empty, line.known && !order.length ? "There are no sensors on this line yet: mount one from the page of the line." : "");
+      renew(empty, line.known && !order.length, () => (line.known && !order.length
+        ? ["There are no sensors on this line yet: ", h("a", { href: `/line/${encodeURIComponent(key)}`, "data-link": "" }, "mount the first"), "."] : null));
       empty.hidden = empty.textContent === "";
       for (const name of order) {
         if (!cards.has(name)) cards.set(name, card(key, name));
@@ -52,46 +51,32 @@ function section(key) {
 }
 
 // Which sensors are silent and why, above the cards: with many sensors nobody finds them below.
-function troubles(line) {
+function troubles(key, line) {
   if (line.source?.kind === "none" || line.error) return [];
   const bad = (line.order ?? []).map((name) => line.devices[name]).filter((device) => device?.fault);
   if (!bad.length) return [];
-  const named = bad.slice(0, 4).map((device) => `${device.name} ${device.fault.meaning} (${device.fault.remedy})`);
-  const rest = bad.length > 4 ? `; and ${bad.length - 4} more` : "";
-  return [{ title: `${bad.length} of ${line.order.length} sensors ${bad.length === 1 ? "has" : "have"} a fault:`, text: `${named.join("; ")}${rest}` }];
+  const items = bad.slice(0, 4).map(({ name, fault }) => ({ name, href: `/device/${encodeURIComponent(key)}/${encodeURIComponent(name)}`,
+    text: `${fault.meaning} since ${timeText(fault.since, now())}. ${fault.remedy}` }));
+  const text = bad.length > 4 ? `The first four of ${bad.length}:` : "";
+  return [{ title: `${bad.length} of ${line.order.length} sensors ${bad.length === 1 ? "has" : "have"} a fault.`, text, items }];
 }
 
-export function notice({ title, text, mild }) {
-  return h("div", { class: mild ? "notice mild" : "notice" }, h("p", {}, h("b", {}, title), text ? ` ${text}` : ""));
+export function notice({ title, text, mild, items = [] }) {
+  return h("div", { class: mild ? "notice mild" : "notice" }, h("p", {}, h("b", {}, title), text ? ` ${text}` : ""),
+    items.length ? h("ul", {}, items.map((each) => h("li", {}, h("a", { href: each.href, "data-link": "" }, each.name), ` ${each.text}`))) : null);
 }
 
 function card(key, name) {
-  const part = (tag, kind) => h(tag, { class: kind });
   const link = h("a", { href: `/device/${encodeURIComponent(key)}/${encodeURIComponent(name)}`, "data-link": "" }, name);
-  const label = h("span", { class: "label", dir: "auto" }), id = part("span", "id"), figure = h("span"), unit = h("small");
-  const more = part("p", "more"), said = part("p", "state"), words = h("span"), aged = part("span", "age");
-  const canvas = h("canvas", { role: "img" });
-  watch(canvas);
-  said.append(words, " ", aged);
-  const box = h("article", { class: "card" }, h("h3", {}, link), id, label, h("p", { class: "speed" }, figure, " ", unit), more, canvas, said);
+  const label = h("span", { class: "label", dir: "auto" }), id = h("span", { class: "id" });
+  const fields = sensorFields(name, { span: 600, title: "Last ten minutes" });
+  const box = h("article", { class: "card" }, h("h3", {}, link), id, label, fields.speed, fields.more, fields.canvas, fields.said);
   return {
     element: h("li", {}, box),
     update(line, device) {
-      const [value, itsUnit] = main(device), [text, unitText] = shown(value, itsUnit), [kind, stateText] = state(line, device);
       setText(label, device.label ?? "");
       setText(id, device.id === null ? "" : `id ${device.id}`);
-      setText(figure, text);
-      setText(unit, unitText);
-      setText(more, windWords(device));
-      setText(words, stateText);
-      setText(aged, ageWords(line, device));
-      setClass(said, "good", kind === "good");
-      setClass(said, "bad", kind === "bad");
-      setClass(box, "bad", kind === "bad");
-      setClass(box, "old", old(line, device));
-      const described = `Last ten minutes of ${name}: now ${text} ${unitText}, ${stateText}`;
-      if (canvas.getAttribute("aria-label") !== described) canvas.setAttribute("aria-label", described);
-      draw(canvas, device.curve ?? [], { end: now() / 1000, span: 600, unit: itsUnit, longest: 3 * (device.interval ?? 1) + 8 });
+      fields.fill(box, line, device, device.curve ?? []);
     },
   };
 }

@@ -1,6 +1,7 @@
-// What is said of a sensor: its state in words, its value and its age. Old is never shown as live.
+// What is shown of a sensor: its state in words, its value and its age, its curve. Old is never shown as live.
 
-import { ageText, timeText } from "./dom.js";
+import { draw, watch } from "./curve.js";
+import { ageText, h, setClass, setText, timeText } from "./dom.js";
 import { live, now } from "./stream.js";
 import { shown } from "./units.js";
 
@@ -13,7 +14,7 @@ export function age(device) {
 export function old(line, device) {
   const seconds = age(device);
   const interval = Math.max(device.interval ?? 1, device.interval === 0 ? line.line?.cycle_s ?? 1 : 0);
-  return seconds === null || seconds > 3 * interval + WAY || !live() || line.source?.kind === "none";
+  return seconds === null || seconds > 3 * interval + WAY || device.online === false || !live() || line.source?.kind === "none";
 }
 
 export function main(device) {
@@ -36,7 +37,34 @@ export function state(line, device) {
 export function ageWords(line, device) {
   if (!old(line, device) || device.enabled === false) return "";
   const seconds = age(device);
-  return seconds === null ? "" : `last value ${ageText(seconds)} ago`;
+  return seconds === null ? "" : ` · last value ${ageText(seconds)} ago`;
+}
+
+// The fields of a sensor that its card and its page share, and what fills them; `axis`: the tall curve, with a scale.
+export function sensorFields(name, { span, title, axis = false }) {
+  const figure = h("span"), unit = h("small"), words = h("span"), aged = h("span", { class: "age" });
+  const speed = h("p", { class: "speed" }, figure, " ", unit), more = h("p", { class: "more" }), said = h("p", { class: "state" }, words, aged);
+  const canvas = h("canvas", { class: axis ? "tall" : "", role: "img" });
+  watch(canvas);
+  return {
+    speed, more, said, canvas,
+    fill(box, line, device, points) {
+      const [value, itsUnit] = main(device), [text, unitText] = shown(value, itsUnit), [kind, stateText] = state(line, device);
+      setText(figure, text);
+      setText(unit, unitText);
+      setText(more, windWords(device));
+      setText(words, stateText);
+      setText(aged, ageWords(line, device));
+      setClass(said, "good", kind === "good");
+      setClass(said, "bad", kind === "bad");
+      setClass(box, "bad", kind === "bad");
+      setClass(box, "old", old(line, device));
+      const described = `${title} of ${name}: now ${text} ${unitText}, ${stateText}`;
+      if (canvas.getAttribute("aria-label") !== described) canvas.setAttribute("aria-label", described);
+      draw(canvas, points, { end: now() / 1000, span, unit: itsUnit, longest: 3 * (device.interval ?? 1) + 8, axis });
+      return unitText;
+    },
+  };
 }
 
 // Gust, mean and direction, as far as the daemon publishes them.

@@ -2,56 +2,83 @@
 
 const SILENT = 5; // s without any event after which nothing is live
 
-export const site = { lines: {}, known: false };
-let heardNow = 0, heardAt = 0, heardDate = 0, lastId = "", source = null, listener = () => {};
+export const site = { lines: {}, known: false, wholes: 0 };
 const POINTS = 180;
+const DRIFT = 0.01; // by which the two sides' clocks may differ
 
-// Epoch ms of the server. While a phone sleeps one of its two clocks may stand still, so the larger step counts.
-export function now() {
-  return heardNow + Math.max(performance.now() - heardAt, Date.now() - heardDate, 0);
+let asleep = false; // hidden or frozen: what is seen first on waking is the page as it was
+let source = null, listener = () => {};
+// Our clock: ms up to the last event, and both of the browser's clocks then.
+let clock = 0, ticks = performance.now(), date = Date.now();
+let ahead = -Date.now(); // by how much our clock is ahead of the server's, of an event that came without delay
+let anew = true; // the next event is the first of its connection
+let sent = -Infinity; // when the newest event was sent, by our clock
+
+// While a phone sleeps one of its two clocks may stand still, so the larger step counts.
+function local() {
+  return clock + Math.max(performance.now() - ticks, Date.now() - date, 0);
 }
 
+// Epoch ms of the server.
+export function now() {
+  return local() - ahead;
+}
+
+// s since the newest event was sent: one that waited for a sleeping phone to wake is old when it comes.
 export function silentFor() {
-  return heardAt === 0 ? Infinity : Math.max(performance.now() - heardAt, Date.now() - heardDate) / 1000;
+  return (local() - sent) / 1000;
+}
+
+export function sleeping() {
+  return asleep;
 }
 
 export function live() {
-  return silentFor() < SILENT;
+  return silentFor() < SILENT && !asleep;
 }
 
 export function start(onChange) {
   listener = onChange;
   open();
-  const wake = () => {
-    if (document.visibilityState === "visible" && !live()) open();
+  const look = (sleeps) => {
+    asleep = sleeps;
+    if (!asleep && silentFor() >= SILENT) open();
+    listener();
   };
-  document.addEventListener("visibilitychange", wake);
-  window.addEventListener("pageshow", wake);
-  window.addEventListener("online", wake);
+  const byVisibility = () => look(document.visibilityState === "hidden");
+  for (const name of ["visibilitychange", "resume"]) document.addEventListener(name, byVisibility);
+  for (const name of ["pageshow", "online"]) window.addEventListener(name, byVisibility);
+  document.addEventListener("freeze", () => look(true));
+  window.addEventListener("pagehide", () => look(true));
   setInterval(() => {
     if (silentFor() > 2 * SILENT && document.visibilityState === "visible") open();
   }, 1000 * SILENT);
 }
 
+// Begins with the whole, for what a server kept is old; the browser itself resumes after a short interruption.
 function open() {
   source?.close();
-  source = new EventSource(lastId ? `/api/events?after=${encodeURIComponent(lastId)}` : "/api/events");
+  anew = true;
+  source = new EventSource("/api/events");
   source.addEventListener("state", (event) => take(event, (data) => {
     site.lines = data.lines;
     site.known = true;
+    site.wholes += 1;
   }));
   source.addEventListener("change", (event) => take(event, (data) => merge(data.lines)));
   source.onerror = () => {
-    if (source.readyState === EventSource.CLOSED) setTimeout(() => !live() && open(), 2000);
+    if (source.readyState === EventSource.CLOSED) setTimeout(() => silentFor() >= SILENT && open(), 2000);
   };
 }
 
 function take(event, apply) {
-  const data = JSON.parse(event.data);
-  lastId = event.lastEventId;
-  heardNow = data.now;
-  heardAt = performance.now();
-  heardDate = Date.now();
+  const data = JSON.parse(event.data), here = local();
+  ahead = anew ? here - data.now : Math.min(ahead + DRIFT * (here - clock), here - data.now);
+  anew = false;
+  sent = data.now + ahead;
+  clock = here;
+  ticks = performance.now();
+  date = Date.now();
   apply(data);
   listener(data.lines);
 }

@@ -6,6 +6,7 @@ import json
 import re
 import signal
 import socket
+import subprocess
 from collections.abc import Callable
 from http.client import HTTPConnection
 from pathlib import Path
@@ -14,7 +15,7 @@ from typing import Any
 import pytest
 from prometheus_client.openmetrics.parser import text_string_to_metric_families
 
-from tests.support.brokers import Mosquitto
+from tests.support.brokers import Authority, Mosquitto, path_of
 from tests.support.shells import Shell, running, typed
 from tests.support.sites import Site, eventually
 
@@ -22,6 +23,13 @@ NAME = "of-the-page"
 """No other daemon of this machine writes the status of a line of this name into /run/lfs10d."""
 NAMED = {"name": NAME}
 TOKEN = "correct-horse-battery"  # noqa: S105 - of a test
+SECRET = "s3cret-and-long-enough"  # noqa: S105 - as above
+AT_ONCE = {
+    "lfs10d_build_info", "lfs10d_mqtt_connected", "lfs10d_line_exchanges_total",
+    "lfs10d_device_online", "lfs10d_device_wind_speed_meters_per_second", "lfs10d_device_polls_total",
+    "lfs10d_device_last_good_timestamp_seconds", "lfs10d_store_samples", "lfs10d_store_dropped_total",
+}  # fmt: skip
+"""Figures that need no statistics, which come every 30 s."""
 
 
 class Page:
@@ -30,9 +38,9 @@ class Page:
     def __init__(self, port: int) -> None:
         self.port = port
 
-    def get(self, path: str) -> str:
+    def get(self, path: str, accept: str = "*/*") -> str:
         connection = HTTPConnection("127.0.0.1", self.port, timeout=10)
-        connection.request("GET", path)
+        connection.request("GET", path, headers={"Accept": accept})
         text = connection.getresponse().read().decode()
         connection.close()
         return text
@@ -86,8 +94,12 @@ def test_the_page_follows_the_daemon_sends_its_requests_and_says_when_it_is_gone
     assert [(each["name"], each["status"]) for each in shown.line["requests"]] == [
         ("device/read", "ok"), ("device/read", "rejected"),
     ]  # fmt: skip
-    names = {family.name for family in text_string_to_metric_families(typed(site, "metrics").stdout)}  # type: ignore[no-untyped-call]  # it has no types
-    assert {"lfs10d_build_info", "lfs10d_mqtt_connected", "lfs10d_device_wind_speed_meters_per_second"} <= names
+    for figures in (typed(site, "metrics").stdout, shown.get("/metrics", "application/openmetrics-text")):
+        names = {each.name for family in text_string_to_metric_families(figures) for each in family.samples}  # type: ignore[no-untyped-call]  # it has no types
+        assert names >= AT_ONCE
+    promtool = [path_of("promtool"), "check", "metrics"]
+    checked = subprocess.run(promtool, input=shown.get("/metrics"), capture_output=True, text=True, check=False)
+    assert (checked.returncode, checked.stdout, checked.stderr) == (0, "", "")
     run.process.kill()
     eventually(lambda: shown.line["source"]["kind"] == "none", "not live", within=5.0)
     assert shown.line["daemon"] == "offline"
@@ -134,3 +146,28 @@ def test_the_page_ends_at_once_when_it_is_told_to(site: Site, shell: Shell) -> N
         stream.sendall(f"GET /api/events HTTP/1.1\r\nHost: 127.0.0.1:{found[1]}\r\n\r\n".encode())
         assert stream.recv(100).startswith(b"HTTP/1.1 200")
         assert serving.ends(signal.SIGTERM) == 0
+
+
+@pytest.mark.needs("openssl", "mosquitto_passwd")
+def test_behind_tls_and_a_password_the_page_is_as_live_and_the_password_shows_nowhere(
+    site: Site, mosquitto: Mosquitto, page: Callable[..., Page], authority: Authority, program: Callable[[str], str]
+) -> None:
+    mosquitto.stop()
+    passwords, file = mosquitto.folder / "passwords", site.folder / "password"
+    known = [program("mosquitto_passwd"), "-c", "-b", str(passwords), "mast", SECRET]
+    subprocess.run(known, check=True, capture_output=True)
+    certificate, key = authority.issue("broker", "IP:127.0.0.1")
+    mosquitto.listener = [f"certfile {certificate}", f"keyfile {key}"]
+    mosquitto.configuration = ["allow_anonymous false", f"password_file {passwords}"]
+    mosquitto.start()
+    file.touch(mode=0o600)
+    file.write_text(f"{SECRET}\n")
+    running(site, line=NAMED, mqtt={"tls": {"ca": authority.ca}, "username": "mast", "password_file": str(file)})
+    file.write_text("wr0ng-and-long-enough\n")
+    shown = page()
+    refused = eventually(lambda: "not authori" in (words := shown.line["source"]["words"]) and words, "the refusal")
+    assert refused.startswith(f"not live: broker 127.0.0.1:{mosquitto.port}: ")
+    file.write_text(f"{SECRET}\n")
+    eventually(lambda: shown.line["source"]["kind"] == "broker", "live from the broker", within=40.0)
+    assert shown.post("request/device/read", {"device": "mast-top"})["words"] == "Done."
+    assert SECRET not in shown.get("/api/state")
