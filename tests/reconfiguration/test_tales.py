@@ -29,6 +29,10 @@ def slow(delay: float) -> Ails:
 
 
 ALONE: dict[str, tuple[list[Ails], list[Any]]] = {
+    "what a life noted whose power was cut does not reach the disk of the next": (
+        [WELL, WELL, WELL],
+        [("adopt", 0, 0, ("crash", 0)), ("readdress", "s3", 9, ("leave", 179))],
+    ),
     "of two changes that a crash left unanswered the overtaken one is answered too": (
         [STORES, WELL, WELL],
         [("readdress", "s3", 9, ("leave", 247)), ("readdress", "s3", 200, ("leave", 247))],

@@ -282,11 +282,12 @@ class Bench:
 
     def cut(self, *surviving: Path) -> None:
         """Cut the gateway's power: everything that ran is gone, and of the files what was not synced."""
-        for task in asyncio.all_tasks(self.loop):
-            task.cancel()
         self.files.steps_left = 0  # nothing more comes onto this disk
         self.dark = True  # nor to the broker
-        self.pump()
+        while tasks := asyncio.all_tasks(self.loop):  # what is cancelled may begin another, which nobody outlives either
+            for task in tasks:
+                task.cancel()
+            self.pump()
         self.dark = False
         self.files.power_cut(surviving)
         self.port.close()
