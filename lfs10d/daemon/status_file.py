@@ -10,7 +10,6 @@ from pathlib import Path
 from lfs10d.system.regular_file import write_new
 
 WORLD_READABLE = 0o644
-_JSON = json.JSONEncoder(allow_nan=False, separators=(",", ":"))
 
 
 class StatusFile:
@@ -24,18 +23,12 @@ class StatusFile:
         """Replace the content; returns whether it could be written. Nothing is synced: it is of the moment."""
         text = _json(status)
         try:
-            try:
-                self._write(text)
-            except FileNotFoundError:
-                self.path.parent.mkdir(parents=True, exist_ok=True)
-                self._write(text)
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            write_new(self._draft, text.encode(), mode=WORLD_READABLE)
+            self._draft.replace(self.path)
         except OSError:
             return False
         return True
-
-    def _write(self, text: str) -> None:
-        write_new(self._draft, text.encode(), mode=WORLD_READABLE)
-        self._draft.replace(self.path)
 
     def remove(self) -> None:
         """Take the file away: nobody stands behind it any more."""
@@ -58,4 +51,4 @@ def _joined(items: list[object]) -> str:
 
 
 def _encoded(value: object) -> str:
-    return _JSON.encode(value)
+    return json.dumps(value, allow_nan=False, separators=(",", ":"))

@@ -190,9 +190,6 @@ class Connection:
         elif not isinstance(opened, socket.socket):
             self._gone(None, self._client.trouble)
         else:
-            with contextlib.suppress(OSError):  # it has just gone, as paho will notice
-                # What is sent goes together already; Nagle would let it wait for the broker's word on what went before.
-                opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             self._pump.begin(opened)
 
     def _read_failed(self, caught: Exception) -> None:

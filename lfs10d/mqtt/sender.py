@@ -52,7 +52,7 @@ class _Sent:
 
 
 class Sender:
-    """Built in the loop. `epoch_ms()` is the wall clock; `stuck()` is called when the connection is of no use."""
+    """`epoch_ms()` is the wall clock; `stuck()` is called when the connection is of no use."""
 
     def __init__(
         self,
@@ -68,7 +68,6 @@ class Sender:
         self._line = line
         self._epoch_ms = epoch_ms
         self._stuck = stuck
-        self._loop = asyncio.get_running_loop()
         self._connection: Connection | None = None
         self._accepted: Accepted | None = None
         self._sent: dict[int, _Sent] = {}
@@ -139,16 +138,15 @@ class Sender:
         sent = self._sent.pop(mid, None)
         if sent is None:
             return
-        now = self._now()
         if sent.qos:
             self._prove(sent)
         else:
             self._unproved.append(sent)  # it was written, that is all
         if reason < REFUSED_FROM:
-            self._outbox.on_ack(sent.item, now, nobody_listens=reason == NO_MATCHING_SUBSCRIBERS)
+            self._outbox.on_ack(sent.item, self._now(), nobody_listens=reason == NO_MATCHING_SUBSCRIBERS)
         else:
             self._refused(sent, reason)
-        congested = self._outbox.congested(now)
+        congested = self._outbox.congested(self._now())
         if congested is not None:
             log.warning(
                 "the way to the broker carries about %.3g messages a second (round trip %.3g s, %d under way at most), "
@@ -183,7 +181,7 @@ class Sender:
             log.warning("the broker refuses %s: %s; it is tried again %s", topic, words, again)
 
     def _now(self) -> float:
-        return self._loop.time()
+        return asyncio.get_running_loop().time()
 
     def _send_some(self) -> None:
         self._turn = None
@@ -197,7 +195,7 @@ class Sender:
         if emptied:
             self._set_alarm()
         else:
-            self._turn = self._loop.call_soon(self._send_some)
+            self._turn = asyncio.get_running_loop().call_soon(self._send_some)
 
     def _send_a_few(self) -> bool:
         """Send up to `LETTERS_AT_ONCE`; return whether nothing more may go now."""
@@ -208,7 +206,7 @@ class Sender:
             if isinstance(item, HistoryBatch):
                 room = room_for_batch(self._topics.full(item.topic), self._accepted)
                 self._assembly = BatchAssembly(item, room)
-                self._loop.call_soon(self._assemble, self._assembly)
+                asyncio.get_running_loop().call_soon(self._assemble, self._assembly)
             else:
                 self._send_encoded(item)
         return False
@@ -244,7 +242,7 @@ class Sender:
             self._assembly = None
             self._send(assembly.batch, assembly.payload)
         else:
-            self._loop.call_soon(self._assemble, assembly)
+            asyncio.get_running_loop().call_soon(self._assemble, assembly)
 
     def _send(self, item: OutboxItem, payload: bytes) -> None:
         if self._connection is None or self._accepted is None:
@@ -286,7 +284,7 @@ class Sender:
             if self._alarm.when() <= min(times):
                 return
             self._alarm.cancel()
-        self._alarm = self._loop.call_at(min(times), self._alarmed)
+        self._alarm = asyncio.get_running_loop().call_at(min(times), self._alarmed)
 
     def _alarmed(self) -> None:
         self._alarm = None
