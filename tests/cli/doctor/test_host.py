@@ -32,7 +32,7 @@ def only(found: list[Finding]) -> Finding:
     ("state", "now", "level", "text"),
     [
         ("unsynced", INSTALLED, "warn", "not synchronised"),
-        ("unknown", INSTALLED, "warn", "nobody knows"),
+        ("unknown", INSTALLED, "warn", "it is not known"),
         ("synced", INSTALLED - 4e7, "fail", "before this version was installed"),
     ],
 )
