@@ -64,7 +64,7 @@ class Block:
         """Return every value by name that the device has now, or the first fault that shows another device.
 
         So a device is recognised. Of several values some may be unavailable, or not finite as a direction in calm often
-        is. Where there is no value at all, the first fault is returned whatever it is.
+        is. Where there is no value at all, and none that shows another device, the first fault is returned.
         """
         values: dict[str, Published | None] = {}
         faults: dict[str, Fault] = {}
@@ -72,7 +72,9 @@ class Block:
         if fault is not None:
             return fault
         there = {name: value for name, value in values.items() if value is not None}
-        wrong = [fault for fault in faults.values() if not there or fault.code not in NO_VALUE_NOW]
+        wrong = [fault for fault in faults.values() if fault.code not in NO_VALUE_NOW]
+        if not there:
+            wrong += faults.values()
         return wrong[0] if wrong else there
 
 

@@ -13,7 +13,7 @@ from tests.support.documents import found, problems
     ("text", "already"),
     [
         ("inner: {required: !mine 1}", "inner.required: the tag"),
-        ("inner: {required: !!int x}", 'inner.required: "x" is not'),
+        ("inner: {required: !!int x}", 'inner.required: "x" does not match'),
         (f"inner: {{required: {'9' * 5000}}}", "inner.required: has too many"),
         ('inner: {required: "\\ud800"}', "inner.required: holds half"),
     ],

@@ -284,7 +284,7 @@ class Bench:
         """Cut the gateway's power: everything that ran is gone, and of the files what was not synced."""
         self.files.steps_left = 0  # nothing more comes onto this disk
         self.dark = True  # nor to the broker
-        while tasks := asyncio.all_tasks(self.loop):  # what is cancelled may begin another, which nobody outlives either
+        while tasks := asyncio.all_tasks(self.loop):  # what is cancelled may begin another
             for task in tasks:
                 task.cancel()
             self.pump()
