@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,9 @@ from lfs10d.config.credentials import (
     unreadable,
 )
 from lfs10d.config.models import MqttConfig
+
+NULL_BYTE = "embedded null byte" if sys.version_info < (3, 13) else "open: embedded null character in path"
+"""How Python words it."""
 
 
 @pytest.fixture(autouse=True)
@@ -59,7 +63,7 @@ def test_a_file_without_a_password_is_unreadable(content: bytes | None, message:
     assert str(refused.value) == message
 
 
-@pytest.mark.parametrize(("path", "message"), [(".", "is a directory"), ("a\0b", "embedded null byte")])
+@pytest.mark.parametrize(("path", "message"), [(".", "is a directory"), ("a\0b", NULL_BYTE)])
 def test_what_is_no_file_is_unreadable(path: str, message: str) -> None:
     with pytest.raises(UnreadableError, match=message):
         readable(Path(path))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,9 @@ from lfs10d.errors import ConfigError
 from lfs10d.profiles.library import builtin_names
 from lfs10d.schema.document import LARGEST_FILE
 from tests.support.config_texts import SMALL, loaded, problems
+
+NULL_BYTE = "embedded null byte" if sys.version_info < (3, 13) else "open: embedded null character in path"
+"""How Python words it."""
 
 pytestmark = pytest.mark.usefixtures("in_a_folder_of_its_own")
 
@@ -162,7 +166,7 @@ def test_a_file_that_is_no_text_is_a_configuration_error(raw: bytes) -> None:
     [
         ("missing.yaml", "missing.yaml:1:1: there is no such file; name another with -c FILE or $LFS10D_CONFIG"),
         (".", ".:1:1: the file cannot be read: is a directory"),
-        ("a\0b", "the file cannot be read: embedded null byte"),
+        ("a\0b", f"the file cannot be read: {NULL_BYTE}"),
     ],
 )
 def test_a_file_that_cannot_be_read_is_one_clear_line(path: str, message: str) -> None:
