@@ -30,6 +30,8 @@ from lfs10d.system.logs import escape
 
 ATTEMPTS = 3
 """Polls that are tried, with time-outs of 200, 400 and 1000 ms (`lfs10d.line.device.FIRST_TIMEOUTS`)."""
+ONE_READING_INTERVAL = 0.5
+"""s: where one reading is wanted, no second poll begins while it is held back (`lfs10d.line.held_readings`)."""
 SHORTEST_INTERVAL = 0.05
 """Seconds between two polls, at least."""
 LOOK_EVERY = 0.1
@@ -130,7 +132,7 @@ class _ReadOptions:
     @property
     def spec(self) -> DeviceSpec:
         """The device for the scheduler."""
-        interval = self.interval if self.watch else SHORTEST_INTERVAL
+        interval = self.interval if self.watch else ONE_READING_INTERVAL
         return DeviceSpec(
             name=f"slave-{self.slave}",
             slave=self.slave,
