@@ -110,7 +110,7 @@ class Viewers:
         """Return the stream, from where the viewer lost it, or from the whole."""
         if len(self._queues) >= MOST_VIEWERS:
             return PlainTextResponse("Too many viewers.\n", 503, headers={"retry-after": "10"})
-        last = request.headers.get("last-event-id") or request.query_params.get("after")
+        last = request.headers.get("last-event-id")
         headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
         return StreamingResponse(self._events(last), media_type="text/event-stream", headers=headers)
 
