@@ -27,8 +27,8 @@ from statistics import median
 from typing import Final
 
 from bench.broker import Broker
+from bench.programs import weigh
 
-TICKS: Final = os.sysconf("SC_CLK_TCK")
 SENSORS: Final = 8
 INTERVAL: Final = "500ms"
 SETTLE: Final = 10.0
@@ -73,18 +73,6 @@ def program(log: Path, *arguments: str) -> Iterator[subprocess.Popen[bytes]]:
         process.wait()
 
 
-def seconds_used(process: int) -> float:
-    """Return the processor time of a process so far."""
-    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / TICKS  # utime and stime, proc(5)
-
-
-def memory(process: int) -> float:
-    """Return the resident memory of a process in MB."""
-    found = re.search(r"VmRSS:\s+(\d+)", Path(f"/proc/{process}/status").read_text())
-    return 0.0 if found is None else int(found[1]) / 1024
-
-
 def polls(address: str) -> int:
     """Return how many polls the page has seen: the sum of all sequence numbers."""
     with urllib.request.urlopen(f"{address}/api/state") as answer:  # noqa: S310  # of our own
@@ -99,9 +87,9 @@ def span(address: str, web: int, daemon: int, viewers: int, seconds: float) -> S
     if viewers:
         watching.start()
     time.sleep(SETTLE / 10)
-    before, seen, since = (seconds_used(web), seconds_used(daemon)), polls(address), time.monotonic()
+    before, seen, since = (weigh(web).cpu, weigh(daemon).cpu), polls(address), time.monotonic()
     time.sleep(seconds)
-    after, took = (seconds_used(web), seconds_used(daemon)), time.monotonic() - since
+    after, took = (weigh(web).cpu, weigh(daemon).cpu), time.monotonic() - since
     found = Span(viewers, (after[0] - before[0]) / took, (after[1] - before[1]) / took, (polls(address) - seen) / took)
     if viewers:
         watching.kill()
@@ -139,7 +127,7 @@ def measure(viewers: int, seconds: float, rounds: int) -> None:
             shares = [median(getattr(one, name) for one in group) for group in (without, with_viewers)]
             words = f"{name}: {shares[0]:.2%} -> {shares[1]:.2%} of a core, {shares[1] - shares[0]:+.2%}"
             print(f"{words} by {viewers} viewers")
-        print(f"memory: web {memory(web.pid):.1f} MB, daemon {memory(daemon.pid):.1f} MB")
+        print(f"memory: web {weigh(web.pid).rss:.1f} MB, daemon {weigh(daemon.pid).rss:.1f} MB")
 
 
 def _row(each: Span) -> str:

@@ -33,14 +33,12 @@ TRIES = 10
 """A busy machine may bring bytes to the line, or the line to the processor, later than the test has them sent."""
 
 
-def played(
-    paced: Starter, send: Callable[[Terminal], None], shown: Callable[[dict[str, Any]], bool], *rate: int
-) -> dict[str, Any]:
+def played(paced: Starter, send: Callable[[Terminal], None], shown: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
     """Return the line's counts after `send`, which is played again while what it is about did not come to be."""
     counts: dict[str, Any] = {}
     for _ in range(TRIES):
         line = paced()
-        with Terminal(line, *rate) as terminal:
+        with Terminal(line) as terminal:
             send(terminal)
             time.sleep(20 * CHARACTER)
         counts = line.close()
@@ -83,12 +81,27 @@ def test_a_request_with_a_pause_inside_is_not_heard(paced: Starter) -> None:
     assert counts["pauses"] + counts["bad_frames"] > 0
 
 
+def test_a_request_with_a_long_pause_inside_is_never_heard(paced: Starter) -> None:
+    """Nothing is played again: no machine is late by so much."""
+    line = paced()
+    with Terminal(line) as terminal:
+        terminal.rest()
+        terminal.send(request(1)[:4])
+        time.sleep(0.3)
+        terminal.send(request(1)[4:])
+        time.sleep(0.3)
+    counts = line.close()
+    assert counts["heard"] == 0
+    assert counts["pauses"] + counts["bad_frames"] > 0
+
+
 def test_a_request_at_another_rate_is_not_heard(paced: Starter) -> None:
-    def send(terminal: Terminal) -> None:
+    line = paced()
+    with Terminal(line, termios.B9600) as terminal:
         terminal.rest()
         terminal.send(request(1))
-
-    counts = played(paced, send, lambda counts: bool(counts["wrong_rate"]), termios.B9600)
+        time.sleep(0.3)
+    counts = line.close()
     assert (counts["heard"], counts["wrong_rate"]) == (0, 1)
 
 
