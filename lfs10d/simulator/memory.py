@@ -63,15 +63,16 @@ class Memory:
         self.inputs: dict[int, int] = {}
         self.bits: dict[tuple[int, int], int] = {}
         self._last: dict[Signal, float] = {}
-        for signal in blueprint.signals:
-            for n in range(signal.count):
-                if signal.is_bit:
-                    self.bits[signal.function, signal.address + n] = 0
+        own = ((signal.function, signal.address, signal.count) for signal in blueprint.signals)
+        for function, address, count in (*own, *blueprint.spans):
+            for place in range(address, address + count):
+                if function in (READ_HOLDING, READ_INPUT):
+                    self._space(function).setdefault(place, 0)
                 else:
-                    self._space(signal).setdefault(signal.address + n, 0)
+                    self.bits[function, place] = 0
 
-    def _space(self, signal: Signal) -> dict[int, int]:
-        return self.inputs if signal.function == READ_INPUT else self.words
+    def _space(self, function: int) -> dict[int, int]:
+        return self.inputs if function == READ_INPUT else self.words
 
     def read(
         self, body: bytes, framing: Framing, source: WindSource, now: int, active: ActiveFaults
@@ -101,8 +102,12 @@ class Memory:
         return body[:2] + bytes((len(data),)) + data, tuple(measured)
 
     def _answers(self, signal: Signal, function: int) -> bool:
-        """Whether a read by this function brings this signal; holding registers are read by function 4 too."""
-        return signal.function == function or (signal.function == READ_HOLDING and function == READ_INPUT)
+        """Whether a read by this function brings this signal.
+
+        Holding registers are read by function 4 too, where the device has no input registers.
+        """
+        holding = signal.function == READ_HOLDING and function == READ_INPUT and signal.address not in self.inputs
+        return signal.function == function or holding
 
     def _measure(self, signal: Signal, source: WindSource, now: int, active: ActiveFaults) -> Published | None:
         """Put the signal's value into its registers; return it, or None if it is a broken one."""
@@ -123,18 +128,19 @@ class Memory:
             self.bits[signal.function, signal.address] = int(bool(signal.settled(value)))
             return signal.settled(value)
         broken = broken_float(active, signal.name)
-        empty = _strikes(active, FaultKind.UNAVAILABLE, signal)
-        words = signal.empty() if empty else signal.words(value) if broken is None else signal.broken(broken)
-        self._put(signal, words)
-        return None if empty or broken is not None else signal.settled(value)
+        if _strikes(active, FaultKind.UNAVAILABLE, signal):
+            self._empty(signal)
+            return None
+        self._put(signal, signal.words(value) if broken is None else signal.broken(broken), signal.mask)
+        return None if broken is not None else signal.settled(value)
 
     def _empty(self, signal: Signal) -> None:
         """Put into the signal's registers that there is no value; a bit, which cannot say so, stays as it is."""
         if not signal.is_bit:
-            self._put(signal, signal.empty())
+            self._put(signal, signal.empty(), signal.empty_mask)
 
-    def _put(self, signal: Signal, words: tuple[int, ...]) -> None:
-        space, mask = self._space(signal), signal.mask
+    def _put(self, signal: Signal, words: tuple[int, ...], mask: int) -> None:
+        space = self._space(signal.function)
         for n, word in enumerate(words):
             place = signal.address + n
             space[place] = space[place] & ~mask | word & mask

@@ -21,7 +21,7 @@ _WORD: Final = 2
 
 @dataclass(frozen=True, slots=True)
 class Blueprint:
-    """One kind of device. Registers that are neither in `words` nor of a signal do not exist."""
+    """One kind of device. Registers that are neither in `words` nor of a signal nor of a span do not exist."""
 
     name: str
     signals: tuple[Signal, ...]
@@ -40,6 +40,8 @@ class Blueprint:
     rate_register: int | None = None
     rate_codes: Mapping[int, int] = field(default_factory=dict)
     """Content of the rate register by baud rate."""
+    spans: tuple[tuple[int, int, int], ...] = ()
+    """Function, address and count of reads that it answers whole: what lies between signals in them is 0."""
 
     def most_words(self, framing: Framing) -> int:
         """Return how many registers one read may ask for."""
@@ -72,7 +74,7 @@ class Allowed:
 
 
 def blueprint_of(profile: Profile) -> Blueprint:
-    """Return the device that a profile describes; registers it does not name do not exist."""
+    """Return the device that a profile describes; registers it neither names nor may skip do not exist."""
     signals = tuple(signal_of(value) for value in profile.values)
     functions: set[int] = {value.function for value in profile.values}
     words: dict[int, int] = {}
@@ -104,6 +106,7 @@ def blueprint_of(profile: Profile) -> Blueprint:
         name=profile.name,
         signals=signals,
         words=words,
+        spans=tuple((block.function, block.address, block.count) for block in profile.reads()),
         writable=writable,
         functions=frozenset(functions | ({profile.write_function} if writable else set())),
         max_words=profile.max_words,

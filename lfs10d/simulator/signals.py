@@ -145,9 +145,17 @@ class Signal:
         if self.nothing is None:
             return (0xFFFF,) * self.count
         content = self.nothing
-        if self.bits is not None and content < 1 << self.bits[1] - self.bits[0] + 1:
+        if self.bits is not None and self._part_holds(content):
             content <<= self.bits[0]
         return self._ordered(content.to_bytes(_WORD * self.count, "big"))
+
+    @property
+    def empty_mask(self) -> int:
+        """The bits of a single register that say that there is no value: all, where a part cannot say so."""
+        return self.mask if self.nothing is None or self._part_holds(self.nothing) else 0xFFFF
+
+    def _part_holds(self, content: int) -> bool:
+        return self.bits is None or content < 1 << self.bits[1] - self.bits[0] + 1
 
     @property
     def mask(self) -> int:

@@ -90,11 +90,18 @@ def test_what_a_device_says_is_published_and_nothing_else(profile: Profile, data
     assert len(readings) >= 6
     told = station(DeviceInfo("any", SLAVE, None, "any", 1.0, True, None, profile.value_names, profile.units, 3))  # noqa: FBT003 - as it is built
     known: dict[str, object] = {}
+    wanted: dict[tuple[int, int, int], tuple[str, ...]] = {
+        (each.function, each.address, each.count): tuple(value.name for value in each.values)
+        for each in profile.reads()
+    }
     begun = -1.0
     for reading in readings:
         for request in line.log:
             if begun < request.ended / 1e9 <= reading.at:
-                known |= {name: value for answer in request.answers for name, value in answer.measured}
+                # What a read spans, and another brings, is not taken from it.
+                taken = wanted.get(_asked(request.body), profile.value_names)
+                measured = [each for answer in request.answers for each in answer.measured]
+                known |= {name: value for name, value in measured if name in taken}
         begun = reading.at
         (payload,) = [
             cast("dict[str, Any]", each.payload)
@@ -113,6 +120,11 @@ def test_what_a_device_says_is_published_and_nothing_else(profile: Profile, data
                 assert payload[name] == known[name]
                 assert isinstance(payload[name], bool | str) == isinstance(known[name], bool | str)
         assert payload["quality"] == ("partial" if errors else "good")
+
+
+def _asked(body: bytes) -> tuple[int, int, int]:
+    """Return function, address and count of a read."""
+    return body[1], int.from_bytes(body[2:4], "big"), int.from_bytes(body[4:6], "big")
 
 
 def _optional(profile: Profile, name: str) -> bool:

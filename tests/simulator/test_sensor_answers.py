@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import struct
 from collections.abc import Callable
 from itertools import pairwise
 
 import pytest
 
+from lfs10d.profiles.profile import Profile
+from lfs10d.simulator.registers import blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import unseal
 from tests.support.sensor_values import ID, Maker, wind_in
@@ -132,3 +135,29 @@ def test_a_fault_shows_at_its_rate(bench: Maker) -> None:
     line.line.sensor(1).add_fault("silent", 0.3)
     answers = sum(line.id_of(1) is not None for _ in range(300))
     assert 170 < answers < 250
+
+
+def built(*values: dict[str, object], **keys: object) -> Sensor:
+    """Return a device of a profile with these values, at slave id 1."""
+    profile = {"name": "any", "title": "Any device", "values": list(values), **keys}
+    return Sensor(1, blueprint=blueprint_of(Profile.model_validate(profile)))
+
+
+@pytest.mark.parametrize(
+    ("nothing", "sent"),
+    [
+        pytest.param(0xFF, 0x00FF, id="a content of the part alone is in its bits"),
+        pytest.param(0xFFFF, 0xFFFF, id="what no part can hold fills the register"),
+    ],
+)
+def test_a_part_of_a_register_says_that_it_has_no_value(bench: Maker, nothing: int, sent: int) -> None:
+    part = {"name": "a", "register": 7, "type": "uint16", "unit": "x", "bits": [0, 7], "unavailable": [nothing]}
+    sensor = built(part)
+    sensor.add_fault("unavailable", values=("a",))
+    assert bench(sensor).read(1, 7, 1) == struct.pack(">BBBH", 1, 3, 2, sent)
+
+
+def test_registers_that_a_profile_may_skip_are_there(bench: Maker) -> None:
+    values = [{"name": name, "register": at, "type": "uint16", "unit": "x"} for name, at in (("a", 7), ("b", 9))]
+    assert bench(built(*values, may_skip=1)).read(1, 8, 1) == struct.pack(">BBBH", 1, 3, 2, 0)
+    assert bench(built(*values)).read(1, 8, 1) == bytes((1, 0x83, 2))
