@@ -50,6 +50,8 @@ class Run:
     wrong: int = 0
     lost: int = 0
     holes: int = 0
+    core: float = 0.0
+    """CPU seconds per second."""
 
 
 @dataclass(frozen=True)
@@ -184,6 +186,7 @@ def measure(row: Row, master: Master, broker: int, daemon: tuple[str, ...]) -> R
         rss=after.rss,
         rss_anon=after.rss_anon,
         jitter=jitter(within, interval_seconds(row)),
+        core=(after.cpu - before.cpu) / (ended - begun),
     )
     if master == "daemon":
         add_samples(run, log, samples, (started, begun, ended))

@@ -63,9 +63,11 @@ class Row:
         t35 = FIXED_T35 if self.baudrate > FIXED_ABOVE else 3.5 * character
         return 1 / ((REQUEST + ANSWER) * character + 2 * t35 + self.turnaround_ms / 1e3)
 
-    def lasting(self, seconds: float) -> Row:
-        """Return the row with runs of another length."""
-        return replace(self, seconds=seconds)
+    def lasting(self, seconds: float | None = None, *, warm: float | None = None) -> Row:
+        """Return the row with runs of another length; `warm`: begun so long after the start."""
+        return replace(
+            self, seconds=self.seconds if seconds is None else seconds, warm=self.warm if warm is None else warm
+        )
 
 
 DYING = tuple(range(4, 33, 4))
@@ -105,6 +107,7 @@ ROWS = (
     Row("adapter-16", "adapter, 16 ms pieces", line=("--adapter", "16")),
     Row("echo", "echoing adapter", line=("--echo",), masters=("daemon",), against="9600"),
     Row("1hz", "10 at 1 Hz", sensors=10, interval="1s", masters=("daemon",), against=""),
+    Row("idle", "nobody is polled", sensors=0, interval="1s", masters=("daemon",), against="", seconds=30.0),
     Row("4hz", "9 at 4 Hz", sensors=9, interval="250ms", masters=("daemon",), against=""),
     Row("8", "8 at 9600", sensors=8, masters=("daemon",), against="9600"),
     Row("247", "247 at 9600", sensors=247, masters=("daemon",), against="9600", warm=9.0),

@@ -8,6 +8,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
 from functools import partial
+from math import inf
 from typing import Protocol, TypeVar
 
 from lfs10d.command import RefusedError, Result
@@ -76,6 +77,7 @@ class LineAccess:
         devices = {spec.slave: TracedDevice(spec.name, spec.codec, spec.profile) for spec in specs}
         until = asyncio.get_running_loop().time() + duration
         self._trace = FrameTrace(until, devices, settings.usual_codec(loaded.config.line))
+        self._line.hand_over_at_once(until)
 
     async def scan(self, ids: tuple[int, ...], rates: tuple[int, ...], share: float) -> Scan:
         """Search the line for devices; return the scan that is over. Raises RefusedError where it must wait."""
@@ -96,6 +98,7 @@ class LineAccess:
         """End trace, scan and pause; return those that were under way."""
         tracing = self._trace is not None and asyncio.get_running_loop().time() < self._trace.until
         self._trace = None
+        self._line.hand_over_at_once(-inf)
         ended = {"trace": tracing, "scan": self._scanner.cancel(), "pause": self._pause.end()}
         return tuple(name for name, one in ended.items() if one)
 

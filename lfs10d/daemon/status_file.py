@@ -10,6 +10,7 @@ from pathlib import Path
 from lfs10d.system.regular_file import write_new
 
 WORLD_READABLE = 0o644
+_JSON = json.JSONEncoder(allow_nan=False, separators=(",", ":"))
 
 
 class StatusFile:
@@ -23,12 +24,18 @@ class StatusFile:
         """Replace the content; returns whether it could be written. Nothing is synced: it is of the moment."""
         text = _json(status)
         try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            write_new(self._draft, text.encode(), mode=WORLD_READABLE)
-            self._draft.replace(self.path)
+            try:
+                self._write(text)
+            except FileNotFoundError:
+                self.path.parent.mkdir(parents=True, exist_ok=True)
+                self._write(text)
         except OSError:
             return False
         return True
+
+    def _write(self, text: str) -> None:
+        write_new(self._draft, text.encode(), mode=WORLD_READABLE)
+        self._draft.replace(self.path)
 
     def remove(self) -> None:
         """Take the file away: nobody stands behind it any more."""
@@ -51,4 +58,4 @@ def _joined(items: list[object]) -> str:
 
 
 def _encoded(value: object) -> str:
-    return json.dumps(value, allow_nan=False, separators=(",", ":"))
+    return _JSON.encode(value)

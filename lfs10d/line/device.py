@@ -28,7 +28,7 @@ When the port is back every device is UNHEARD.
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
+from bisect import bisect_left, bisect_right, insort
 from collections import deque
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -118,8 +118,11 @@ class ResponseTimes:
 
     def learn(self, turnaround: float) -> None:
         """Take one more answer's turnaround in s."""
+        ordered = self._ordered
+        if len(self._last) == LEARNED_FROM:
+            del ordered[bisect_left(ordered, self._last[0])]
         self._last.append(turnaround)
-        self._ordered = ordered = sorted(self._last)
+        insort(ordered, turnaround)
         self.p99 = ordered[ceil(0.99 * len(ordered)) - 1]
 
     def count_near(self, turnaround: float, margin: float) -> int:

@@ -23,6 +23,8 @@ class HandOver:
 
     def __init__(self) -> None:
         self.hold = 0.0
+        self.at_once_until = -inf
+        """Until then nothing is held: somebody watches the frames (`line/trace`)."""
         self._took: deque[float] = deque(maxlen=REMEMBERED)
         self._since = inf
         self._seen = 0
@@ -38,7 +40,7 @@ class HandOver:
         They grow from call to call until they are `handed_over`. `asked` is when the next exchange began, or will at
         the earliest.
         """
-        if self.hold == 0:
+        if self.hold == 0 or now < self.at_once_until:
             return now
         self._since = min(self._since, now)
         self._urgent = self._urgent or not all(map(_can_wait, events[self._seen :]))

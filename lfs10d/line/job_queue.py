@@ -50,6 +50,11 @@ class JobQueue:
         self._waiting.insert(0, job)
         self._slice = job
 
+    @property
+    def idle(self) -> bool:
+        """No job waits or rests."""
+        return not (self._waiting or self._held)
+
     def hold(self, job: Job, hold: Hold) -> None:
         """Let a job rest."""
         self._held.append((inf if hold.until is None else hold.until, job))

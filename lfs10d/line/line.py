@@ -104,6 +104,10 @@ class Line:
         self.poller.post(tell)
         self.wake()
 
+    def hand_over_at_once(self, until: float) -> None:
+        """Hand over each exchange by itself until that monotonic time: somebody watches the frames."""
+        self.poller.hand_over.at_once_until = until
+
     async def pause(self) -> None:
         """Give the port back until `resume`; return when it is free."""
         freed: asyncio.Future[None] = self._loop.create_future()

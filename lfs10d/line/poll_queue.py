@@ -22,6 +22,8 @@ FLAT_OUT_PATIENCE = 5.0
 """A device with interval 0 goes as one that became due so many s after it was asked last."""
 EXCLUDED_PAUSE = 0.25
 """A device whose slave id belongs to a job for the moment is looked at again after so many s."""
+LATE = 0.25
+"""The line hurries for a device that has waited for so large a part of its interval."""
 SPREAD = 2.0
 """Grids lie at most so many exchanges apart, so that every device is asked soon after the start."""
 
@@ -76,6 +78,13 @@ class PollQueue:
     def resume(self, poll: Poll, key: float) -> None:
         """Let `poll` wait for its next exchange as one that became due at `key`."""
         self._push(key, poll)
+
+    def patient(self, now: float) -> bool:
+        """Whether nobody waits so long that the line must hurry: none flat out, none again, none late."""
+        if self._flat:
+            return False
+        due, _, first = self._due[0] if self._due else (inf, 0, None)
+        return first is None or (isinstance(first, Device) and now - due < LATE * first.spec.interval)
 
     def next_due(self) -> float:
         """When somebody is due; inf where nobody waits. With interval 0 somebody is due always."""

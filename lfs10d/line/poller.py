@@ -167,7 +167,8 @@ class Poller:
                 return None
             held = self.scheduler.second_answers.held
             self._events += held.released(now)
-            return Wait(min(resting.until, held.next_at), listen=True)
+            until = min(resting.until, held.next_at)
+            return Wait(until, listen=True, hurried=not self.scheduler.patient(now))
         self._settled(step)
         self._count(self._clock())
         return None
@@ -181,7 +182,7 @@ class Poller:
 
     def _ask(self, ask: Ask) -> None:
         self._purpose = self.scheduler.purpose
-        self.bus.ask(ask, self.scheduler.pending.by_slave)
+        self.bus.ask(ask, self.scheduler.pending.by_slave, hurried=not self.scheduler.patient(self._asked))
 
     def _settled(self, outcome: Outcome) -> None:
         now = self._clock()

@@ -68,6 +68,8 @@ class ReadPlan:
     def follow(self, profile: Profile) -> None:
         """Read by another profile of the same registers from now on."""
         self._profile = profile
+        self._everything = profile.reads()
+        self.value_names = profile.value_names
         self.simple = not any(value.optional or value.interval is not None for value in profile.values)
         """Every poll reads the same."""
         self._slow = tuple(value for value in profile.values if value.interval is not None)
@@ -86,7 +88,7 @@ class ReadPlan:
         `everything`: slow values too.
         """
         if self.simple:
-            return self._profile.reads()
+            return self._everything
         resting = set() if everything else {each.name for each in self._slow if not self._due(each, now, interval)}
         absent = {name for name, (_, again_at) in self._absent.items() if now < again_at}
         if len(resting | absent) == len(self._profile.values):
@@ -148,7 +150,7 @@ class ReadPlan:
             self._alone.clear()
             self._found_absent = False
         ages: dict[str, float] = {}
-        for name in self._profile.value_names:
+        for name in self.value_names:
             if name in values:
                 continue
             newest = self._kept(name, at)

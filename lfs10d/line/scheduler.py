@@ -87,9 +87,8 @@ class Scheduler:
         """Make the queue of polls anew, with new grids for `fresh`."""
         polled = [device for device in self.devices.values() if device.spec.enabled]
         if polled:
-            wire_time = _wire_time(polled[0], self.timing)
             enabled = [device for device in fresh if device.spec.enabled]
-            spread(enabled, polled=len(polled), wire_time=wire_time, now=now)
+            spread(enabled, polled=len(polled), wire_time=_wire_time(polled[0], self.timing), now=now)
         kept = [poll for poll in self._polls.polls() if self._wanted(poll)]
         self._polls.clear()
         for poll in kept:
@@ -109,8 +108,7 @@ class Scheduler:
 
     def submit(self, job: Job, now: float) -> list[Reading]:
         """Take a job; it is asked as soon as its class and its share allow. While the port is lost it is cut off."""
-        wanted = not isinstance(job, Poll) or self._wanted(job)
-        lost = self._lost
+        wanted, lost = not isinstance(job, Poll) or self._wanted(job), self._lost
         if wanted and lost is None:
             probes = job.purpose is Purpose.PROBE
             self._jobs.submit(job, now, self._probing.account if probes else None)
@@ -191,6 +189,12 @@ class Scheduler:
             else:
                 self._jobs.over(chosen)
         return Rest(min(self._probing.next_at, self._polls.next_due(), self._jobs.next_at(now)))
+
+    def patient(self, now: float) -> bool:
+        """Whether nobody waits for the line so long that it must hurry; flat out, and with a job on it, it must."""
+        job = self._current[0] if self._current else None
+        flat_out = isinstance(job, Poll) and job.device.spec.interval == 0
+        return self._jobs.idle and not flat_out and now < self._probing.next_at and self._polls.patient(now)
 
     def _begin(self, job: Job, ask: Ask, now: float) -> None:
         self._current = job, ask
@@ -311,7 +315,6 @@ class Scheduler:
 
 
 def _wire_time(device: Device, timing: LineTiming) -> float:
-    block = device.spec.profile.reads()[0]
+    block, codec = device.spec.profile.reads()[0], device.spec.codec
     request = ReadRegisters(device.slave, block.address, block.count, block.function)
-    codec = device.spec.codec
     return timing.exchange(len(codec.encode(request)), codec.answer_size(request))

@@ -55,8 +55,8 @@ class SecondAnswers:
             return False
         self._quiet.exchanged(outcome, online=device.online)
         doubtful = self._doubts.exchanged(outcome, device.response_times, timeout)
-        whole = diagnosis.stranger(outcome.request, device.spec.codec, outcome.heard) is not None
-        if spoilt(outcome) and not whole and outcome.strays:
+        broken = outcome.strays and spoilt(outcome)
+        if broken and diagnosis.stranger(outcome.request, device.spec.codec, outcome.heard) is None:
             self._doubt_held(outcome.strays[0][1], outcome)
         return doubtful
 

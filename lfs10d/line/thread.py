@@ -71,24 +71,28 @@ class LineThread(threading.Thread):
             self._poller.bus.close()
 
     def _wait(self, wait: Wait) -> bool:
-        """Wait as told, or until woken, or until shortly before; return whether the port may have something to read."""
+        """Wait as told, or until woken, or until shortly before; return whether the port may have something to read.
+
+        Where the wait is not hurried nothing is done ahead of its time.
+        """
         now = time.monotonic()
         self.declared = now + min(max(wait.until - now, 0.0), IDLE_MOST)
-        ahead = wait.not_before - self.waking - now
+        waking = self.waking if wait.hurried else 0.0
+        ahead = wait.not_before - waking - now
         if ahead > WORTH_SLEEPING:
             if self._select([self._woken], min(ahead, IDLE_MOST)):
                 return wait.listen
             now = time.monotonic()
         left = min(wait.until - now, IDLE_MOST)
-        if left <= self.waking:
+        if left <= waking:
             while time.monotonic() < wait.until:
                 pass
         # What came while nobody looked must be read before time is called: hence a look even where no time is left.
         if not wait.listen:
-            self._select([self._woken], max(left - self.waking, 0.0))
+            self._select([self._woken], max(left - waking, 0.0))
             return False
         port = self._poller.bus.port.fileno()
-        return port in self._select([self._woken, port], max(left - self.waking, 0.0))
+        return port in self._select([self._woken, port], max(left - waking, 0.0))
 
     def _select(self, watched: list[int], timeout: float) -> list[int]:
         """Wait until one of `watched` can be read, at most `timeout` s; return which; all where the system refuses."""

@@ -36,12 +36,21 @@ sorted, which brings the code back into the processor's caches, and the last byt
 later. The next silence begins at that moment."""
 
 
+UNHURRIED_AFTER = 0.0001
+"""Who waits for an answer while nobody waits for the line looks so long after its last byte, in s: all of it is there
+then, and one look is enough."""
+
+
 class Wait(NamedTuple):
-    """Nothing to do before `until`; with `listen` also when bytes come, but not before `not_before`."""
+    """Nothing to do before `until`; with `listen` also when bytes come, but not before `not_before`.
+
+    `hurried`: somebody waits for the line, so that a tenth of a millisecond counts.
+    """
 
     until: float
     listen: bool
     not_before: float = -inf
+    hurried: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +80,7 @@ class Bus:
         self._clock = clock
         self._echo = EchoLearner(rules.echo)
         self._ask: Ask | None = None
+        self._hurried = True
         self._pending: Mapping[int, tuple[Pending, ...]] = {}
         self._exchange: Exchange | None = None
         self._quiet_since = -inf
@@ -175,12 +185,14 @@ class Bus:
 
     # -- one exchange
 
-    def ask(self, ask: Ask, pending: Mapping[int, tuple[Pending, ...]]) -> None:
+    def ask(self, ask: Ask, pending: Mapping[int, tuple[Pending, ...]], *, hurried: bool = True) -> None:
         """Take what to put on the line next; `step` carries it out.
 
         `pending` are the requests to any slave whose answers may still come, by slave id; it may change until then.
+        `hurried`: others wait for the line.
         """
         self._ask = ask
+        self._hurried = hurried
         self._pending = pending
 
     def step(self, now: float, *, readable: bool) -> Step:
@@ -243,10 +255,11 @@ class Bus:
         while True:
             action = exchange.step(now)
             if isinstance(action, Listen):
-                early = min(AWAKE_BEFORE, self.timing.character)
-                return Wait(action.until, listen=True, not_before=action.not_before - early)
+                early = min(AWAKE_BEFORE, self.timing.character) if self._hurried else -UNHURRIED_AFTER
+                not_before = action.not_before - early
+                return Wait(action.until, listen=True, not_before=not_before, hurried=self._hurried)
             if isinstance(action, Quiet):
-                return Wait(action.until, listen=True)
+                return Wait(action.until, listen=True, hurried=self._hurried)
             if isinstance(action, Settled):
                 return self._settled(action.outcome)
             if self.port.waiting():  # the last look before we speak

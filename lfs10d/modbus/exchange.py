@@ -155,7 +155,7 @@ class Exchange:
         self._state = State.SILENCE
         self._frame = ask.codec.encode(ask.request)
         self._reception = Reception(ask, line, pending, self._frame)
-        self._answer_size = ask.codec.answer_size(ask.request)
+        self._answer_size = self._reception.answer_size
         self._gap = timing.gap if line.gap is None else max(timing.gap, line.gap)
         # Silence that was still running when the line was given to us is no babble.
         self._give_up = max(asked + ask.timeout, quiet_since + self._gap)

@@ -48,25 +48,23 @@ class FoundFrame:
 class FrameSearch:
     """The stream of one exchange."""
 
-    __slots__ = ("_base", "_claims", "_mark_ends", "_mark_times", "_stream")
+    __slots__ = ("_base", "_claims", "_mark_ends", "_mark_times", "_stream", "end")
 
     def __init__(self) -> None:
+        self.end = 0
+        """The position behind the last character heard."""
         self._stream = bytearray()
         self._base = 0
         self._mark_ends: list[int] = []
         self._mark_times: list[float] = []
         self._claims: list[tuple[int, int]] = []
 
-    @property
-    def end(self) -> int:
-        """The position behind the last character heard."""
-        return self._base + len(self._stream)
-
     def feed(self, data: bytes, now: float) -> None:
         """Add what was heard at `now`; call `seek` for every expected before the next."""
         if len(self._stream) > 2 * KEPT:
             self._forget(len(self._stream) - KEPT)
         self._stream += data
+        self.end += len(data)
         self._mark_ends.append(self.end)
         self._mark_times.append(now)
 
@@ -140,6 +138,8 @@ class FrameSearch:
 
     def unclaimed_count(self, start: int) -> int:
         """Return how many characters from `start` on belong to no claimed frame."""
+        if not self._claims:
+            return self.end - start
         claimed = sum(max(0, end - max(begin, start)) for begin, end in self._claims)
         return self.end - start - claimed
 

@@ -32,7 +32,7 @@ class Reception:
     `answer` is the right frame, once it is whole; `spare` a right frame that came too early to be believed at
     once, on a port without pace; `displaced` a right frame that may answer another master's request to the asked
     slave, which was heard. `late_at` is when the asked slave's last late answer was whole, `whole_at` when
-    the frame in progress can be whole.
+    the frame in progress can be whole. `answer_size` is how many characters a normal answer has.
     """
 
     def __init__(self, ask: Ask, line: LineContext, pending: Mapping[int, tuple[Pending, ...]], frame: bytes) -> None:
@@ -45,6 +45,7 @@ class Reception:
         self._search = FrameSearch()
         self._normal = ExpectedFrame(ask.codec, normal)
         self._exception = ExpectedFrame(ask.codec, exception)
+        self.answer_size = normal.size
         self._older = [older for each in earlier for older in self._expected_of(each)]
         self._pending = list(earlier)
         self._held: list[tuple[bytes, float]] = []

@@ -6,6 +6,7 @@ paho offers `loop_read`, `loop_write` and `loop_misc` for this (docs/decisions/0
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import socket
 from collections.abc import Callable
 from typing import Protocol
@@ -48,7 +49,10 @@ class Pump:
         self._upkeep: asyncio.TimerHandle | None = None
 
     def begin(self, opened: socket.socket) -> None:
-        """Watch this connected socket."""
+        """Watch this connected socket; what is sent goes at once, for it goes together already (TCP_CORK)."""
+        with contextlib.suppress(OSError):  # it has just gone, as paho will notice
+            # Nagle would let a sample wait for the broker's word on what went before, such as statistics by QoS 0.
+            opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._descriptor = opened.fileno()
         self._loop.add_reader(self._descriptor, self._readable, opened)
         self._keep_up()

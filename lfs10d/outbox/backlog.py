@@ -100,6 +100,11 @@ class Backlog:
 
     # What goes
 
+    @property
+    def waits(self) -> bool:
+        """`next` may have something, now or later; False: nothing of it is in memory."""
+        return bool(self.history or self.spool.page or self.losses or self._recent.wanted)
+
     def next(self, now: float, refused: AbstractSet[str]) -> HistoryBatch | LossNotice | None:
         """Take what goes next, after `repeat`; None: nothing. Topics that are `refused` are passed over."""
         if now < self._open_from:

@@ -24,6 +24,10 @@ class Losses:
     _waiting: dict[Key, list[Loss]] = field(default_factory=dict)
     _declared: dict[Key, float] = field(default_factory=dict)
 
+    def __bool__(self) -> bool:
+        """Tell whether any waits to be declared."""
+        return bool(self._waiting)
+
     def add(self, sample: Sample) -> None:
         """Note that this sample will never be delivered."""
         self.total += 1

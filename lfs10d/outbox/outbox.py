@@ -38,7 +38,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import chain
 
-from lfs10d.outbox.backlog import Backlog
+from lfs10d.outbox.backlog import BATCH_MOST, Backlog
 from lfs10d.outbox.congestion import Congested, Congestion
 from lfs10d.outbox.history import QueuedSample
 from lfs10d.outbox.in_flight import InFlight
@@ -301,6 +301,8 @@ class Outbox:
 
     def _make_room(self) -> None:
         history = self.backlog.history
+        if len(self._queues.live) + len(self.backlog) + BATCH_MOST * len(self._in_flight) <= self._capacity:
+            return  # there is room whatever is under way
         while self._in_memory() > self._capacity and (history or self._queues.live):
             live = None if history else self._queues.live.take_oldest()
             queued = history.evict() if live is None else live.queued

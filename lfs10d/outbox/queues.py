@@ -72,6 +72,10 @@ class Queues:
 
     def next(self, now: float, *, batch: bool) -> OutboxItem | None:
         """Take what goes next, None where nothing may; no history unless `batch`."""
+        if not (self or self.backlog.waits):
+            self._turns.all_passed()
+            self._narrow, self._burst_until = False, None
+            return None
         self._batch_may_go = batch
         if self._keeps_back(now):
             retained = self.retained.next_change(self._refused)
@@ -105,7 +109,7 @@ class Queues:
         return None
 
     def _next_history(self, now: float) -> OutboxItem | None:
-        return self.backlog.next(now, self._refused) if self._batch_may_go else None
+        return self.backlog.next(now, self._refused) if self._batch_may_go and self.backlog.waits else None
 
     def __bool__(self) -> bool:
         """Tell whether anything but the backlog waits."""
@@ -113,7 +117,8 @@ class Queues:
 
     def due(self) -> float | None:
         """Return when `next` may have something though nothing happens before; None: not by time alone."""
-        times = (self.backlog.due(self._refused), self._refusals.due())
+        backlog = self.backlog.due(self._refused) if self.backlog.waits else None
+        times = (backlog, self._refusals.due())
         return min((each for each in times if each is not None), default=None)
 
     # What waits again

@@ -46,11 +46,15 @@ class Turns:
 
         `first`: the classes below this number go before the others now.
         """
-        numbers = range(len(self._advanced))
-        advanced = self._advanced
+        advanced = self._advanced.__getitem__
         if first is None:
-            return sorted(numbers, key=advanced.__getitem__)
-        return sorted(numbers, key=lambda each: (each >= first, advanced[each]))
+            return sorted(range(len(self._advanced)), key=advanced)
+        return sorted(range(first), key=advanced) + sorted(range(first, len(self._advanced)), key=advanced)
+
+    def all_passed(self) -> None:
+        """Note that every class had its turn and nothing to send."""
+        level = self._level
+        self._advanced = [max(each, level) for each in self._advanced]
 
     def passed(self, number: int) -> None:
         """Note that this class had its turn and nothing to send."""

@@ -49,10 +49,13 @@ def write_new(path: Path, data: bytes, *, mode: int) -> None:
 
     What is there is removed, not opened: a symbolic link to another file leaves that one alone.
     """
-    with contextlib.suppress(FileNotFoundError):
-        path.unlink()
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
-    descriptor = os.open(path, flags, mode)
+    try:
+        descriptor = os.open(path, flags, mode)
+    except FileExistsError:
+        with contextlib.suppress(FileNotFoundError):
+            path.unlink()
+        descriptor = os.open(path, flags, mode)
     try:
         os.fchmod(descriptor, mode)
         rest = memoryview(data)

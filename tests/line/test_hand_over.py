@@ -30,6 +30,13 @@ def test_without_a_hold_everything_goes_at_once() -> None:
     assert held(0.0).due([GOOD, DONE], 10.0, 0.0) == 10.0
 
 
+def test_while_somebody_watches_the_frames_nothing_is_held() -> None:
+    some = held(0.02)
+    some.at_once_until = 11.0
+    assert some.due([DONE, GOOD], 10.0, 10.0) == 10.0
+    assert some.due([DONE, GOOD], 11.0, 11.0) == 11.02
+
+
 def test_a_good_sample_waits_for_the_next_ones_no_longer_than_the_hold() -> None:
     some = held(0.02)
     assert some.due([DONE, GOOD], 10.0, 10.0) == 10.02

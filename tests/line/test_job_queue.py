@@ -133,6 +133,18 @@ def test_a_job_rests_until_its_time_or_until_it_is_woken(queue: JobQueue) -> Non
     assert queue.next_at(0.0) == inf
 
 
+def test_it_is_idle_where_no_job_waits_or_rests(queue: JobQueue) -> None:
+    resting, waiting = Task(), Task()
+    seen = [queue.idle]
+    queue.hold(resting, Hold())
+    seen.append(queue.idle)
+    queue.wake(resting)
+    seen.append(queue.idle)
+    queue.submit(waiting, 0.0)
+    seen.append(queue.idle)
+    assert seen == [True, False, True, False]
+
+
 def test_what_is_dropped_is_forgotten_wherever_it_waits(queue: JobQueue) -> None:
     waiting, resting, kept = Task(excludes=frozenset({1})), Task(0.5), Task()
     for job in (waiting, resting, kept):

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from lfs10d.line.device import Device, DeviceSpec, PollRules
 from lfs10d.line.jobs.poll import Poll
-from lfs10d.line.poll_queue import EXCLUDED_PAUSE, FLAT_OUT_PATIENCE, PollQueue, back_on_grid, spread
+from lfs10d.line.poll_queue import EXCLUDED_PAUSE, FLAT_OUT_PATIENCE, LATE, PollQueue, back_on_grid, spread
 from lfs10d.modbus.ask import Ask
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.pending import PendingRequests
@@ -167,6 +167,17 @@ def test_nobody_waits_twice() -> None:
     queue = a_queue(device, device)
     assert queue.choose(0.0, NOBODY) is not None
     assert queue.choose(0.0, NOBODY) is None
+
+
+def test_the_line_hurries_for_who_is_polled_flat_out_is_late_or_asked_again() -> None:
+    assert PollQueue(PendingRequests()).patient(0.0)
+    queue = a_queue(a_device(1, 1.0, due=5.0))
+    assert queue.patient(0.0)
+    assert queue.patient(5.0 + 0.99 * LATE)
+    assert not queue.patient(5.0 + LATE)
+    queue.resume(Poll(a_device(3, 1.0), PendingRequests(), due=0.0, purpose=Purpose.POLL), 0.0)
+    assert not queue.patient(0.0)
+    assert not a_queue(a_device(1, 0.0), a_device(2, 1.0, due=5.0)).patient(0.0)
 
 
 def test_clearing_forgets_everybody() -> None:

@@ -31,6 +31,18 @@ def test_a_poll_is_one_reading() -> None:
     assert rig.scheduler.purpose is Purpose.POLL
 
 
+def test_the_line_hurries_flat_out_and_where_a_job_or_a_probe_waits() -> None:
+    rig = Rig(spec(1), spec(2))
+    rig.run(0.5)
+    scheduler = rig.scheduler
+    assert scheduler.patient(0.5)
+    scheduler.submit(Task(asking(7), share=0.3), 0.5)
+    assert not scheduler.patient(0.5)
+    flat_out = Rig(spec(1, 0.0))
+    flat_out.scheduler.next(0.0)  # it is on the line, and waits for nothing else
+    assert not flat_out.scheduler.patient(0.0)
+
+
 def test_an_outcome_without_a_question_is_a_mistake() -> None:
     rig = Rig(spec(1))
     with pytest.raises(RuntimeError, match=r"^an outcome without an Ask$"):

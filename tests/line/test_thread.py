@@ -209,6 +209,16 @@ def test_it_is_back_early_enough_for_a_turn_and_then_waits_to_the_moment(rig: Ri
 
 
 @pytest.mark.parametrize("listen", [True, False])
+def test_where_nothing_is_hurried_it_sleeps_to_the_moment(rig: Rig, *, listen: bool) -> None:
+    rig.poller.bus.port.open()
+    rig.thread.waking = IDLE_MOST / 2
+    moment = time.monotonic() + 0.05
+    assert not rig.thread._wait(Wait(moment, listen=listen, not_before=moment - 0.02, hurried=False))
+    assert time.monotonic() >= moment
+    rig.poller.bus.close()
+
+
+@pytest.mark.parametrize("listen", [True, False])
 def test_how_early_it_is_back_can_be_set(rig: Rig, *, listen: bool) -> None:
     rig.poller.bus.port.open()
     rig.thread.waking = IDLE_MOST / 2

@@ -9,7 +9,7 @@ import pytest
 
 from lfs10d.errors import PortBusyError, PortLostError
 from lfs10d.modbus.ask import Ask
-from lfs10d.modbus.bus import AWAKE_BEFORE, RATE_SETTLE, REOPEN_FIRST, Bus, LineRules, Wait
+from lfs10d.modbus.bus import AWAKE_BEFORE, RATE_SETTLE, REOPEN_FIRST, UNHURRIED_AFTER, Bus, LineRules, Wait
 from lfs10d.modbus.echo import Echo
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.outcome import Outcome
@@ -151,6 +151,16 @@ def test_an_order_waits_for_silence_is_sent_and_answered(rig: Rig) -> None:
     assert isinstance(outcome, Outcome)
     assert outcome.answer == (0x414F, 0xD70A)
     assert rig.bus.idle
+
+
+def test_where_nobody_waits_it_looks_once_when_all_of_the_answer_is_there(rig: Rig) -> None:
+    rig.bus.ask(READ, {}, hurried=False)
+    assert rig.step() == Wait(100.0 + T9600.gap, listen=True, hurried=False)
+    assert rig.step(T9600.gap) != Wait(inf, listen=True)
+    begun = rig.step(0.02, ANSWER[:4])
+    assert isinstance(begun, Wait)
+    assert begun.not_before == pytest.approx(rig.clock.now + 5 * T9600.character + UNHURRIED_AFTER)
+    assert not begun.hurried
 
 
 def test_it_knows_until_when_a_request_is_on_the_wire(rig: Rig) -> None:

@@ -42,6 +42,13 @@ def test_devices_are_declared_apart() -> None:
     assert {loss.source for loss in all_of(losses)} == {"a", "b"}
 
 
+def test_it_says_whether_a_loss_waits() -> None:
+    losses = Losses()
+    assert not losses
+    losses.restore(Loss("a", "k", 1, 2, 2))
+    assert losses
+
+
 def test_nothing_lost_is_nothing_declared() -> None:
     losses = Losses()
     assert losses.take(0.0) is None

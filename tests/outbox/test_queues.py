@@ -55,6 +55,16 @@ def test_changes_messages_and_live_samples_go_before_history_until_the_window_wa
     assert isinstance(queues.next(0.0, batch=True), HistoryBatch)
 
 
+def test_when_all_has_gone_the_first_classes_go_before_the_others_again(waiting: Waiting) -> None:
+    queues = waiting.queues
+    queues.full()
+    assert queues.next(0.0, batch=True) is None
+    first, second = trace(), event("x")
+    queues.messages.traces.append(first)
+    queues.messages.messages.append(second)
+    assert [queues.next(0.0, batch=True), queues.next(0.0, batch=True)] == [second, first]
+
+
 def test_no_history_while_the_batch_before_is_not_on_its_way_or_samples_are_not_wanted(waiting: Waiting) -> None:
     waiting.backlog.history.add(queued("h", 1))
     assert waiting.queues.next(0.0, batch=False) is None

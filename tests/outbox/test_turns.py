@@ -24,6 +24,21 @@ from lfs10d.outbox.turns import (
 )
 
 
+def test_where_nobody_has_anything_all_begin_level_with_who_went_last() -> None:
+    """As if each had been passed by itself."""
+    together, apart = Turns(3), Turns(3)
+    for turns in (together, apart):
+        for number in (0, 1, 1):
+            turns.went(number, 1)
+    together.all_passed()
+    for number in apart.order():
+        apart.passed(number)
+    assert together.order() == apart.order() == [0, 2, 1]
+    for turns in (together, apart):
+        turns.went(0, 0.25)
+    assert together.order() == apart.order()
+
+
 def test_equals_go_in_their_order_and_then_in_turn() -> None:
     turns = Turns(3)
     went = []

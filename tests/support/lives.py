@@ -76,6 +76,9 @@ class Wire:
 
         self.poller.post(tell)
 
+    def hand_over_at_once(self, until: float) -> None:
+        self.poller.hand_over.at_once_until = until
+
 
 class Unpaused:
     """A line that is never freed for another program."""

@@ -170,7 +170,7 @@ class Poll:
         """Read the next block; where there is none, see what became of the values."""
         if self._block < len(self._blocks):
             return Requeue(self.due)
-        device, names = self.device, self.device.spec.profile.value_names
+        device, names = self.device, self.device.reads.value_names
         if not device.reads.simple:
             self.ages = device.reads.complete(self.values, self.faults, self.at, device.spec.interval)
         if self.faults and all(self.values[name] is None for name in names):
