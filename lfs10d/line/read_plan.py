@@ -113,16 +113,9 @@ class ReadPlan:
         if known is None:
             read = [value for value in self._profile.values if value.name not in left_out]
             together = self._profile.batched(value for value in read if value.name not in alone)
-            known = together + self._each(value for value in read if value.name in alone)
+            known = together + self._profile.alone(value for value in read if value.name in alone)
             self._batched[left_out, alone] = known
         return known
-
-    def _each(self, values: Iterable[Value]) -> tuple[Block, ...]:
-        """Return a read for each of these values, one for those that are parts of the same registers."""
-        places: dict[tuple[int, int], list[Value]] = {}
-        for value in values:
-            places.setdefault((value.function, value.register), []).append(value)
-        return tuple(block for place in places.values() for block in self._profile.batched(place))
 
     def refused(self, block: Block, fault: Fault, now: float) -> tuple[Block, ...] | None:
         """Take the refusal of a read; return what to read in its place, None where the poll fails by it."""
@@ -135,7 +128,7 @@ class ReadPlan:
             return ()
         self._alone |= {value.name for value in optional}
         rest = self._profile.batched(value for value in block.values if not value.optional)
-        return rest + self._each(optional)
+        return rest + self._profile.alone(optional)
 
     def complete(
         self, values: dict[str, Published | None], faults: dict[str, Fault], at: float, interval: float

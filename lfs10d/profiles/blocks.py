@@ -78,12 +78,17 @@ class Block:
         return wrong[0] if wrong else there
 
 
-def batch(values: Iterable[Value], most_words: int, may_skip: int = 0) -> tuple[Block, ...]:
+def batch(
+    values: Iterable[Value], most_words: int, may_skip: int = 0, named: Iterable[Value] = ()
+) -> tuple[Block, ...]:
     """Put values that touch or overlap into one read of at most `most_words`.
 
-    At most `may_skip` registers between two values are read that no value names. Each value fits `most_words` by
-    itself. Values of one read have one interval. Blocks come in order of function and address.
+    At most `may_skip` registers between two values are read that no value names: none of these, and none of `named`,
+    the others of the device, which it may lack. Each value fits `most_words` by itself. Values of one read have one
+    interval. Blocks come in order of function and address.
     """
+    values = tuple(values)
+    others = (*values, *named)
     blocks: list[Block] = []
     together: list[Value] = []
     end = 0
@@ -91,6 +96,7 @@ def batch(values: Iterable[Value], most_words: int, may_skip: int = 0) -> tuple[
         if together:
             first = together[0]
             touches = _alike(value, first) and value.register <= end + may_skip
+            touches = touches and not _names_one(others, value.function, end, value.register)
             most = MOST_BITS if value.function in BIT_FUNCTIONS else most_words
             if not touches or max(end, value.end) - first.register > most:
                 blocks.append(Block.of(tuple(together)))
@@ -104,6 +110,13 @@ def batch(values: Iterable[Value], most_words: int, may_skip: int = 0) -> tuple[
 
 def _order(value: Value) -> tuple[float, ...]:
     return value.function, value.interval or 0, value.register, value.words
+
+
+def _names_one(values: Iterable[Value], function: ReadFunction, first: int, end: int) -> bool:
+    """Whether one of the values has a register from `first` up to `end`, which is excluded."""
+    return first < end and any(
+        value.function == function and value.register < end and first < value.end for value in values
+    )
 
 
 def _alike(value: Value, other: Value) -> bool:

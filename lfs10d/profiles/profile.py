@@ -284,13 +284,26 @@ class Profile(Facts):
         return next(block for block in self._blocks if any(value.name == name for value in block.values))
 
     def batched(self, values: Iterable[Value]) -> tuple[Block, ...]:
-        """Return the reads that bring some of its values."""
-        return batch(values, self.most_words, self.may_skip)
+        """Return the reads that bring some of its values, and touch no register that another one names."""
+        return batch(values, self.most_words, self.may_skip, self.values)
+
+    def alone(self, values: Iterable[Value]) -> tuple[Block, ...]:
+        """Return a read for each of these values, one for those that are parts of the same registers."""
+        places: dict[tuple[int, int], list[Value]] = {}
+        for value in values:
+            places.setdefault((value.function, value.register), []).append(value)
+        return tuple(block for place in places.values() for block in self.batched(place))
 
     def without_optional(self, block: Block) -> tuple[Block, ...]:
-        """Return the reads of a block's other values; none where it has optional ones only, or none of them."""
+        """Return the reads of a block's required values; where it has none, those of each optional one alone.
+
+        None where that would be the same read again.
+        """
         required = [value for value in block.values if not value.optional]
-        return self.batched(required) if len(required) < len(block.values) else ()
+        if required:
+            return self.batched(required) if len(required) < len(block.values) else ()
+        alone = self.alone(block.values)
+        return alone if len(alone) > 1 else ()
 
     def decode(self, block: Block, registers: tuple[int, ...]) -> dict[str, Published] | Fault:
         """Return the values of `block` that are available, or the first fault: `not_finite` or `out_of_range`."""

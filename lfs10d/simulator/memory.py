@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from itertools import count as count_from
 from typing import Final, TypeAlias
 
 from lfs10d.simulator.faults import ActiveFaults, FaultKind, SensorFault
@@ -84,22 +85,31 @@ class Memory:
         most = _MOST_BITS if bits else self.blueprint.most_words(framing)
         if not 1 <= count <= most:
             return refusal(body, ILLEGAL_VALUE), ()
-        measured: list[tuple[str, Published | None]] = []
+        measured: list[tuple[Signal, Published | None]] = []
+        empty: list[Signal] = []
         for signal in self.blueprint.signals:
             overlaps = signal.address < address + count and address < signal.address + signal.count
             if overlaps and self._answers(signal, function):
                 if _strikes(active, FaultKind.ABSENT, signal):
                     return refusal(body, ILLEGAL_ADDRESS), ()
-                measured.append((signal.name, self._measure(signal, source, now, active)))
+                value = self._value(signal, source, now, active)
+                silent = value is None or _strikes(active, FaultKind.UNAVAILABLE, signal)
+                if silent and not signal.is_bit:  # a bit cannot say that there is no value, and stays as it is
+                    empty.append(signal)
+                    value = None
+                measured.append((signal, None if value is None else self._hold(signal, value, active)))
+        emptied = self._emptied(empty)
         try:
             if bits:
                 data = _packed([self.bits[function, place] for place in range(address, address + count)])
             else:
                 words = {**self.words, **self.inputs} if function == READ_INPUT and self.inputs else self.words
+                words = {**words, **emptied} if emptied else words
                 data = b"".join([words[place].to_bytes(2, "big") for place in range(address, address + count)])
         except KeyError:
             return refusal(body, ILLEGAL_ADDRESS), ()
-        return body[:2] + bytes((len(data),)) + data, tuple(measured)
+        told = ((signal.name, None if self._hidden(signal, emptied) else value) for signal, value in measured)
+        return body[:2] + bytes((len(data),)) + data, tuple(told)
 
     def _answers(self, signal: Signal, function: int) -> bool:
         """Whether a read by this function brings this signal.
@@ -109,41 +119,50 @@ class Memory:
         holding = signal.function == READ_HOLDING and function == READ_INPUT and signal.address not in self.inputs
         return signal.function == function or holding
 
-    def _measure(self, signal: Signal, source: WindSource, now: int, active: ActiveFaults) -> Published | None:
-        """Put the signal's value into its registers; return it, or None if it is a broken one."""
+    def _value(self, signal: Signal, source: WindSource, now: int, active: ActiveFaults) -> float | None:
+        """Return what the signal measures now, None where nothing was recorded."""
         last = self._last.get(signal)
-        stuck = last is not None and _strikes(active, FaultKind.STUCK, signal)
-        if stuck and last is not None:
+        if last is not None and _strikes(active, FaultKind.STUCK, signal):
             value = last
         elif (recorded := self.recorded.get(signal.name)) is None:
             value = signal.fitted(source(now))
-        else:
-            known = recorded(now)
-            if known is None:
-                self._empty(signal)
-                return None
+        elif (known := recorded(now)) is not None:
             value = known
+        else:
+            return None
         self._last[signal] = value
+        return value
+
+    def _hold(self, signal: Signal, value: float, active: ActiveFaults) -> Published | None:
+        """Put the value into the signal's registers; return what they say, None if it is a broken one."""
         if signal.is_bit:
-            self.bits[signal.function, signal.address] = int(bool(signal.settled(value)))
+            self.bits[signal.function, signal.address] = signal.bit(value)
             return signal.settled(value)
         broken = broken_float(active, signal.name)
-        if _strikes(active, FaultKind.UNAVAILABLE, signal):
-            self._empty(signal)
-            return None
-        self._put(signal, signal.words(value) if broken is None else signal.broken(broken), signal.mask)
+        words = signal.words(value) if broken is None else signal.broken(broken)
+        space = self._space(signal.function)
+        for place, word, mask in zip(count_from(signal.address), words, signal.masks, strict=False):
+            space[place] = space[place] & ~mask | word & mask
         return None if broken is not None else signal.settled(value)
 
-    def _empty(self, signal: Signal) -> None:
-        """Put into the signal's registers that there is no value; a bit, which cannot say so, stays as it is."""
-        if not signal.is_bit:
-            self._put(signal, signal.empty(), signal.empty_mask)
+    def _emptied(self, signals: Iterable[Signal]) -> Mapping[int, int]:
+        """Return the registers of these signals, all of one function, as they say that there is no value."""
+        emptied: dict[int, int] = {}
+        for signal in signals:
+            space = self._space(signal.function)
+            for place, word, mask in zip(count_from(signal.address), signal.empty(), signal.empty_masks, strict=False):
+                emptied[place] = emptied.get(place, space[place]) & ~mask | word & mask
+        return emptied
 
-    def _put(self, signal: Signal, words: tuple[int, ...], mask: int) -> None:
+    def _hidden(self, signal: Signal, emptied: Mapping[int, int]) -> bool:
+        """Whether registers that say of another part that it has no value do not say this signal's."""
+        if not emptied or signal.is_bit:
+            return False
         space = self._space(signal.function)
-        for n, word in enumerate(words):
-            place = signal.address + n
-            space[place] = space[place] & ~mask | word & mask
+        return any(
+            (emptied.get(place, space[place]) ^ space[place]) & mask
+            for place, mask in zip(count_from(signal.address), signal.masks, strict=False)
+        )
 
     def refuses(self, body: bytes) -> int | None:
         """Return the exception to a write that is not allowed; None for one that is."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -41,7 +41,7 @@ class Blueprint:
     rate_codes: Mapping[int, int] = field(default_factory=dict)
     """Content of the rate register by baud rate."""
     spans: tuple[tuple[int, int, int], ...] = ()
-    """Function, address and count of reads that it answers whole: what lies between signals in them is 0."""
+    """Function, address and count of registers without a name that it has all the same; they are 0."""
 
     def most_words(self, framing: Framing) -> int:
         """Return how many registers one read may ask for."""
@@ -106,7 +106,7 @@ def blueprint_of(profile: Profile) -> Blueprint:
         name=profile.name,
         signals=signals,
         words=words,
-        spans=tuple((block.function, block.address, block.count) for block in profile.reads()),
+        spans=tuple(_skipped(profile)),
         writable=writable,
         functions=frozenset(functions | ({profile.write_function} if writable else set())),
         max_words=profile.max_words,
@@ -116,3 +116,14 @@ def blueprint_of(profile: Profile) -> Blueprint:
         rate_register=profile.baudrate.register if profile.baudrate else None,
         rate_codes=profile.baudrate.codes if profile.baudrate else {},
     )
+
+
+def _skipped(profile: Profile) -> Iterator[tuple[int, int, int]]:
+    """Yield function, address and count of what lies between two values, where a read may span it."""
+    function, end = 0, 0
+    for value in sorted(profile.values, key=lambda each: (each.function, each.register)):
+        if value.function != function:
+            function, end = value.function, value.register
+        if end < value.register <= end + profile.may_skip:
+            yield function, end, value.register - end
+        end = max(end, value.end)

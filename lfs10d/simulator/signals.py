@@ -84,6 +84,10 @@ class Signal:
         """Return the registers that hold this value; what does not fit is bent to the nearest that does."""
         return self._ordered(self._raw(value))
 
+    def bit(self, value: float) -> int:
+        """Return the coil or discrete input that says this value."""
+        return int(bool(self._content(value)))
+
     def settled(self, value: float) -> Published:
         """Return what its registers say of this value; of a float the decimal itself."""
         if self.contents:
@@ -102,7 +106,7 @@ class Signal:
 
     def _raw(self, value: float) -> bytes:
         if self.type in _FLOATS:
-            return struct.pack(_CODES[self.type], (value - self.offset) / self.scale)
+            return struct.pack(_CODES[self.type], self._unscaled(value))
         if self.type == "string":
             return self._spelled(value).encode().ljust(_WORD * self.count, b"\0")
         content = self._content(value)
@@ -112,6 +116,11 @@ class Signal:
             first, last = self.bits
             content = (content & (1 << last - first + 1) - 1) << first
         return (content % (1 << 16 * self.count)).to_bytes(_WORD * self.count, "big")
+
+    def _unscaled(self, value: float) -> float:
+        if self.scale == 1 and self.offset == 0:
+            return value
+        return float((Decimal(repr(value)) - Decimal(repr(self.offset))) / Decimal(repr(self.scale)))
 
     def _spelled(self, value: float) -> str:
         return f"V{value:.4f}"[: _WORD * self.count]
@@ -150,20 +159,22 @@ class Signal:
         return self._ordered(content.to_bytes(_WORD * self.count, "big"))
 
     @property
-    def empty_mask(self) -> int:
-        """The bits of a single register that say that there is no value: all, where a part cannot say so."""
-        return self.mask if self.nothing is None or self._part_holds(self.nothing) else 0xFFFF
+    def empty_masks(self) -> tuple[int, ...]:
+        """The bits of each register that say that there is no value: all, where a part cannot say so."""
+        whole = self.nothing is not None and not self._part_holds(self.nothing)
+        return (0xFFFF,) * self.count if whole else self.masks
 
     def _part_holds(self, content: int) -> bool:
         return self.bits is None or content < 1 << self.bits[1] - self.bits[0] + 1
 
     @property
-    def mask(self) -> int:
-        """The bits of a single register that are its own."""
-        if self.bits is None or self.count > 1:
-            return 0xFFFF
-        mask = (1 << self.bits[1] - self.bits[0] + 1) - 1 << self.bits[0]
-        return (mask & 0xFF) << 8 | mask >> 8 if self.swapped else mask
+    def masks(self) -> tuple[int, ...]:
+        """The bits of each register that are its own."""
+        if self.bits is None:
+            return (0xFFFF,) * self.count
+        first, last = self.bits
+        mask = (1 << last - first + 1) - 1 << first
+        return self._ordered(mask.to_bytes(_WORD * self.count, "big"))
 
     def _ordered(self, data: bytes) -> tuple[int, ...]:
         words = struct.unpack(f"{'<' if self.swapped else '>'}{len(data) // _WORD}H", data)

@@ -21,52 +21,10 @@ from lfs10d.simulator.port import SimulatedPort, VirtualClock, run
 from lfs10d.simulator.registers import blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.telemetry.info import DeviceInfo
+from tests.support.any_profiles import a_profile, certificates
 from tests.support.stations import instant, station
 
-WIDTHS = {"int16": 1, "uint16": 1, "int32": 2, "uint32": 2, "int64": 4, "uint64": 4, "float32": 2, "float64": 4}
 SLAVE = 9
-
-
-@st.composite
-def a_value(draw: st.DrawFn, number: int, register: int) -> tuple[dict[str, Any], int]:
-    """Return the keys of a value at a register, and how many registers it fills."""
-    value: dict[str, Any] = {"name": f"x{number}", "register": register, "optional": draw(st.booleans())}
-    if draw(st.integers(0, 3)) == 0:
-        value["interval"] = "3s"
-    kind = draw(st.sampled_from([*WIDTHS, "bcd", "string", "bool", "map"]))
-    if kind == "bool":
-        return value | {"function": draw(st.sampled_from([1, 2]))}, 1
-    value["function"] = draw(st.sampled_from([3, 4]))
-    value["byte_order"] = draw(st.sampled_from(["big", "little"]))
-    if kind == "string":
-        return value | {"type": kind, "length": (length := draw(st.integers(1, 4)))}, length
-    if kind == "map":
-        return value | {"type": "uint16", "map": {0: "dry", 1: "rain", 7: "snow"}}, 1
-    words = WIDTHS.get(kind) or draw(st.integers(1, 3))
-    value |= {"type": kind, "unit": "x"}
-    if kind == "bcd":
-        value["length"] = words
-    if words > 1:
-        value["word_order"] = draw(st.sampled_from(["high_first", "low_first"]))
-    if not kind.startswith("float"):
-        value["scale"] = draw(st.sampled_from([1.0, 0.1, 0.01]))
-        if kind in WIDTHS and draw(st.booleans()):
-            first = draw(st.integers(0, 16 * words - 8))
-            value["bits"] = [first, draw(st.integers(first + 7, 16 * words - 1))]
-    if kind != "bcd" and draw(st.booleans()):
-        value["unavailable"] = [(1 << 16 * words) - 1]
-    return value, words
-
-
-@st.composite
-def a_profile(draw: st.DrawFn) -> Profile:
-    values, register = [], draw(st.integers(0, 0x8000))
-    for number in range(draw(st.integers(1, 6))):
-        value, words = draw(a_value(number, register))
-        values.append(value)
-        register += words + draw(st.sampled_from([0, 0, 1, 3]))
-    keys = {"may_skip": draw(st.sampled_from([0, 0, 2]))}
-    return Profile.model_validate({"name": "any", "title": "Any device", "values": values, **keys})
 
 
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -74,11 +32,15 @@ def a_profile(draw: st.DrawFn) -> Profile:
 def test_what_a_device_says_is_published_and_nothing_else(profile: Profile, data: st.DataObject) -> None:
     sensor = Sensor(SLAVE, blueprint=blueprint_of(profile))
     names = st.lists(st.sampled_from(profile.value_names), max_size=2, unique=True)
-    absent = [each for each in data.draw(names) if _optional(profile, each)]
+    absent = _with_their_other_halves(profile, [each for each in data.draw(names) if _optional(profile, each)])
     if absent:
         sensor.add_fault("absent", values=tuple(absent))
     if empty := [each for each in data.draw(names) if _says_nothing(profile, each)]:
         sensor.add_fault("unavailable", values=tuple(empty), last=3.5)
+    if stuck := data.draw(names):
+        sensor.add_fault("stuck", values=tuple(stuck), first=2.5)
+    calibration = data.draw(certificates(profile))
+    profile = profile.calibrated(calibration)
     line = SimulatedLine([sensor])
     clock = VirtualClock(0.0)
     port = SimulatedPort(line, clock, PortSettings("/dev/simulated", 9600))
@@ -110,14 +72,17 @@ def test_what_a_device_says_is_published_and_nothing_else(profile: Profile, data
         ]
         errors = payload.get("errors", {})
         if payload["quality"] == "bad":
-            assert all(known.get(name) is None or name in absent for name in profile.value_names)
+            assert all(
+                known.get(name) is None or name in absent or _says_nothing(profile, name)
+                for name in profile.value_names
+            )
             continue
         for name in profile.value_names:
             if name in errors:
                 assert payload[name] is None
                 assert name in absent or known[name] is None or _says_nothing(profile, name)
             else:
-                assert payload[name] == known[name]
+                assert _is(payload[name], known[name], calibration.get(name), _modulo(profile, name)), name
                 assert isinstance(payload[name], bool | str) == isinstance(known[name], bool | str)
         assert payload["quality"] == ("partial" if errors else "good")
 
@@ -129,6 +94,27 @@ def _asked(body: bytes) -> tuple[int, int, int]:
 
 def _optional(profile: Profile, name: str) -> bool:
     return next(each.optional for each in profile.values if each.name == name)
+
+
+def _with_their_other_halves(profile: Profile, names: list[str]) -> list[str]:
+    places = {(each.function, each.register) for each in profile.values if each.name in names}
+    return [each.name for each in profile.values if (each.function, each.register) in places]
+
+
+def _modulo(profile: Profile, name: str) -> float | None:
+    return next(each.modulo for each in profile.values if each.name == name)
+
+
+def _is(published: object, known: object, certificate: tuple[float, float] | None, modulo: float | None) -> bool:
+    """Whether what is published is what the device measured, by its certificate."""
+    if certificate is None or not isinstance(known, int | float):
+        return published == known
+    wanted = known * certificate[0] + certificate[1]
+    difference = cast("float", published) - wanted
+    if modulo is not None:
+        assert 0 <= cast("float", published) < modulo
+        difference = (difference + modulo / 2) % modulo - modulo / 2
+    return abs(difference) <= 1e-6 * max(1.0, abs(wanted))
 
 
 def _says_nothing(profile: Profile, name: str) -> bool:

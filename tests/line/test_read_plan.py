@@ -61,6 +61,18 @@ def test_the_rest_is_read_in_the_same_poll_without_what_is_absent_and_later_poll
     assert plan.reads(1.0, 1.0) is plan.reads(2.0, 1.0)
 
 
+def test_a_read_that_may_skip_registers_does_not_skip_the_absent_one() -> None:
+    plan = ReadPlan(station({"name": "gust", "register": 2}, {"name": "battery", "register": 4}, may_skip=3))
+    (together,) = plan.reads(0.0, 1.0)
+    assert (together.address, together.count) == (0, 5)
+    instead = plan.refused(together, REFUSED, 0.0)
+    assert instead is not None
+    assert [(block.address, block.count) for block in instead] == [(0, 1), (2, 3), (1, 1)]
+    assert plan.refused(instead[2], REFUSED, 0.0) == ()
+    plan.complete({"wind": 5, "gust": 7, "battery": 12}, {}, 0.1, 1.0)
+    assert spans(plan, 1.0) == [(0, 1), (2, 3)]
+
+
 def test_what_is_absent_is_asked_again_alone_after_ten_minutes_and_is_back_when_it_answers() -> None:
     plan = ReadPlan(station())
     absent(plan, 0.0)

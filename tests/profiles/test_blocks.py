@@ -83,6 +83,22 @@ def test_batching_loses_nothing_reads_nothing_unlisted_and_keeps_the_limit(
         assert not touch or second.values[0].end - first.address > most
 
 
+@given(values=some_values(), most=st.integers(2, 9), skips=st.integers(0, 9), data=st.data())
+def test_a_read_of_some_values_touches_no_register_that_only_others_name(
+    values: tuple[Value, ...], most: int, skips: int, data: st.DataObject
+) -> None:
+    read = data.draw(st.lists(st.sampled_from(values), unique_by=lambda each: each.name))
+    unasked = [each for each in values if each not in read]
+    blocks = batch(read, most, skips, values)
+    assert sorted(each.name for block in blocks for each in block.values) == sorted(each.name for each in read)
+    for block in blocks:
+        own = {word for each in block.values for word in range(each.register, each.end)}
+        spanned = set(range(block.address, block.address + block.count)) - own
+        for each in unasked:
+            assert each.function != block.function or spanned.isdisjoint(range(each.register, each.end))
+        assert block.count <= most
+
+
 @given(values=some_values(), most=st.integers(2, 6), data=st.data())
 def test_a_block_decodes_what_each_value_alone_would_be(
     values: tuple[Value, ...], most: int, data: st.DataObject

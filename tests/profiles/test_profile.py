@@ -300,18 +300,3 @@ def test_the_rates_of_a_device_are_the_factorys_first_and_those_that_can_be_set(
     codes = {"register": 4, "codes": {2400: 0, 4800: 1, 9600: 2}}
     assert profile_of(factory={"id": 1, "baudrate": 4800}, baudrate=codes).rates == (4800, 2400, 9600)
     assert profile_of().rates == ()
-
-
-def test_a_setting_is_found_by_its_register_and_some_values_are_read_together(profile_of: Build) -> None:
-    plain = {"type": "uint16", "unit": "m"}
-    values = [{"name": name, "register": register} | plain for name, register in (("a", 1), ("b", 2), ("c", 3))]
-    profile = profile_of(values=values, settings=[{"name": "average", "register": 16}], may_skip=1)
-    setting = profile.setting_at(16)
-    assert setting is not None
-    assert setting.name == "average"
-    assert profile.setting_at(17) is None
-    first, _, last = profile.values
-    (block,) = profile.batched((first, last))
-    assert (block.address, block.count, block.values) == (1, 3, (first, last))
-    assert profile.first_of("speed") is None
-    assert profile_of(values=[values[0], values[1] | {"device_class": "speed"}]).first_of("speed") is not None

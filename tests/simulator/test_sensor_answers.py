@@ -161,3 +161,36 @@ def test_registers_that_a_profile_may_skip_are_there(bench: Maker) -> None:
     values = [{"name": name, "register": at, "type": "uint16", "unit": "x"} for name, at in (("a", 7), ("b", 9))]
     assert bench(built(*values, may_skip=1)).read(1, 8, 1) == struct.pack(">BBBH", 1, 3, 2, 0)
     assert bench(built(*values)).read(1, 8, 1) == bytes((1, 0x83, 2))
+
+
+def test_whatever_a_read_may_span_is_there_though_the_profiles_own_reads_end_elsewhere(bench: Maker) -> None:
+    """Without the first of them, three values of which two fit into a read are read as one and two."""
+    plain = {"type": "uint16", "unit": "x"}
+    values = [{"name": name, "register": at} | plain for name, at in (("a", 4), ("b", 6), ("c", 8), ("d", 12))]
+    line = bench(built(*values, {"name": "e", "register": 5, "function": 4} | plain, may_skip=1, max_words=3))
+    assert line.read(1, 6, 3) is not None
+    assert [line.read(1, at, 1) for at in (10, 11)] == [bytes((1, 0x83, 2))] * 2
+
+
+def test_a_part_without_a_value_leaves_the_rest_of_its_register_alone(bench: Maker) -> None:
+    low = {"name": "a", "register": 7, "type": "uint16", "unit": "x", "bits": [0, 7], "unavailable": [0xFFFF]}
+    sensor = built(low, {"name": "b", "register": 7, "type": "uint16", "unit": "x", "bits": [10, 14]})
+    sensor.words[7] = 0x8000
+    sensor.add_fault("unavailable", values=("a",))
+    line = bench(sensor)
+    assert line.read(1, 7, 1) == bytes((1, 3, 2, 0xFF, 0xFF))
+    assert dict(line.answer.measured) == {"a": None, "b": None}  # all ones do not say what b measures
+    sensor.clear_faults("unavailable")
+    answer = line.read(1, 7, 1)
+    assert answer is not None
+    assert (answer[3] & 0x83, dict(line.answer.measured)["b"]) == (0x80, answer[3] >> 2 & 31)
+    assert dict(line.answer.measured)["a"] == answer[4]
+
+
+def test_two_parts_of_a_long_content_do_not_overwrite_each_other(bench: Maker) -> None:
+    long = {"register": 7, "type": "uint32", "unit": "x", "word_order": "low_first", "byte_order": "little"}
+    line = bench(built({"name": "a", "bits": [4, 20]} | long, {"name": "b", "bits": [21, 31]} | long))
+    answer = line.read(1, 7, 2)
+    assert answer is not None
+    content = int.from_bytes(answer[3:7], "little")
+    assert dict(line.answer.measured) == {"a": content >> 4 & 0x1FFFF, "b": content >> 21}

@@ -4,11 +4,12 @@ Rules
 -----
 1. Profiles are tried in order; each by the register of its slave id, where it has one, and the read that brings its
    first value. What was answered once is not asked again. Nothing is ever written.
-2. A profile fits that reads believable values; optional ones may be absent. One with a register of its slave id fits
-   only if all agree: that register holds a possible id, the values are believable, and the register of the rate, where
-   it has one, holds one of its codes. Where the profile names registers that tell the device from others (`identify`),
-   they must hold what it says. Values that collide do not disagree, where the id is the right one: then two such
-   devices share it.
+2. A profile fits that reads believable values; optional ones may be absent. Where the first read brings none now, the
+   others are read, if more than values speaks for the profile. One with a register of its slave id fits only if all
+   agree: that register holds a possible id, the values are believable, and the register of the rate, where it has one,
+   holds one of its codes. Where the profile names registers that tell the device from others (`identify`), they must
+   hold what it says. Values that collide do not disagree, where the id is the right one: then two such devices share
+   it.
 3. An answer is any right frame of the slave, an exception too. Silence is asked again, `SILENCES` times in all.
 4. Where bytes came that make no right frame, or a second frame behind the right one, the read is repeated, `TRIES`
    times in all. Spoilt `SPOILT` times, two devices probably share the id (`ALL_SPOILT` where no right answer came).
@@ -30,7 +31,7 @@ from lfs10d.line.read_plan import ILLEGAL_ADDRESS
 from lfs10d.modbus.frames import Codec
 from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.request import READ_HOLDING_REGISTERS, ReadRegisters
-from lfs10d.profiles.blocks import Block
+from lfs10d.profiles.blocks import NO_VALUE_NOW, Block
 from lfs10d.profiles.library import builtin_names
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Fault, FaultCode, Value
@@ -135,6 +136,12 @@ def _read_of(block: Block, slave: int) -> ReadRegisters:
     return ReadRegisters(slave, block.address, block.count, block.function)
 
 
+def _may_lack(block: Block, outcome: Outcome | None) -> bool:
+    """Whether a read was refused because of optional registers."""
+    refused = outcome is not None and outcome.fault is not None and outcome.fault.exception_code == ILLEGAL_ADDRESS
+    return refused and any(value.optional for value in block.values)
+
+
 class _Evidence(IntEnum):
     """What speaks for a profile, the least first."""
 
@@ -226,30 +233,30 @@ class Identification:
         self, profile: Profile, evidence: _Evidence
     ) -> Generator[ReadRegisters, Outcome, tuple[int, Mapping[str, Value] | Fault]]:
         """Read its first values; return from how many registers, and the values or why they are not believed."""
-        words, values = 0, dict[str, Value]()
-        left = [profile.main_read]
+        words, values, missing = 0, dict[str, Value](), None
+        left, others = [profile.main_read], [block for block in profile.reads() if block is not profile.main_read]
         while left:
             block = left.pop(0)
             outcome = yield from self._hear(_read_of(block, self._slave))
             if outcome is None and evidence is _Evidence.OWN_ID and self._found.duplicate:
                 continue  # two such devices, whose values collide
-            if outcome is None or outcome.answer is None:
-                absent = (
-                    outcome is not None
-                    and outcome.fault is not None
-                    and outcome.fault.exception_code == ILLEGAL_ADDRESS
-                )
-                instead = profile.without_optional(block) if absent else ()
-                if not instead:
-                    return 0, _NO_ANSWER
-                left.extend(instead)
-                continue
-            read = profile.decode(block, outcome.answer)
-            if isinstance(read, Fault):
-                return 0, read
-            words += block.count
-            values |= read
-        return words, values
+            if outcome is not None and outcome.answer is not None:
+                read = profile.decode(block, outcome.answer)
+                if not isinstance(read, Fault):
+                    words += block.count
+                    values |= read
+                elif read.code in NO_VALUE_NOW:
+                    missing = read
+                else:
+                    return 0, read
+            elif _may_lack(block, outcome):
+                missing = missing or _NO_ANSWER
+                left.extend(profile.without_optional(block))
+            else:
+                return 0, _NO_ANSWER
+            if missing and not left and not values and (evidence is not _Evidence.VALUES or profile.identify):
+                left, others = others, []
+        return words, values if values or missing is None else missing
 
     def _identified(self, profile: Profile) -> Generator[ReadRegisters, Outcome, bool]:
         for each in profile.identify:

@@ -4,7 +4,7 @@ Rules
 -----
 1. *Recognised*: the register of the slave id has answered with the id of the request, the registers of `identify` and
    of the rate (where the profile has them) hold what they can hold, and every value that is available has answered in
-   range each time it was read. Optional registers may be absent, but not all values.
+   range each time it was read. Optional registers may be absent, but some value is there and available.
 2. *One alone*: the value is read three times, and behind each read a silent slave id is read, so that the line is
    listened to for 0.2, 0.2 and 0.6 s. Two sensors share the id where any of these answers collides, is followed by
    another or by bytes that no longer come when the silent id alone is read, or is impossible (not in range, no finite
@@ -28,9 +28,9 @@ from lfs10d.line.jobs.identification import rate_fits
 from lfs10d.line.jobs.procedure import Step
 from lfs10d.line.read_plan import ILLEGAL_ADDRESS
 from lfs10d.modbus.outcome import Outcome
-from lfs10d.profiles.blocks import Block
+from lfs10d.profiles.blocks import NO_VALUE_NOW, Block
 from lfs10d.profiles.values import Value
-from lfs10d.reading import Fault
+from lfs10d.reading import Fault, FaultCode
 from lfs10d.reconfiguration.journal import Endpoint
 from lfs10d.reconfiguration.procedures.identity_query import PATIENT, QUICK, SILENCE, IdentityQuery, IdentityReply
 
@@ -113,30 +113,38 @@ def _timeouts(query: IdentityQuery) -> tuple[float | None, ...]:
 
 
 def _all_values_fit(endpoint: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, Recognition]:
-    """Read every value; optional ones that it refuses are absent, as long as it has others."""
-    found = Recognition(f"it refuses all its values (exception {ILLEGAL_ADDRESS:02X})")
+    """Read every value; some may be absent or without a number now, as long as it has others."""
+    found, none = None, Recognition(f"it refuses all its values (exception {ILLEGAL_ADDRESS:02X})")
     blocks = list(query.profile.reads())
     while blocks:
         block = blocks.pop(0)
-        fit, refused = yield from _values_fit(block, endpoint, query)
-        if refused == ILLEGAL_ADDRESS and any(value.optional for value in block.values):
+        fit, missing = yield from _values_fit(block, endpoint, query)
+        if missing is not None and _may_lack(block, missing.exception_code):
             blocks[:0] = query.profile.without_optional(block)
-            continue
-        if fit.why is not None or fit.spoilt:
+        elif missing is not None and missing.code in NO_VALUE_NOW:
+            none = fit
+        elif fit.why is not None or fit.spoilt:
             return fit
-        found = fit
-    return found
+        else:
+            found = fit
+    return found or none
+
+
+def _may_lack(block: Block, exception: int | None) -> bool:
+    """Whether a read was refused because of optional registers."""
+    return exception == ILLEGAL_ADDRESS and any(value.optional for value in block.values)
 
 
 def _values_fit(
     block: Block, endpoint: Endpoint, query: IdentityQuery
-) -> Generator[Step, Outcome, tuple[Recognition, int | None]]:
+) -> Generator[Step, Outcome, tuple[Recognition, Fault | None]]:
     """Read a block of values `READS` times; the first answer that is none of such a device decides.
 
-    The second is the exception with which it was refused.
+    The second is why it has no value: it was refused, or says so.
     """
     spoilt = answered = 0
     exception: int | None = None
+    nothing: Fault | None = None
     for timeout in _timeouts(query):
         reply = yield from query.read_values(endpoint, timeout, block=block)
         spoilt += reply.noise
@@ -146,13 +154,16 @@ def _values_fit(
         answered += 1
         values = block.decode(reply.words)
         if isinstance(values, Fault):
-            return Recognition(values.message), None
+            if values.code not in NO_VALUE_NOW:
+                return Recognition(values.message), None
+            nothing = values
     if spoilt >= READS:
         return Recognition(spoilt=True), None
     if answered:
-        return Recognition(), None
+        return Recognition(nothing.message if nothing else None), nothing
     how = "does not answer for" if exception is None else f"refuses (exception {exception:02X})"
-    return Recognition(f"it {how} its values at 0x{block.address:04X}"), exception
+    message = f"it {how} its values at 0x{block.address:04X}"
+    return Recognition(message), Fault(FaultCode.EXCEPTION, message, exception)
 
 
 def look_for_twins(endpoint: Endpoint, silent: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, Look]:
@@ -164,15 +175,18 @@ def look_for_twins(endpoint: Endpoint, silent: Endpoint, query: IdentityQuery) -
 
 
 def _read_and_listen(endpoint: Endpoint, silent: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, Look]:
-    value, block = _number_in(query.profile.reads())
+    blocks = list(query.profile.reads())
+    value, block = _number_in(blocks)
     numbers: list[float] = []
     for window in LISTENING:
         look = yield from _measured(value, block, endpoint, query)
-        if isinstance(look, Look) and look.exception == ILLEGAL_ADDRESS and not numbers:
-            instead = query.profile.without_optional(block)
-            if instead:  # an optional register is absent
-                value, block = _number_in(instead)
-                look = yield from _measured(value, block, endpoint, query)
+        while not numbers and isinstance(look, Look) and _may_lack(block, look.exception):
+            place = blocks.index(block)
+            blocks[place : place + 1] = query.profile.without_optional(block)
+            if not blocks:
+                return look
+            value, block = _number_in(blocks)
+            look = yield from _measured(value, block, endpoint, query)
         if isinstance(look, Look):
             return look
         numbers.append(look)
@@ -226,6 +240,8 @@ def _measured(
             return Look(twins="answers collide there")
         if reply.words is not None:
             values = block.decode(reply.words)
+            if isinstance(values, Fault) and values.code is FaultCode.UNAVAILABLE:
+                values = {}
             if isinstance(values, Fault):
                 return Look(twins=f"its values are impossible: {values.message}")
             number = values.get(value.name, 0.0)  # an unavailable one jumps nowhere

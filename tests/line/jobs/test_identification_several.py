@@ -131,3 +131,44 @@ def test_a_device_is_recognised_by_its_first_value_wherever_that_is_read() -> No
     assert finding is not None
     assert (finding.profile, dict(finding.values)) == (profile, {"wind_speed": 7})
     assert asked == [ReadRegisters(3, 500, 1)]
+
+
+SPARE = [
+    {"name": "speed", "register": 1, "type": "uint16", "unit": "m", "optional": True, "range": [0, 60]},
+    {"name": "gust", "register": 2, "type": "uint16", "unit": "m", "optional": True},
+    {"name": "battery", "register": 9, "type": "uint16", "unit": "V"},
+]
+
+
+@pytest.mark.parametrize(
+    ("content", "values"),
+    [
+        ({1: 7, 9: 12}, {"speed": 7}),
+        ({2: 8, 9: 12}, {"gust": 8}),
+        ({9: 12}, {"battery": 12}),
+        ({1: 61, 9: 12}, None),
+        ({}, None),
+    ],
+)
+def test_of_values_that_are_all_optional_one_is_enough(content: dict[int, int], values: dict[str, int] | None) -> None:
+    profile = Profile.model_validate({"name": "spare", "title": "S", "values": SPARE, "slave_id": {"register": 5}})
+    found, _ = interview(registers({5: 3} | content), profiles=(profile,))
+    assert found is not None
+    assert (found.profile, found.values) == ((profile, values) if values else (None, {}))
+
+
+def test_values_alone_speak_for_a_profile_by_the_first_read_only() -> None:
+    """Anything may be in the others."""
+    profile = Profile.model_validate({"name": "spare", "title": "S", "values": SPARE})
+    found, asked = interview(registers({9: 12}), profiles=(profile,))
+    assert found is not None
+    assert (found.profile, [each.address for each in asked]) == (None, [1, 1, 2])
+
+
+def test_a_first_value_that_is_unavailable_leaves_it_to_the_others() -> None:
+    values = [SPARE[0] | {"unavailable": [0xFFFF], "optional": False}, SPARE[2]]
+    profile = Profile.model_validate({"name": "spare", "title": "S", "values": values, "slave_id": {"register": 5}})
+    for content, wanted in (({1: 0xFFFF, 9: 12}, profile), ({1: 0xFFFF}, None)):
+        found, _ = interview(registers({5: 3} | content), profiles=(profile,))
+        assert found is not None
+        assert found.profile is wanted
