@@ -70,7 +70,9 @@ class DoubtfulAnswers:
         slave, began = outcome.request.slave, outcome.began
         if began is None or not outcome.heard:
             return False
-        state = self._slaves.setdefault(slave, _SlaveTrust())
+        state = self._slaves.get(slave)
+        if state is None:
+            state = self._slaves[slave] = _SlaveTrust()
         before, state.ended = state.ended, outcome.ended
         state.proved_at = state.own_by = -inf
         self._settle(slave, state, outcome.ended)

@@ -92,14 +92,19 @@ class QuietWatch:
 
     def answered(self, slave: int, at: float) -> None:
         """Take a right answer of a slave, whole at `at`: the line may have to be quiet now."""
-        state = self._slaves.setdefault(slave, _SlaveQuiet())
+        state = self._slaves.get(slave)
+        if state is None:
+            state = self._slaves[slave] = _SlaveQuiet()
+        awaited = self._duplicates.awaited(slave)
+        if awaited is None and not (state.hit or state.same or state.any):  # as nearly always
+            state.answered_at = at
+            return
         suspected, own = self._suspected(state), slave in state.hit
         for each in state.hit | state.same.keys():
             state.same[each] = _counted(state.same.get(each, 0.0), hit=each in state.hit)
         state.any = _counted(state.any, hit=bool(state.hit))
         state.hit.clear()
         state.answered_at = at
-        awaited = self._duplicates.awaited(slave)
         if awaited is not None:
             state.awaited_until = at + awaited
             if state.vain < VAIN:

@@ -243,7 +243,7 @@ class Scheduler:
         self._spend(job, outcome, now)
         ignored = self._ignored(outcome)
         again = doubtful or widened or (ignored and isinstance(job, Poll) and self._benefits(job.device))
-        if isinstance(job, Poll) and self._wanted(job) and again:
+        if again and isinstance(job, Poll) and self._wanted(job):
             self._jobs.resume(job)
             return []
         following = job.on_outcome(outcome, now)

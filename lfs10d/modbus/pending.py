@@ -40,6 +40,7 @@ QUIET_LEAST = 1.0
 """How long a slave is left alone where no barrier can tell, at least; in s."""
 _SILENT = frozenset({FaultCode.TIMEOUT, FaultCode.LATE, FaultCode.WRONG_SLAVE})
 """With these faults the asked slave itself said nothing."""
+_NO_RESTS = (None, None, None)
 EQUALS_KEPT = 16
 """Of equal pending requests so many are remembered, the newest: more than any sensor keeps in mind. The answer of one
 forgotten too soon would count as that of the next, and whatever was asked between the two as answered."""
@@ -149,7 +150,7 @@ class PendingRequests:
             del self._quiet_until[slave]
             until = None
         rests = (until, self.duplicates.rests_until(slave, now), self.other_master.busy_until(slave, now))
-        return max((each for each in rests if each is not None), default=None)
+        return None if rests == _NO_RESTS else max(each for each in rests if each is not None)
 
     def asked_by_another(self, request: Request, codec: Codec, now: float) -> None:
         """Note that another master's request was heard, whole at `now`."""

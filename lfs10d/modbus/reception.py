@@ -224,7 +224,11 @@ class Reception:
     @property
     def rest(self) -> int:
         """How many characters came in the place of an answer and are neither echo nor an earlier answer."""
-        return self._search.unclaimed_count(self._from) + sum(len(held) for held, _ in self._held)
+        return self._search.unclaimed_count(self._from) + self._held_count
+
+    @property
+    def _held_count(self) -> int:
+        return sum(len(held) for held, _ in self._held) if self._held else 0
 
     def leftover(self) -> bytes:
         """Return these characters (the last of them where there were very many)."""
@@ -306,7 +310,7 @@ class Reception:
     @property
     def unsolicited(self) -> int:
         """How many bytes are no echo and belong to no answer, of this or of an earlier request."""
-        count = self._search.unclaimed_count(0) + sum(len(held) for held, _ in self._held)
+        count = self._search.unclaimed_count(0) + self._held_count
         if self.answer is None and self.spare is None and self.displaced is None and self.begun:
             count -= min(self.rest, self.expected)
         return count
