@@ -84,6 +84,12 @@ def no_content(content: float, kind: RegisterType, width: int) -> str | None:
     return None
 
 
+def limits_of(kind: RegisterType, width: int) -> tuple[int, int]:
+    """Return the least and the greatest whole number that so many bits of this type hold."""
+    low = -(1 << width - 1) if kind in SIGNED else 0
+    return low, low + (1 << width) - 1
+
+
 def bits_of(content: float, kind: RegisterType, width: int) -> int:
     """Return a content as its bits; a float with a decimal point is the number itself."""
     if not isinstance(content, int):

@@ -36,7 +36,8 @@ def hint_for_address(address: int, function: int | None) -> str | None:
     if digit not in TABLES or counted == 0 or address % ROUND == 0 or (digit == 1 and function != TABLES[1][1]):
         return None
     meaning = _meaning(digit, counted - 1, function)
-    return f"register {address} looks like a number of the manual, not an address: {meaning}"
+    hint = f"register {address} looks like a number of the manual, not an address: {meaning}"
+    return f"{hint}; if it is the address, write it in hexadecimal: 0x{address:04X}"
 
 
 def _meaning(digit: int, address: int, function: int | None) -> str:

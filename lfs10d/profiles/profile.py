@@ -21,7 +21,7 @@ from lfs10d.profiles.settings import Setting
 from lfs10d.profiles.values import Value
 from lfs10d.reading import Fault, Number
 from lfs10d.reading import Value as Published
-from lfs10d.schema.fields import Duration, Name, Whole
+from lfs10d.schema.fields import Duration, Hexadecimal, Name, Whole
 
 FramingName: TypeAlias = Literal["rtu", "ascii"]
 ChecksumName: TypeAlias = Literal["crc", "sum"]
@@ -249,9 +249,10 @@ class Profile(Facts):
         hints = (
             (name, hint_for_address(fact.register, getattr(fact, "function", None)))
             for name, fact in facts
-            if fact is not None
+            if fact is not None and not isinstance(fact.register, Hexadecimal)  # no manual counts in hexadecimal
         )
-        return tuple(f"{name}: {hint}" for name, hint in hints if hint is not None)
+        words = ((value.name, value.doubt) for value in self.values)
+        return tuple(f"{name}: {hint}" for name, hint in (*hints, *words) if hint is not None)
 
     @property
     def rates(self) -> tuple[int, ...]:

@@ -13,6 +13,7 @@ from lfs10d.profiles.contents import (
     WORD_BITS,
     RegisterContent,
     bits_of,
+    limits_of,
     no_content,
     part_of,
     part_problems,
@@ -32,7 +33,7 @@ from lfs10d.profiles.registers import (
     WordOrder,
 )
 from lfs10d.reading import Number
-from lfs10d.schema.fields import Duration, Text, Whole
+from lfs10d.schema.fields import Duration, Text, Whole, shown
 
 ReadFunction: TypeAlias = Literal[1, 2, 3, 4]
 
@@ -115,6 +116,8 @@ class Value(Registered):
             refuse([((), f"is missing; write here: {TYPES_OF_NUMBERS}")])
         if kind == "bool":
             refuse([((), "registers hold no booleans; write uint16 with bits and map, or function 1 or 2")])
+        if kind not in (*WORDS, *LONGEST):
+            refuse([((), f"must be one of {TYPES_OF_NUMBERS}, not {shown(kind)}")])
         return kind
 
     @field_validator("type", mode="after")
@@ -209,7 +212,7 @@ class Value(Registered):
     def _has_a_unit_unless_itis_text(cls, unit: object, info: ValidationInfo) -> object:
         if unit is not None:
             return unit
-        if not says_text(info.data):
+        if not says_text(info.data) and "map" in info.data:
             refuse([((), "is missing; write here: the unit of the number, '1' for a bare one")])
         return "1"
 
@@ -222,6 +225,15 @@ class Value(Registered):
     def end(self) -> int:
         """The register after its last."""
         return self.register + self.words
+
+    @property
+    def doubt(self) -> str | None:
+        """What is valid and probably a mistake: a word for what its registers cannot hold; None without that."""
+        width = width_of(self.type, self.length)
+        part = part_of(self.bits, self.mask, self.byte, width)
+        low, high = limits_of(self.type, part.width if part else width)
+        never = [content for content in self.map or () if not low <= content <= high]
+        return f"map names {never[0]}, and the content is {low} to {high}" if never else None
 
     @property
     def is_text(self) -> bool:

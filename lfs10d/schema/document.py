@@ -20,7 +20,7 @@ from pydantic_core import ErrorDetails
 from yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from lfs10d.errors import ConfigError, Problem
-from lfs10d.schema.fields import quoted, shown
+from lfs10d.schema.fields import Hexadecimal, quoted, shown
 from lfs10d.schema.messages import KeyPath, in_words, keys_at, missing, unknown_key
 from lfs10d.schema.yaml12 import DEEPEST_NESTING, FORMS, TAG, Loader
 
@@ -289,7 +289,9 @@ class _NodeReader:
                 # Python's words for these have no dot; no other number holds a letter but e.
                 return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
         try:
-            return int(text[2:], {"0o": 8, "0x": 16}[text[:2]]) if text[:2] in {"0o", "0x"} else int(text)
+            if text[:2] == "0x":
+                return Hexadecimal(text[2:], 16)
+            return int(text, 0 if text[:2] == "0o" else 10)
         except ValueError:  # more digits than Python converts
             self.report(node, path, "has too many digits")
             return _UNREAD

@@ -57,6 +57,12 @@ def quoted(text: str, longest: int = _SHOWN_CHARACTERS) -> str:
     )
 
 
+class Hexadecimal(int):
+    """A whole number that a file has in hexadecimal."""
+
+    __slots__ = ()
+
+
 class FieldError(ValueError):
     """A value is not of the kind; the message says what it must be."""
 
@@ -161,7 +167,7 @@ class Choice(FieldKind):
         """Take a listed value of exactly its type: true is not 1, "9600" is not 9600."""
         if value is None and self.null:
             return None
-        if type(value) is int or type(value) is str:
+        if isinstance(value, int | str) and not isinstance(value, bool):
             if value in self.meaning:
                 return self.meaning[value]
             if value in self.values:

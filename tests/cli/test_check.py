@@ -82,7 +82,8 @@ def test_a_register_that_is_a_number_of_the_manual_is_a_warning_once_for_its_pro
     assert code == 0
     assert err == (
         'lfs10d.yaml:2:13: slaves[1]: warning: profile "station.yaml": battery: register 40001 looks like a number of '
-        "the manual, not an address: 4 stands for holding register there, and the rest counts from one, so write 0\n"
+        "the manual, not an address: 4 stands for holding register there, and the rest counts from one, so write 0; "
+        "if it is the address, write it in hexadecimal: 0x9C41\n"
     )
 
 

@@ -100,7 +100,8 @@ def test_a_warning_of_a_profile_goes_to_standard_error(tmp_path: Path) -> None:
     assert "30007" not in result.stdout
     assert result.stderr == (
         "lfs10d: warning: level: register 30007 looks like a number of the manual, not an address: 3 stands for input "
-        "register there, and the rest counts from one, so write 6\n"
+        "register there, and the rest counts from one, so write 6; if it is the address, write it in "
+        "hexadecimal: 0x7537\n"
     )
 
 

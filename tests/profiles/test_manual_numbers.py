@@ -43,7 +43,7 @@ def test_an_address_that_looks_like_a_number_of_the_manual_is_doubted(
     hint = hint_for_address(address, function)
     assert hint is not None
     assert hint.startswith(f"register {address} looks like a number of the manual, not an address: ")
-    assert hint.endswith(f"so write {written}")
+    assert hint.endswith(f"so write {written}; if it is the address, write it in hexadecimal: 0x{address:04X}")
 
 
 @pytest.mark.parametrize(

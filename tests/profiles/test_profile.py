@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from lfs10d.profiles.library import builtin_names, load_profile
+from lfs10d.profiles.library import builtin_names, load_profile, parse_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Fault, FaultCode
 
@@ -284,10 +284,17 @@ def test_a_register_that_looks_like_a_number_of_the_manual_is_doubted(profile_of
     )
     level, slave_id, identify = profile.doubts()
     assert level.startswith("level: register 40001 looks like a number of the manual, not an address")
-    assert level.endswith("so write 0")
-    assert slave_id.endswith("so write 2000")
-    assert identify.endswith("so write 10 and function: 4")
+    assert "so write 0; if it is the address, write it in hexadecimal: 0x9C41" in level
+    assert "so write 2000;" in slave_id
+    assert "so write 10 and function: 4;" in identify
     assert profile_of().doubts() == ()
+
+
+def test_a_register_written_in_hexadecimal_is_an_address() -> None:
+    """Some manuals print both: 30003 is 0x7533."""
+    text = "name: a\ntitle: A\nvalues:\n  - {name: b, register: NUMBER, function: 4, type: uint16, unit: m}\n"
+    assert parse_profile(text.replace("NUMBER", "0x7533"), "a.yaml").doubts() == ()
+    assert len(parse_profile(text.replace("NUMBER", "30003"), "a.yaml").doubts()) == 1
 
 
 @pytest.mark.parametrize("name", builtin_names())

@@ -28,6 +28,9 @@ def problems(data: dict[str, Any]) -> list[tuple[str, str]]:
     [
         (NUMBER | {"type": None}, "type", "is missing; write here: int16"),
         (NUMBER | {"type": "bool"}, "type", "registers hold no booleans"),
+        (NUMBER | {"type": "uint8"}, "type", "must be one of int16, uint16, int32, uint32, int64, uint64, float32, "),
+        (NUMBER | {"type": 16}, "type", "must be one of int16, "),
+        ({"name": "x", "register": 1, "type": "uint16", "map": {0: 1}}, "map.0", "must be text of 1 to 64"),
         (BIT | {"type": "uint16"}, "type", "function 1 and 2 read booleans; leave the type out"),
         (NUMBER | {"type": "int64", "register": 0xFFFD}, "type", "int64 fills four registers"),
         (NUMBER | {"length": 2}, "length", "uint16 has its own length; leave it out"),
@@ -67,6 +70,27 @@ def test_a_mistake_is_told_at_its_place(data: dict[str, Any], place: str, messag
     (found,) = problems(data)
     assert found[0] == place
     assert found[1].startswith(message)
+
+
+@pytest.mark.parametrize(
+    ("keys", "doubt"),
+    [
+        ({"byte": "high", "map": {0: "dry", 255: "x", 256: "wet"}}, "map names 256, and the content is 0 to 255"),
+        ({"bits": [3, 4], "map": {4: "wet"}}, "map names 4, and the content is 0 to 3"),
+        ({"mask": 0xF0, "map": {-1: "wet"}}, "map names -1, and the content is 0 to 15"),
+        ({"type": "int16", "map": {40000: "wet"}}, "map names 40000, and the content is -32768 to 32767"),
+        ({"type": "int16", "map": {-1: "wet"}}, None),
+        ({"type": None, "function": 1, "map": {2: "wet"}}, "map names 2, and the content is 0 to 1"),
+        ({"unit": "m"}, None),
+    ],
+)
+def test_a_word_for_what_the_registers_cannot_hold_is_doubted(keys: dict[str, Any], doubt: str | None) -> None:
+    value = Value.model_validate({"name": "level", "register": 1, "type": "uint16"} | keys)
+    assert value.doubt == doubt
+    profile = Profile.model_validate(
+        {"name": "p", "title": "P", "values": [{"name": "level", "register": 1, "type": "uint16"} | keys]}
+    )
+    assert profile.doubts() == (() if doubt is None else (f"level: {doubt}",))
 
 
 @pytest.mark.parametrize(

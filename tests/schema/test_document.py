@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from lfs10d.errors import ConfigError, Problem
 from lfs10d.schema.document import LARGEST_FILE, MOST_VALUES, Document, decode, parse
+from lfs10d.schema.fields import Hexadecimal
 from lfs10d.schema.yaml12 import DEEPEST_NESTING
 from tests.support.documents import problems
 
@@ -36,7 +37,7 @@ def refusal(text: str) -> str:
         ("010", 10),
         ("-08", -8),
         ("+5", 5),
-        ("0x1F", 31),
+        ("0x1F", Hexadecimal(31)),
         ("0o17", 15),
         ("1.", 1.0),
         (".5", 0.5),
@@ -53,7 +54,7 @@ def refusal(text: str) -> str:
         ("'5'", "5"),
         ('"on"', "on"),
         ("!!str 5", "5"),
-        ("!!int 0x10", 16),
+        ("!!int 0x10", Hexadecimal(16)),
         ("!!float 1", 1.0),
     ],
 )

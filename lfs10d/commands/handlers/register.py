@@ -3,8 +3,8 @@
 Rules
 -----
 1. Nothing is sent to slave 0: all devices would obey, and nobody answer.
-2. What sets a slave id or a baud rate is left to `device/readdress` and `line/baudrate`, which verify it; what sets a
-   motor going is never written. At a slave that is not configured that holds for every profile there is.
+2. What sets a slave id or a baud rate is left to `device/readdress` and `line/baudrate`, which verify it; what triggers
+   an action (a motor that starts) is never written. At a slave that is not configured that holds for every profile.
 3. Nothing is written at a slave id that a physical change is about, while that is open.
 4. Of a configured device only what its profile marks as a writable setting is written, within the setting's range.
 """
@@ -143,7 +143,7 @@ def _check_harmless(address: int, profile: Profile) -> None:
     if profile.baudrate is not None and address == profile.baudrate.register:
         raise refuse("not_allowed", f"{what} sets its baud rate: use line/baudrate", param="address")
     if address in profile.run_commands:
-        raise refuse("not_allowed", f"{what} may set a motor going: it is never written", param="address")
+        raise refuse("not_allowed", f"{what} triggers an action: it is never written", param="address")
 
 
 def _check_setting(address: int, value: int, profile: Profile) -> None:
