@@ -32,16 +32,19 @@ class LineReport:
         parts, now = self._parts, self._parts.clock.now()
         port, frames = parts.line.port, log.isEnabledFor(logging.DEBUG)
         published: list[Publication] = []
+        opened = False
         for event in events:
             _log(self._event_log.on_event(event, port=port.settings.path, notices=port.notices, frames=frames))
             self._watch_start(event)
             known = parts.publisher.on_event(event, now)
             _log(self._event_log.on_publications(known))
             published += [*known, *parts.access.on_event(event, known, now)]
+            if isinstance(event, PortChanged):
+                opened = opened or event.fault is None
             if isinstance(event, Exchanged) or (isinstance(event, PortChanged) and event.fault is not None):
                 parts.signals.ready()
         parts.publisher.publish([*published, *parts.publisher.due(now)])
-        if any(isinstance(event, PortChanged) and event.fault is None for event in events):
+        if opened:
             parts.publisher.on_readings(conflict_readings(parts.config.now.conflicts, now.mono))
             parts.reconfiguration.follow()
             parts.baudrate_watch.begin()

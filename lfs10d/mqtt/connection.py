@@ -104,15 +104,8 @@ class Connection:
         return info.mid if info.rc == MQTTErrorCode.MQTT_ERR_SUCCESS else None
 
     def cork(self, *, on: bool) -> None:
-        """Let what is published from here on wait for the cork to be taken off: it goes by one segment.
-
-        A send of its own for each message costs more of the processor than all else that is done for it, here and at
-        a broker beside us.
-        """
-        opened = self._client.socket()
-        if isinstance(opened, socket.socket):
-            with contextlib.suppress(OSError):  # it has just gone, as paho will notice
-                opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_CORK, on)
+        """Let what is published from here on wait for the cork to be taken off."""
+        self._pump.cork(on=on)
 
     def subscribe(self, filters: Sequence[Filter]) -> int | None:
         """Subscribe, retained messages first; return the id, None where there is no connection now."""

@@ -15,7 +15,7 @@ from lfs10d.telemetry.first_burst import FirstBurst
 from lfs10d.telemetry.info import DaemonInfo, DeviceInfo, LineInfo
 from lfs10d.telemetry.line_state import PAUSED, POLLING, Requests
 from lfs10d.telemetry.publication import EventType, Publication, event
-from lfs10d.telemetry.station import Station
+from lfs10d.telemetry.station import NOTHING_WAITS, Station
 
 TICK_SLACK = 0.03
 """Seconds that a tick waits for a sample to be sent with: at 9600 baud there is one every 26 ms."""
@@ -53,7 +53,10 @@ class Publisher:
 
     def due(self, now: Instant) -> list[Publication]:
         """Return what is due by `now`: sent with a sample it shares the segment to the broker."""
-        return self._station.tick(now, self._uplink.backlog) if self._station.due() <= now.mono else []
+        if self._station.due() > now.mono:
+            return []
+        backlog = self._uplink.backlog if self._station.stats_due <= now.mono else NOTHING_WAITS
+        return self._station.tick(now, backlog)
 
     def publish(self, publications: Iterable[Publication]) -> None:
         """Publish these, but for what must wait until the broker has the first burst."""

@@ -6,7 +6,6 @@ paho offers `loop_read`, `loop_write` and `loop_misc` for this (docs/decisions/0
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import socket
 from collections.abc import Callable
 from typing import Protocol
@@ -44,21 +43,38 @@ class Pump:
         self._read = read
         self._failed = failed
         self._loop = asyncio.get_running_loop()
+        self._opened: socket.socket | None = None
         self._descriptor: int | None = None
         self._writing = False
         self._upkeep: asyncio.TimerHandle | None = None
 
     def begin(self, opened: socket.socket) -> None:
         """Watch this connected socket; what is sent goes at once, for it goes together already (TCP_CORK)."""
-        with contextlib.suppress(OSError):  # it has just gone, as paho will notice
-            # Nagle would let a sample wait for the broker's word on what went before, such as statistics by QoS 0.
-            opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._opened = opened
+        # Nagle would let a sample wait for the broker's word on what went before, such as statistics by QoS 0.
+        self._set(socket.TCP_NODELAY, on=True)
         self._descriptor = opened.fileno()
         self._loop.add_reader(self._descriptor, self._readable, opened)
         self._keep_up()
 
+    def cork(self, *, on: bool) -> None:
+        """Let what is written from here on wait for the cork to be taken off: it goes by one segment.
+
+        A send of its own for each message costs more of the processor than all else that is done for it, here and at
+        a broker beside us.
+        """
+        self._set(socket.TCP_CORK, on=on)
+
+    def _set(self, option: int, *, on: bool) -> None:
+        if self._opened is not None:
+            try:
+                self._opened.setsockopt(socket.IPPROTO_TCP, option, on)
+            except OSError:  # it has just gone, as paho will notice
+                self._opened = None
+
     def end(self) -> None:
         """Watch it no longer; it is still open, or its number would be another's."""
+        self._opened = None
         if self._upkeep is not None:
             self._upkeep.cancel()
         if self._descriptor is not None:

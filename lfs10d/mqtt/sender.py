@@ -142,11 +142,12 @@ class Sender:
             self._prove(sent)
         else:
             self._unproved.append(sent)  # it was written, that is all
+        now = self._now()
         if reason < REFUSED_FROM:
-            self._outbox.on_ack(sent.item, self._now(), nobody_listens=reason == NO_MATCHING_SUBSCRIBERS)
+            self._outbox.on_ack(sent.item, now, nobody_listens=reason == NO_MATCHING_SUBSCRIBERS)
         else:
             self._refused(sent, reason)
-        congested = self._outbox.congested(self._now())
+        congested = self._outbox.congested(now)
         if congested is not None:
             log.warning(
                 "the way to the broker carries about %.3g messages a second (round trip %.3g s, %d under way at most), "
@@ -199,8 +200,9 @@ class Sender:
 
     def _send_a_few(self) -> bool:
         """Send up to `LETTERS_AT_ONCE`; return whether nothing more may go now."""
+        now = self._now()
         for _ in range(ITEMS_AT_ONCE):
-            item = self._outbox.next(self._now(), batch=self._assembly is None)
+            item = self._outbox.next(now, batch=self._assembly is None)
             if item is None:
                 return True
             if isinstance(item, HistoryBatch):
@@ -253,7 +255,7 @@ class Sender:
             retain, qos = item.publication.retain, item.publication.qos
         if isinstance(item, Message):
             correlation = item.correlation
-        if self._outbox.suspects.goes_alone(item.topic):
+        if self._outbox.suspects.alone and self._outbox.suspects.goes_alone(item.topic):
             qos = 1  # its acknowledgement clears it
         limit = self._accepted.maximum_packet_size
         if limit is not None:

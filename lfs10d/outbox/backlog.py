@@ -21,7 +21,7 @@ from collections.abc import Set as AbstractSet
 
 from lfs10d.outbox.drain import Drain
 from lfs10d.outbox.history import History, QueuedSample
-from lfs10d.outbox.items import HistoryBatch, LossNotice, OutboxItem, samples_of
+from lfs10d.outbox.items import HistoryBatch, LiveSample, LossNotice, OutboxItem, samples_of
 from lfs10d.outbox.losses import Loss, Losses
 from lfs10d.outbox.recent_acks import RecentAcks
 from lfs10d.outbox.spill import Spill
@@ -103,7 +103,9 @@ class Backlog:
     @property
     def waits(self) -> bool:
         """`next` may have something, now or later; False: nothing of it is in memory."""
-        return bool(self.history or self.spool.page or self.losses or self._recent.wanted)
+        recent = self._recent
+        waiting = self.history.count or self.spool.page.count or self.losses.waiting
+        return bool(waiting or recent.repeat or recent.without_listener)
 
     def next(self, now: float, refused: AbstractSet[str]) -> HistoryBatch | LossNotice | None:
         """Take what goes next, after `repeat`; None: nothing. Topics that are `refused` are passed over."""
@@ -158,7 +160,7 @@ class Backlog:
 
     def repeat(self, now: float) -> bool:
         """Once the backlog is open, let what rule 2 says wait once more; return True if it does."""
-        if now < self._open_from or not self._recent.wanted:
+        if not (self._recent.repeat or self._recent.without_listener) or now < self._open_from:
             return False
         self.history.extend(self._recent.again())
         return True
@@ -174,22 +176,23 @@ class Backlog:
 
     # What became of it
 
-    def over(self, item: OutboxItem) -> None:
+    def over(self, item: HistoryBatch | LossNotice) -> None:
         """Note that an item is no longer under way."""
-        if isinstance(item, HistoryBatch | LossNotice):
-            self._under_way.pop(item, None)
+        self._under_way.pop(item, None)
 
     def on_ack(self, item: OutboxItem, now: float, *, nobody_listens: bool = False) -> None:
         """Note that the broker has it; `nobody_listens`: it said that no subscription matches."""
-        self._recent.on_ack(now)
-        if isinstance(item, HistoryBatch) and self.drain.on_ack(now):
-            self.drain.look(now, len(self) + self.spool.depth)
-        samples = samples_of(item)
-        rows = [queued.row for queued in samples if queued.row is not None]
-        if rows:
-            self.spool.on_ack(rows, now)
-        else:
-            self._recent.add(samples, now, without_listener=nobody_listens and now < self._open_from)
+        without_listener = nobody_listens and now < self._open_from
+        if isinstance(item, LiveSample):
+            self._recent.add((item.queued,), now, without_listener=without_listener)
+        elif isinstance(item, HistoryBatch):
+            if self.drain.on_ack(now):
+                self.drain.look(now, len(self) + self.spool.depth)
+            rows = [queued.row for queued in item.samples if queued.row is not None]
+            if rows:
+                self.spool.on_ack(rows, now)
+            else:
+                self._recent.add(item.samples, now, without_listener=without_listener)
 
     def dead(self, item: OutboxItem) -> None:
         """Note that it will never be delivered."""
@@ -263,7 +266,7 @@ class Backlog:
     def undeclared(self) -> list[Loss]:
         """Return the losses that are not declared, one under way included."""
         under_way = [each.loss for each in self._under_way if isinstance(each, LossNotice)]
-        return under_way + self.losses.waiting()
+        return under_way + self.losses.undeclared()
 
     def correct(self, shift: int, clock: ClockState = "synced") -> None:
         """Give what waits the time that the clock tells now, as `QueuedSample.at` does."""

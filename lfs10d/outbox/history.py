@@ -62,12 +62,13 @@ def _age(queued: QueuedSample) -> tuple[float, int]:
 class History:
     """What waits; `len()` counts the samples. No sample is put here while it stands here already."""
 
+    count: int = 0
+    """What `len()` says."""
     _queues: dict[Key, list[QueuedSample]] = field(default_factory=dict)
-    _count: int = 0
     _repeated: int = 0
 
     def __len__(self) -> int:
-        return self._count
+        return self.count
 
     def __contains__(self, key: Key) -> bool:
         """Tell whether a sample of this source and boot waits."""
@@ -80,7 +81,7 @@ class History:
             insort(queue, queued, key=_seq)
         else:
             queue.append(queued)
-        self._count += 1
+        self.count += 1
         self._repeated += queued.repeated
 
     def extend(self, many: Iterable[QueuedSample]) -> None:
@@ -95,7 +96,7 @@ class History:
             self.extend(taken)
             return
         queue[:0] = taken
-        self._count += len(taken)
+        self.count += len(taken)
         self._repeated += sum(queued.repeated for queued in taken)
 
     def waits(self, passed_over: Container[str] = NONE) -> bool:
@@ -118,7 +119,7 @@ class History:
         del queue[:most]
         if not queue:
             del self._queues[key]
-        self._count -= len(taken)
+        self.count -= len(taken)
         self._repeated -= sum(queued.repeated for queued in taken)
         return taken
 
@@ -128,7 +129,7 @@ class History:
             return next(iter(self.take(1)), None)
         queues = {key: [queued for queued in queue if not queued.repeated] for key, queue in self._queues.items()}
         self._queues = {key: queue for key, queue in queues.items() if queue}
-        self._count -= self._repeated
+        self.count -= self._repeated
         self._repeated = 0
         return None
 
@@ -140,7 +141,7 @@ class History:
     def clear(self) -> None:
         """Forget all."""
         self._queues.clear()
-        self._count = self._repeated = 0
+        self.count = self._repeated = 0
 
     def oldest(self) -> QueuedSample | None:
         """Return the one that waits longest, None where none waits."""

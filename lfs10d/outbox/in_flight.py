@@ -46,7 +46,7 @@ class InFlight:
     def begin(self, item: OutboxItem, now: float) -> OutboxItem | None:
         """Take an item at `now`; return it unless it goes alone and has to wait for that."""
         self._since[item] = now
-        if not self._suspects.goes_alone(item.topic):
+        if not (self._suspects.alone and self._suspects.goes_alone(item.topic)):
             return item
         self._alone, self._alone_went = item, False
         return self.next_alone()
@@ -58,15 +58,12 @@ class InFlight:
         self._alone_went = True
         return self._alone
 
-    def since(self, item: OutboxItem) -> float:
-        """Return when an item was taken."""
-        return self._since[item]
-
-    def end(self, item: OutboxItem) -> None:
-        """Let an item go: it is acknowledged, refused, or cannot be sent."""
-        del self._since[item]
+    def end(self, item: OutboxItem) -> float:
+        """Let an item go: it is acknowledged, refused, or cannot be sent; return when it was taken."""
+        since = self._since.pop(item)
         if item is self._alone:
             self._alone = None
+        return since
 
     def replace(self, item: OutboxItem, other: OutboxItem) -> None:
         """Put another item in the place of one."""

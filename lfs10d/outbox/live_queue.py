@@ -19,20 +19,21 @@ class LiveQueue:
     """What waits; `len()` counts the samples."""
 
     def __init__(self) -> None:
-        self._waiting: dict[LiveSample, None] = {}  # the oldest first
+        self.waiting: dict[LiveSample, None] = {}
+        """The oldest first."""
         self._devices: dict[str, deque[LiveSample]] = {}  # in the order of their turns; none is empty
 
     def __len__(self) -> int:
-        return len(self._waiting)
+        return len(self.waiting)
 
     def add(self, live: LiveSample) -> None:
         """Put a new sample behind those of its device."""
-        self._waiting[live] = None
+        self.waiting[live] = None
         self._devices.setdefault(live.queued.sample.device, deque()).append(live)
 
     def put_back(self, live: LiveSample) -> None:
         """Put a sample that did not arrive before all others."""
-        self._waiting = {live: None, **self._waiting}
+        self.waiting = {live: None, **self.waiting}
         self._devices.setdefault(live.queued.sample.device, deque()).appendleft(live)
 
     def take(self) -> LiveSample | None:
@@ -44,14 +45,14 @@ class LiveQueue:
         live = waiting.popleft()
         if waiting:
             self._devices[device] = waiting
-        del self._waiting[live]
+        del self.waiting[live]
         return live
 
     def take_oldest(self) -> LiveSample | None:
         """Take the sample that waits longest, None where none waits."""
         live = self.oldest()
         if live is not None:
-            del self._waiting[live]
+            del self.waiting[live]
             device = live.queued.sample.device
             self._devices[device].remove(live)  # its first
             if not self._devices[device]:
@@ -60,7 +61,7 @@ class LiveQueue:
 
     def oldest(self) -> LiveSample | None:
         """Return the sample that waits longest, None where none waits."""
-        return next(iter(self._waiting), None)
+        return next(iter(self.waiting), None)
 
     @property
     def old_at(self) -> float | None:
@@ -76,6 +77,6 @@ class LiveQueue:
 
     def correct(self, shift: int, clock: ClockState = "synced") -> None:
         """Give all the time that the clock tells now, as `QueuedSample.at` does; the turns stay."""
-        replaced = {live: live.at(shift, clock) for live in self._waiting}
-        self._waiting = dict.fromkeys(replaced.values())
+        replaced = {live: live.at(shift, clock) for live in self.waiting}
+        self.waiting = dict.fromkeys(replaced.values())
         self._devices = {device: deque(replaced[live] for live in waiting) for device, waiting in self._devices.items()}

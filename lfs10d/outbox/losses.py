@@ -21,12 +21,9 @@ class Losses:
 
     total: int = 0
     """Samples lost since the start, declared or not."""
-    _waiting: dict[Key, list[Loss]] = field(default_factory=dict)
+    waiting: dict[Key, list[Loss]] = field(default_factory=dict)
+    """Those that wait."""
     _declared: dict[Key, float] = field(default_factory=dict)
-
-    def __bool__(self) -> bool:
-        """Tell whether any waits to be declared."""
-        return bool(self._waiting)
 
     def add(self, sample: Sample) -> None:
         """Note that this sample will never be delivered."""
@@ -35,7 +32,7 @@ class Losses:
 
     def restore(self, loss: Loss) -> None:
         """Put back a loss whose declaration was not acknowledged."""
-        self._waiting[loss.key] = joined([*self._waiting.get(loss.key, ()), loss], MOST_RANGES)
+        self.waiting[loss.key] = joined([*self.waiting.get(loss.key, ()), loss], MOST_RANGES)
 
     def evicted(self, losses: Iterable[Loss]) -> None:
         """Note that the store had no room for these."""
@@ -43,9 +40,9 @@ class Losses:
             self.total += loss.count
             self.restore(loss)
 
-    def waiting(self) -> list[Loss]:
-        """Return those that are not declared yet."""
-        return [loss for losses in self._waiting.values() for loss in losses]
+    def undeclared(self) -> list[Loss]:
+        """Return those that wait, in order."""
+        return [loss for losses in self.waiting.values() for loss in losses]
 
     def connected(self) -> None:
         """Let every loss be declared at once on a new connection."""
@@ -53,18 +50,18 @@ class Losses:
 
     def take(self, now: float) -> Loss | None:
         """Take the next to be declared at `now`, None where none is due."""
-        for key, ranges in self._waiting.items():
+        for key, ranges in self.waiting.items():
             if now >= self._due(key):
                 loss = ranges.pop(0)
                 if not ranges:
-                    del self._waiting[key]
+                    del self.waiting[key]
                     self._declared[key] = now
                 return loss
         return None
 
     def due(self) -> float | None:
         """Return when the next may be declared, None where none waits; -inf for at once."""
-        return min(map(self._due, self._waiting), default=None)
+        return min(map(self._due, self.waiting), default=None)
 
     def _due(self, key: Key) -> float:
         declared = self._declared.get(key)

@@ -5,18 +5,15 @@ The rules (contract, section 3):
 1. Classes by weight (`turns`): changes of retained topics, responses and events, and live samples 8 each; history 8,
    and more while the backlog does not shrink (`drain`); refreshes of retained topics (newer figures, nothing else) 4;
    traces, and what clears a retained topic, 1. The first three go before the others until the window was full; then
-   all go in turn until nothing waits: each class goes on, and refreshes come less often. Within a class the oldest
-   goes first; live samples device by device.
+   all go in turn until nothing waits. Within a class the oldest goes first; live samples device by device.
 2. Of a retained topic only the newest version waits, and no second version goes while the first is under way.
    After a connect the whole burst goes first, and everything else only after that, but for no longer than 10 s; its
    `last` (availability) goes when all of it is acknowledged.
 3. A sample that is older than 3 s when its turn comes belongs to the backlog, whose rules are in `backlog`.
 4. An item leaves for ever when it is acknowledged (PUBACK). A connection lost puts all that was under way back.
-5. At most `capacity` samples wait in memory. Beyond that re-sends are dropped first, then the oldest samples, which
-   are declared.
-6. What the broker refuses waits, and its topic is passed over until it is tried again, see `refusals`; the others go
-   on. Only a message that is wrong in itself is dead; a batch is first cut smaller. A dead sample is declared like
-   an evicted one.
+5. At most `capacity` samples wait in memory: beyond that re-sends are dropped first, then the oldest, declared.
+6. What the broker refuses waits, and its topic is passed over for a time (`refusals`); the others go on. Only what is
+   wrong in itself is dead; a batch is first cut smaller. A dead sample is declared like an evicted one.
 7. What ends the connection each time is found (`suspects`), and treated like that, for an hour.
 8. At a clean exit one last message goes as soon as the window has room, and nothing after it.
 
@@ -36,13 +33,13 @@ item            acknowledged            connection lost              refused    
 from __future__ import annotations
 
 from collections.abc import Iterable
-from itertools import chain
+from itertools import chain, islice
 
 from lfs10d.outbox.backlog import BATCH_MOST, Backlog
 from lfs10d.outbox.congestion import Congested, Congestion
 from lfs10d.outbox.history import QueuedSample
 from lfs10d.outbox.in_flight import InFlight
-from lfs10d.outbox.items import HistoryBatch, LiveSample, Message, OutboxItem, Retained
+from lfs10d.outbox.items import HistoryBatch, LiveSample, LossNotice, Message, OutboxItem, Retained
 from lfs10d.outbox.parting import Parting
 from lfs10d.outbox.queues import Queues
 from lfs10d.outbox.refusals import Refusals
@@ -96,8 +93,8 @@ class Outbox:
         if publication.sample is not None:
             if publication.sample.grouped and not self.telemetry:
                 return
-            self._queues.live.add(LiveSample(publication, QueuedSample(publication.sample, now, shift=shift)))
             self.age(now)
+            self._queues.live.add(LiveSample(publication, QueuedSample(publication.sample, now, shift=shift)))
             self._make_room()
         elif publication.kind is PublicationKind.RETAINED:
             if (connected or publication.payload is None) and self._queues.retained.add(publication):
@@ -171,7 +168,7 @@ class Outbox:
         """Something may go, now or later; False: nothing before something is added."""
         if self._parting is not None:
             return not self._parting.sent
-        return bool(self._in_flight.alone or self._queues) or self.due() is not None
+        return self._in_flight.alone or bool(self._queues) or self.due() is not None
 
     def due(self) -> float | None:
         """Return when `next` may have something though nothing happens before; None: not by time alone."""
@@ -181,12 +178,12 @@ class Outbox:
 
     def on_ack(self, item: OutboxItem, now: float, *, nobody_listens: bool = False) -> None:
         """Note that the broker has it; `nobody_listens`: it said that no subscription matches."""
-        if isinstance(item, LiveSample | HistoryBatch):
-            self._congestion.answered(now - self._in_flight.since(item))
-        self._over(item)
+        since = self._over(item)
         self._refusals.accepted(item.topic)
-        self._repeat(now)
-        self.backlog.on_ack(item, now, nobody_listens=nobody_listens)
+        if isinstance(item, LiveSample | HistoryBatch | LossNotice):
+            self._congestion.answered(now - since)
+            self._repeat(now)
+            self.backlog.on_ack(item, now, nobody_listens=nobody_listens)
 
     def congested(self, now: float) -> Congested | None:
         """Return once what the window carries, where that is less than what is published."""
@@ -227,16 +224,18 @@ class Outbox:
         """Try again what was refused before, and report anew; return True if a topic was refused."""
         return self._queues.reload(now)
 
-    def _over(self, item: OutboxItem) -> None:
-        self._in_flight.end(item)
+    def _over(self, item: OutboxItem) -> float:
+        """Note that it is under way no longer; return when it was taken."""
+        since = self._in_flight.end(item)
         if self._parting is not None:
             self._parting.note(item)
         if isinstance(item, Retained):
             self._queues.retained.over(item)
-        self.backlog.over(item)
+        elif isinstance(item, HistoryBatch | LossNotice):
+            self.backlog.over(item)
+        return since
 
     def _repeat(self, now: float) -> None:
-        """Let what may have been lost at the broker wait once more, from the moment the backlog is opened."""
         if self.backlog.repeat(now):
             self._make_room()
 
@@ -256,7 +255,7 @@ class Outbox:
     def idle(self) -> bool:
         """Nothing is under way, and nothing but the backlog waits."""
         waiting = self._queues
-        return not (self._in_flight or waiting.retained or waiting.messages.messages or waiting.live)
+        return not (self._in_flight or waiting.retained or waiting.messages.messages or waiting.live.waiting)
 
     @property
     def under_way(self) -> tuple[OutboxItem, ...]:
@@ -279,8 +278,8 @@ class Outbox:
         oldest_ts = self.backlog.spool.oldest()
         if oldest_ts is None:
             under_way = chain.from_iterable(self._in_flight.in_memory())
-            live = self._queues.live.oldest()
-            waiting = [*under_way, *self.backlog.waiting(), *([] if live is None else [live.queued])]
+            live = (each.queued for each in self._queues.live.waiting)
+            waiting = chain(under_way, self.backlog.waiting(), islice(live, 1))
             first = min(waiting, key=lambda queued: queued.since, default=None)
             oldest_ts = first.sample.ts if first else None
         return BacklogStats(self.depth, oldest_ts, self.dropped)
@@ -295,16 +294,17 @@ class Outbox:
 
     def age(self, now: float) -> None:
         """Let live samples that are too old for it wait with the backlog."""
-        for live in self._queues.live.take_old(now):
-            self.backlog.history.add(live.queued)
-            self._displaced(now)
+        if self._queues.live.waiting:
+            for live in self._queues.live.take_old(now):
+                self.backlog.history.add(live.queued)
+                self._displaced(now)
 
     def _make_room(self) -> None:
-        history = self.backlog.history
-        if len(self._queues.live) + len(self.backlog) + BATCH_MOST * len(self._in_flight) <= self._capacity:
+        history, lives = self.backlog.history, self._queues.live
+        if len(lives) + len(self.backlog) + BATCH_MOST * len(self._in_flight) <= self._capacity:
             return  # there is room whatever is under way
-        while self._in_memory() > self._capacity and (history or self._queues.live):
-            live = None if history else self._queues.live.take_oldest()
+        while self._in_memory() > self._capacity and (history or lives):
+            live = None if history else lives.take_oldest()
             queued = history.evict() if live is None else live.queued
             if queued is not None:
                 self.backlog.losses.add(queued.sample)

@@ -41,17 +41,17 @@ class Queues:
         self._suspects = suspects
         self._refused = refusals.topics
         self._burst_until: float | None = None
-        self._classes: dict[int, Callable[[float], OutboxItem | None]] = {
-            CHANGES: lambda _now: self.retained.next_change(self._refused),
-            MESSAGES: lambda _now: self.messages.next_message(self._refused),
-            LIVE: lambda _now: self._next_live(),
+        self._classes: dict[int, Callable[[AbstractSet[str]], OutboxItem | None]] = {
+            CHANGES: self.retained.next_change,
+            MESSAGES: self.messages.next_message,
+            LIVE: self._next_live,
             HISTORY: self._next_history,
-            REFRESHES: lambda _now: self.retained.next_refresh(self._refused),
-            TRACES: lambda _now: self.messages.next_trace(self._refused),
-            CLEARINGS: lambda _now: self.retained.next_clearing(self._refused),
+            REFRESHES: self.retained.next_refresh,
+            TRACES: self.messages.next_trace,
+            CLEARINGS: self.retained.next_clearing,
         }
         self._turns = Turns(len(self._classes))
-        self._batch_may_go = True
+        self._now = 0.0
         self._narrow = False  # the window was full, and not everything has gone since
 
     def connected(self, now: float) -> None:
@@ -72,53 +72,64 @@ class Queues:
 
     def next(self, now: float, *, batch: bool) -> OutboxItem | None:
         """Take what goes next, None where nothing may; no history unless `batch`."""
-        if not (self or self.backlog.waits):
-            self._turns.all_passed()
-            self._narrow, self._burst_until = False, None
-            return None
-        self._batch_may_go = batch
+        self._now = now
         if self._keeps_back(now):
             retained = self.retained.next_change(self._refused)
-            if retained is not None or self.retained.first:
+            if retained is not None or self.retained.last is not None:
                 return retained
-        for number in self._turns.order(first=None if self._narrow else FIRST_CLASSES):
-            item = self._classes[number](now)
+        for number in self._turns.order(self._waiting(batch=batch), first=None if self._narrow else FIRST_CLASSES):
+            item = self._classes[number](self._refused)
             if item is None:
                 self._turns.passed(number)
             else:
-                level = self.backlog.drain.level
-                self._turns.went(number, weight(number, bursting=self.retained.first, level=level))
+                bursting = self.retained.last is not None
+                self._turns.went(number, weight(number, bursting=bursting, level=self.backlog.drain.level))
                 return item
         self._narrow = False
         return None
 
+    def _waiting(self, *, batch: bool) -> list[int]:
+        """Return the classes that hold something, in order; no history unless `batch`."""
+        retained, messages = self.retained, self.messages
+        held = {
+            CHANGES: retained.changes or retained.last,
+            MESSAGES: messages.messages,
+            LIVE: self.live.waiting,
+            HISTORY: batch and self.backlog.waits,
+            REFRESHES: retained.refreshes,
+            TRACES: messages.traces,
+            CLEARINGS: retained.clearings,
+        }
+        return [number for number, some in held.items() if some]
+
     def _keeps_back(self, now: float) -> bool:
         """Tell whether nothing but the burst may go now."""
-        if not self.retained.first:
+        if self.retained.last is None:
             self._burst_until = None
             return False
         if self._burst_until is None:
             self._burst_until = now + BURST_FIRST
         return now < self._burst_until
 
-    def _next_live(self) -> LiveSample | None:
+    def _next_live(self, refused: AbstractSet[str]) -> LiveSample | None:
         while (live := self.live.take()) is not None:
-            if live.topic not in self._refused:
+            if live.topic not in refused:
                 return live
             self.backlog.history.add(live.queued)
         return None
 
-    def _next_history(self, now: float) -> OutboxItem | None:
-        return self.backlog.next(now, self._refused) if self._batch_may_go and self.backlog.waits else None
+    def _next_history(self, refused: AbstractSet[str]) -> HistoryBatch | LossNotice | None:
+        return self.backlog.next(self._now, refused)
 
     def __bool__(self) -> bool:
         """Tell whether anything but the backlog waits."""
-        return bool(self.retained or self.messages or self.live)
+        return bool(self.live.waiting or self.retained or self.messages)
 
     def due(self) -> float | None:
         """Return when `next` may have something though nothing happens before; None: not by time alone."""
-        backlog = self.backlog.due(self._refused) if self.backlog.waits else None
-        times = (backlog, self._refusals.due())
+        if not self.backlog.waits:
+            return self._refusals.due() if self._refused else None
+        times = (self.backlog.due(self._refused), self._refusals.due())
         return min((each for each in times if each is not None), default=None)
 
     # What waits again
@@ -167,7 +178,7 @@ class Queues:
 
     def lift_due(self, now: float) -> None:
         """Try the topics again whose time has come."""
-        due = self._refusals.due()
+        due = self._refusals.due() if self._refused else None
         if due is not None and due <= now:
             self._lift(self._refusals.lift(now))
 

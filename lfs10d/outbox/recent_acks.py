@@ -22,48 +22,42 @@ class RecentAcks:
 
     def __init__(self, *, capacity: int, detection: float) -> None:
         self.repeat = False
-        """A connection was lost since the last `again`."""
+        """A connection was lost since the last `again`, which is to be called once the backlog is open."""
         self._detection = detection
         self._acknowledged: deque[tuple[float, QueuedSample]] = deque(maxlen=capacity)
-        self._without_listener: deque[tuple[float, QueuedSample]] = deque(maxlen=capacity)
+        self.without_listener: deque[tuple[float, QueuedSample]] = deque(maxlen=capacity)
+        """What was passed to nobody on a young connection: `again` is to be called for it too."""
 
     def add(self, samples: tuple[QueuedSample, ...], now: float, *, without_listener: bool) -> None:
         """Note that the broker has these; `without_listener`: it passed them to nobody, on a young connection."""
-        late = without_listener and not self.repeat
-        (self._without_listener if late else self._acknowledged).extend((now, queued) for queued in samples)
-
-    def on_ack(self, now: float) -> None:
-        """Forget what was acknowledged so long ago that a loss now would not touch it."""
-        if not self.repeat:
+        if not self.repeat:  # what a loss now would not touch is of no use
             self._forget(now - AGAIN_WITHIN)
+        acknowledged = self.without_listener if without_listener and not self.repeat else self._acknowledged
+        for queued in samples:
+            acknowledged.append((now, queued))
 
     def lost(self, now: float) -> None:
         """Note that the connection is lost."""
         if not self.repeat:
             self._forget(now - AGAIN_WITHIN - self._detection)
-        self._acknowledged.extend(self._without_listener)
-        self._without_listener.clear()
+        self._acknowledged.extend(self.without_listener)
+        self.without_listener.clear()
         self.repeat = True
 
     def part(self) -> None:
         """Note that we part from a broker that has answered everything: what it has needs no second sending."""
         if not self.repeat:
             self._acknowledged.clear()
-        self._without_listener.clear()
+        self.without_listener.clear()
 
     @property
     def waiting(self) -> bool:
         """There is something for `again`."""
-        return bool(self._acknowledged if self.repeat else self._without_listener)
-
-    @property
-    def wanted(self) -> bool:
-        """`again` is to be called once the backlog is open."""
-        return self.repeat or bool(self._without_listener)
+        return bool(self._acknowledged if self.repeat else self.without_listener)
 
     def again(self) -> Iterator[QueuedSample]:
         """Take what is to be sent once more, and begin anew."""
-        again = self._acknowledged if self.repeat else self._without_listener
+        again = self._acknowledged if self.repeat else self.without_listener
         self.repeat = False
         return self._take(again)
 

@@ -115,7 +115,5 @@ class Refusals:
 
     def due(self) -> float | None:
         """Return when a topic is to be tried again by time alone; None: none is."""
-        if not self.topics:
-            return None
         times = [until for until in (*self._until.values(), *self._bans.values()) if until < _NEXT_CONNECT]
         return min(times, default=None)

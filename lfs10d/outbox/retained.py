@@ -19,42 +19,38 @@ class RetainedQueue:
     """Of each topic one version waits and one is under way at most."""
 
     def __init__(self) -> None:
-        self._changes: dict[str, Retained] = {}
-        self._refreshes: dict[str, Retained] = {}
-        self._clearings: dict[str, Retained] = {}
+        self.changes: dict[str, Retained] = {}
+        self.refreshes: dict[str, Retained] = {}
+        self.clearings: dict[str, Retained] = {}
+        self.last: Retained | None = None
+        """The end of a burst that waits for its turn: nothing else may go now."""
         self._passed_over: dict[str, Retained] = {}
         self._under_way: set[str] = set()
         self._burst: set[str] = set()
-        self._last: Retained | None = None
         self._closing: Retained | None = None  # the `last` that is not acknowledged yet
 
     def __bool__(self) -> bool:
         """Tell whether anything waits."""
-        return bool(self._changes or self._refreshes or self._clearings) or self._last is not None
+        return bool(self.changes or self.refreshes or self.clearings) or self.last is not None
 
     @property
     def announced(self) -> bool:
         """The last burst is acknowledged, its `last` too."""
         return self._closing is None
 
-    @property
-    def first(self) -> bool:
-        """Nothing else may go now: the `last` of a burst waits for its turn."""
-        return self._last is not None
-
     def add(self, publication: Publication) -> bool:
         """Take the newest version of a topic; return True if it replaces a refresh that still waited."""
-        replaced = publication.topic in self._refreshes
+        replaced = publication.topic in self.refreshes
         self._wait(Retained(publication))
         return replaced
 
     def _wait(self, item: Retained) -> None:
-        topic, queue = item.topic, self._changes
+        topic, queue = item.topic, self.changes
         if item.publication.payload is None:
-            queue = self._clearings
-        elif item.publication.refresh and topic not in self._changes:
-            queue = self._refreshes
-        for other in (self._changes, self._refreshes, self._clearings):
+            queue = self.clearings
+        elif item.publication.refresh and topic not in self.changes:
+            queue = self.refreshes
+        for other in (self.changes, self.refreshes, self.clearings):
             if other is not queue:
                 other.pop(topic, None)
         queue[topic] = item
@@ -66,20 +62,20 @@ class RetainedQueue:
             if publication.payload is None:
                 self._wait(item)
             else:
-                self._refreshes.pop(publication.topic, None)
-                self._clearings.pop(publication.topic, None)
-                self._changes[publication.topic] = item
+                self.refreshes.pop(publication.topic, None)
+                self.clearings.pop(publication.topic, None)
+                self.changes[publication.topic] = item
                 self._burst.add(publication.topic)
-        self._last = self._closing = Retained(last)
+        self.last = self._closing = Retained(last)
 
     def next_change(self, refused: AbstractSet[str]) -> Retained | None:
         """Take the change, or the `last` of the burst, that goes next; topics the broker refuses are passed over."""
-        item = self._take(self._changes, refused)
+        item = self._take(self.changes, refused)
         if item is not None:
             return item
-        if self._burst or self._last is None or self._last.topic in self._under_way:
+        if self._burst or self.last is None or self.last.topic in self._under_way:
             return None
-        last, self._last = self._last, None
+        last, self.last = self.last, None
         if last.topic in refused:
             self._passed_over[last.topic] = last
             self._closing = None
@@ -89,11 +85,11 @@ class RetainedQueue:
 
     def next_refresh(self, refused: AbstractSet[str]) -> Retained | None:
         """Take the refresh that goes next."""
-        return self._take(self._refreshes, refused)
+        return self._take(self.refreshes, refused)
 
     def next_clearing(self, refused: AbstractSet[str]) -> Retained | None:
         """Take what clears a topic."""
-        return self._take(self._clearings, refused)
+        return self._take(self.clearings, refused)
 
     def _take(self, waiting: dict[str, Retained], refused: AbstractSet[str]) -> Retained | None:
         for topic in refused:
@@ -117,13 +113,14 @@ class RetainedQueue:
         self._wait_unless_newer(item)
 
     def _wait_unless_newer(self, item: Retained) -> None:
-        if not any(item.topic in queue for queue in (self._changes, self._refreshes, self._clearings)):
+        if not any(item.topic in queue for queue in (self.changes, self.refreshes, self.clearings)):
             self._wait(item)
 
     def over(self, item: Retained) -> None:
         """Note that an item is no longer under way, acknowledged or dead."""
-        self._under_way.discard(item.topic)
-        self._burst.discard(item.topic)
+        topic = item.topic
+        self._under_way.discard(topic)
+        self._burst.discard(topic)
         if item is self._closing:
             self._closing = None
 
@@ -131,9 +128,9 @@ class RetainedQueue:
         """Forget everything but what clears a topic: the next burst holds it."""
         self._under_way.clear()
         self._burst.clear()
-        self._last = self._closing = None
-        self._changes.clear()
-        self._refreshes.clear()
+        self.last = self._closing = None
+        self.changes.clear()
+        self.refreshes.clear()
         self._passed_over = {
             topic: each for topic, each in self._passed_over.items() if each.publication.payload is None
         }

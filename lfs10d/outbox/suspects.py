@@ -31,12 +31,13 @@ class Suspects:
     """The rules above; sizes are in bytes."""
 
     def __init__(self) -> None:
+        self.alone = False
+        """Some go alone."""
         self._sizes: dict[str, int] = {}
-        self._alone = False
 
     def goes_alone(self, topic: str) -> bool:
         """Tell whether a message of this topic may only be sent while nothing else is under way."""
-        return self._alone and topic in self._sizes
+        return self.alone and topic in self._sizes
 
     def explain(self, sent: Mapping[str, int]) -> bool:
         """Tell whether one of these was under way at the last end too: then a message may be why."""
@@ -46,7 +47,7 @@ class Suspects:
         """Note that the broker ended the connection while these (topic -> size) were under way."""
         again = {topic: size for topic, size in sent.items() if topic in self._sizes}
         self._sizes = again or dict(sent)
-        self._alone = bool(again) or certain
+        self.alone = bool(again) or certain
         if len(again) != 1:
             return None
         [(topic, size)] = again.items()
@@ -60,4 +61,4 @@ class Suspects:
         """Note that the broker has taken a message of `size` bytes."""
         if self._sizes and size >= ABOUT_AS_LARGE * self._sizes.get(topic, float("inf")):
             del self._sizes[topic]
-            self._alone = self._alone and bool(self._sizes)
+            self.alone = self.alone and bool(self._sizes)

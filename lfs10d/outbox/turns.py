@@ -8,6 +8,8 @@ divided by w, rounded up, plus one for each other class.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 CHANGES, MESSAGES, LIVE, HISTORY, REFRESHES, TRACES, CLEARINGS = range(7)
 """The classes of the outbox."""
 
@@ -41,23 +43,22 @@ class Turns:
         self._advanced = [0.0] * classes
         self._level = 0.0  # where the class stood that went last
 
-    def order(self, *, first: int | None = None) -> list[int]:
-        """Return the classes in the order in which they may send: the first that has a message goes.
+    def order(self, waiting: Sequence[int], *, first: int | None = None) -> Sequence[int]:
+        """Return the classes `waiting` in the order in which they may send: the first that has a message goes.
 
-        `first`: the classes below this number go before the others now.
+        The others have nothing to send. `first`: the classes below this number go before the others now.
         """
-        advanced = self._advanced.__getitem__
+        for number, advanced in enumerate(self._advanced):
+            if advanced < self._level and number not in waiting:
+                self._advanced[number] = self._level
+        if len(waiting) < 2:  # noqa: PLR2004 - nothing to compare
+            return waiting
         if first is None:
-            return sorted(range(len(self._advanced)), key=advanced)
-        return sorted(range(first), key=advanced) + sorted(range(first, len(self._advanced)), key=advanced)
-
-    def all_passed(self) -> None:
-        """Note that every class had its turn and nothing to send."""
-        level = self._level
-        self._advanced = [max(each, level) for each in self._advanced]
+            return sorted(waiting, key=self._advanced.__getitem__)
+        return sorted(waiting, key=lambda number: (number >= first, self._advanced[number]))
 
     def passed(self, number: int) -> None:
-        """Note that this class had its turn and nothing to send."""
+        """Note that this class had its turn and nothing to send after all."""
         self._advanced[number] = max(self._advanced[number], self._level)
 
     def went(self, number: int, weight: float) -> None:

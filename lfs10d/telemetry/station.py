@@ -72,7 +72,8 @@ class Station:
         self._devices = {info.name: self._new_device(info, now) for info in devices}
         self._wind = WindStation(line.name, daemon.boot, devices, now)
         self._states_due: float | None = None
-        self._stats_due = now.mono + STATS_EVERY
+        self.stats_due = now.mono + STATS_EVERY
+        """When `tick` is to be told what waits for the broker: monotonic s."""
 
     def on_event(self, happened: Event, now: Instant) -> list[Publication]:
         """Take one event of the line thread; return what it changes, in order.
@@ -103,7 +104,7 @@ class Station:
     def tick(self, now: Instant, backlog: BacklogStats = NOTHING_WAITS) -> list[Publication]:
         """Return what time alone makes due: states that were held back, statistics.
 
-        `backlog` is what waits for the broker.
+        `backlog` is what waits for the broker, wanted from `stats_due` on.
         """
         published = self._watch_clock(now)
         if self._states_due is not None and self._states_due <= now.mono:
@@ -112,10 +113,10 @@ class Station:
                 if state is not None:
                     published.append(state)
             self._states_due = self._next_state()
-        if self._stats_due <= now.mono:
-            self._stats_due += STATS_EVERY
-            if self._stats_due <= now.mono:  # the process was stopped: missed statistics are not made up
-                self._stats_due = now.mono + STATS_EVERY
+        if self.stats_due <= now.mono:
+            self.stats_due += STATS_EVERY
+            if self.stats_due <= now.mono:  # the process was stopped: missed statistics are not made up
+                self.stats_due = now.mono + STATS_EVERY
             published.append(self._line.stats(now, backlog))
             published += [device.stats(now) for device in self._devices.values()]
         if self._wind.due <= now.mono:
@@ -128,7 +129,7 @@ class Station:
 
     def due(self) -> float:
         """Return the monotonic time at which `tick` is wanted next."""
-        due = min(self._stats_due, self._wind.due)
+        due = min(self.stats_due, self._wind.due)
         return due if self._states_due is None else min(self._states_due, due)
 
     def burst(self, now: Instant, backlog: BacklogStats = NOTHING_WAITS) -> list[Publication]:

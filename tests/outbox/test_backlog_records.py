@@ -15,7 +15,7 @@ def test_a_loss_notice_that_cannot_be_sent_waits_again() -> None:
     backlog = Backlog(capacity=10, detection=40.0)
     notice = LossNotice(Loss("a", "k", 1, 2, 2))
     backlog.dead(notice)
-    assert backlog.losses.waiting() == [notice.loss]
+    assert backlog.losses.undeclared() == [notice.loss]
 
 
 # Records

@@ -31,9 +31,10 @@ def test_the_window_is_full_and_has_room_again(in_flight: InFlight) -> None:
     first, second = live("a", 1), live("a", 2)
     assert [in_flight.begin(each, at) for at, each in enumerate((first, second))] == [first, second]
     assert (in_flight.full, in_flight.closed, in_flight.alone) == (True, True, False)
-    assert (list(in_flight), len(in_flight), in_flight.since(second)) == ([first, second], 2, 1)
+    assert (list(in_flight), len(in_flight)) == ([first, second], 2)
     in_flight.end(first)
     assert (in_flight.full, in_flight.closed) == (False, False)
+    assert in_flight.end(second) == 1
 
 
 def test_a_suspect_goes_when_nothing_else_is_under_way_and_nothing_goes_beside_it(
@@ -68,7 +69,7 @@ def test_a_replaced_item_keeps_its_place_and_time(in_flight: InFlight) -> None:
     in_flight.begin(other, 2.0)
     in_flight.replace(whole, part)
     assert list(in_flight) == [part, other]
-    assert in_flight.since(part) == 1.0
+    assert in_flight.end(part) == 1.0
 
 
 def test_a_loss_returns_all_in_order_and_closes_the_window(in_flight: InFlight) -> None:

@@ -44,9 +44,9 @@ def test_devices_are_declared_apart() -> None:
 
 def test_it_says_whether_a_loss_waits() -> None:
     losses = Losses()
-    assert not losses
+    assert not losses.waiting
     losses.restore(Loss("a", "k", 1, 2, 2))
-    assert losses
+    assert losses.waiting
 
 
 def test_nothing_lost_is_nothing_declared() -> None:
@@ -114,4 +114,4 @@ def test_what_the_store_had_no_room_for_counts_and_waits_to_be_declared() -> Non
     losses = Losses()
     losses.evicted([Loss("a", "k", 1, 5, 5), Loss("b", "k", 2, 2, 1), Loss("a", "k", 6, 6, 1)])
     assert losses.total == 7
-    assert losses.waiting() == [Loss("a", "k", 1, 6, 6), Loss("b", "k", 2, 2, 1)]
+    assert losses.undeclared() == [Loss("a", "k", 1, 6, 6), Loss("b", "k", 2, 2, 1)]

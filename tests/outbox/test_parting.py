@@ -20,7 +20,7 @@ def test_the_last_message_goes_once_as_soon_as_the_window_has_room() -> None:
     assert not parting.over
     in_flight.window = 2
     assert [parting.next(in_flight, 2.0), parting.next(in_flight, 2.0)] == [parting.last, None]
-    assert (parting.sent, parting.over, in_flight.since(parting.last)) == (True, False, 2.0)
+    assert (parting.sent, parting.over, in_flight.end(parting.last)) == (True, False, 2.0)
     parting.note(parting.last)
     parting.note(other)
     assert parting.over

@@ -112,7 +112,7 @@ def test_what_is_refused_waits_in_its_place(waiting: Waiting) -> None:
     assert len(waiting.backlog.history) == 2
     assert not waiting.queues.messages
     waiting.queues.refused(LossNotice(Loss("a", "k", 1, 2, 2)))
-    assert waiting.backlog.losses.waiting() == [Loss("a", "k", 1, 2, 2)]
+    assert waiting.backlog.losses.undeclared() == [Loss("a", "k", 1, 2, 2)]
 
 
 def test_what_was_under_way_at_a_loss_waits_in_its_place_and_the_burst_is_forgotten(waiting: Waiting) -> None:
@@ -167,7 +167,7 @@ def test_what_ends_the_connection_is_banned_and_its_samples_wait_unless_they_are
 def test_a_loss_notice_that_ends_the_connection_waits(waiting: Waiting) -> None:
     notice = LossNotice(Loss("a", "k", 1, 2, 2))
     waiting.queues.condemn(Culprit("event", 90), [notice, event("x")], 0.0, denied=False)
-    assert waiting.backlog.losses.waiting() == [notice.loss]
+    assert waiting.backlog.losses.undeclared() == [notice.loss]
 
 
 def test_where_the_last_of_a_burst_is_refused_the_rest_goes_on(waiting: Waiting) -> None:

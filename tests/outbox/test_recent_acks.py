@@ -22,14 +22,13 @@ def seqs(samples: Iterable[QueuedSample]) -> list[int]:
 
 
 def acknowledge(acks: RecentAcks, seq: int, now: float, *, without_listener: bool = False) -> None:
-    acks.on_ack(now)
     acks.add((queued("a", seq),), now, without_listener=without_listener)
 
 
 def test_without_a_loss_nothing_is_sent_again() -> None:
     acks = recent()
     acknowledge(acks, 1, 0.0)
-    assert (acks.waiting, acks.wanted) == (False, False)
+    assert (acks.waiting, acks.repeat) == (False, False)
     assert seqs(acks.take_lost()) == []
 
 
@@ -41,16 +40,16 @@ def test_after_a_loss_the_last_ten_seconds_go_again_from_when_it_may_have_happen
     acks.lost(20.0 + DETECTION)
     acks.lost(99.0 + DETECTION)  # while it is away nothing is forgotten
     acknowledge(acks, 4, 200.0)
-    assert (acks.waiting, acks.wanted) == (True, True)
+    assert (acks.waiting, acks.repeat) == (True, True)
     assert seqs(acks.again()) == [3, 4]
-    assert (acks.waiting, acks.wanted) == (False, False)
+    assert (acks.waiting, acks.repeat) == (False, False)
 
 
 def test_what_nobody_listened_to_goes_again_without_a_loss() -> None:
     acks = recent()
     acknowledge(acks, 1, 0.0, without_listener=True)
     acknowledge(acks, 2, 1.0)
-    assert (acks.waiting, acks.wanted) == (True, True)
+    assert (acks.waiting, acks.repeat) == (True, False)
     assert seqs(acks.again()) == [1]
 
 

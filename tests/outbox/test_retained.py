@@ -18,10 +18,10 @@ def state(version: int, topic: str = "state") -> publication.Publication:
 
 def test_nothing_waits_at_first() -> None:
     retention = RetainedQueue()
-    assert (bool(retention), retention.announced, retention.first, retention.next_change(NONE)) == (
+    assert (bool(retention), retention.announced, retention.last, retention.next_change(NONE)) == (
         False,
         True,
-        False,
+        None,
         None,
     )
 
@@ -47,11 +47,12 @@ def test_a_burst_is_announced_when_its_last_is_over() -> None:
     first = retention.next_change(NONE)
     assert first is not None
     assert retention.next_change(NONE) is None
-    assert retention.first
+    assert retention
     retention.over(first)
     last = retention.next_change(NONE)
     assert last is not None
-    assert (last.publication, retention.first, retention.announced) == (ONLINE, False, False)
+    assert (last.publication, retention.announced) == (ONLINE, False)
+    assert retention.last is None
     retention.over(last)
     assert retention.announced
 
