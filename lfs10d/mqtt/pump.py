@@ -6,6 +6,7 @@ paho offers `loop_read`, `loop_write` and `loop_misc` for this (docs/decisions/0
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import socket
 from collections.abc import Callable
 from typing import Protocol
@@ -52,7 +53,8 @@ class Pump:
         """Watch this connected socket; what is sent goes at once, for it goes together already (TCP_CORK)."""
         self._opened = opened
         # Nagle would let a sample wait for the broker's word on what went before, such as statistics by QoS 0.
-        self._set(socket.TCP_NODELAY, on=True)
+        with contextlib.suppress(OSError):
+            opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._descriptor = opened.fileno()
         self._loop.add_reader(self._descriptor, self._readable, opened)
         self._keep_up()
@@ -63,12 +65,9 @@ class Pump:
         A send of its own for each message costs more of the processor than all else that is done for it, here and at
         a broker beside us.
         """
-        self._set(socket.TCP_CORK, on=on)
-
-    def _set(self, option: int, *, on: bool) -> None:
         if self._opened is not None:
             try:
-                self._opened.setsockopt(socket.IPPROTO_TCP, option, on)
+                self._opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_CORK, on)
             except OSError:  # it has just gone, as paho will notice
                 self._opened = None
 

@@ -200,10 +200,10 @@ class Uplink:
         """Send these, or keep them while the broker is away."""
         now = asyncio.get_running_loop().time()
         shift = self._shift(now)
-        dropped = self._outbox.dropped
+        losses, dropped = self._outbox.backlog.losses, self._outbox.dropped
         for publication in publications:
             self._outbox.add(publication, now, shift=shift)
-        if self._outbox.dropped > dropped and not self._drop_told:
+        if losses.total > dropped and not self._drop_told:
             self._drop_told = True
             log.warning("more samples wait for the broker than there is room for: the oldest are dropped")
         self._sender.wake()

@@ -17,9 +17,10 @@ class InFlight:
 
     def __init__(self, suspects: Suspects) -> None:
         self.window = 0
+        self.alone: OutboxItem | None = None
+        """The item that goes alone."""
         self._suspects = suspects
         self._since: dict[OutboxItem, float] = {}
-        self._alone: OutboxItem | None = None
         self._alone_went = False
 
     def __len__(self) -> int:
@@ -36,19 +37,14 @@ class InFlight:
     @property
     def closed(self) -> bool:
         """Nothing may go before an acknowledgement: the window is full, or an item goes alone."""
-        return self._alone is not None or self.full
-
-    @property
-    def alone(self) -> bool:
-        """An item goes alone."""
-        return self._alone is not None
+        return self.alone is not None or len(self._since) >= self.window
 
     def begin(self, item: OutboxItem, now: float) -> OutboxItem | None:
         """Take an item at `now`; return it unless it goes alone and has to wait for that."""
         self._since[item] = now
         if not (self._suspects.alone and self._suspects.goes_alone(item.topic)):
             return item
-        self._alone, self._alone_went = item, False
+        self.alone, self._alone_went = item, False
         return self.next_alone()
 
     def next_alone(self) -> OutboxItem | None:
@@ -56,26 +52,26 @@ class InFlight:
         if self._alone_went or len(self._since) > 1:
             return None
         self._alone_went = True
-        return self._alone
+        return self.alone
 
     def end(self, item: OutboxItem) -> float:
         """Let an item go: it is acknowledged, refused, or cannot be sent; return when it was taken."""
         since = self._since.pop(item)
-        if item is self._alone:
-            self._alone = None
+        if item is self.alone:
+            self.alone = None
         return since
 
     def replace(self, item: OutboxItem, other: OutboxItem) -> None:
         """Put another item in the place of one."""
         self._since = {other if each is item else each: at for each, at in self._since.items()}
-        if self._alone is item:
-            self._alone = other
+        if self.alone is item:
+            self.alone = other
 
     def lost(self) -> list[OutboxItem]:
         """Return what was under way when the connection was lost, and forget it."""
         items = list(self._since)
         self._since.clear()
-        self._alone = None
+        self.alone = None
         self.window = 0
         return items
 

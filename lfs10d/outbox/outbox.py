@@ -93,7 +93,8 @@ class Outbox:
         if publication.sample is not None:
             if publication.sample.grouped and not self.telemetry:
                 return
-            self.age(now)
+            if self._queues.live.waiting:
+                self.age(now)
             self._queues.live.add(LiveSample(publication, QueuedSample(publication.sample, now, shift=shift)))
             self._make_room()
         elif publication.kind is PublicationKind.RETAINED:
@@ -152,14 +153,17 @@ class Outbox:
         """
         if self._parting is not None:
             return self._parting.next(self._in_flight, now)
-        if self._in_flight.alone:
+        if self._in_flight.alone is not None:
             return self._in_flight.next_alone()
         if self._in_flight.full:
             self._queues.full()
             return None
-        self._queues.lift_due(now)
-        self._repeat(now)
-        self.age(now)
+        if self._refusals.topics:
+            self._queues.lift_due(now)
+        if self.backlog.repeat(now):
+            self._make_room()
+        if self._queues.live.waiting:
+            self.age(now)
         item = self._queues.next(now, batch=batch)
         return None if item is None else self._in_flight.begin(item, now)
 
@@ -168,7 +172,7 @@ class Outbox:
         """Something may go, now or later; False: nothing before something is added."""
         if self._parting is not None:
             return not self._parting.sent
-        return self._in_flight.alone or bool(self._queues) or self.due() is not None
+        return self._in_flight.alone is not None or bool(self._queues) or self.due() is not None
 
     def due(self) -> float | None:
         """Return when `next` may have something though nothing happens before; None: not by time alone."""
@@ -182,7 +186,8 @@ class Outbox:
         self._refusals.accepted(item.topic)
         if isinstance(item, LiveSample | HistoryBatch | LossNotice):
             self._congestion.answered(now - since)
-            self._repeat(now)
+            if self.backlog.repeat(now):
+                self._make_room()
             self.backlog.on_ack(item, now, nobody_listens=nobody_listens)
 
     def congested(self, now: float) -> Congested | None:
@@ -234,10 +239,6 @@ class Outbox:
         elif isinstance(item, HistoryBatch | LossNotice):
             self.backlog.over(item)
         return since
-
-    def _repeat(self, now: float) -> None:
-        if self.backlog.repeat(now):
-            self._make_room()
 
     # What waits
 
@@ -294,10 +295,9 @@ class Outbox:
 
     def age(self, now: float) -> None:
         """Let live samples that are too old for it wait with the backlog."""
-        if self._queues.live.waiting:
-            for live in self._queues.live.take_old(now):
-                self.backlog.history.add(live.queued)
-                self._displaced(now)
+        for live in self._queues.live.take_old(now):
+            self.backlog.history.add(live.queued)
+            self._displaced(now)
 
     def _make_room(self) -> None:
         history, lives = self.backlog.history, self._queues.live

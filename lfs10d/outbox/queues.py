@@ -178,7 +178,7 @@ class Queues:
 
     def lift_due(self, now: float) -> None:
         """Try the topics again whose time has come."""
-        due = self._refusals.due() if self._refused else None
+        due = self._refusals.due()
         if due is not None and due <= now:
             self._lift(self._refusals.lift(now))
 

@@ -118,13 +118,16 @@ class LineCounters:
         """Return the figures of the last half minute, or since the start where that is less: at least 1 s."""
         oldest = floor(now) - WINDOW + 1
         span = min(now - oldest, now - self._started)
-        seconds = [second for second in self._seconds if second.number >= oldest]
-        longest = max((second.longest for second in seconds), default=0.0)
+        polls, busy, longest = 0, 0.0, 0.0
+        for second in self._seconds:
+            if second.number >= oldest:
+                polls += second.polls
+                busy += second.busy
+                longest = max(longest, second.longest)
         cycle = round(longest, 3) if longest > 0 else None
         if span < LEAST_SPAN:
             return Rates(None, None, cycle)
-        load = min(100.0, 100 * sum(second.busy for second in seconds) / span)
-        return Rates(round(load, 1), round(sum(second.polls for second in seconds) / span, 2), cycle)
+        return Rates(round(min(100.0, 100 * busy / span), 1), round(polls / span, 2), cycle)
 
     def payload(self, now: float, *, ts: int, gap_required: float, backlog: BacklogStats) -> dict[str, object]:
         """Return the object for `line/stats`."""

@@ -30,7 +30,7 @@ def test_without_a_connection_there_is_no_room(suspects: Suspects) -> None:
 def test_the_window_is_full_and_has_room_again(in_flight: InFlight) -> None:
     first, second = live("a", 1), live("a", 2)
     assert [in_flight.begin(each, at) for at, each in enumerate((first, second))] == [first, second]
-    assert (in_flight.full, in_flight.closed, in_flight.alone) == (True, True, False)
+    assert (in_flight.full, in_flight.closed, in_flight.alone) == (True, True, None)
     assert (list(in_flight), len(in_flight)) == ([first, second], 2)
     in_flight.end(first)
     assert (in_flight.full, in_flight.closed) == (False, False)
@@ -58,9 +58,9 @@ def test_a_suspect_batch_that_is_shortened_still_goes_alone(in_flight: InFlight,
     suspects.ended({whole.topic: 10}, certain=True)
     assert in_flight.begin(whole, 0.0) is whole
     in_flight.replace(whole, part)
-    assert in_flight.alone
+    assert in_flight.alone is part
     in_flight.end(part)
-    assert not in_flight.alone
+    assert not in_flight.closed
 
 
 def test_a_replaced_item_keeps_its_place_and_time(in_flight: InFlight) -> None:
