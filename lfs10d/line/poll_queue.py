@@ -26,6 +26,11 @@ LATE = 0.25
 """The line hurries for a device that has waited for so large a part of its interval."""
 SPREAD = 2.0
 """Grids lie at most so many exchanges apart, so that every device is asked soon after the start."""
+TOGETHER_FROM = 1.0
+"""Polls of an interval (s) from this on follow each other where they leave enough of the line: code that has just run
+costs less of the processor. With shorter ones a job that waits in silence would make more of them miss their points."""
+TOGETHER_MOST = 1 / 3
+"""Enough is left where the polls fill at most so much of the line."""
 
 
 def spread(devices: Iterable[Device], *, polled: int, wire_time: float, now: float) -> None:
@@ -36,7 +41,9 @@ def spread(devices: Iterable[Device], *, polled: int, wire_time: float, now: flo
     phase = now
     for device in devices:
         device.due = phase
-        phase += min(device.spec.interval / polled, SPREAD * wire_time)
+        interval = device.spec.interval
+        together = interval >= TOGETHER_FROM and polled * wire_time <= TOGETHER_MOST * interval
+        phase += min(interval / polled, wire_time * (1.0 if together else SPREAD))
 
 
 class PollQueue:

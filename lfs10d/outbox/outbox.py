@@ -93,8 +93,7 @@ class Outbox:
         if publication.sample is not None:
             if publication.sample.grouped and not self.telemetry:
                 return
-            if self._queues.live.waiting:
-                self.age(now)
+            self.age(now)
             self._queues.live.add(LiveSample(publication, QueuedSample(publication.sample, now, shift=shift)))
             self._make_room()
         elif publication.kind is PublicationKind.RETAINED:
@@ -160,10 +159,8 @@ class Outbox:
             return None
         if self._refusals.topics:
             self._queues.lift_due(now)
-        if self.backlog.repeat(now):
-            self._make_room()
-        if self._queues.live.waiting:
-            self.age(now)
+        self._repeat(now)
+        self.age(now)
         item = self._queues.next(now, batch=batch)
         return None if item is None else self._in_flight.begin(item, now)
 
@@ -186,8 +183,7 @@ class Outbox:
         self._refusals.accepted(item.topic)
         if isinstance(item, LiveSample | HistoryBatch | LossNotice):
             self._congestion.answered(now - since)
-            if self.backlog.repeat(now):
-                self._make_room()
+            self._repeat(now)
             self.backlog.on_ack(item, now, nobody_listens=nobody_listens)
 
     def congested(self, now: float) -> Congested | None:
@@ -239,6 +235,10 @@ class Outbox:
         elif isinstance(item, HistoryBatch | LossNotice):
             self.backlog.over(item)
         return since
+
+    def _repeat(self, now: float) -> None:
+        if self.backlog.repeat(now):
+            self._make_room()
 
     # What waits
 
@@ -295,7 +295,7 @@ class Outbox:
 
     def age(self, now: float) -> None:
         """Let live samples that are too old for it wait with the backlog."""
-        for live in self._queues.live.take_old(now):
+        for live in self._queues.live.take_old(now) if self._queues.live.waiting else ():
             self.backlog.history.add(live.queued)
             self._displaced(now)
 

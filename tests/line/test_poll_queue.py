@@ -192,11 +192,22 @@ def test_clearing_forgets_everybody() -> None:
 
 
 def test_grids_are_laid_side_by_side_but_not_far_apart() -> None:
-    devices = [a_device(slave, 1.0) for slave in range(1, 5)]
+    devices = [a_device(slave, 0.5) for slave in range(1, 5)]
     spread(devices, polled=4, wire_time=0.025, now=7.0)
     assert [device.due for device in devices] == pytest.approx([7.0, 7.05, 7.1, 7.15])
-    spread(devices, polled=100, wire_time=0.025, now=7.0)
+    spread(devices, polled=50, wire_time=0.025, now=7.0)
     assert [device.due for device in devices] == pytest.approx([7.0, 7.01, 7.02, 7.03])
+
+
+@pytest.mark.parametrize(
+    ("interval", "polled", "apart"), [(1.0, 13, 0.025), (1.0, 14, 0.05), (0.99, 4, 0.05), (2.0, 26, 0.025)]
+)
+def test_polls_of_a_slow_interval_follow_each_other_where_they_leave_enough_of_the_line(
+    interval: float, polled: int, apart: float
+) -> None:
+    devices = [a_device(slave, interval) for slave in range(1, 4)]
+    spread(devices, polled=polled, wire_time=0.025, now=7.0)
+    assert [device.due for device in devices] == pytest.approx([7.0, 7.0 + apart, 7.0 + 2 * apart])
 
 
 def test_what_passed_while_offline_is_no_overrun() -> None:

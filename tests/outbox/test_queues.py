@@ -103,6 +103,9 @@ def test_a_live_sample_of_a_refused_topic_waits_with_the_backlog(waiting: Waitin
     waiting.queues.live.add(other)
     assert waiting.queues.next(0.0, batch=False) is other
     assert len(waiting.backlog.history) == 1
+    waiting.queues.live.add(live("a", 2))
+    assert waiting.queues.next(0.0, batch=False) is None
+    assert len(waiting.backlog.history) == 2
 
 
 def test_what_is_refused_waits_in_its_place(waiting: Waiting) -> None:
@@ -129,7 +132,9 @@ def test_what_was_under_way_at_a_loss_waits_in_its_place_and_the_burst_is_forgot
 
 def test_a_topic_is_tried_again_when_its_time_has_come(waiting: Waiting) -> None:
     message = event("x")
+    assert waiting.queues.due() is None
     waiting.refusals.refused("event", QUOTA, 0.0)
+    assert waiting.queues.due() == 1.0
     waiting.queues.refused(message)
     waiting.queues.lift_due(0.5)
     assert waiting.queues.next(0.5, batch=True) is None
