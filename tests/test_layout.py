@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections import defaultdict
 from pathlib import Path
 
@@ -43,3 +44,11 @@ def test_each_package_says_its_job_in_one_line() -> None:
         docstring = ast.get_docstring(tree)
         assert docstring, folder.name
         assert folder.name == "cli" or len(tree.body) == 1, f"{folder.name}/__init__.py holds code"
+
+
+def test_the_index_of_the_rigs_names_each_module_once() -> None:
+    folder = Path(__file__).parent / "support"
+    index = ast.get_docstring(ast.parse((folder / "__init__.py").read_text())) or ""
+    named = re.findall(r"^ {4}`(\w+)`  +\S", index, flags=re.MULTILINE)
+    modules = {each.stem for each in folder.glob("*.py") if not each.name.startswith(("__init__", "test_"))}
+    assert sorted(named) == sorted(modules)

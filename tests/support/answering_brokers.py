@@ -1,4 +1,4 @@
-"""A broker with a mind of its own: MQTT 5 and 3.1.1, as much of it as a publisher needs."""
+"""A broker that refuses messages as the test says: MQTT 5 and 3.1.1, as much of it as a publisher needs."""
 
 from __future__ import annotations
 

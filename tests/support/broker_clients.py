@@ -1,4 +1,4 @@
-"""A broker client and who notes what it reports."""
+"""A real broker client, and a record of what it reports."""
 
 from __future__ import annotations
 

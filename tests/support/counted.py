@@ -1,4 +1,4 @@
-"""Exchanges and readings to be counted."""
+"""Exchanges and readings for the counters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A device and a profile beside the configuration for requests on devices."""
+"""A device and a profile file, for requests on devices."""
 
 from __future__ import annotations
 

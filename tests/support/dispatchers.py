@@ -1,4 +1,4 @@
-"""A dispatcher with handlers of its own and who receives its responses."""
+"""A dispatcher with handlers of the test, and a record of its responses."""
 
 from __future__ import annotations
 

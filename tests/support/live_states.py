@@ -1,4 +1,4 @@
-"""What a live view received."""
+"""What the live view receives."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A configuration file's entries, with what holds where they say nothing."""
+"""Entries of a configuration file with the defaults filled in."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Brokers that answer by the byte."""
+"""Brokers that reply with given bytes, and one of 2014 that knows MQTT 3.1.1 only."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How exchanges ended, for tests of those who are told: plain facts, changed where a test means one."""
+"""Outcomes of exchanges, for tests of what receives them: usual ones, in which a test replaces what it needs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A line on which requests stay unanswered."""
+"""Requests that are still unanswered, and what happens to them."""
 
 from __future__ import annotations
 

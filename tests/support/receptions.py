@@ -1,4 +1,4 @@
-"""What was received in pieces, sorted."""
+"""Bytes received in pieces, sorted into replies and noise."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a line of other devices published, recorded once."""
+"""Lines of other devices, and all that a daemon published of them, recorded once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Values in the answers of a simulated sensor."""
+"""Wind speeds in the replies of a simulated sensor."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A station with devices of one and of two values, and what is told to it: for the tests of what it says."""
+"""A station with devices of one and of two values, and readings for it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The terminal side of the paced line."""
+"""The master's end of the bench's paced line."""
 
 from __future__ import annotations
 
