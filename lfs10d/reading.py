@@ -1,4 +1,4 @@
-"""What the line thread tells: readings, faults, exchanges and the state of the port, as plain values.
+"""The way up: fault codes, readings, exchanges and the state of the port, as the line thread reports them.
 
 Times are monotonic seconds of the line thread's clock; durations are seconds.
 """
@@ -14,7 +14,7 @@ from typing import Final, Literal, Never, TypeAlias
 Number: TypeAlias = int | float
 
 Value: TypeAlias = int | float | str | bool
-"""What a device says of one quantity: a number, a word of its profile, or whether something is so."""
+"""The value of one quantity: a number, a text or word of its profile, or a boolean."""
 
 NOTHING: Final[Mapping[str, Never]] = MappingProxyType({})
 """Nothing by name, one object for all who have nothing to tell."""

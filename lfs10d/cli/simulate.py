@@ -16,12 +16,12 @@ from lfs10d.cli import json_option
 from lfs10d.cli.options import DurationType, profile_names
 from lfs10d.profiles.library import load_profile
 from lfs10d.schema.quantities import BAUDRATES
+from lfs10d.simulator.blueprint import LFS10, blueprint_of
 from lfs10d.simulator.builder import LinePlan, build, slave_ids
 from lfs10d.simulator.fault_file import FaultFile, load_faults, profiles_of
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.recorded import load_recording
-from lfs10d.simulator.registers import LFS10, blueprint_of
 from lfs10d.simulator.wire import SECOND, Format, Framing, Parity
 
 DURATION = DurationType("5ms, 1s or 2m")

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from lfs10d.simulator.blueprint import LFS10, Blueprint
 from lfs10d.simulator.fault_file import FaultFile, SlaveEntry
 from lfs10d.simulator.faults import window
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.line_faults import babble, second_master, stray
 from lfs10d.simulator.recorded import Recording
-from lfs10d.simulator.registers import LFS10, Blueprint
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.signals import READ_HOLDING
 from lfs10d.simulator.wind import Wind

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from random import Random
 from typing import Final
 
+from lfs10d.simulator.blueprint import READ_INPUT, WRITES
 from lfs10d.simulator.faults import STRIKES_ANSWERS, STRIKES_FRAMES, ActiveFaults, FaultKind
-from lfs10d.simulator.registers import READ_INPUT, WRITES
 from lfs10d.simulator.signals import READ_HOLDING
 from lfs10d.simulator.wire import Framing
 

@@ -6,16 +6,16 @@ from collections.abc import Iterable, Mapping
 from itertools import count as count_from
 from typing import Final, TypeAlias
 
-from lfs10d.simulator.faults import ActiveFaults, FaultKind, SensorFault
-from lfs10d.simulator.frame_faults import broken_float
-from lfs10d.simulator.recorded import RecordedValue
-from lfs10d.simulator.registers import (
+from lfs10d.simulator.blueprint import (
     READ_INPUT,
     WRITE_COILS,
     WRITE_SEVERAL,
     WRITE_SINGLE,
     Blueprint,
 )
+from lfs10d.simulator.faults import ActiveFaults, FaultKind, SensorFault
+from lfs10d.simulator.frame_faults import broken_float
+from lfs10d.simulator.recorded import RecordedValue
 from lfs10d.simulator.signals import READ_HOLDING, Published, Signal
 from lfs10d.simulator.wind import WindSource
 from lfs10d.simulator.wire import Framing

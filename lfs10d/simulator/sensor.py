@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 from random import Random
 from typing import Final
 
+from lfs10d.simulator.blueprint import LFS10, WRITE_COILS, WRITES, Blueprint
 from lfs10d.simulator.faults import (
     ActiveFaults,
     FaultKind,
@@ -41,7 +42,6 @@ from lfs10d.simulator.memory import (
     refusal,
     written,
 )
-from lfs10d.simulator.registers import LFS10, WRITE_COILS, WRITES, Blueprint
 from lfs10d.simulator.wind import Unique, WindSource
 from lfs10d.simulator.wire import Format, Framing, nanoseconds, seal
 

@@ -18,9 +18,9 @@ from lfs10d.cli.options import take
 from lfs10d.cli.read import _Attempts, _explanation, _ReadOptions, command
 from lfs10d.profiles.library import load_profile
 from lfs10d.reading import Exchanged, Fault, FaultCode, Purpose
+from lfs10d.simulator.blueprint import LFS10, blueprint_of
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
-from lfs10d.simulator.registers import LFS10, blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.signals import Signal
 from lfs10d.simulator.wire import Format

@@ -49,6 +49,7 @@ def test_every_recipe_names_files_and_tests() -> None:
     recipes = re.split(r"^## ", CONTRIBUTING, flags=re.MULTILINE)[1:]
     assert [each.partition("\n")[0] for each in recipes] == [
         "A register type",
+        "A fault code",
         "A request",
         "A published topic",
         "A retry rule",

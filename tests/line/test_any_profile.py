@@ -16,9 +16,9 @@ from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Event, Reading
+from lfs10d.simulator.blueprint import blueprint_of
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.port import SimulatedPort, VirtualClock, run
-from lfs10d.simulator.registers import blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.telemetry.info import DeviceInfo
 from tests.support.any_profiles import a_profile, certificates

@@ -18,10 +18,10 @@ from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Event, FaultCode, Reading
+from lfs10d.simulator.blueprint import blueprint_of
 from lfs10d.simulator.burst import MASTER
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.port import SimulatedPort, VirtualClock
-from lfs10d.simulator.registers import blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.signals import Published
 from tests.support.lines import Rig

@@ -13,7 +13,7 @@ from lfs10d.modbus.request import ReadRegisters, Request, WriteRegister
 from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.profiles.profile import ChecksumName, FramingName, Profile
 from lfs10d.reading import Fault, Number
-from lfs10d.simulator.registers import blueprint_of
+from lfs10d.simulator.blueprint import blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import unseal
 

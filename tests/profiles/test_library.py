@@ -11,7 +11,7 @@ from lfs10d.profiles import library
 from lfs10d.profiles.library import builtin_names, load_profile, parse_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Fault
-from lfs10d.simulator.registers import blueprint_of
+from lfs10d.simulator.blueprint import blueprint_of
 
 ROOT = Path(__file__).parents[2]
 WIND_VANE = ROOT / "config" / "profiles" / "wind-vane.yaml"

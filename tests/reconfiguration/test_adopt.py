@@ -8,7 +8,7 @@ import pytest
 
 from lfs10d.command import Command
 from lfs10d.reconfiguration.adopt_request import AdoptRequest
-from lfs10d.simulator.registers import Blueprint
+from lfs10d.simulator.blueprint import Blueprint
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from tests.support.lives import Bench

@@ -26,7 +26,7 @@ from lfs10d.mqtt.topics import Topics
 from lfs10d.mqtt.uplink import Uplink
 from lfs10d.profiles.library import load_profile
 from lfs10d.reading import Event
-from lfs10d.simulator.registers import blueprint_of
+from lfs10d.simulator.blueprint import blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.system.clock import Clock, Instant
 from lfs10d.telemetry.publication import BacklogStats, Publication

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from lfs10d.simulator.blueprint import Blueprint
 from lfs10d.simulator.builder import LinePlan, build, slave_ids
 from lfs10d.simulator.fault_file import parse_faults
 from lfs10d.simulator.line import SimulatedLine
-from lfs10d.simulator.registers import Blueprint
 from lfs10d.simulator.signals import Signal
 from lfs10d.simulator.wind import Unique
 from lfs10d.simulator.wire import SECOND, Format, seal

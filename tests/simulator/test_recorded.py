@@ -11,10 +11,10 @@ import pytest
 
 from lfs10d.errors import ConfigError
 from lfs10d.simulator import recorded
+from lfs10d.simulator.blueprint import LFS10, Blueprint
 from lfs10d.simulator.builder import LinePlan, build
 from lfs10d.simulator.memory import Memory
 from lfs10d.simulator.recorded import RecordedValue, Recording, load_recording, parse_recording
-from lfs10d.simulator.registers import LFS10, Blueprint
 from lfs10d.simulator.signals import READ_COILS, Signal
 from lfs10d.simulator.wind import Unique
 from lfs10d.simulator.wire import SECOND

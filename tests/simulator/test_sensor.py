@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
+from lfs10d.simulator.blueprint import Blueprint
 from lfs10d.simulator.faults import FaultKind
-from lfs10d.simulator.registers import Blueprint
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.signals import Signal
 from lfs10d.simulator.wire import Format

@@ -10,7 +10,7 @@ from itertools import pairwise
 import pytest
 
 from lfs10d.profiles.profile import Profile
-from lfs10d.simulator.registers import blueprint_of
+from lfs10d.simulator.blueprint import blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import unseal
 from tests.support.sensor_values import ID, Maker, wind_in

@@ -15,9 +15,9 @@ from typing import Any
 
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
+from lfs10d.simulator.blueprint import blueprint_of
 from lfs10d.simulator.line import HeardRequest, SimulatedLine
 from lfs10d.simulator.pty import PtyLine
-from lfs10d.simulator.registers import blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wind import Unique
 from lfs10d.simulator.wire import Check, Format, Framing, unseal

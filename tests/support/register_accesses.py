@@ -18,9 +18,9 @@ from lfs10d.modbus.request import ReadRegisters, Request
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Event, Exchanged, Purpose
+from lfs10d.simulator.blueprint import blueprint_of
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.port import SimulatedPort, VirtualClock, run
-from lfs10d.simulator.registers import blueprint_of
 from lfs10d.simulator.sensor import Sensor
 
 ROOT = Path(__file__).parents[2]

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from lfs10d.simulator.registers import Blueprint
+from lfs10d.simulator.blueprint import Blueprint
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from tests.support.lives import Bench, Life

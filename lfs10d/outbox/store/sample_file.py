@@ -1,4 +1,4 @@
-"""The samples in one SQLite file: kept, read, let go, evicted.
+"""The samples in one SQLite file: written, read, deleted, and evicted above the limits of size and age.
 
 All methods block, and belong to one thread. Each is one transaction: it has happened on the disk, or raises
 sqlite3.Error or DamagedError; then the file is to be closed, since nobody knows what of it has happened.

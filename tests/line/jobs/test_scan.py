@@ -6,7 +6,7 @@ import pytest
 
 from lfs10d.line.jobs.identification import FoundDevice
 from lfs10d.profiles.library import builtin_names
-from lfs10d.simulator.registers import blueprint_of
+from lfs10d.simulator.blueprint import blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from tests.support.scans import ALL, BUILTIN, PROFILES, by_id, found_ids, ill, line_of, scanned

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.profiles.profile import Profile
-from lfs10d.simulator.registers import LFS10, Blueprint, blueprint_of
+from lfs10d.simulator.blueprint import LFS10, Blueprint, blueprint_of
 from lfs10d.simulator.signals import Signal
 
 LD_E = Signal(0x1004, "int32", low_word_first=True)

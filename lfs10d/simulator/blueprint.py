@@ -1,4 +1,4 @@
-"""What a simulated device is: registers, signals, limits. LFS10 here; every other device is just data too."""
+"""A kind of simulated device: its registers, signals and limits. LFS10 here; others are built from their profiles."""
 
 from __future__ import annotations
 
