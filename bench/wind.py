@@ -60,7 +60,7 @@ def feed(station: WindStation | None, names: list[str], begin: float, seconds: i
         for place, name in enumerate(names):
             at = begin + quarter / HERTZ + place * 0.0075
             speed = round(8 + 3 * sin(at / 7 + place) + 2 * sin(at / 1.7), 2)
-            values = {"wind_speed": speed, "wind_direction": at * 3 % 360}
+            values = {"wind_speed": speed, "wind_direction": round(at * 3 % 360, 1)}
             reading = Reading(name, at, values, None, 0.0182, online=True, response_timeout=0.06)
             now = Instant(at, WALL + at, "synced")
             if station is not None:

@@ -26,6 +26,7 @@ class ShownLine:
         self.names = [f"mast-{number}" for number in range(2, sensors + 2)]
         self.labels: dict[str, str] = {}
         self.seq = 0
+        self._good_ts: dict[str, int] = {}
         self._interval = interval
         self.model.link.connected = True
         self.model.link.place = PLACE
@@ -80,6 +81,7 @@ class ShownLine:
                 self.publish(f"device/{name}/availability", "online")
                 sample = self._sample(name, speed + 0.7 * place, ago, seq=self.seq) | more
                 self.publish(f"device/{name}/telemetry", sample, old=ago > 0)
+                self._good_ts[name] = self.ts(ago)
 
     def wind(self, speed: float = 6.0, *, beaufort: int = 4) -> None:
         """Publish wind statistics of each sensor."""
@@ -91,7 +93,7 @@ class ShownLine:
             )  # fmt: skip
             self.publish(f"device/{name}/stats", {"polls": 3600, "good": 3597, "errors": {"crc": 3},
                                                   "rtt_ms": {"p50": 18.2, "p95": 21.0}, "response_timeout_ms": 90.1,
-                                                  "last_good_ts": self.ts()})  # fmt: skip
+                                                  "last_good_ts": self._good_ts.get(name)})  # fmt: skip
 
     def fail(self, name: str, code: str, message: str, *, offline: bool = True, ago: float = 0.0) -> None:
         """Publish that a sensor fails, for `ago` s."""
@@ -102,7 +104,8 @@ class ShownLine:
             self.publish(f"device/{name}/wind", none | {"unit": "m/s", "coverage_10m": 0.0})
         self.publish(f"device/{name}/telemetry", self._sample(name, None, 0.0, seq=self.seq) | {"error": code})
         self.publish(f"device/{name}/error", {"active": True, "code": code, "message": message, "since": self.ts(ago),
-                                              "last": self.ts(), "count": 37, "heard": "02 03 04 41 2"})  # fmt: skip
+                                              "last": self.ts(), "count": 37,
+                                              "heard": "02 03 04 41 20" if code == "crc" else ""})  # fmt: skip
 
     def _sample(self, name: str, value: float | None, ago: float, *, seq: int) -> dict[str, Any]:
         return {

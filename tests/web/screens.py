@@ -56,6 +56,7 @@ def shoot(browser: Browser, state: str, folder: Path) -> list[str]:
         page = context.new_page()
         opened(page, server, beginning)
         act(page, server)
+        page.wait_for_timeout(700)  # the last hour is asked for once the page is there
         for name, (width, dark) in WIDTHS.items():
             page.set_viewport_size({"width": width, "height": 800})
             page.emulate_media(color_scheme="dark" if dark else "light")

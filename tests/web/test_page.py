@@ -73,18 +73,22 @@ def test_a_sensor_is_followed_live_its_unit_kept_and_what_is_old_is_grey(page: P
 def test_a_phone_that_wakes_after_an_hour_shows_nothing_old_as_live(page: Page, server: PageServer) -> None:
     line = server.do(lambda: ShownLine(server, sensors=1, interval=600.0))
     server.do(lambda: line.measure(10.0))
+    server.do(line.wind)
     page.goto(server.address)
     expect(page.locator("#banner")).to_have_text("Live")
+    expect(page.locator(".more")).to_have_text("gust 10.2 m/s · mean 5.4 m/s")
     shown = page.evaluate(
         """async () => {
             const later = Date.now() + 3600e3;
             Date.now = () => later;
             document.getElementById("unit").dispatchEvent(new Event("change"));
-            return [document.getElementById("banner").textContent, document.querySelector(".card").className];
+            return ["#banner", ".more"].map((each) => document.querySelector(each).textContent).concat(
+                document.querySelector(".card").className);
         }"""
     )
     assert shown[0].startswith("NOT LIVE")
-    assert shown[1] == "card old"
+    assert shown[1] == "last known: gust 10.2\xa0m/s · mean 5.4\xa0m/s"
+    assert shown[2] == "card old"
 
 
 SEEN = """() => {

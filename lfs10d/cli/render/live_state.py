@@ -13,7 +13,7 @@ from math import isfinite
 from typing import Any, Final, TypeGuard
 
 from lfs10d.cli.render.response import BESIDES
-from lfs10d.reading import Value
+from lfs10d.reading import FaultCode, Value
 
 MOVES_WITHIN: Final = 3.0
 """s over which a value's movement is measured."""
@@ -44,6 +44,8 @@ class ShownDevice:
     good: bool = False
     error: str | None = None
     rtt_ms: float | None = None
+    ts: float = 0.0
+    """Time stamp of the last sample."""
     good_ts: float | None = None
     since: float | None = None
     """When its error rose, epoch ms of the daemon's clock; None while it has none."""
@@ -155,7 +157,7 @@ class LiveState:
             units = dict.fromkeys(values, sample.get("unit") or "")
         if not old:
             self._ahead = wall - ts / 1000
-        device.seq, device.boot = seq, boot
+        device.seq, device.boot, device.ts = seq, boot, ts
         _sample(device, sample, values, units)
         if device.good:
             device.good_ts = ts
@@ -224,8 +226,11 @@ class LiveState:
         return ("", -1) if device is None else (device.boot, device.seq)
 
     def age(self, device: ShownDevice, wall: float) -> float | None:
-        """Return how many s ago it gave its last good value; None: never as far as we know."""
-        if device.good_ts is None:
+        """Return how many s ago it gave its last good value; None: never as far as we know.
+
+        A device that is shown as not polled yet has none since then, though statistics may know of one already.
+        """
+        if device.good_ts is None or (device.error == FaultCode.STARTING and device.good_ts >= device.ts):
             return None
         return max(0.0, wall - self._ahead - device.good_ts / 1000)
 

@@ -7,12 +7,13 @@ holds; the standard deviation is Yamartino's (Journal of Climate and Applied Met
 from __future__ import annotations
 
 from array import array
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import asin, atan2, cos, degrees, hypot, radians, sin, sqrt
 from typing import ClassVar, Final
 
-from lfs10d.telemetry.wind.series import BLOCK, GAP, Edge, HeldSeries, Sums
+from lfs10d.telemetry.wind.series import BLOCK, GAP, HeldSeries, Sums
 
 RESULTANT_LEAST: Final = 0.05
 """Length of the mean vector below which it has no direction."""
@@ -78,23 +79,17 @@ def spread(seen: int) -> Spread | None:
     if not seen:
         return None
     bits = f"{seen >> 1:0{CIRCLE}b}"[::-1]  # one digit per degree, the first is that of 1
-    first = bits.index("1")
-    calms = (bits[first + 1 :] + bits[: first + 1]).split("1")[:-1]  # after each direction, to the next
-    widest = max(calms, key=len)
-    place, begin = first, first
-    for calm in calms:
-        following = (place + 1 + len(calm)) % CIRCLE
-        if calm is widest:
-            begin = following
-            break
-        place = following
-    return Spread(CIRCLE - 1 - len(widest), begin + 1, place + 1)
+    directions = [place for place, bit in enumerate(bits, 1) if bit == "1"]
+    following = [*directions[1:], directions[0] + CIRCLE]
+    calms = [after - direction for direction, after in zip(directions, following, strict=True)]
+    widest = calms.index(max(calms))
+    return Spread(CIRCLE - calms[widest], compass(following[widest]), directions[widest])
 
 
 class DirectionSeries(HeldSeries):
     """The directions of one vane. Of the sums of a block, the integrals are those of the unit vector: north, east."""
 
-    __slots__ = ("_samples", "_seen")
+    __slots__ = ("_open_seen", "_samples", "_seen")
 
     reach: ClassVar[int] = 660_000
     """The last 10 min, and what a record may still want of the minute before."""
@@ -102,40 +97,53 @@ class DirectionSeries(HeldSeries):
     def __init__(self) -> None:
         super().__init__()
         self._samples, self._seen = array("B"), bytearray()
-        """Of each block; the directions seen in it as `SEEN_BYTES`."""
+        """Of each closed block; the directions seen in it as `SEEN_BYTES`."""
+        self._open_seen = 0
+        """The directions seen in the newest block."""
 
     def vector(self, begin: int, end: int) -> Vector:
         """Return the mean vector over [begin, end)."""
-        return self.vector_between(self.begin(begin), self.until(end))
+        return self.vector_of(self.between(self.edge(begin), self.edge(end)))
 
-    def vector_between(self, begin: Edge, end: Edge) -> Vector:
-        """Return the mean vector from one moment to a later one."""
-        covered, north, east = self.between(begin, end)
-        return Vector(round(covered), north, east)
+    def vector_of(self, sums: Sums) -> Vector:
+        """Return the mean vector of a window with these sums."""
+        return Vector(*sums)
 
     def samples(self, begin: int, end: int) -> int:
         """Return how many values were measured within [begin, end)."""
-        parts = self._measured(begin, end)
-        return sum(self._samples[parts.blocks]) + sum(len(self._good(*each)) for each in parts.raw)
+        first, last, blocks = self._measured(begin, end)
+        if blocks.start >= blocks.stop:
+            return last - first - self._values[first:last].count(GAP)
+        ends = (*self._values[first : blocks.start * BLOCK], *self._values[blocks.stop * BLOCK : last])
+        return sum(self._samples[blocks]) + len(ends) - ends.count(GAP)
 
     def spread(self, begin: int, end: int) -> Spread | None:
         """Return the sector of what was measured within [begin, end)."""
-        parts = self._measured(begin, end)
-        seen = 0
-        for block in range(parts.blocks.start, parts.blocks.stop):
-            seen |= int.from_bytes(self._seen[block * SEEN_BYTES : (block + 1) * SEEN_BYTES], "little")
-        for first, last in parts.raw:
-            seen |= self._bits(first, last)
+        first, last, blocks = self._measured(begin, end)
+        if blocks.start >= blocks.stop:
+            return spread(self._bits(first, last))
+        newest = blocks.stop * BLOCK
+        seen = self._open_seen if last == len(self._times) else self._bits(newest, last)
+        for block in range(blocks.start, blocks.stop):
+            seen |= self._seen_in(block)
+        if first < blocks.start * BLOCK and self._seen_in(blocks.start - 1) & ~seen:
+            seen |= self._bits(first, blocks.start * BLOCK)
         return spread(seen)
 
-    def _good(self, first: int, last: int) -> list[float]:
-        scale = self._scale
-        return [value / scale for value in self._values[first:last] if value != GAP]
+    def _measured(self, begin: int, end: int) -> tuple[int, int, slice]:
+        """Return the first entry that begins within [begin, end), the one behind the last, and the blocks between."""
+        first = bisect_left(self._times, begin - self._origin)
+        last = max(first, bisect_left(self._times, end - self._origin))
+        return first, last, slice(-(-first // BLOCK), min(last // BLOCK, self._closed))
+
+    def _seen_in(self, block: int) -> int:
+        return int.from_bytes(self._seen[block * SEEN_BYTES : (block + 1) * SEEN_BYTES], "little")
 
     def _bits(self, first: int, last: int) -> int:
-        seen = 0
-        for value in self._good(first, last):
-            seen |= 1 << compass(value)
+        seen, scale = 0, self._scale
+        for value in self._values[first:last]:
+            if value != GAP:
+                seen |= 1 << compass(value / scale)
         return seen
 
     def _sums(self, values: Sequence[float], held: list[int]) -> Sums:
@@ -145,9 +153,31 @@ class DirectionSeries(HeldSeries):
         north, east = sum(cos(angle) * time for angle, time in pairs), sum(sin(angle) * time for angle, time in pairs)
         return Sums(sum(time for _, time in pairs), north, east)
 
-    def _close(self, first: int) -> None:
-        self._samples.append(len(self._good(first, first + BLOCK)))
-        self._seen += self._bits(first, first + BLOCK).to_bytes(SEEN_BYTES, "little")
+    def _settle(self, held: int) -> None:
+        self._open_covered, self._open_first, self._open_second = self._open_and(held)
+
+    def _open(self, until: int) -> Sums:
+        return self._open_and(until + self._origin - self.newest)
+
+    def _open_and(self, held: int) -> Sums:
+        """Return the sums of the newest block if its newest value holds so long."""
+        angle = radians(self._newest_kept / self._scale)
+        north, east = self._open_first + cos(angle) * held, self._open_second + sin(angle) * held
+        return Sums(self._open_covered + held, north, east)
+
+    def _took(self, at: int, kept: float) -> None:  # noqa: ARG002 - a direction's time is of no further use
+        self._open_seen |= 1 << compass(kept / self._scale)
+
+    def _gap(self) -> None:
+        """No direction spoils another."""
+
+    def _close(self) -> None:
+        self._samples.append(BLOCK - self._open_gaps)
+        self._seen += self._open_seen.to_bytes(SEEN_BYTES, "little")
+
+    def _empty_open(self) -> None:
+        super()._empty_open()
+        self._open_seen = 0
 
     def _drop(self, blocks: int) -> None:
         super()._drop(blocks)

@@ -12,12 +12,14 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise, starmap
 from typing import Final
 
 from lfs10d.reading import Number, Value
 from lfs10d.telemetry.info import WindValues
 from lfs10d.telemetry.wind.direction import VARIABLE_BELOW, VARIABLE_FROM, DirectionSeries, Vector
-from lfs10d.telemetry.wind.speed import GUST_OVER, Extremes, Mean, Peak, SpeedSeries
+from lfs10d.telemetry.wind.extremes import Extremes, Peak
+from lfs10d.telemetry.wind.speed import GUST_OVER, Mean, SpeedSeries
 
 MINUTE: Final = 60_000
 SHORT: Final = 2 * MINUTE
@@ -132,16 +134,17 @@ class MeasuredWind:
 
     def _speeds(self, now: int, shift: int, *, undersampled: bool) -> dict[str, object]:
         speed, factor = self._speed, self._factor
-        until = speed.until(now)
-        short, before = speed.mean_between(speed.begin(now - SHORT), until), speed.mean(now - SHORT - LONG, now - SHORT)
+        edges = [speed.edge(now - each) for each in (SHORT + LONG, LONG, SHORT, 0)]
+        oldest, older, newest = starmap(speed.between, pairwise(edges))
+        short, before = speed.mean_of(newest), speed.mean_of(oldest.plus(older))
         apart = round(abs(short.mean - before.mean) * factor, SPEED_DECIMALS)
         discontinuity = apart >= DISCONTINUITY and _means(short, SHORT) and _means(before, LONG)
         window = SHORT if discontinuity else LONG
-        long = short if discontinuity else speed.mean_between(speed.begin(now - LONG), until)
+        long = short if discontinuity else speed.mean_of(older.plus(newest))
         whole = speed.extremes(now - LONG + 1, now + 1)
         peaks = speed.extremes(now - SHORT + GUST_OVER, now + 1) if discontinuity else whole
         gust, lull = (None, None) if undersampled else (peaks.gust, peaks.lull)
-        newest = None if undersampled or now >= speed.held_until else speed.newest_gust()
+        last_gust = None if undersampled or now >= speed.held_until else speed.newest_gust()
         mean = round(long.mean, SPEED_DECIMALS) if _means(long, window) else None
         covered_2m, covered_10m, samples = short.covered, long.covered, whole.samples
         if self.values.speed is None:
@@ -151,7 +154,7 @@ class MeasuredWind:
             "unit": self.values.unit,
             "mean_2m": round(short.mean, SPEED_DECIMALS) if _means(short, SHORT) else None,
             "mean_10m": mean,
-            "gust_3s": None if newest is None else round(newest, SPEED_DECIMALS),
+            "gust_3s": None if last_gust is None else round(last_gust, SPEED_DECIMALS),
             "gust_10m": _speed(gust),
             "gust_10m_ts": None if gust is None else gust.at + shift,
             "lull_10m": _speed(lull),
@@ -168,8 +171,8 @@ class MeasuredWind:
 
     def _directions(self, now: int, mean: object) -> dict[str, object]:
         direction = self._direction
-        until = direction.until(now)
-        short, long = (direction.vector_between(direction.begin(now - each), until) for each in (SHORT, LONG))
+        older, newest = starmap(direction.between, pairwise([direction.edge(now - each) for each in (LONG, SHORT, 0)]))
+        short, long = direction.vector_of(newest), direction.vector_of(older.plus(newest))
         sector = direction.spread(now - LONG + 1, now + 1)
         variable = sector is not None and sector.degrees >= VARIABLE_FROM
         light = isinstance(mean, float) and mean * self._factor < EXTREMES_FROM

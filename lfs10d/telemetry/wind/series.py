@@ -10,12 +10,12 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from array import array
-from bisect import bisect_left, bisect_right
+from bisect import bisect_right
 from collections.abc import Sequence
 from operator import sub
 from typing import ClassVar, Final, NamedTuple
 
-BLOCK: Final = 32
+BLOCK: Final = 48
 """Entries that are summed up together: a window has at most two blocks of which only a part lies in it."""
 
 REACH: Final = 720_000
@@ -38,36 +38,52 @@ _LATEST: Final = 2**31
 """Milliseconds after the first entry's origin at which times are counted from a newer one: they have 32 bits."""
 
 
-class WindowParts(NamedTuple):
-    """The entries of a window: half-open ranges of raw ones, and the whole blocks between them."""
-
-    raw: tuple[tuple[int, int], ...]
-    blocks: slice
-
-
 class Sums(NamedTuple):
     """The milliseconds covered in a span, and two integrals over them."""
 
-    covered: float
+    covered: int
     first: float
     second: float
 
+    def plus(self, other: Sums) -> Sums:
+        """Return the sums of both spans."""
+        return Sums(self.covered + other.covered, self.first + other.first, self.second + other.second)
+
+    def less(self, part: Sums) -> Sums:
+        """Return the sums of what is left of a span without a part of it."""
+        return Sums(self.covered - part.covered, self.first - part.first, self.second - part.second)
+
+
+NO_SUMS: Final = Sums(0, 0, 0)
+
 
 class Edge(NamedTuple):
-    """A moment, the block in which it lies, and the sums of the part of that block on the window's side of it."""
+    """A moment at which windows begin or end, the block in which it lies, and that block's sums before and behind it.
+
+    Of the newest block `behind` is nothing: what begins there ends there too.
+    """
 
     at: int
     block: int
-    sums: Sums
+    before: Sums
+    behind: Sums
 
 
 class HeldSeries:
-    """Entries in order of time: a good value, or a gap that begins where a value holds no longer."""
+    """Entries in order of time: a good value, or a gap that begins where a value holds no longer.
+
+    The newest block is summed up as it grows, so that a window costs little more than its oldest block.
+    """
 
     __slots__ = (
         "_close_at",
         "_covered",
         "_first",
+        "_newest_kept",
+        "_open_covered",
+        "_open_first",
+        "_open_gaps",
+        "_open_second",
         "_origin",
         "_scale",
         "_second",
@@ -86,10 +102,13 @@ class HeldSeries:
         self._scale = SCALE
         """What values are multiplied with: 1 where they are kept as they are."""
         self._covered, self._first, self._second = array("I"), array("d"), array("d")
-        """The sums of each block that is summed up."""
+        """The sums of each block that is complete."""
+        self._empty_open()
+        self._newest_kept: float = 0
+        """The newest value as it is kept."""
         self._origin = 0
         self._close_at = BLOCK
-        """Entries with which the next block is complete, and the entry behind it is not known yet."""
+        """Entries with which the newest block is complete; it is closed when another follows."""
         self.newest = 0
         """When the newest value was measured; 0: there is none."""
         self.held_until = 0
@@ -97,8 +116,9 @@ class HeldSeries:
 
     def add(self, at: int, value: float, hold: int) -> None:
         """Take a good value measured at `at`, which holds for `hold` at most; one before the newest counts as new."""
-        if at < self.newest:  # noqa: PLR1730 - a call would take longer; this is done for each sample
-            at = self.newest
+        newest = self.newest
+        if at < newest:  # noqa: PLR1730 - a call would take longer; this is done for each sample
+            at = newest
         kept = value
         if self._scale != 1:
             kept = round(value * SCALE)
@@ -107,31 +127,41 @@ class HeldSeries:
                 kept = value
         if self.held_until < at:
             self._resume(at, kept)
+        else:
+            self._settle(at - newest)
+        if len(self._times) == self._close_at:
+            self._close_block(at)
         self._times.append(at - self._origin)
         self._values.append(kept)  # type: ignore[arg-type] # whole, where they are
         self.newest = at
         self.held_until = at + hold
-        if len(self._times) > self._close_at:
-            self._sum_up(at)
+        self._newest_kept = kept
+        self._took(at, kept)
 
     def end(self, at: int) -> None:
         """Let the newest value hold no longer than `at`, which is not before it."""
         self.held_until = min(self.held_until, max(at, self.newest))
 
-    def begin(self, at: int) -> Edge:
-        """Return the beginning of windows: what lies behind `at` in its block."""
-        at -= self._origin
-        place = max(0, bisect_right(self._times, at) - 1)
-        block = place // BLOCK
-        last = min((block + 1) * BLOCK, len(self._times))
-        return Edge(at, block, self._sums(*self._held(place, last, at, _LAST)))
-
-    def until(self, at: int) -> Edge:
-        """Return the end of windows: what lies before `at` in its block."""
+    def edge(self, at: int) -> Edge:
+        """Return a moment at which windows begin or end."""
         at -= self._origin
         last = bisect_right(self._times, at)
-        block = max(0, last - 1) // BLOCK
-        return Edge(at, block, self._sums(*self._held(block * BLOCK, last, 0, at)))
+        place = max(0, last - 1)
+        block = place // BLOCK
+        begin = block * BLOCK
+        if block == self._closed:
+            if last == len(self._times):
+                return Edge(at, block, self._open(min(at, self.held_until - self._origin)), NO_SUMS)
+            return Edge(at, block, self._sums(*self._held(begin, last, 0, at)), NO_SUMS)
+        whole = Sums(self._covered[block], self._first[block], self._second[block])
+        if self._scale == 1:  # what is left of a sum has not all digits of its parts
+            before = self._sums(*self._held(begin, last, 0, at))
+            return Edge(at, block, before, self._sums(*self._held(place, begin + BLOCK, at, _LAST)))
+        if last - begin <= BLOCK // 2:
+            before = self._sums(*self._held(begin, last, 0, at))
+            return Edge(at, block, before, whole.less(before))
+        behind = self._sums(*self._held(place, begin + BLOCK, at, _LAST))
+        return Edge(at, block, whole.less(behind), behind)
 
     def between(self, begin: Edge, end: Edge) -> Sums:
         """Return the sums of a window."""
@@ -139,7 +169,7 @@ class HeldSeries:
             first = max(0, bisect_right(self._times, begin.at) - 1)
             return self._sums(*self._held(first, bisect_right(self._times, end.at), begin.at, end.at))
         which = slice(begin.block + 1, end.block)
-        (covered, one, two), (more, more_one, more_two) = begin.sums, end.sums
+        (covered, one, two), (more, more_one, more_two) = begin.behind, end.before
         return Sums(
             covered + sum(self._covered[which]) + more,
             one + sum(self._first[which]) + more_one,
@@ -148,34 +178,38 @@ class HeldSeries:
 
     def _keep_as_they_are(self) -> None:
         self._values = array("d", [each if each == GAP else each / SCALE for each in self._values])
+        self._newest_kept /= SCALE
         self._scale = 1
         self._scaled_down()
 
     def _resume(self, at: int, kept: float) -> None:
         """Note the gap before a value; where nothing before it is in any window the series begins with it."""
         if self._times and at - self.reach <= self.held_until:
+            self._settle(self.held_until - self.newest)
+            if len(self._times) == self._close_at:
+                self._close_block(at)
             self._times.append(self.held_until - self._origin)
             self._values.append(GAP)
-            if len(self._times) > self._close_at:
-                self._sum_up(at)
+            self._open_gaps += 1
+            self._gap()
         else:
             self._drop(self._closed)
             del self._times[:], self._values[:]
+            self._empty_open()
             self._close_at = BLOCK
             self._origin = at
             self._start(kept)
 
-    def _sum_up(self, at: int) -> None:
-        """Sum up the block that is complete, and drop what lies before all windows that end at `at` or later.
+    def _close_block(self, at: int) -> None:
+        """Close the block that is complete, and drop what lies before all windows that end at `at` or later.
 
         The entry that may hold at their beginning stays.
         """
-        first = self._close_at - BLOCK
-        sums = self._sums(*self._held(first, first + BLOCK, 0, _LAST))
-        self._covered.append(int(sums.covered))
-        self._first.append(sums.first)
-        self._second.append(sums.second)
-        self._close(first)
+        self._covered.append(self._open_covered)
+        self._first.append(self._open_first)
+        self._second.append(self._open_second)
+        self._close()
+        self._empty_open()
         blocks = max(0, bisect_right(self._times, at - self.reach - self._origin) - 1) // BLOCK
         if blocks * BLOCK >= _DROPPED_AT_ONCE:
             self._drop(blocks)
@@ -186,15 +220,6 @@ class HeldSeries:
             self._origin += oldest
 
     # What a window is made of
-
-    def _measured(self, begin: int, end: int) -> WindowParts:
-        """Return the entries that begin within [begin, end)."""
-        first = bisect_left(self._times, begin - self._origin)
-        last = max(first, bisect_left(self._times, end - self._origin))
-        block, blocks = -(-first // BLOCK), min(last // BLOCK, self._closed)
-        if block >= blocks:
-            return WindowParts(((first, last),), slice(0, 0))
-        return WindowParts(((first, block * BLOCK), (blocks * BLOCK, last)), slice(block, blocks))
 
     def _held(self, first: int, last: int, begin: int, end: int) -> tuple[list[int] | list[float], list[int]]:
         """Return these entries, and the milliseconds for which each holds within [begin, end), counted from the origin.
@@ -220,13 +245,35 @@ class HeldSeries:
         del self._times[: blocks * BLOCK], self._values[: blocks * BLOCK]
         del self._covered[:blocks], self._first[:blocks], self._second[:blocks]
 
+    def _empty_open(self) -> None:
+        """Begin the newest block."""
+        self._open_covered, self._open_first, self._open_second = 0, 0.0, 0.0
+        """Its sums, but for its newest value, which holds for an unknown time."""
+        self._open_gaps = 0
+
     @abstractmethod
     def _sums(self, values: Sequence[float], held: list[int]) -> Sums:
         """Return the time covered and the integrals of these entries; gaps are among the values."""
 
     @abstractmethod
-    def _close(self, first: int) -> None:
-        """Note what else is to be known of the block that begins with entry `first`."""
+    def _settle(self, held: int) -> None:
+        """Add the newest value to the sums of the newest block: it holds for `held`."""
+
+    @abstractmethod
+    def _open(self, until: int) -> Sums:
+        """Return the sums of the newest block if its newest value holds until then."""
+
+    @abstractmethod
+    def _took(self, at: int, kept: float) -> None:
+        """Note what else is to be known of the newest value."""
+
+    @abstractmethod
+    def _gap(self) -> None:
+        """Note that the newest entry is a gap, behind the value measured at `newest`."""
+
+    @abstractmethod
+    def _close(self) -> None:
+        """Note what else is to be known of the block that is closed."""
 
     @abstractmethod
     def _start(self, kept: float) -> None:

@@ -8,22 +8,24 @@ them. Means are weighted by the time for which each value holds.
 from __future__ import annotations
 
 from array import array
-from bisect import bisect_right
-from collections import deque
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import accumulate
 from math import inf, sqrt
 from operator import mul
-from typing import Final, NamedTuple
+from typing import Final
 
-from lfs10d.telemetry.wind.series import BLOCK, GAP, SCALE, Edge, HeldSeries, Sums
+from lfs10d.telemetry.wind.extremes import NOTHING_FOUND, Extremes, Found, Peak
+from lfs10d.telemetry.wind.series import BLOCK, GAP, SCALE, HeldSeries, Sums
 
 GUST_OVER: Final = 3000
 """Milliseconds of a gust's mean (WMO-No. 8)."""
 
 GUST_LEAST: Final = 3
 """Values that a gust's mean is made of at least."""
+
+_NOTHING: Final[tuple[float, float, float]] = (-inf, -inf, inf)
+"""Greatest value, gust and lull of a block that has none yet."""
 
 
 @dataclass(slots=True)
@@ -50,67 +52,31 @@ class Mean:
         self.covered = covered
 
 
-class Peak(NamedTuple):
-    """A gust or lull, and when its mean ended (ms)."""
-
-    speed: float
-    at: int
-
-
-@dataclass(slots=True)
-class Extremes:
-    """`samples` values, the greatest of them, the greatest and the least mean of 3 s; None where there is none."""
-
-    samples: int = 0
-    greatest: float | None = None
-    gust: Peak | None = None
-    lull: Peak | None = None
-
-    def add(self, other: Extremes) -> None:
-        """Take the values of a later window as well; of equal ones the later counts."""
-        self.samples += other.samples
-        if other.greatest is not None and (self.greatest is None or other.greatest > self.greatest):
-            self.greatest = other.greatest
-        if other.gust is not None and (self.gust is None or other.gust.speed >= self.gust.speed):
-            self.gust = other.gust
-        if other.lull is not None and (self.lull is None or other.lull.speed <= self.lull.speed):
-            self.lull = other.lull
-
-
-class _Found(NamedTuple):
-    """`samples` values and the greatest of them; the greatest and least mean of 3 s, and the entries they end with.
-
-    Without one they are -inf and inf.
-    """
-
-    samples: int
-    greatest: float
-    gust: float
-    gust_place: int
-    lull: float
-    lull_place: int
-
-    def with_later(self, other: _Found) -> _Found:
-        """Return what is found in both; of equal gusts the later counts."""
-        gust = other if other.gust >= self.gust else self
-        lull = other if other.lull <= self.lull else self
-        return _Found(
-            self.samples + other.samples,
-            max(self.greatest, other.greatest),
-            gust.gust,
-            gust.gust_place,
-            lull.lull,
-            lull.lull_place,
-        )
-
-
-_NONE: Final = _Found(0, -inf, -inf, 0, inf, 0)
-
-
 class SpeedSeries(HeldSeries):
     """The speeds of one anemometer."""
 
-    __slots__ = ("_greatest", "_gusts", "_gusts_at", "_lulls", "_lulls_at", "_samples", "_zero")
+    __slots__ = (
+        "_greatest",
+        "_gust",
+        "_gusts",
+        "_gusts_at",
+        "_lulls",
+        "_lulls_at",
+        "_oldest",
+        "_open_greatest",
+        "_open_gust",
+        "_open_gust_place",
+        "_open_lull",
+        "_open_lull_place",
+        "_samples",
+        "_total",
+        "_whole_from",
+        "_zero",
+    )
+
+    _open_greatest: float
+    _open_gust: float
+    _open_lull: float
 
     def __init__(self) -> None:
         super().__init__()
@@ -119,27 +85,43 @@ class SpeedSeries(HeldSeries):
         self._samples, self._greatest = array("B"), array("d")
         self._gusts, self._gusts_at = array("d"), array("B")
         self._lulls, self._lulls_at = array("d"), array("B")
-        """Of each block; gusts and lulls with their place in it, -inf and inf where there is none."""
+        """Of each closed block; gusts and lulls with their place in it, -inf and inf where there is none."""
+        self._oldest = 0
+        """The oldest value of the last 3 s that no gap parts from the newest."""
+        self._total: float = 0
+        """The sum of the values from there on, as they are kept."""
+        self._whole_from = 0
+        """When the values before the newest gap are 3 s old: until then there is no gust."""
+        self._gust = -inf
+        """The mean of 3 s at the newest value, as it is kept; -inf where there is none."""
 
     def mean(self, begin: int, end: int) -> Mean:
         """Return the mean over [begin, end)."""
-        return self.mean_between(self.begin(begin), self.until(end))
+        return self.mean_of(self.between(self.edge(begin), self.edge(end)))
 
-    def mean_between(self, begin: Edge, end: Edge) -> Mean:
-        """Return the mean from one moment to a later one."""
-        covered, one, two = self.between(begin, end)
+    def mean_of(self, sums: Sums) -> Mean:
+        """Return the mean of a window with these sums."""
+        covered, one, two = sums
         if not covered:
             return Mean()
         scale = self._scale
         mean = (self._zero + one / covered) / scale
-        return Mean(round(covered), mean, max(0.0, two - one * one / covered) / (scale * scale))
+        return Mean(covered, mean, max(0.0, two - one * one / covered) / (scale * scale))
 
     def extremes(self, begin: int, end: int) -> Extremes:
         """Return what was measured, and the gusts that were taken, within [begin, end)."""
-        parts = self._measured(begin, end)
-        found = self._scan(*parts.raw[0])
-        if len(parts.raw) > 1:
-            found = found.with_later(self._of_blocks(parts.blocks)).with_later(self._scan(*parts.raw[1]))
+        first = bisect_left(self._times, begin - self._origin)
+        last = max(first, bisect_left(self._times, end - self._origin))
+        block, blocks = -(-first // BLOCK), min(last // BLOCK, self._closed)
+        if block > blocks or last == block * BLOCK:
+            found = self._scan(first, last)
+        else:
+            whole = last == len(self._times)
+            found = self._found_open() if whole else self._scan(blocks * BLOCK, last)
+            if block < blocks:
+                found = self._of_blocks(slice(block, blocks)).with_later(found)
+            if first < block * BLOCK:
+                found = self._rest(block - 1, first, found).with_later(found)
         return Extremes(
             found.samples,
             found.greatest if found.samples else None,
@@ -149,9 +131,7 @@ class SpeedSeries(HeldSeries):
 
     def newest_gust(self) -> float | None:
         """Return the mean of 3 s that was taken at the newest value, None where it was none."""
-        last = len(self._times)
-        gust = self._scan(last - 1, last).gust
-        return None if gust == -inf else gust
+        return None if self._gust == -inf else self._gust / self._scale
 
     def _sums(self, values: Sequence[float], held: list[int]) -> Sums:
         """Return time covered, and the integrals of the speed as it is kept and of its square, counted from `_zero`."""
@@ -162,62 +142,77 @@ class SpeedSeries(HeldSeries):
         weighted = list(map(mul, apart, held))
         return Sums(sum(held), sum(weighted), sum(map(mul, weighted, apart)))
 
-    def _scan(self, first: int, last: int) -> _Found:
-        """Return the extremes of these entries; a gust may reach back to entries before them."""
-        if first >= last or first < 0:
-            return _NONE
-        start = bisect_right(self._times, self._times[first] - GUST_OVER, 0, first)
-        times, values = self._times[start:last].tolist(), self._values[start:last].tolist()
-        if GAP in values:
-            return self._scan_gaps(start, first, times, values)
-        sums = list(accumulate(values, initial=0))
-        gusts, places, oldest = [], [], 0
-        for place in range(first - start, last - start):
-            until = times[place] - GUST_OVER
-            while times[oldest] <= until:
+    def _settle(self, held: int) -> None:
+        apart = self._newest_kept - self._zero
+        weighted = apart * held
+        self._open_covered += held
+        self._open_first += weighted
+        self._open_second += weighted * apart
+
+    def _open(self, until: int) -> Sums:
+        held = until + self._origin - self.newest
+        apart = self._newest_kept - self._zero
+        weighted = apart * held
+        return Sums(self._open_covered + held, self._open_first + weighted, self._open_second + weighted * apart)
+
+    def _took(self, at: int, kept: float) -> None:
+        times, oldest, outside = self._times, self._oldest, at - self._origin - GUST_OVER
+        if self._scale == 1:  # a sum that runs on loses digits
+            while times[oldest] <= outside:
                 oldest += 1
-            count = place + 1 - oldest
-            if count >= GUST_LEAST:
-                gusts.append((sums[place + 1] - sums[oldest]) / count)
-                places.append(start + place)
-        return self._found(last - first, max(values[first - start :]), gusts, places)
+            total = sum(self._values[oldest:])
+        else:
+            total = self._total + kept
+            while times[oldest] <= outside:
+                total -= self._values[oldest]
+                oldest += 1
+        self._oldest, self._total = oldest, total
+        if kept > self._open_greatest:  # noqa: PLR1730 - a call would take longer; this is done for each sample
+            self._open_greatest = kept
+        count = len(times) - oldest
+        if count < GUST_LEAST or at < self._whole_from:
+            self._gust = -inf
+            return
+        self._gust = gust = total / count
+        if gust >= self._open_gust:  # of equal ones the later counts
+            self._open_gust, self._open_gust_place = gust, len(times) - 1
+        if gust <= self._open_lull:
+            self._open_lull, self._open_lull_place = gust, len(times) - 1
 
-    def _scan_gaps(self, start: int, first: int, times: list[int], values: Sequence[float]) -> _Found:
-        """Return the extremes of the entries from `first` on, where there are gaps among them or before them.
+    def _gap(self) -> None:
+        self._oldest, self._total = len(self._times), 0
+        self._whole_from = self.newest + GUST_OVER
 
-        Times and values are those from the entry `start` on.
-        """
-        gusts, places, good, window = [], [], [], deque[int]()
-        whole_from = 0  # the window has no gap between its values if its oldest entry is none before this one
-        for place, (at, value) in enumerate(zip(times, values, strict=True)):
-            while window and times[window[0]] <= at - GUST_OVER:
-                window.popleft()
-            if value == GAP:
-                whole_from = place
-                continue
-            window.append(place)
-            if start + place < first:
-                continue
-            good.append(value)
-            if len(window) >= GUST_LEAST and window[0] >= whole_from:
-                gusts.append(sum(values[window[0] : place + 1]) / len(window))
-                places.append(start + place)
-        return self._found(len(good), max(good, default=-inf), gusts, places)
+    # Extremes
 
-    def _found(self, samples: int, greatest: float, gusts: list[float], places: list[int]) -> _Found:
+    def _found_open(self) -> Found:
+        """Return the extremes of the newest block."""
         scale = self._scale
-        if not gusts:
-            return _Found(samples, greatest / scale, -inf, 0, inf, 0)
-        gust, lull, last = max(gusts), min(gusts), len(gusts) - 1
-        backwards = gusts[::-1]  # of equal ones the later counts
-        gust_at, lull_at = places[last - backwards.index(gust)], places[last - backwards.index(lull)]
-        return _Found(samples, greatest / scale, gust / scale, gust_at, lull / scale, lull_at)
+        return Found(
+            len(self._times) - self._closed * BLOCK - self._open_gaps,
+            self._open_greatest / scale,
+            self._open_gust / scale,
+            self._open_gust_place,
+            self._open_lull / scale,
+            self._open_lull_place,
+        )
 
-    def _of_blocks(self, which: slice) -> _Found:
+    def _rest(self, block: int, first: int, later: Found) -> Found:
+        """Return the extremes of the entries of a closed block from `first` on.
+
+        They are looked for only if any of the block is beyond those of `later`.
+        """
+        end = (block + 1) * BLOCK
+        if self._greatest[block] > later.greatest or self._gusts[block] > later.gust or self._lulls[block] < later.lull:
+            return self._scan(first, end)
+        whole = self._samples[block] == BLOCK
+        return NOTHING_FOUND._replace(samples=end - first - (0 if whole else self._values[first:end].count(GAP)))
+
+    def _of_blocks(self, which: slice) -> Found:
         gusts, lulls, last = self._gusts[which], self._lulls[which], which.stop - 1
         gust, lull = max(gusts), min(lulls)
         gust_block, lull_block = last - gusts[::-1].index(gust), last - lulls[::-1].index(lull)
-        return _Found(
+        return Found(
             sum(self._samples[which]),
             max(self._greatest[which]),
             gust,
@@ -226,24 +221,66 @@ class SpeedSeries(HeldSeries):
             lull_block * BLOCK + self._lulls_at[lull_block],
         )
 
-    def _close(self, first: int) -> None:
-        found = self._scan(first, first + BLOCK)
-        self._samples.append(found.samples)
+    def _scan(self, first: int, last: int) -> Found:
+        """Return the extremes of these entries; a gust may reach back to entries before them."""
+        if first >= last:
+            return NOTHING_FOUND
+        start = bisect_right(self._times, self._times[first] - GUST_OVER, 0, first)
+        times, values = self._times[start:last].tolist(), self._values[start:last].tolist()
+        gusts, places, good, oldest, whole_from = [], [], [], 0, 0
+        for place, (at, value) in enumerate(zip(times, values, strict=True)):
+            if value == GAP:
+                oldest = place + 1
+                whole_from = times[place - 1] + GUST_OVER if place else 0
+                continue
+            while times[oldest] <= at - GUST_OVER:
+                oldest += 1
+            if start + place < first:
+                continue
+            good.append(value)
+            if place + 1 - oldest >= GUST_LEAST and at >= whole_from:
+                gusts.append(sum(values[oldest : place + 1]) / (place + 1 - oldest))
+                places.append(start + place)
+        scale, greatest = self._scale, max(good, default=-inf)
+        if not gusts:
+            return NOTHING_FOUND._replace(samples=len(good), greatest=greatest / scale)
+        gust, lull, end = max(gusts), min(gusts), len(gusts) - 1
+        backwards = gusts[::-1]  # of equal ones the later counts
+        gust_at, lull_at = places[end - backwards.index(gust)], places[end - backwards.index(lull)]
+        return Found(len(good), greatest / scale, gust / scale, gust_at, lull / scale, lull_at)
+
+    # Blocks
+
+    def _close(self) -> None:
+        found, first = self._found_open(), self._closed * BLOCK - BLOCK
+        self._samples.append(BLOCK - self._open_gaps)
         self._greatest.append(found.greatest)
         self._gusts.append(found.gust)
         self._gusts_at.append(max(0, found.gust_place - first))
         self._lulls.append(found.lull)
         self._lulls_at.append(max(0, found.lull_place - first))
 
+    def _empty_open(self) -> None:
+        super()._empty_open()
+        self._open_greatest, self._open_gust, self._open_lull = _NOTHING
+        self._open_gust_place = self._open_lull_place = 0
+
     def _drop(self, blocks: int) -> None:
         super()._drop(blocks)
+        self._oldest -= blocks * BLOCK
         for column in (self._samples, self._greatest, self._gusts, self._gusts_at, self._lulls, self._lulls_at):
             del column[:blocks]
 
     def _start(self, kept: float) -> None:
         self._zero = kept
+        self._oldest, self._total, self._whole_from = 0, 0, 0
 
     def _scaled_down(self) -> None:
         self._zero /= SCALE
+        self._open_first /= SCALE
+        self._open_second /= SCALE**2
+        self._open_greatest /= SCALE
+        self._open_gust /= SCALE
+        self._open_lull /= SCALE
         self._first = array("d", [each / SCALE for each in self._first])
         self._second = array("d", [each / SCALE**2 for each in self._second])

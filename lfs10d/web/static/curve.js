@@ -1,9 +1,10 @@
 // A curve on a canvas: the band from least to greatest, the mean, and a mark for each step with failed polls.
 // A step is [start in s, mean, least, greatest, failed polls]; where a value is missing the curve has a gap.
 
-import { shown } from "./units.js";
+import { marks, shown } from "./units.js";
 
 const STEP = 4;
+const LINE_HEIGHT = 14; // px of a text of the scale
 const waiting = new Map();
 const watcher = typeof IntersectionObserver === "undefined" ? null : new IntersectionObserver((entries) => {
   for (const entry of entries) {
@@ -96,11 +97,12 @@ function runs(points, longest) {
 
 function scaleOf(pen, { begin, span, width, height, left, x, y, greatest, unit, color }) {
   pen.fillStyle = color("--soft");
-  const raw = greatest / 4, power = 10 ** Math.floor(Math.log10(raw));
-  const step = [1, 2, 2.5, 5, 10].map((each) => each * power).find((each) => each >= raw);
   pen.fillText(shown(0, unit)[1], 2, 11);
-  for (let value = 0; value <= greatest; value += step) {
-    pen.fillText(shown(value, unit)[0], 2, y(value) + 4);
+  const [zero, ...others] = marks(greatest, unit), drawn = [];
+  for (const [value, words] of [zero, ...others.reverse()]) {
+    if (drawn.some((each) => Math.abs(each - y(value)) < LINE_HEIGHT)) continue; // Beaufort numbers lie close together
+    drawn.push(y(value));
+    pen.fillText(words, 2, y(value) + 4);
     pen.globalAlpha = 0.35;
     pen.beginPath();
     pen.moveTo(left, Math.round(y(value)) + 0.5);
@@ -108,8 +110,12 @@ function scaleOf(pen, { begin, span, width, height, left, x, y, greatest, unit, 
     pen.stroke();
     pen.globalAlpha = 1;
   }
+  let free = -Infinity;
   for (let minute = Math.ceil(begin / 600) * 600; minute < begin + span; minute += 600) {
     const text = new Date(minute * 1000).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", hour12: false });
-    pen.fillText(text, Math.min(x(minute), width - 34), height - 4);
+    const wide = pen.measureText(text).width, place = Math.min(x(minute), width - wide);
+    if (place < free) continue;
+    pen.fillText(text, place, height - 4);
+    free = place + wide + 6;
   }
 }

@@ -6,7 +6,7 @@ import { answers, frameList, lineNotices } from "./line.js";
 import { notice } from "./overview.js";
 import { sensorFields } from "./sensor.js";
 import { now, site } from "./stream.js";
-import { shown } from "./units.js";
+import { worded } from "./units.js";
 
 export function devicePage(root, key, name) {
   const label = h("p", { class: "facts", dir: "auto" }), fields = sensorFields(name, { span: 3600, title: "Last hour", axis: true });
@@ -76,7 +76,7 @@ function configTable(device) {
 
 function windTable(wind) {
   if (!wind) return h("p", { class: "empty" }, "No wind statistics are published for it.");
-  const speed = (value) => (typeof value === "number" ? shown(value, wind.unit ?? "m/s").join(" ") : "–");
+  const speed = (value) => (typeof value === "number" ? worded(value, wind.unit ?? "m/s") : "–");
   const when = (ts) => (ts ? ` at ${timeText(ts, now())}` : "");
   const rows = [["mean of 2 min", speed(wind.mean_2m)], ["mean of 10 min", speed(wind.mean_10m)], ["gust (3 s) in 10 min", speed(wind.gust_10m) + when(wind.gust_10m_ts)], ["lull in 10 min", speed(wind.lull_10m) + when(wind.lull_10m_ts)],
     ["greatest value in 10 min", speed(wind.max_10m)], ["Beaufort", wind.beaufort ?? "–"], ["covered", typeof wind.coverage_10m === "number" ? `${Math.round(wind.coverage_10m * 100)} % of 10 min` : null]];

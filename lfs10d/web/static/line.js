@@ -5,7 +5,7 @@ import { ageText, facts, h, renew, setText, timeText, together } from "./dom.js"
 import { notice } from "./overview.js";
 import { main, old, state } from "./sensor.js";
 import { now, site } from "./stream.js";
-import { shown } from "./units.js";
+import { worded } from "./units.js";
 import { post } from "./session.js";
 
 export function lineFacts(line) {
@@ -75,7 +75,7 @@ export function linePage(root, key) {
     renew(parts.notices, lineNotices(line), () => lineNotices(line).map(notice));
     const rows = (line.order ?? []).filter((name) => line.devices[name]).map((name) => {
       const device = line.devices[name];
-      return [name, device.id, device.label ?? "", shown(...main(device)).join(" "), state(line, device)[1], old(line, device)];
+      return [name, device.id, device.label ?? "", worded(...main(device)), state(line, device)[1], old(line, device)];
     });
     renew(parts.sensors, rows, () => rows.length ? sensorTable(key, rows) : h("p", { class: "empty" }, "There are no sensors on this line yet."));
     renew(parts.facts, [line.line, line.info, line.source], () => lineTable(line));
@@ -84,7 +84,7 @@ export function linePage(root, key) {
     renew(parts.answers, line.requests, () => answers(line.requests ?? []));
     renew(parts.scan, line.scan, () => line.scan ? scanProgress(line.scan) : null);
     renew(parts.mounting, [line.mounting?.words, line.mounting?.problem], () => mountingState(line.mounting));
-    const mounted = (line.mounting?.adopted ?? []).map((each) => [each, line.devices[each.device]]).map(([each, device]) => [each, device ? shown(...main(device)).join(" ") : "", device ? state(line, device) : ["", ""]]);
+    const mounted = (line.mounting?.adopted ?? []).map((each) => [each, line.devices[each.device]]).map(([each, device]) => [each, device ? worded(...main(device)) : "", device ? state(line, device) : ["", ""]]);
     renew(parts.mounted, mounted, () => mountedList(key, mounted));
     update(line);
   };

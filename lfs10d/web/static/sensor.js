@@ -3,7 +3,7 @@
 import { draw, watch } from "./curve.js";
 import { ageText, h, setClass, setText, timeText } from "./dom.js";
 import { live, now } from "./stream.js";
-import { shown } from "./units.js";
+import { shown, worded } from "./units.js";
 
 const WAY = 1; // s from the sensor to the eye, beyond three intervals
 
@@ -37,7 +37,7 @@ export function state(line, device) {
 export function ageWords(line, device) {
   if (!old(line, device) || device.enabled === false) return "";
   const seconds = age(device);
-  return seconds === null ? "" : ` · last value ${ageText(seconds)} ago`;
+  return seconds === null ? "" : ` · last value ${ageText(seconds)}\u00a0ago`;
 }
 
 // The fields of a sensor that its card and its page share, and what fills them; `axis`: the tall curve, with a scale.
@@ -52,7 +52,7 @@ export function sensorFields(name, { span, title, axis = false }) {
       const [value, itsUnit] = main(device), [text, unitText] = shown(value, itsUnit), [kind, stateText] = state(line, device);
       setText(figure, text);
       setText(unit, unitText);
-      setText(more, windWords(device));
+      setText(more, windWords(device, old(line, device)));
       setText(words, stateText);
       setText(aged, ageWords(line, device));
       setClass(said, "good", kind === "good");
@@ -67,17 +67,17 @@ export function sensorFields(name, { span, title, axis = false }) {
   };
 }
 
-// Gust, mean and direction, as far as the daemon publishes them.
-export function windWords(device) {
+// Gust, mean and direction, as far as the daemon publishes them; of an old value it is said that they are old too.
+export function windWords(device, isOld) {
   const wind = device.wind, words = [];
   if (wind) {
     for (const [name, key] of [["gust", "gust_10m"], ["mean", "mean_10m"]]) {
-      if (typeof wind[key] === "number") words.push(`${name} ${shown(wind[key], wind.unit ?? "m/s").join(" ")}`);
+      if (typeof wind[key] === "number") words.push(`${name} ${worded(wind[key], wind.unit ?? "m/s")}`);
     }
     if (typeof wind.direction_2m === "number") words.push(`from ${Math.round(wind.direction_2m)}°`);
   }
   for (const [name, value] of Object.entries(device.values ?? {}).slice(1)) {
-    words.push(`${name.replaceAll("_", " ")} ${shown(value, device.units[name]).join(" ")}`);
+    words.push(`${name.replaceAll("_", " ")} ${worded(value, device.units[name])}`);
   }
-  return words.join(" · ");
+  return words.length && isOld ? `last known: ${words.join(" · ")}` : words.join(" · ");
 }

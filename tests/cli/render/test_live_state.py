@@ -113,6 +113,22 @@ def test_of_a_device_that_fails_the_statistics_tell_the_last_good_value() -> Non
     assert heard.age("b") is None
 
 
+@pytest.mark.parametrize("statistics_first", [False, True])
+def test_a_device_not_polled_yet_has_no_value_since_the_start_but_perhaps_one_before(statistics_first: bool) -> None:  # noqa: FBT001 - a case
+    heard = Heard("a")
+    stats = {"last_good_ts": round((WALL + heard.now) * 1000)}
+    if statistics_first:
+        heard.tell("device/a/stats", stats)
+    heard.sample("a", None, leaf="state", error="starting")
+    heard.tell("device/a/stats", stats)
+    assert heard.age("a") is None
+    heard.sample("a", 5.0)
+    assert heard.age("a") == 0.0
+    heard.now += 30
+    heard.sample("a", None, leaf="state", error="starting", boot="cccccccc")
+    assert heard.age("a") == pytest.approx(30)
+
+
 @pytest.mark.parametrize("interval", [0.25, 1.0, 3600.0])
 def test_a_value_is_late_three_intervals_and_three_seconds_after_it_came(interval: float) -> None:
     heard = Heard()

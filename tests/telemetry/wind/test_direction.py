@@ -94,6 +94,19 @@ def test_what_is_forgotten_counts_no_longer() -> None:
     assert filled.spread(T + 1_400_000, T + 2_010_000) == Spread(0, 180, 180)
 
 
+def test_of_a_window_over_several_blocks_the_values_at_its_ends_count_one_by_one() -> None:
+    filled = series([float(place) for place in range(BLOCK)] + [100.0] * 3 * BLOCK + [200.0] * 10)
+    assert filled.samples(T, T + 10**6) == 4 * BLOCK + 10
+    for first in range(BLOCK - 2, BLOCK + 2):
+        begin, end = T + 1000 * first, T + 10**6
+        assert filled.samples(begin, end) == 4 * BLOCK + 10 - first
+        least = first if first < BLOCK else 100
+        assert filled.spread(begin, end) == Spread(200 - least, least, 200)
+    assert filled.spread(T + 1000 * (BLOCK - 1), T + 1000 * (4 * BLOCK + 5)) == Spread(201 - BLOCK, BLOCK - 1, 200)
+    filled.add(T + 500_000, 200.0, 2000)  # behind a gap
+    assert filled.samples(T + 30_000, T + 10**6) == 4 * BLOCK + 11 - 30
+
+
 def test_after_a_long_silence_a_series_begins_anew() -> None:
     filled = series([90.0] * 100)
     filled.add(T + 10**7, 180.0, 2000)

@@ -77,6 +77,14 @@ def test_before_anything_is_measured_nothing_is_known_and_it_is_not_calm() -> No
     assert found["unit"] == "m/s"
 
 
+def test_values_dated_before_the_newest_count_as_new() -> None:
+    wind = MeasuredWind(SPEED)
+    wind.on_values({"wind_speed": 4.0}, {}, T, HOLD)
+    wind.on_values({"wind_speed": 6.0}, {}, T - 300, HOLD)
+    assert wind.newest == T
+    assert wind.figures(T + 1, SHIFT, undersampled=False)["samples_10m"] == 2
+
+
 def test_a_mean_is_null_until_half_its_window_is_covered() -> None:
     assert pick(figures(measured(lambda _: 4.0, 59)), "mean_2m", "mean_10m") == (None, None)
     assert pick(figures(measured(lambda _: 4.0, 60)), "mean_2m", "mean_10m") == (4.0, None)

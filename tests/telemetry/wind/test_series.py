@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from lfs10d.telemetry.wind.series import BLOCK, GAP, REACH
+from lfs10d.telemetry.wind.series import BLOCK, GAP, REACH, Sums
 from lfs10d.telemetry.wind.speed import SpeedSeries
 
 T = 1_000_000_000
@@ -20,6 +20,12 @@ def test_blocks_are_summed_up_as_they_are_complete_though_a_gap_completes_one() 
     filled.add(T + 250 * BLOCK + 9000, 5.0, 2000)  # first the gap, then the value
     assert filled._closed == 1
     assert filled.mean(T, T + 10**6).covered == 250 * (BLOCK - 1) + 2000 + 2000
+
+
+def test_the_sums_of_a_span_are_those_of_its_parts() -> None:
+    whole, part = Sums(5000, 7.0, 9.0), Sums(2000, 3.0, 4.0)
+    assert whole.less(part) == Sums(3000, 4.0, 5.0)
+    assert whole.less(part).plus(part) == whole
 
 
 def test_a_window_between_blocks_in_one_block_and_over_several_has_all_of_its_entries() -> None:

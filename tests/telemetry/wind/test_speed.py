@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lfs10d.telemetry.wind.extremes import Extremes
 from lfs10d.telemetry.wind.series import BLOCK, REACH, HeldSeries
-from lfs10d.telemetry.wind.speed import Extremes, Mean, Peak, SpeedSeries
+from lfs10d.telemetry.wind.speed import Mean, SpeedSeries
 from tests.support.naive_wind import Good, Naive
 
 T = 1_000_000_000
@@ -209,14 +210,31 @@ def test_two_windows_amount_to_their_whole() -> None:
     assert found == filled.extremes(begin, end)
 
 
-def test_of_equal_gusts_the_later_counts() -> None:
-    found = Extremes(1, 3.0, Peak(3.0, 1), Peak(3.0, 1))
-    found.add(Extremes(1, 3.0, Peak(3.0, 2), Peak(3.0, 2)))
-    assert found == Extremes(2, 3.0, Peak(3.0, 2), Peak(3.0, 2))
-    found.add(Extremes(1, 2.0, Peak(2.0, 3), Peak(4.0, 3)))
-    assert found == Extremes(3, 3.0, Peak(3.0, 2), Peak(3.0, 2))
-    found.add(Extremes(1, 4.0, None, None))
-    assert found == Extremes(4, 4.0, Peak(3.0, 2), Peak(3.0, 2))
+@pytest.mark.parametrize("thousandths", [1, 1 / 3])
+def test_any_window_of_a_long_series_with_gaps_is_counted_as_a_naive_reference_counts_it(thousandths: float) -> None:
+    at, values = T, []
+    for place in range(300):
+        at += 9000 if place % 47 == 46 else 250 + place % 7
+        values.append((at, 8 + (place * 37 % 101) * thousandths / 10, 300 if place % 53 == 52 else HOLD))
+    filled, naive = series(values), Naive(values)
+    for begin in range(T - 500, at + 3000, 1499):
+        for end in (begin + 400, begin + 4000, begin + 31_000, at - 700, at + 1):
+            if begin < end:
+                compare(filled, naive, begin, end)
+
+
+def test_a_value_of_any_size_leaves_nothing_behind_in_later_windows() -> None:
+    values = [(T + STEP * place, 1e30 if place == 40 else 5 + place % 3 / 3, HOLD) for place in range(200)]
+    filled, naive, end = series(values), Naive(values), T + STEP * 199
+    for begin in range(T + STEP * 41, end, STEP):
+        mean = filled.mean(begin, end)
+        assert mean.covered == naive.covered(begin, end)
+        assert mean.mean == pytest.approx(naive.mean(begin, end), abs=1e-9)
+    newest = naive.gust_at(199)
+    assert filled.newest_gust() == pytest.approx(newest)
+    gust = gusts(filled, end, 36_000).gust
+    assert gust is not None
+    assert gust.speed == pytest.approx(max(each for each, _ in naive.gusts(end - 35_999, end + 1)))
 
 
 # -- a naive reference ----------------------------------------------------------------------------------------------
