@@ -43,9 +43,9 @@ from lfs10d.telemetry.publication import (
     retained,
 )
 
-STATE_EARLY: Final = 0.01
+STATE_EARLY: Final = 0.03
 """Seconds that a state may come before its time (the next one then waits as much longer): otherwise a device polled
-every second would miss its turn by the jitter of its polls and be shown late each time."""
+every second would miss its turn by the jitter of its polls, or by `mqtt.hold`, and be shown late each time."""
 
 
 class DeviceState:
