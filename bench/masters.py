@@ -21,13 +21,14 @@ AS_A_SERVICE = {"MALLOC_ARENA_MAX": "1"}
 def daemon_configuration(row: Row, port: Path, broker: int) -> dict[str, object]:
     """Return the daemon's configuration of a row; JSON is YAML."""
     profile = row.profile if row.profile == "lfs10" else str(HERE / f"{row.profile}.yaml")
-    return {
+    sections = {
         "line": {"name": "line0", "port": str(port), "baudrate": row.baudrate, "realtime": row.realtime},
         "poll": {"interval": row.interval},
-        "slaves": [{"id": slave, "profile": profile} for slave in row.ids],
         "mqtt": {"host": "127.0.0.1", "port": broker, "base_topic": BASE},
         "log": {"level": "warning"},
+        **row.sections,
     }
+    return {**sections, "slaves": [{"id": slave, "profile": profile, **row.slave} for slave in row.ids]}
 
 
 def command(master: Master, row: Row, folder: Path, port: Path, broker: int, daemon: tuple[str, ...]) -> list[str]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Literal, TypeAlias
 
 Master: TypeAlias = Literal["reference", "daemon"]
@@ -32,6 +33,10 @@ class Row:
     ill: tuple[int, ...] = ()
     """Slave ids left out of the comparison: those that die."""
     realtime: bool = False
+    sections: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
+    """Further keys of the daemon's configuration, by section."""
+    slave: Mapping[str, object] = field(default_factory=dict)
+    """Further keys of each slave."""
     request: tuple[str, str] | None = None
     """What is asked of the daemon by MQTT while it is measured: the request's name and payload."""
     every: float = 0.0
@@ -75,6 +80,8 @@ A_DAY = 864_000
 """Samples of ten sensors at 1 Hz."""
 SCAN = '{"ids": "33-247", "baudrates": [9600]}'
 """At the line's own rate, for the line counts requests at another as a fault."""
+AS_IT_IS = {"wind_speed": {"scale": 1, "offset": 0}}
+"""A calibration that is computed and changes nothing, for values are compared with what was sent."""
 REPUBLISH = ("republish", "{}")
 LIVING = tuple(slave for slave in range(1, 33) if slave not in DYING)
 
@@ -111,6 +118,17 @@ ROWS = (
     Row("4hz", "9 at 4 Hz", sensors=9, interval="250ms", masters=("daemon",), against=""),
     Row("8", "8 at 9600", sensors=8, masters=("daemon",), against="9600"),
     Row("247", "247 at 9600", sensors=247, masters=("daemon",), against="9600", warm=9.0),
+    Row("plain", "32 without wind", profile="plain", masters=("daemon",), against="9600"),
+    Row("records", "records of 1 min", sections={"wind": {"records": "1m"}}, masters=("daemon",), against="9600"),
+    Row("partial", "every sample partial", profile="partial", masters=("daemon",), against="9600"),
+    Row("calibrated", "32 calibrated", slave={"calibration": AS_IT_IS}, masters=("daemon",), against="9600"),
+    Row(
+        "discovery",
+        "Home Assistant's discovery",
+        sections={"homeassistant": {"discovery": True}},
+        masters=("daemon",),
+        against="9600",
+    ),
     Row("replay", "a day's backlog replayed", backlog=A_DAY, masters=("daemon",), against="9600", warm=14.0),
     Row("scan", "a scan of all ids", request=("line/scan", SCAN), masters=("daemon",), against="9600"),
     Row("burst", "all retained topics each s", request=REPUBLISH, every=1.0, masters=("daemon",), against="9600"),
