@@ -24,8 +24,8 @@ def figures(soak: Soak) -> Iterable[tuple[str, str]]:
     killed = f"{counts['killed with it']} samples between others, {oracle.excused['SIGKILL']} answers at the end"
     reach = max(soak.ledger.killed_seconds, oracle.reach.get("SIGKILL", 0.0))
     yield "lost with a SIGKILL", f"{killed}, of at most {reach:.1f} s"
-    yield "good answers not believed", f"{oracle.missed}, told as failures or asked for again"
-    yield "good answers nobody told of", str(oracle.untold)
+    yield "good answers not accepted", f"{oracle.missed}, published as failures or polled again"
+    yield "good answers without a sample", str(oracle.untold)
     yield "stale shown as live", str(len(soak.stale))
     for number, gauge in enumerate(soak.daemon.gauges, 1):
         if gauge.points:

@@ -104,7 +104,7 @@ class Soak:
         """What is not as promised, each in one line."""
         missed = [f"untold: {one.device} sent number {one.number} at {one.at:.3f}" for one in self.oracle.examples]
         if self.oracle.failed and not missed:
-            missed = [f"{self.oracle.missed} of {self.oracle.heard} good answers were not believed"]
+            missed = [f"{self.oracle.missed} of {self.oracle.heard} good answers were not accepted"]
         grown = [
             f"life {number}: {what}" for number, gauge in enumerate(self.daemon.gauges, 1) for what in gauge.grown()
         ]

@@ -96,6 +96,8 @@ def _row(name: str, field: FieldInfo) -> tuple[str, ...]:
 
 def _value(field: FieldInfo) -> str:
     """Return what one value may be, in words."""
+    if get_origin(field.annotation) is tuple and get_args(field.annotation)[0] is str:
+        return "a list of names"
     inner = model_in(field.annotation)
     if inner is not None:
         return "a fault, or a list of faults" if inner is FaultEntry else "a list of mappings"

@@ -81,10 +81,10 @@ class LineConfig(Section):
         0.0, description="Added to the 3.5 characters of silence before each request."
     )
     turnaround_delay: Annotated[float, Duration(0, 10)] = Field(
-        0.1, description="Silence after a broadcast, which no slave answers."
+        0.1, description="Silence after a broadcast, which no slave answers. No request of lfs10d sends one."
     )
     echo: Annotated[Literal["auto", "on", "off"], Choice(("auto", "on", "off"))] = Field(
-        "auto", description="Whether the adapter returns the bytes it sends; auto is found out."
+        "auto", description="Whether the adapter returns the bytes it sends; auto: detected."
     )
     low_latency: Annotated[bool, Flag()] = Field(
         default=True, description="Use the low-latency mode of the driver, if it has one."
@@ -144,7 +144,7 @@ class SlaveConfig(Section):
     label: Label = Field(None, description="Free text for people, never in a topic.")
     profile: Annotated[str, FilePath()] = Field(
         "lfs10",
-        description="lfs10, ld-e, fuling-dzb, eh600, or the path of a profile YAML, relative to this file.",
+        description="Name of an included profile, or the path of a profile YAML, relative to this file.",
     )
     interval: Interval = Field(1.0, description="Time between two polls. Default: poll.interval.")
     enabled: Annotated[bool, Flag()] = Field(default=True, description="Whether it is polled.")
@@ -228,8 +228,8 @@ class MqttConfig(Section):
     )
     hold: Annotated[float, Duration(0, 1)] = Field(
         0.02,
-        description="A good sample may wait so long for others to go with it, which saves processor time; never where "
-        "no other can come in that time.",
+        description="How long a good sample may wait to be sent together with others, which saves processor time; never "
+        "where no other can come in that time.",
     )
 
     @property

@@ -41,6 +41,10 @@ def test_every_key_of_the_faults_file_is_documented(model: type[BaseModel]) -> N
         assert f"| `{field.alias or name}` | " in PAGE
 
 
+def test_the_values_of_a_fault_are_names() -> None:
+    assert re.search(r"^\| `values` \| a list of names \|", PAGE, re.MULTILINE)
+
+
 def test_the_example_is_a_faults_file() -> None:
     (text,) = re.findall(r"^```yaml\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
     faults = parse_faults(text, "faults.yaml", range(1, 9))

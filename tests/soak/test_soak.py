@@ -40,7 +40,7 @@ def test_a_short_soak_finds_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert counts["bad"] > 0  # the sensors do ail
     assert soak.oracle.told_of == counts["good"]
     rows = dict(figures(soak))
-    assert rows["lost"] == rows["wrong"] == rows["good answers nobody told of"] == "0"
+    assert rows["lost"] == rows["wrong"] == rows["good answers without a sample"] == "0"
     assert len(soak.daemon.lives) == 2
 
 
