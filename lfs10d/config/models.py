@@ -228,8 +228,8 @@ class MqttConfig(Section):
     )
     hold: Annotated[float, Duration(0, 1)] = Field(
         0.02,
-        description="How long a good sample may wait to be sent together with others, which saves processor time; never "
-        "where no other can come in that time.",
+        description="How long a good sample may wait to be sent together with others, which saves processor time; "
+        "never where no other can come in that time.",
     )
 
     @property
