@@ -1,1 +1,1 @@
-"""From files to frozen models."""
+"""The configuration: from YAML files and changes by request to frozen models."""

@@ -1,1 +1,1 @@
-"""The line thread: who is polled next, one exchange after the other."""
+"""The line thread: which device is polled next, one exchange after the other; jobs; pauses between requests."""

@@ -1,4 +1,4 @@
-"""Which answers are not believed at once: what may be a second answer to the request before. Pure. Durations in s.
+"""Doubts an answer that may be the second answer to the request before. Pure. Durations in s.
 
 A second answer may come as soon as the next request is out, and looks like the answer to that.
 

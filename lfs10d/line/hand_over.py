@@ -1,4 +1,4 @@
-"""Which events of the line's thread wait a moment, so that several go to the asyncio loop together. Pure.
+"""Collects events of the line thread for a moment, to hand several to the asyncio loop at once. Pure.
 
 Each hand-over wakes the loop and makes a packet of its own, which costs more of the processor than the sample in it.
 `hold` is how long a sample may wait for others (`mqtt.hold`), in s. What somebody waits for, and what is bad, goes at
@@ -55,7 +55,7 @@ class HandOver:
 
 
 def _can_wait(event: Event) -> bool:
-    """Tell whether an event is nobody's answer, no news of a fault, and one of many."""
+    """Tell whether an event may wait: no request waits for it, it reports no fault, and many like it come."""
     match event:
         case Reading():
             return event.fault is None and not event.requests and not event.probe

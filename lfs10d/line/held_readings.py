@@ -1,4 +1,4 @@
-"""Readings held back for a moment: another answer may still show that theirs is a second one. Pure. Times in s.
+"""Holds readings back for a moment, until it is sure that their answer belongs to their request. Pure. Times in s.
 
 A second answer that comes when the next answer is due looks like that answer. The slave's own then follows it. So a
 reading whose own answer could still come is published only when its slave was read again, or after a time within which

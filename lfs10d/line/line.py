@@ -67,12 +67,12 @@ class Line:
         self._thread.start()
 
     async def stop(self, within: float) -> None:
-        """Give the port back and end; after `within` s the thread is left to itself."""
+        """Close the port and end the thread; after `within` s it is no longer waited for."""
         self._thread.stop()
         await asyncio.to_thread(self._thread.join, within)
 
     def wake(self) -> None:
-        """Have what was given to the poller looked at now."""
+        """Wake the thread, so that it looks at what was given to the poller."""
         self._thread.wake()
 
     @property
@@ -161,7 +161,7 @@ class Line:
             self._precede(wanted=True)
 
     def _precede(self, *, wanted: bool) -> None:
-        """Put the thread under SCHED_FIFO and have it awake earlier, or make it an ordinary one again."""
+        """Put the thread under SCHED_FIFO and wake it earlier, or make it an ordinary thread again."""
         self._thread.waking = WAKING
         if not wanted:
             yield_precedence()

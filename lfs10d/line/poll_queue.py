@@ -56,7 +56,7 @@ class PollQueue:
         self._turn = 0
 
     def clear(self) -> None:
-        """Forget everybody."""
+        """Forget all devices and polls."""
         for _, _, entry in self._due:
             if isinstance(entry, Device):
                 entry.queued = False
@@ -87,14 +87,14 @@ class PollQueue:
         self._push(key, poll)
 
     def patient(self, now: float) -> bool:
-        """Whether nobody waits so long that the line must hurry: none flat out, none again, none late."""
+        """Whether the line need not hurry: no device with interval 0, no retry and no late poll waits."""
         if self._flat:
             return False
         due, _, first = self._due[0] if self._due else (inf, 0, None)
         return first is None or (isinstance(first, Device) and now - due < LATE * first.spec.interval)
 
     def next_due(self) -> float:
-        """When somebody is due; inf where nobody waits. With interval 0 somebody is due always."""
+        """When the next poll is due; inf where none waits. A device with interval 0 is always due."""
         if self._flat:
             return -inf
         return self._due[0][0] if self._due else inf

@@ -1,4 +1,4 @@
-"""The body of the line thread: the scheduler decides, the bus carries out, what happened goes out as events.
+"""The body of the line thread: the scheduler decides, the bus carries out, events report what happened.
 
 `Poller.turn` is called with a time and says when to come back: by `LineThread` with the real clock, by tests with a
 virtual one. Other threads only `post`.
@@ -87,7 +87,7 @@ class Poller:
         self.scheduler.replace(devices, rules, now)
 
     def reconfigure(self, settings: PortSettings, rules: LineRules) -> None:
-        """Speak by other settings from now on; another path closes the port and opens that one."""
+        """Use other settings from now on; another path closes the port and opens the new one."""
         self.post(lambda now: self._reconfigure(settings, rules, now))
 
     def _reconfigure(self, settings: PortSettings, rules: LineRules, now: float) -> None:
@@ -106,7 +106,7 @@ class Poller:
         freed()
 
     def resume(self) -> None:
-        """Open the port again; whether that succeeds is told in any case. Nothing happens if it is not paused."""
+        """Open the port again; the result is reported in any case. Nothing happens if it is not paused."""
         self.post(self._resume)
 
     def _resume(self, now: float) -> None:

@@ -70,7 +70,7 @@ class Probing:
         self.next_at = min((self._allowed_at(device, ready) for device in self._offline), default=inf)
 
     def stop(self) -> None:
-        """Probe nobody until the next review."""
+        """Probe no device until the next review."""
         self._offline = []
         self.anyone_online = False
         self.next_at = inf

@@ -1,4 +1,4 @@
-"""When the whole line is kept quiet after an answer, to hear whether a second one follows. Pure. Durations in s.
+"""Keeps the line quiet after an answer where a second one may follow, to hear it. Pure. Durations in s.
 
 A second answer that runs into what a neighbour is asked or says is never heard whole, and costs the neighbour its
 value each time. So the line itself must be silent for a moment.

@@ -1,4 +1,4 @@
-"""A share of the line's time, kept by an account that fills with time and empties with use."""
+"""Limits a job to a share of the line's time (a token bucket)."""
 
 from __future__ import annotations
 

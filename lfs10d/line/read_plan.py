@@ -1,4 +1,4 @@
-"""Which registers of a device the next poll reads: not what it lacks, and not so often what changes slowly. Pure.
+"""Which registers of a device the next poll reads: not those it lacks, and slow values less often. Pure.
 
 Rules
 -----

@@ -1,4 +1,4 @@
-"""The rest that one slave needs between two exchanges, and what its silence teaches about it. Pure. Durations in s.
+"""The pause that one slave needs between two exchanges, learned from requests that it ignores. Pure. Durations in s.
 
 Rules
 -----

@@ -40,7 +40,7 @@ from lfs10d.reading import Fault, FaultCode, Purpose, Reading
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """Nobody wants the line before `until` (inf: before somebody submits something)."""
+    """Nothing is to be asked before `until` (inf: before something is submitted)."""
 
     until: float
 
@@ -84,7 +84,7 @@ class Scheduler:
         self._requeue(fresh, now)
 
     def _requeue(self, fresh: list[Device], now: float) -> None:
-        """Make the queue of polls anew, with new grids for `fresh`."""
+        """Rebuild the queue of polls, with new grids for `fresh`."""
         polled = [device for device in self.devices.values() if device.spec.enabled]
         if polled:
             enabled = [device for device in fresh if device.spec.enabled]
@@ -191,7 +191,7 @@ class Scheduler:
         return Rest(min(self._probing.next_at, self._polls.next_due(), self._jobs.next_at(now)))
 
     def patient(self, now: float) -> bool:
-        """Whether nobody waits for the line so long that it must hurry; flat out, and with a job on it, it must."""
+        """Whether the line need not hurry; with a device of interval 0 or a job on it, it must."""
         job = self._current[0] if self._current else None
         flat_out = isinstance(job, Poll) and job.device.spec.interval == 0
         return self._jobs.idle and not flat_out and now < self._probing.next_at and self._polls.patient(now)
@@ -270,7 +270,7 @@ class Scheduler:
         return before not in (None, self._silent)
 
     def _benefits(self, device: Device) -> bool:
-        """Whether a doubt about silence is worth another exchange at once (rule 4)."""
+        """Whether a silence is to be checked by another exchange at once (rule 4)."""
         if device.starting:
             return False
         return device.health is Health.UNHEARD or device.probe_exempt or not self._probing.anyone_online

@@ -1,4 +1,4 @@
-"""Right frames that answer no request of ours: another master's traffic, and second answers to one request. Pure."""
+"""Valid frames that answer no request of ours: another master's traffic, second answers to one request. Pure."""
 
 from __future__ import annotations
 

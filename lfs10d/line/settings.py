@@ -1,4 +1,4 @@
-"""From the configuration to port, bus, scheduler and jobs."""
+"""Turns the configuration into the settings of port, bus, scheduler and jobs."""
 
 from __future__ import annotations
 

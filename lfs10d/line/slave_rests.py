@@ -1,4 +1,4 @@
-"""The rest of each slave between two exchanges, whatever they are for. Pure.
+"""Until when each slave must not be asked: its pause after the last exchange (`request_gap`). Pure.
 
 Rules
 -----

@@ -1,4 +1,4 @@
-"""What a change is charged beyond its own time: the polls keep 90 % of their rate on a 70 % full line. Pure.
+"""The line time that a change of a sensor is charged, so that polls keep 90 % of their rate on a 70 % full line. Pure.
 
 Rules
 -----

@@ -51,7 +51,7 @@ class LineThread(threading.Thread):
             os.write(self._waker, b"w")
 
     def stop(self) -> None:
-        """Have the thread give the port back and end."""
+        """Let the thread close the port and end."""
         self._stopping = True
         self.wake()
 

@@ -1,1 +1,1 @@
-"""The wire: times, frames, the exchange, the port and the bus. Knows no MQTT."""
+"""The wire: silences, frames, one request and its reply, the serial port. Knows no MQTT."""

@@ -31,7 +31,7 @@ class Ask:
 
 @dataclass(frozen=True, slots=True)
 class LineContext:
-    """What every exchange must know of the line at the moment. Durations are seconds.
+    """The state of the line that every exchange needs. Durations are seconds.
 
     `adapter_latency` is the longest pause that the adapter may put into one answer. `turnaround_delay` is the silence
     after a broadcast. `gap` is the required silence where it is longer than the timing's (a change of rate).

@@ -55,7 +55,7 @@ class Wait(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class LineRules:
-    """How this line is spoken on. Durations in s; `turnaround_delay` is the silence after a broadcast."""
+    """Settings for every exchange on this line. Durations in s; `turnaround_delay` is the silence after a broadcast."""
 
     extra_gap: float = 0.0
     turnaround_delay: float = 0.1
@@ -132,7 +132,7 @@ class Bus:
         return PortChanged(now, None)
 
     def _lost(self, error: PortError, now: float) -> PortChanged | None:
-        """Close the port; tell it once per reason."""
+        """Close the port; report it once per reason."""
         self.close()
         code = FaultCode.PORT_BUSY if isinstance(error, PortBusyError) else FaultCode.PORT_LOST
         fault = Fault(code, str(error))
@@ -147,19 +147,19 @@ class Bus:
         return -inf if self._exchange is None else self._exchange.quiet_since
 
     def close(self) -> None:
-        """Give the port back; what was asked is abandoned."""
+        """Close the port; the request under way is abandoned."""
         self.open = False
         self._exchange = self._ask = None
         self.port.close()
 
     def retry(self, now: float) -> None:
-        """Try to open the closed port at once; what comes of it is told even if it is as it was before."""
+        """Try to open the closed port at once; the result is reported even if it is as it was before."""
         self._reopen_at = now
         self._pause = REOPEN_FIRST
         self._fault = None
 
     def reconfigure(self, settings: PortSettings, rules: LineRules, now: float) -> None:
-        """Speak by other settings from the next exchange on; what is set at opening has the port reopened."""
+        """Use other settings from the next exchange on; those that are set at opening reopen the port."""
         if rules.echo != self.rules.echo:
             self._echo = EchoLearner(rules.echo)
         self.rules = rules
@@ -230,7 +230,7 @@ class Bus:
         return replace(self._settings, baudrate=ask.baudrate)
 
     def _change_rate(self, settings: PortSettings) -> None:
-        """Speak by other settings: let everything go out, then keep the longer of the two gaps once."""
+        """Use other settings: drain the port, then keep the longer of the two gaps once."""
         before = self.timing
         self.port.drain()
         self.port.reconfigure(settings)

@@ -58,7 +58,7 @@ def judge(ask: Ask, reception: Reception) -> Diagnosis | None:
 
 
 def stranger_spoke(ask: Ask, reception: Reception) -> bool:
-    """Whether what came is a right frame that is no answer to us: ours may still follow."""
+    """Whether a valid frame came that is no answer to our request: ours may still follow."""
     return stranger(ask.request, ask.codec, reception.leftover()) is not None
 
 

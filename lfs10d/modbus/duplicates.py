@@ -1,4 +1,4 @@
-"""Slaves for which two answers come to one request: a second sensor of the same id, or a repeater. Pure.
+"""Slave ids that answer each request twice: a second sensor with the same id, or a repeater. Pure.
 
 No frame says which request it answers. So a second answer that comes late is taken for the answer to the next request,
 unless the slave is left alone until it has come.

@@ -63,7 +63,7 @@ FAULT_HEARD = 32
 
 
 class State(StrEnum):
-    """Where an exchange stands."""
+    """The states of an exchange."""
 
     SILENCE = "silence"
     READY = "ready"
@@ -72,7 +72,7 @@ class State(StrEnum):
 
 
 class Happening(StrEnum):
-    """What moves an exchange on."""
+    """The events of an exchange."""
 
     SILENT = "silent"
     BABBLED = "babbled"
@@ -128,7 +128,7 @@ Decision: TypeAlias = Quiet | Send | Listen | Settled
 
 
 class MisuseError(RuntimeError):
-    """The caller told what cannot have happened; nothing was changed. A mistake in our own code."""
+    """The caller reported what cannot have happened; nothing was changed. An internal error."""
 
 
 class Exchange:
@@ -194,7 +194,7 @@ class Exchange:
         return Quiet(min(silent_at, self._give_up))
 
     def sent(self, begun: float, ended: float) -> None:
-        """Tell that the frame was written: the clock just before and just after the one `write`."""
+        """Note that the frame was written: the times just before and just after the one `write`."""
         if ended < begun:
             raise MisuseError("a request cannot have been written before it was begun")
         self._pass(Happening.SENT)
@@ -207,7 +207,7 @@ class Exchange:
         self._reception.sent(begun)
 
     def received(self, data: bytes, now: float) -> None:
-        """Tell what was read at `now`, in any state, in any pieces."""
+        """Take what was read at `now`, in any state, in any pieces."""
         if not data:
             return
         self._quiet_since = max(self._quiet_since, now)

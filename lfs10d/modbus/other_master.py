@@ -1,4 +1,4 @@
-"""When another master on the line asks a slave, and so when we had better not. Pure. Times in s.
+"""Predicts when another master on the line asks a slave, so that our request waits. Pure. Times in s.
 
 Both requests may come to the same slave at the same time, and then no answer tells whose it is. A master that asks in
 a fixed rhythm leaves a pause after each answer.

@@ -1,4 +1,4 @@
-"""How an exchange ended: plain values. Durations and times are seconds."""
+"""The result of an exchange: plain values. Durations and times are seconds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What others say on the line: right frames that are no answer to a request of ours. Pure.
+"""Finds the frames of others on the line: valid frames that are no answer to a request of ours. Pure.
 
 Only reads are looked for, of the slaves that are polled: requests of another master (slave id, function 01 to 04, two
 words), answers (a byte count, of registers an even one) and exceptions. Whatever else is on the line is passed over.

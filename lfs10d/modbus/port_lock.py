@@ -44,7 +44,7 @@ def is_pty(fd: int) -> bool:
 
 
 def claim(fd: int, *, proc: Path = PROC) -> bool:
-    """Lock the open port; False if somebody else has it. Other troubles are OSError."""
+    """Lock the open port; False if another process has it. Raises OSError for other failures."""
     try:
         fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
@@ -61,7 +61,7 @@ def claim(fd: int, *, proc: Path = PROC) -> bool:
 
 
 def release(fd: int) -> None:
-    """Undo `claim` before closing: the flag would stay while anybody else has the port open. Never fails."""
+    """Undo `claim` before closing: the flag would stay while another process has the port open. Never fails."""
     try:
         if not is_pty(fd):
             fcntl.ioctl(fd, termios.TIOCNXCL)
@@ -71,7 +71,7 @@ def release(fd: int) -> None:
 
 
 def holder(path: str, *, proc: Path = PROC) -> Holder | None:
-    """Tell who holds the port, by its lock or else by its open file; None where /proc does not say."""
+    """Return the process that holds the port, by its lock or else its open file; None where /proc does not show it."""
     try:
         status = Path(path).stat()
     except (OSError, ValueError):

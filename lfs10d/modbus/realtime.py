@@ -1,4 +1,4 @@
-"""Waking up on time: what the calling thread asks of the kernel, once, before it waits for bytes.
+"""Makes the calling thread wake up on time: timer slack and SCHED_FIFO, set once before it waits for bytes.
 
 A line waits 3.65 ms of silence at 9600 baud; by default the kernel wakes it up to 50 us late, and later still when
 others want the processor.

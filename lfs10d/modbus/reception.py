@@ -1,4 +1,4 @@
-"""What was heard during one exchange, sorted: echo, what came too early, late answers, the answer, the rest."""
+"""Sorts what was received during one exchange: echo, too early, late answers, the answer, the rest."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ RATE_TOLERANCE = 0.9
 
 
 class Reception:
-    """The ear of one exchange, which sent `frame`.
+    """What one exchange, which sent `frame`, has received so far.
 
     `answer` is the right frame, once it is whole; `spare` a right frame that came too early to be believed at
     once, on a port without pace; `displaced` a right frame that may answer another master's request to the asked
@@ -72,7 +72,7 @@ class Reception:
                 yield pending, ExpectedFrame(pending.codec, shape)
 
     def sent(self, begun: float) -> None:
-        """Tell when the request was begun: from now on its echo and its answer may come."""
+        """Note when the request was begun: from now on its echo and its answer may come."""
         timing = self._line.timing
         self._earliest = begun + timing.transmission(len(self._frame) - EARLY_TOLERANCE)
         self._undecided = self._line.echo is not Echo.OFF
@@ -209,7 +209,7 @@ class Reception:
         return found
 
     def _foresee(self, now: float) -> None:
-        """Reckon when the frame in progress can be whole: the soonest that any of its pieces lets expect."""
+        """Estimate when the frame in progress can be complete at the earliest."""
         if self._held:
             missing = len(self._frame) - self._matched if self._line.echo is Echo.ON else 0
         else:

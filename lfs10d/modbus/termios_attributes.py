@@ -1,4 +1,4 @@
-"""Raw termios as a pure function of the settings, and what of it a driver did not take.
+"""The termios attributes for given settings, and which of them a driver did not accept. Pure.
 
 Raw means that every byte arrives as it was sent and at once: no line discipline at work, no flow control, no
 modem lines heeded (CLOCAL), DTR and RTS left alone at closing (HUPCL clear: some converters key the

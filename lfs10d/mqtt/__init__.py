@@ -1,1 +1,1 @@
-"""MQTT: topics, what waits, the connection and the uplink. Knows no Modbus."""
+"""MQTT: topics, the connection to the broker, sending and receiving. Knows no Modbus."""

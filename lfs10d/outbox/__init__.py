@@ -1,1 +1,1 @@
-"""What waits for the broker, in memory and on disk. Knows no MQTT client."""
+"""The queue to the broker, in memory and on disk: order, losses, retries. Knows no MQTT client."""

@@ -1,4 +1,4 @@
-"""Whether the window carries less than is published, and what it carries: for one warning. Pure.
+"""Detects a connection that carries fewer messages than are published, and its capacity: for one warning. Pure.
 
 It does where the window was full and states were replaced before they went, or samples grew old, in each of three
 periods of 10 s in a row.

@@ -1,4 +1,4 @@
-"""How much of the window the history takes: more the longer its backlog does not shrink. Pure.
+"""The part of the window that `history` may use: the longer the backlog does not shrink, the more. Pure.
 
 At level 1 one batch is under way at a time, and the history has the weight of the live samples. Where the backlog has
 not shrunk from one look to the next though batches were full, the level doubles, and with it the weight, up to 8, and a

@@ -54,7 +54,7 @@ def _seq(queued: QueuedSample) -> int:
 
 
 def _age(queued: QueuedSample) -> tuple[float, int]:
-    """Return what is the less, the older it is: of a page of the store all came at once, so its row tells."""
+    """Return a key by which older samples sort first; samples of one page of the store sort by row."""
     return queued.since, queued.row or 0
 
 

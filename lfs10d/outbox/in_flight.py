@@ -1,4 +1,4 @@
-"""What is under way to the broker: sent, or about to be, and not acknowledged yet. Pure."""
+"""Items in flight: sent to the broker, or about to be, and not acknowledged yet. Pure."""
 
 from __future__ import annotations
 

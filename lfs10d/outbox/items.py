@@ -1,4 +1,4 @@
-"""The items of the outbox: what one message on its way to the broker is made of. Pure values.
+"""The items of the outbox: each becomes one message to the broker. Pure values.
 
 Topics are under `B`. Two items are never equal, whatever they say: each is one message.
 """

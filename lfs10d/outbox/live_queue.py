@@ -1,4 +1,4 @@
-"""The live samples that wait: the devices in turn, of each the oldest first. Pure.
+"""The queue of live samples: the devices in turn, of each the oldest first. Pure.
 
 A device that is polled often delays no other: each waits for at most one sample of every other device.
 """

@@ -1,4 +1,4 @@
-"""What was lost and must be declared: ranges of seq per device and boot. Pure."""
+"""Lost samples that are still to be reported by a `dropped` event: ranges of seq per device and boot. Pure."""
 
 from __future__ import annotations
 

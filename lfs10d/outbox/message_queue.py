@@ -1,4 +1,4 @@
-"""The responses, events and traces that wait; those of a topic the broker refuses wait apart. Pure."""
+"""The queues of responses, events and traces; those of a topic that the broker refuses wait apart. Pure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What waits for the broker, in which order it goes, and what becomes of it. Pure: time is an argument.
+"""The queue to the broker: what is sent next, what is kept, and what is lost. Pure: time is an argument.
 
 The rules (contract, section 3):
 
@@ -10,7 +10,7 @@ The rules (contract, section 3):
    After a connect the whole burst goes first, and everything else only after that, but for no longer than 10 s; its
    `last` (availability) goes when all of it is acknowledged.
 3. A sample that is older than 3 s when its turn comes belongs to the backlog, whose rules are in `backlog`.
-4. An item leaves for ever when it is acknowledged (PUBACK). A connection lost puts all that was under way back.
+4. An item is done when it is acknowledged (PUBACK). When a connection is lost, all items in flight wait again.
 5. At most `capacity` samples wait in memory: beyond that re-sends are dropped first, then the oldest, declared.
 6. What the broker refuses waits, and its topic is passed over for a time (`refusals`); the others go on. Only what is
    wrong in itself is dead; a batch is first cut smaller. A dead sample is declared like an evicted one.

@@ -1,4 +1,4 @@
-"""The last message of a connection that is left in order. Pure."""
+"""The last message before a clean disconnect. Pure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""All that waits for the broker, by class, and which of it goes next: rules 1, 2 and 6 of `outbox`. Pure."""
+"""All queues to the broker, by class, and which item is sent next: rules 1, 2 and 6 of `outbox`. Pure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Samples acknowledged lately, which are sent once more where the acknowledgement may mean nothing. Pure.
+"""Samples acknowledged lately, sent again where the broker may have lost them after its acknowledgement. Pure.
 
 An acknowledgement of a broker that dies is not durable: what was acknowledged from 10 s before a loss until the backlog
 is opened goes once more. After the first connect of a life so does what was acknowledged until then with the word that

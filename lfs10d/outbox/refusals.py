@@ -1,4 +1,4 @@
-"""Topics that the broker refuses: which are passed over now, and when each is tried again. Pure: time is an argument.
+"""Topics that the broker refuses: which are skipped now, and when each is tried again. Pure: time is an argument.
 
 =====================================  ==============  ==================================  =======================
 refusal                                the message     the topic                           tried again

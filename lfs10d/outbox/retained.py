@@ -1,4 +1,4 @@
-"""The retained topics that wait: the newest version of each, a burst of all of them, and what goes last in it. Pure.
+"""The queue of retained topics: the newest version of each, and the burst of all of them after a connect. Pure.
 
 Changes and refreshes (`Publication.refresh`: only newer figures) wait apart, each in the order in which they came. A
 refresh of a topic whose change waits replaces that version in its place; a change takes the place of a refresh. What

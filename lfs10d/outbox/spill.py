@@ -1,4 +1,4 @@
-"""When samples that wait in memory are handed to the store. Pure.
+"""Decides when samples that wait in memory are written to the store. Pure.
 
 While the broker has been away for more than 3 s, what waits is handed over, at first at once, then every 5 s; and
 whenever half of the memory is taken, which happens where the broker is too slow. What the store cannot take waits in

@@ -1,4 +1,4 @@
-"""The part of the backlog that lies in the store, as far as the outbox must know it. Pure.
+"""The part of the backlog that is in the store, as the outbox sees it: rows to read and rows to delete. Pure.
 
 What is in the store is older than what waits in memory, so it goes first: a page is taken into memory, leaves in
 batches, and is followed by the next. A row stays in the store until its batch is acknowledged, and 10 s longer: if
@@ -116,16 +116,16 @@ class Spool:
         self._acknowledged.append((now, tuple(rows)))
 
     def release(self, rows: Iterable[int]) -> None:
-        """Let these go."""
+        """Release these: they may be deleted from the store."""
         self._released.update(rows)
 
     def forget(self, before: float) -> None:
-        """Let go what was acknowledged until then."""
+        """Release what was acknowledged until then."""
         while self._acknowledged and self._acknowledged[0][0] <= before:
             self._released.update(self._acknowledged.popleft()[1])
 
     def release_all(self) -> None:
-        """Let go all that was acknowledged: we part from the broker in order."""
+        """Release all that was acknowledged: a clean disconnect."""
         self.forget(float("inf"))
 
     @property

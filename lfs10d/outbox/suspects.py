@@ -1,4 +1,4 @@
-"""Which message makes the broker end the connection. Pure.
+"""Finds the message because of which the broker ends the connection. Pure.
 
 Brokers end a connection for one message: too large, denied. By MQTT 3.1.1 none says why, by MQTT 5 not all do.
 

@@ -1,4 +1,4 @@
-"""Weighted turns of the classes of messages that wait for room in the window. Pure.
+"""The order in which the classes of messages are sent when the window is full, by weight. Pure.
 
 Stride scheduling: with each message a class advances by 1 / weight, and the least advanced class goes next; of equals
 the first. A class that had nothing to send begins level with the class that went last: it has saved up no turns and

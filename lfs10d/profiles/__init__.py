@@ -1,1 +1,1 @@
-"""What a device is: its registers, limits and settings, as data files of one schema; registers to numbers."""
+"""What a device is: its registers, limits and settings, as YAML files of one schema; registers to values."""

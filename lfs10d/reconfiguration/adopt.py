@@ -127,7 +127,7 @@ class Adopt:
         return await runner.perform(run, command, intend, conclude)
 
     def _wish(self, request: AdoptRequest, profile: Profile, now: Effective) -> adopt.AdoptWish | Result:
-        """Return what is wanted of the line, or why it need not even be asked."""
+        """Return what is to be done on the line, or the rejection if nothing needs to be asked there."""
         line_rate = now.config.line.baudrate
         if profile.factory is None or (unfit := _unfit(profile, now.config.line)) is not None:
             why = f"profile {profile.name} has no factory settings" if profile.factory is None else unfit
@@ -172,7 +172,7 @@ class Adopt:
         change: OpenAdopt | None,
         command: CommandRecord,
     ) -> Result:
-        """Put on the disk what came of it; return the result."""
+        """Record the outcome on disk; return the result."""
         runner, ending = self._runner, report.readdress.ending
         to = report.to or 0
         name = request.name or default_device_name(to)
@@ -195,7 +195,7 @@ class Adopt:
         return result
 
     async def _save(self, name: str, report: adopt.AdoptReport, change: OpenAdopt, record: ResultRecord | None) -> None:
-        """Put on the disk where the sensor is, or that it is still to be found."""
+        """Record on disk where the sensor is, or that it is still to be found."""
         runner, readdress = self._runner, report.readdress
         journal, journalled = runner.journal, runner.journalled
         if readdress.ending is ReaddressEnding.MOVED:

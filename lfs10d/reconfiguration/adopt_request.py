@@ -1,4 +1,4 @@
-"""What a request to adopt a sensor wants."""
+"""The parameters of `line/adopt`, as the change uses them."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ class BaudrateChange:
         self._runner = runner
 
     def settled(self, to: int) -> Result | None:
-        """Return the result of a command that needs no word on the line; None if it needs some."""
+        """Return the result of a command that needs no exchange on the line; None if it needs some."""
         now = self._runner.running()
         old = now.config.line.baudrate
         if to != old:
@@ -91,7 +91,7 @@ class BaudrateChange:
         return None
 
     def _unfit(self, to: int, now: Effective) -> Result | None:
-        """Return why the line need not even be asked; None if it must be."""
+        """Return why the command is rejected without an exchange on the line; None if it is not."""
         config, profiles = now.config, now.loaded.profiles
         able = [slave for slave in config.slaves if to in _rates(profiles[slave.profile])]
         if not able and any(profiles[slave.profile].baudrate for slave in config.slaves):
@@ -136,7 +136,7 @@ class BaudrateChange:
         earlier: frozenset[int],
         command: CommandRecord,
     ) -> Result:
-        """Put on the disk what came of it; return the result."""
+        """Record the outcome on disk; return the result."""
         runner = self._runner
         result = baudrate_answers.result(wish.old, wish.to, report, dry_run=wish.dry_run)
         if change is None or report.ended in UNTOUCHED:

@@ -47,7 +47,7 @@ class BaudrateRecovery:
         return max((change.number for change in self._changes.changes()), default=0)
 
     async def follow(self, change: OpenBaudrate, run: ProcedureRun) -> None:
-        """Look for the sensors of an open change; finish it, or undo what the daemon did not live to finish."""
+        """Look for the sensors of an open change; finish it, or undo what a crash interrupted."""
         if change.answered and change.facts.pending is not None:
             await self._await_power(change, list(change.facts.pending), run)
         else:
@@ -120,7 +120,7 @@ class _Undo:
             found, pause = next_found, min(2 * pause, longest)
 
     async def _put_back(self, found: Sequence[RateSensor]) -> BaudrateReport | None:
-        """Bring sensors to the old rate; return what came of it, None where the port was lost."""
+        """Bring sensors to the old rate; return the outcome, None where the port was lost."""
         away = [sensor for sensor in found if self._where[sensor.name] != self._old]
         here = [sensor for sensor in found if self._where[sensor.name] == self._old]
         steps = put_back(away, self._old, self._to, self._where)

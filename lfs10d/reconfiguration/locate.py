@@ -1,4 +1,4 @@
-"""Devices that the file has at another place than where they were verified last: used is the place that answers."""
+"""Finds devices whose id or rate in the file differs from the last verified one: the place that answers is used."""
 
 from __future__ import annotations
 

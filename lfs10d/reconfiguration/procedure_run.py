@@ -1,4 +1,4 @@
-"""A procedure on the line, as seen from the asyncio loop: what it awaits off the line, one after the other."""
+"""A running procedure as seen from the asyncio loop, which does for it what must not be done in the line thread."""
 
 from __future__ import annotations
 

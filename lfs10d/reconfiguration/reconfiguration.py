@@ -1,4 +1,4 @@
-"""Changes of sensors: the commands that ask for them, one at a time, and what they leave open.
+"""Changes of sensors: carries out their commands, one at a time, and recovers changes that are still open.
 
 A change that the daemon did not live to finish is followed at the next start until its sensor is found; its command is
 answered then.

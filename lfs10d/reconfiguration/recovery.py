@@ -1,4 +1,4 @@
-"""Open changes: their sensors are looked for until each is found; then the change is finished, or dropped."""
+"""Recovers open changes: looks for their sensors until each is found, then finishes the change or drops it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What all changes of sensors share: the journal, the line, the configuration and the answer. Knows no kind of change.
+"""Runs a change of sensors of any kind: journal, line, configuration, response. Knows no kind of change.
 
 The steps of a change, each on the disk before the next begins: intent in the journal, write, verification, the fact in
 `changes.yaml`, the journal closed, the answer.

@@ -1,1 +1,1 @@
-"""A line full of sensors, well or ill, in memory or on a pseudo terminal; and a judge of the master."""
+"""A simulated line of sensors, with faults, in memory or on a pseudo terminal; and a judge of the master."""

@@ -1,1 +1,1 @@
-"""What is published about line and devices: a pure fold of readings and time into publications."""
+"""What is published about line and devices, computed from readings and time. Pure."""

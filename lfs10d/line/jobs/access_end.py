@@ -6,7 +6,7 @@ from enum import StrEnum
 
 
 class End(StrEnum):
-    """How it ended."""
+    """How an access to registers ended."""
 
     DONE = "done"
     """The registers were read; what was written was read back."""

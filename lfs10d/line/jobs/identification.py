@@ -143,7 +143,7 @@ def _may_lack(block: Block, outcome: Outcome | None) -> bool:
 
 
 class _Evidence(IntEnum):
-    """What speaks for a profile, the least first."""
+    """The evidence for a profile, the weakest first."""
 
     VALUES = 0
     OTHER_ID = 1
@@ -188,7 +188,7 @@ class Identification:
             self._told[first.request] = first
 
     def steps(self) -> IdentificationSteps:
-        """Ask until it is clear who is there."""
+        """Ask until it is known which device answers."""
         fits: list[_Fit] = []
         for profile in self._profiles:
             if all(fit.may_also_be(profile) for fit in fits) and (fit := (yield from self._fit(profile))) is not None:

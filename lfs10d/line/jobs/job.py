@@ -1,4 +1,4 @@
-"""What a job is: something done on the line, one exchange after the other.
+"""The interface of a job: work on the line, one exchange after the other.
 
 A job never touches the line. The scheduler calls `ask` when the line could be the job's, and `on_outcome` with the
 outcome of what it asked; between the two and after them others may have had the line. Time is an argument.
@@ -28,7 +28,7 @@ class Done:
 
 @dataclass(frozen=True, slots=True)
 class Requeue:
-    """More to ask, but not before what was due by `key`."""
+    """More to ask, after all that was due by `key`."""
 
     key: float
 
@@ -45,7 +45,7 @@ Next: TypeAlias = Requeue | Continue | Done
 
 
 class Account(Protocol):
-    """What holds a job to its part of the line's time; see `lfs10d.line.quota.Quota`."""
+    """Limits a job to its share of the line's time; see `lfs10d.line.quota.Quota`."""
 
     def allows(self, now: float) -> bool:
         """Whether the line may be used now."""

@@ -43,7 +43,7 @@ Steps: TypeAlias = "Generator[Request, Outcome, End]"
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Whom to ask, and how; `profile` is None for a slave that is not configured, `response_timeout` (s) if learned."""
+    """The slave to ask; `profile` is None for one that is not configured, `response_timeout` (s) is None if learned."""
 
     slave: int
     codec: Codec
@@ -188,7 +188,7 @@ class Access:
             self._rest_until = self._now + BUSY_PAUSE
 
     def _ask_patiently(self, what: ReadRegisters) -> Generator[Request, Outcome, Outcome]:
-        """Ask until there is an answer, an exception that is no word for busy, or no more patience."""
+        """Ask until there is an answer, an exception other than busy, or no try is left."""
         *tries, last = self._target.timeouts
         for timeout in tries:
             outcome = yield from self._ask_once(what, timeout)
@@ -208,7 +208,7 @@ class Access:
         return outcome
 
     def _refuses(self, outcome: Outcome) -> bool:
-        """Whether it is an exception that no patience will change."""
+        """Whether it is an exception that asking again will not change."""
         return _refused(outcome) and self.fault is not None and not self.fault.busy
 
     def _failed(self, outcome: Outcome) -> End:

@@ -104,7 +104,7 @@ class Scan:
 
     @property
     def found(self) -> tuple[FoundDevice, ...]:
-        """Who was found so far, by rate and id."""
+        """The devices found so far, by rate and id."""
         answering = {device.slave for device in tuple(self._found.values()) if device.answers}
         devices = (
             replace(device, suspect=device.slave >= RESERVED_FROM and bool(answering - {device.slave}))

@@ -1,4 +1,4 @@
-"""What the samples of a store have in common, kept once: eras of the clock, and series.
+"""The tables that many samples of a store share: eras of the clock, and series.
 
 An era is one stretch of one boot in which wall and monotonic clock kept their distance, under one word about the
 clock. A sample's `ts` is counted from its era's base, so that setting the clock right corrects one row.

@@ -1,4 +1,4 @@
-"""A connection to one SQLite file of ours: made if there is none, refused if it is not ours or not whole.
+"""Opens one SQLite file of the store: created if there is none, refused if it is not ours or is damaged.
 
 ::
 

@@ -1,4 +1,4 @@
-"""How a sample lies in the store: values as cells of SQLite, and a check over each row. Pure.
+"""The format of a sample in the store: values as cells of SQLite, and a checksum over each row. Pure.
 
 ====================  ==================================================================================
 a value               its cell
@@ -52,7 +52,7 @@ _CHECKS = 1 << 16
 
 
 class DamagedError(Exception):
-    """The store's file says what no store of ours ever said; it must be put aside."""
+    """The store's file holds what this program never wrote; it must be put aside."""
 
 
 def pack(value: Value) -> Cell:

@@ -97,7 +97,7 @@ class SampleFile:
         database.limit(self._db, limits)
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         self._db.close()
 
     # In
@@ -201,7 +201,7 @@ class SampleFile:
         return next((row.sample.ts for row in self.read(0, 1)), None)
 
     def delete(self, ids: Collection[int], *, losses: Sequence[Loss]) -> None:
-        """Let these go, and keep `losses` as those to be declared; give back what room is no longer needed."""
+        """Delete these, and keep `losses` as those to be declared; give back what room is no longer needed."""
         with transaction(self._db):
             for first, last in runs(ids):
                 self._delete(first, last)

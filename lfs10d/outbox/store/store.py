@@ -1,4 +1,4 @@
-"""The backlog on disk: which file is used, what becomes of one that cannot be, and when nothing can be kept.
+"""The backlog on disk: opens or replaces its file, and reports when nothing can be kept. Limits: `sample_file`.
 
 =======================================  ================================================================
 the file                                 what is done

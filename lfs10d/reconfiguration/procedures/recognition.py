@@ -63,7 +63,7 @@ class Recognition:
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What was found out about one place. `answers`: the value could be read. `twins`: the sign of two sensors.
+    """The findings at one place. `answers`: the value could be read. `twins`: the sign of two sensors.
 
     `taken`: something was received from the place that was to be silent. `exception` is the code of a refusal.
     """

@@ -1,4 +1,4 @@
-"""Recovers the sensors of an open change of the rate: put back, or awaited, however long it takes. Pure.
+"""Recovers the sensors of an open change of the rate: sets them back, or waits for them without limit. Pure.
 
 What the daemon did not live to finish is undone, unless every sensor is at the new rate already: what answers is put
 back at once, what is lost is looked for until it is found and then put back too. Sensors that have
