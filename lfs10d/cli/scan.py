@@ -116,7 +116,8 @@ def command(
     own = {file: load_profile(file, relative_to=Path()) for file in profiles}
     if not given("rates"):
         rates = tuple(dict.fromkeys((*rates, *(rate for each in own.values() for rate in each.rates))))
-    known = (*own.values(), *by_evidence(load_profile(name, relative_to=Path()) for name in builtin_names()))
+    included = (load_profile(name, relative_to=Path()) for name in builtin_names())
+    known = (*own.values(), *by_evidence(each for each in included if each not in own.values()))
     calibrations = calibrations_of(line.port, options["config"])
     search = ScanPlan(
         ids,

@@ -9,8 +9,7 @@ Rules
    device is due at once.
 4. A device that is never heard, or probed in turn with others, and is silent right after another was silent, is asked
    once more at once: some sensors ignore the request after one to a dead neighbour.
-5. A slave is given its rest before each request, whatever it is for (see `slave_rests`): a job that wants to ask
-   it sooner is held, while others have the line.
+5. A slave is given its rest before each request (see `slave_rests`): a job that wants to ask it sooner is held.
 6. One poll, one reading; none if its device is no longer configured, or no longer enabled and nobody requested it.
 """
 
@@ -198,6 +197,7 @@ class Scheduler:
 
     def _begin(self, job: Job, ask: Ask, now: float) -> None:
         self._current = job, ask
+        self.pending.begin(ask.request.slave, ask.baudrate or self.timing.baudrate, now)
         if isinstance(job, Poll) and not job.begun:
             job.device.polled_at = now
 

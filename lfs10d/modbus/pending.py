@@ -21,7 +21,8 @@ Rules
    after silence, and what is older too.
 7. Another master's request that was heard is pending too, until its answer is heard: the slave owes it.
    Where it asks in a rhythm ours waits for the pause (`lfs10d.modbus.other_master`).
-8. A slave that is answered for twice is left alone until the second answer has come (`lfs10d.modbus.duplicates`).
+8. What a slave was asked at another rate is over once it has been silent for `OTHER_RATE`: it hears at one rate only.
+9. A slave that is answered for twice is left alone until the second answer has come (`lfs10d.modbus.duplicates`).
 """
 
 from __future__ import annotations
@@ -40,6 +41,8 @@ QUIET_LEAST = 1.0
 """How long a slave is left alone where no barrier can tell, at least; in s."""
 _SILENT = frozenset({FaultCode.TIMEOUT, FaultCode.LATE, FaultCode.WRONG_SLAVE})
 """With these faults the asked slave itself said nothing."""
+OTHER_RATE = 0.9
+"""In s; a scan waits a little longer for the last id of a round before it asks at the next rate."""
 _NO_RESTS = (None, None, None)
 EQUALS_KEPT = 16
 """Of equal pending requests so many are remembered, the newest: more than any sensor keeps in mind. The answer of one
@@ -50,13 +53,15 @@ forgotten too soon would count as that of the next, and whatever was asked betwe
 class Pending:
     """An unanswered earlier request, whose answer may still come; `sent_end` is its last bit.
 
-    `ours`: we asked it, no other master did.
+    `ours`: we asked it, no other master did. `baudrate` is the rate at which it was asked, None where that
+    is not known.
     """
 
     request: Request
     codec: Codec
     sent_end: float
     ours: bool = True
+    baudrate: int | None = None
 
 
 class PendingRequests:
@@ -68,6 +73,7 @@ class PendingRequests:
         self._over: set[Pending] = set()
         self._quiet_until: dict[int, float] = {}
         self._tardy: set[int] = set()
+        self._baudrate: int | None = None
         self.duplicates = Duplicates()
         self.other_master = OtherMaster()
 
@@ -79,6 +85,14 @@ class PendingRequests:
     def earlier(self, slave: int) -> tuple[Pending, ...]:
         """Return the requests to `slave` whose answers may still come, the oldest first."""
         return self._pending.get(slave, ())
+
+    def begin(self, slave: int, baudrate: int, now: float) -> None:
+        """Note that an exchange with `slave` begins at this rate: what it was asked at another may be over (rule 8)."""
+        self._baudrate = baudrate
+        for each in self._pending.get(slave, ()):
+            if each.baudrate not in (None, baudrate) and now >= each.sent_end + OTHER_RATE:
+                self._lingers.pop(each, None)
+                self._drop(slave, [each], now)
 
     def tardy(self, slave: int) -> bool:
         """Whether an answer of `slave` has ever come after its time, whoever was asked meanwhile."""
@@ -184,7 +198,7 @@ class PendingRequests:
             self._came_late(late, now)
         if outcome.sent_end is None or slave == 0:
             return
-        asked = Pending(outcome.request, codec, outcome.sent_end)
+        asked = Pending(outcome.request, codec, outcome.sent_end, baudrate=self._baudrate)
         pending = self._pending.get(slave, ())
         if outcome.may_follow:
             self._remember(asked, lingers=asked.sent_end + max(2 * timeout, QUIET_LEAST))

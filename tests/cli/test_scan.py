@@ -18,6 +18,8 @@ from click.testing import CliRunner
 from lfs10d.cli.render.scan_progress import span
 from lfs10d.cli.scan import command
 from lfs10d.config.loader import load
+from lfs10d.profiles.library import load_profile
+from lfs10d.simulator.blueprint import blueprint_of
 from lfs10d.simulator.line_faults import stray
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.sensor import Sensor
@@ -236,3 +238,11 @@ def test_what_was_found_is_written_to_a_new_file_that_is_valid(
     assert lfs10d("check", "-c", "site.yaml").returncode == 0
     again = lfs10d("scan", sensors.path, "--ids", "1-3", "--baudrate", "9600", "--write", "site.yaml")
     assert (again.returncode, "exists already" in again.stderr) == (2, True)
+
+
+def test_an_included_profile_that_is_named_is_not_its_own_alternative(lfs10d: Lfs10d, sensors: PtyLine) -> None:
+    renke = load_profile("renke-rs-fsjt", relative_to=Path())
+    sensors.line.add(Sensor(2, blueprint=blueprint_of(renke)))
+    done = lfs10d("scan", sensors.path, "--ids", "2", "--baudrate", "9600", "--profile", renke.name, "--json")
+    (found,) = json.loads(done.stdout)["found"]
+    assert (found["profile"], found["alternatives"]) == (renke.name, ["pr-3000-fsjt"])

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lfs10d.modbus.outcome import LateAnswer
-from lfs10d.modbus.pending import EQUALS_KEPT
+from lfs10d.modbus.pending import EQUALS_KEPT, OTHER_RATE
 from lfs10d.modbus.request import ReadRegisters, Request, WriteRegister
 from lfs10d.reading import Fault, FaultCode
 from tests.support.outcomes import ended
@@ -256,3 +256,25 @@ def test_a_slave_that_is_answered_for_twice_is_left_alone() -> None:
     line.silent(WIND, 1.0)
     line.pending.leave_alone(1, 0.2)
     assert line.pending.left_alone_until(1, 1.1) == 2.0
+
+
+def test_what_a_slave_was_asked_at_another_rate_is_over_once_it_was_silent() -> None:
+    line = Line()
+    line.pending.begin(1, 4800, 0.0)
+    line.silent(WHO, 0.0)
+    line.pending.begin(1, 9600, OTHER_RATE - 0.1)
+    assert line.waiting() == [WHO]
+    line.pending.begin(2, 9600, 5.0)
+    assert line.waiting() == [WHO]
+    line.pending.begin(1, 4800, 5.0)
+    assert line.waiting() == [WHO]
+    line.pending.begin(1, 9600, OTHER_RATE)
+    assert line.waiting() == []
+    assert line.free(WHO, OTHER_RATE)
+
+
+def test_what_was_asked_at_a_rate_that_is_not_known_stays() -> None:
+    line = Line()
+    line.silent(WHO, 0.0)
+    line.pending.begin(1, 9600, 5.0)
+    assert line.waiting() == [WHO]

@@ -74,7 +74,8 @@ def test_a_sensor_whose_value_is_no_number_is_found_as_an_unknown_device() -> No
     assert (finding.answers, finding.profile, dict(finding.values)) == (True, None, {})
 
 
-def test_every_built_in_device_is_recognised_or_told_with_what_cannot_be_told_from_it() -> None:
+@pytest.mark.parametrize("rates", [(9600,), (4800, 9600)], ids=["one rate", "after another rate"])
+def test_every_built_in_device_is_recognised_or_told_with_what_cannot_be_told_from_it(rates: tuple[int, ...]) -> None:
     """Small numbers are directions and wind speeds alike; devices 40 and 41 lack a register that is optional."""
     names = builtin_names()
     line = line_of(
@@ -85,7 +86,7 @@ def test_every_built_in_device_is_recognised_or_told_with_what_cannot_be_told_fr
     sensors = {sensor.slave: sensor for sensor in line.sensors}
     sensors[40].add_fault("absent", values=("wind_force",))
     sensors[41].add_fault("absent", values=("rain_counter",))
-    found = by_id(scanned(line, range(1, 50)).scan)
+    found = by_id(scanned(line, range(1, 50), rates).scan)
     told = {str(names[slave - 10] if slave < 30 else slave): _names(finding) for slave, finding in found.items()}
     sure = {name: [name] for name in ("lfs10", "ld-e", "fuling-dzb", "eh600", "ecowitt-wn90lp", "dfrobot-sen0483")}
     assert told == {
@@ -97,6 +98,15 @@ def test_every_built_in_device_is_recognised_or_told_with_what_cannot_be_told_fr
         "40": ["renke-rs-fsjt", "pr-3000-fsjt"],
         "41": ["ecowitt-wn90lp"],
     }
+
+
+@pytest.mark.parametrize("name", [name for name, profile in BUILTIN.items() if profile.slave_id is not None])
+def test_a_single_device_is_recognised_at_whichever_rate(name: str) -> None:
+    """It was unknown at the second: what it was asked at the first could have been answered too."""
+    for slave, rates in ((1, (4800, 9600, 19200)), (144, (19200, 9600))):
+        sensor = Sensor(slave, blueprint=blueprint_of(BUILTIN[name]))
+        (found,) = scanned(line_of(sensor), [slave], rates).scan.found
+        assert name in _names(found)
 
 
 def _names(finding: FoundDevice) -> list[str]:
