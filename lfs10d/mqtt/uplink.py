@@ -15,10 +15,10 @@ from collections.abc import Set as AbstractSet
 from functools import partial
 
 from lfs10d.mqtt.broker_client import BrokerClient
+from lfs10d.mqtt.clean_exit import CleanExit
 from lfs10d.mqtt.cleanup import Cleanup
 from lfs10d.mqtt.connection import Connection
 from lfs10d.mqtt.discovery import Discovery
-from lfs10d.mqtt.farewell import Farewell
 from lfs10d.mqtt.messages import Accepted, Filter, Incoming, Will
 from lfs10d.mqtt.reasons import REFUSED_FROM, Disconnect, reason_in_words
 from lfs10d.mqtt.retained_reader import RetainedReader
@@ -79,7 +79,7 @@ class Uplink:
         line = base.rpartition("/")[2]
         self._sender = Sender(self._outbox, self._topics, line, epoch_ms=epoch_ms, stuck=self._on_stuck)
         self._subscription: int | None = None
-        self._farewell = Farewell(self._client, self._outbox, self._sender.wake)
+        self._clean_exit = CleanExit(self._client, self._outbox, self._sender.wake)
         self._epoch_ms, self._store = epoch_ms, store
         self._spooler: Spooler | None = None
         self._retained_reader: RetainedReader | None = None
@@ -170,7 +170,7 @@ class Uplink:
     async def stop(self) -> None:
         """Send what waits, say `offline`, disconnect, keep the rest; at most 1.9 s, whatever broker and disk do."""
         self._leaving = True
-        await self._farewell.part(_OFFLINE)
+        await self._clean_exit.run(_OFFLINE)
         if self._spooler is not None:
             await self._spooler.stop(KEEP_WITHIN)
 
@@ -179,7 +179,7 @@ class Uplink:
         refused = self._outbox.reload(asyncio.get_running_loop().time())
         if settings is not None:
             self._leaving = True
-            await self._farewell.part(_OFFLINE)
+            await self._clean_exit.run(_OFFLINE)
             self._leaving = False
             self._cleanup.single = False
             self._client.renew(settings)
@@ -253,7 +253,7 @@ class Uplink:
         self.discovery.lost()
         self._retained_requests.lost()
         self._drop_told = False
-        self._farewell.on_progress()
+        self._clean_exit.on_progress()
         self._poke()
         self._events.on_uplink_change()
 
@@ -268,7 +268,7 @@ class Uplink:
                 self._events.on_announced()
                 self.discovery.begin(self._client.standing)
             self._clear_if_out()
-        self._farewell.on_progress()
+        self._clean_exit.on_progress()
 
     def subscribed(self, mid: int, reasons: tuple[int, ...]) -> None:
         """Report a refused subscription."""

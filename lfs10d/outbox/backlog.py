@@ -93,9 +93,9 @@ class Backlog:
         self._under_way.clear()
         self.spool.rewind()
 
-    def part(self) -> None:
-        """Note that we part from a broker that has answered everything: what it has needs no second sending."""
-        self._recent.part()
+    def on_clean_exit(self) -> None:
+        """Note a clean exit from a broker that has acknowledged everything: nothing is sent to it a second time."""
+        self._recent.on_clean_exit()
         self.spool.release_all()
 
     # What goes

@@ -40,7 +40,7 @@ from lfs10d.outbox.congestion import Congested, Congestion
 from lfs10d.outbox.history import QueuedSample
 from lfs10d.outbox.in_flight import InFlight
 from lfs10d.outbox.items import HistoryBatch, LiveSample, LossNotice, Message, OutboxItem, Retained
-from lfs10d.outbox.parting import Parting
+from lfs10d.outbox.last_message import LastMessage
 from lfs10d.outbox.queues import Queues
 from lfs10d.outbox.refusals import Refusals
 from lfs10d.outbox.suspects import Culprit, Suspects
@@ -67,7 +67,7 @@ class Outbox:
         """What may have ended the last connection."""
         self._queues = Queues(self.backlog, self._refusals, self.suspects)
         self._in_flight = InFlight(self.suspects)
-        self._parting: Parting | None = None
+        self._last_message: LastMessage | None = None
 
     @property
     def telemetry(self) -> bool:
@@ -114,17 +114,17 @@ class Outbox:
         """Send all retained topics, then `last`, then everything else."""
         self._queues.retained.burst(publications, last)
 
-    def part(self, last: Publication) -> Parting:
+    def send_last(self, last: Publication) -> LastMessage:
         """Send `last` as soon as the window has room, and nothing else over this connection (rule 8)."""
-        self._parting = Parting(Retained(last))
-        return self._parting
+        self._last_message = LastMessage(Retained(last))
+        return self._last_message
 
     # What happens to the connection
 
     def connected(self, now: float, *, window: int = IN_FLIGHT_MOST) -> None:
         """Begin to send: at most `window` items under way at once. `burst` is to follow."""
         self._in_flight.window = window
-        self._parting = None
+        self._last_message = None
         self._congestion.connected()
         self.backlog.connected(now, window)
         self._queues.connected(now)
@@ -150,8 +150,8 @@ class Outbox:
 
         `batch`: the batch before is on its way, so that another may follow.
         """
-        if self._parting is not None:
-            return self._parting.next(self._in_flight, now)
+        if self._last_message is not None:
+            return self._last_message.next(self._in_flight, now)
         if self._in_flight.alone is not None:
             return self._in_flight.next_alone()
         if self._in_flight.full:
@@ -167,13 +167,13 @@ class Outbox:
     @property
     def waits(self) -> bool:
         """Something may go, now or later; False: nothing before something is added."""
-        if self._parting is not None:
-            return not self._parting.sent
+        if self._last_message is not None:
+            return not self._last_message.sent
         return self._in_flight.alone is not None or bool(self._queues) or self.due() is not None
 
     def due(self) -> float | None:
         """Return when `next` may have something though nothing happens before; None: not by time alone."""
-        return None if self._in_flight.closed or self._parting is not None else self._queues.due()
+        return None if self._in_flight.closed or self._last_message is not None else self._queues.due()
 
     # What became of it
 
@@ -194,7 +194,7 @@ class Outbox:
         """Note that the broker refused it, not as `UNFIT` (`refusals`); return True if its topic is to be reported."""
         self._over(item)
         report = self._refusals.refused(item.topic, reason, now)
-        if self._parting is None or item is not self._parting.last:
+        if self._last_message is None or item is not self._last_message.item:
             self._queues.refused(item)
         self._make_room()
         return report
@@ -228,8 +228,8 @@ class Outbox:
     def _over(self, item: OutboxItem) -> float:
         """Note that it is under way no longer; return when it was taken."""
         since = self._in_flight.end(item)
-        if self._parting is not None:
-            self._parting.note(item)
+        if self._last_message is not None:
+            self._last_message.note(item)
         if isinstance(item, Retained):
             self._queues.retained.over(item)
         elif isinstance(item, HistoryBatch | LossNotice):

@@ -44,8 +44,8 @@ class RecentAcks:
         self.without_listener.clear()
         self.repeat = True
 
-    def part(self) -> None:
-        """Note that we part from a broker that has answered everything: what it has needs no second sending."""
+    def on_clean_exit(self) -> None:
+        """Note a clean exit from a broker that has acknowledged everything: nothing is sent to it a second time."""
         if not self.repeat:
             self._acknowledged.clear()
         self.without_listener.clear()

@@ -159,7 +159,7 @@ def test_parting_from_a_broker_that_has_answered_leaves_nothing_to_repeat() -> N
     item = outbox.next(20.0)
     assert item is not None
     outbox.on_ack(item, 20.0)
-    outbox.backlog.part()
+    outbox.backlog.on_clean_exit()
     outbox.lost(20.1)
     assert not outbox.backlog.spill.at_last
 
@@ -173,7 +173,7 @@ def test_what_is_still_to_be_repeated_is_kept_at_the_end() -> None:
     outbox.on_ack(item, 20.0)
     outbox.lost(20.1)
     connect(outbox, 21.0)
-    outbox.backlog.part()
+    outbox.backlog.on_clean_exit()
     outbox.lost(22.0)
     assert outbox.backlog.spill.at_last
     store.take(outbox, 22.0)

@@ -125,7 +125,7 @@ def test_what_nobody_listened_to_is_not_kept_on_disk_by_a_daemon_that_parts() ->
     connect(outbox, 0.0)
     outbox.add(sample(1), 1.0)
     heard_by_nobody(outbox, 1.0)
-    outbox.backlog.part()
+    outbox.backlog.on_clean_exit()
     outbox.lost(2.0)
     assert not outbox.backlog.spill.at_last
 

@@ -65,7 +65,7 @@ def test_a_broker_that_was_left_in_order_has_everything() -> None:
     acks = recent()
     acknowledge(acks, 1, 0.0)
     acknowledge(acks, 2, 0.0, without_listener=True)
-    acks.part()
+    acks.on_clean_exit()
     acks.lost(1.0)
     assert not acks.waiting
 
@@ -74,5 +74,5 @@ def test_one_that_was_left_before_the_samples_went_again_has_not() -> None:
     acks = recent()
     acknowledge(acks, 1, 0.0)
     acks.lost(AGAIN_WITHIN)
-    acks.part()
+    acks.on_clean_exit()
     assert acks.waiting

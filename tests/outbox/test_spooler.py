@@ -53,7 +53,7 @@ def test_at_the_end_what_waits_is_on_disk_and_what_was_acknowledged_is_not(tmp_p
             await until(lambda: bool(place.outbox.backlog.spool.page), "the page")
             assert place.settle_next() == list(range(1, 101))
             place.add(151, 160)
-            place.outbox.backlog.part()
+            place.outbox.backlog.on_clean_exit()
             place.outbox.lost(asyncio.get_running_loop().time())
         assert place.on_disk() == list(range(101, 161))
 

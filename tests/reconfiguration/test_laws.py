@@ -4,7 +4,7 @@ Nor is anything written to a device of another kind at the factory's id, and of 
 heard none is moved.
 
 The same 40 stories of each kind are told every time. With `LFS10D_EXAMPLES=1000` so many are told of each, others
-each time, and one that fails is made shorter. Those that once failed are in test_tales.py.
+each time, and one that fails is made shorter. Those that once failed are in test_laws_regressions.py.
 """
 
 from __future__ import annotations

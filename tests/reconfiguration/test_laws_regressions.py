@@ -1,4 +1,4 @@
-"""Stories of test_laws.py that once ended badly, each as short as it could be made."""
+"""Cases of test_laws.py that once failed, each as short as it could be made."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Leaves the broker in order: what waits, then `offline`, then DISCONNECT; within the broker's Receive Maximum."""
+"""Sends what waits, then `offline`, then DISCONNECT at a clean exit; within the broker's Receive Maximum."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from lfs10d.telemetry.publication import Publication
 log = logging.getLogger(__name__)
 
 DRAIN_WITHIN = 0.4
-FAREWELL_WITHIN = 0.6
+OFFLINE_WITHIN = 0.6
 LEAVE_WITHIN = 0.3
 """Seconds of a clean exit: for what still waits, for `offline` to be acknowledged, for the connection to close."""
 
 
-class Farewell:
+class CleanExit:
     """Used in the thread of the asyncio loop; `wake()` has the sender send what may go."""
 
     def __init__(self, client: BrokerClient, outbox: Outbox, wake: Callable[[], None]) -> None:
@@ -31,7 +31,7 @@ class Farewell:
         """Look again: the broker has acknowledged something, or the connection is lost."""
         self._progress.set()
 
-    async def part(self, last: Publication) -> None:
+    async def run(self, last: Publication) -> None:
         """Send what waits, then `last`, and disconnect; at most 1.3 s.
 
         Where the window has no room for `last` in time, the connection is closed without DISCONNECT: then the broker
@@ -42,11 +42,11 @@ class Farewell:
         if not self._connected:
             await self._client.leave(LEAVE_WITHIN)
             return
-        parting = self._outbox.part(last)
+        offline = self._outbox.send_last(last)
         self._wake()
-        if await self._until(lambda: parting.over, loop.time() + FAREWELL_WITHIN):
-            self._outbox.backlog.part()
-        await self._client.leave(LEAVE_WITHIN, will=not parting.sent)
+        if await self._until(lambda: offline.over, loop.time() + OFFLINE_WITHIN):
+            self._outbox.backlog.on_clean_exit()
+        await self._client.leave(LEAVE_WITHIN, will=not offline.sent)
 
     @property
     def _connected(self) -> bool:

@@ -1,4 +1,4 @@
-"""The last message before the end."""
+"""The last message before a clean exit, on the whole outbox."""
 
 from __future__ import annotations
 
@@ -11,9 +11,6 @@ from tests.support.outboxes import (
     sample,
 )
 
-# The last message
-
-
 OFFLINE = telemetry.retained("availability", "offline")
 
 
@@ -24,24 +21,24 @@ def test_the_last_message_goes_when_there_is_room_and_nothing_goes_after_it() ->
         outbox.add(sample(seq), 0.0)
     first = outbox.next(0.0)
     assert first is not None
-    parting = outbox.part(OFFLINE)
+    offline = outbox.send_last(OFFLINE)
     assert outbox.next(0.0) is None
     assert outbox.waits
     outbox.on_ack(first, 0.1)
     last = outbox.next(0.1)
-    assert last is parting.last
-    assert (outbox.due(), parting.over) == (None, False)
-    outbox.on_ack(parting.last, 0.2)
-    assert (outbox.next(0.2), outbox.waits, parting.over) == (None, False, True)
+    assert last is offline.item
+    assert (outbox.due(), offline.over) == (None, False)
+    outbox.on_ack(offline.item, 0.2)
+    assert (outbox.next(0.2), outbox.waits, offline.over) == (None, False, True)
     assert outbox.depth == 1, "the other sample is kept"
 
 
 def test_a_last_message_that_is_refused_does_not_go_over_the_next_connection() -> None:
     outbox = connected()
-    parting = outbox.part(OFFLINE)
-    assert outbox.next(0.0) is parting.last
-    assert outbox.refused(parting.last, NOT_AUTHORIZED, 0.0)
-    assert parting.over
+    offline = outbox.send_last(OFFLINE)
+    assert outbox.next(0.0) is offline.item
+    assert outbox.refused(offline.item, NOT_AUTHORIZED, 0.0)
+    assert offline.over
     outbox.lost(0.1)
     connect(outbox, 1.0)
     assert outbox.next(1.0) is None

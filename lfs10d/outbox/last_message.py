@@ -6,11 +6,11 @@ from lfs10d.outbox.in_flight import InFlight
 from lfs10d.outbox.items import OutboxItem, Retained
 
 
-class Parting:
-    """`last` goes as soon as the window has room, and nothing else from then on."""
+class LastMessage:
+    """`item` is sent as soon as the window has room, and nothing else from then on."""
 
-    def __init__(self, last: Retained) -> None:
-        self.last = last
+    def __init__(self, item: Retained) -> None:
+        self.item = item
         self.sent = False
         self.over = False
         """The broker has answered it."""
@@ -20,9 +20,9 @@ class Parting:
         if self.sent or in_flight.full:
             return None
         self.sent = True
-        in_flight.begin(self.last, now)
-        return self.last
+        in_flight.begin(self.item, now)
+        return self.item
 
     def note(self, item: OutboxItem) -> None:
         """Note that an item is under way no longer."""
-        self.over = self.over or item is self.last
+        self.over = self.over or item is self.item
