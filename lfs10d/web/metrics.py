@@ -27,6 +27,12 @@ _UNITS: Final = {
     "W/m2": "watts_per_square_meter", "W/m²": "watts_per_square_meter", "mm/h": "millimeters_per_hour",
 }  # fmt: skip
 _DEVICE: Final = "lfs10d_device"
+_OWN: Final = frozenset(
+    f"{_DEVICE}_{own}{suffix}"
+    for own in ("online", "polls", "poll_errors", "response_seconds", "last_good_timestamp_seconds")
+    for suffix in ("", "_total", "_created", "_count", "_sum")
+)
+"""Names that our own metrics of a device have or may have (OpenMetrics 1.0, section 4.3)."""
 _NO_EXCHANGE: Final = frozenset({"overrun", "port_lost", "port_busy"})
 """Codes that are counted without a request on the line."""
 _OLD_AFTER: Final = 1.5
@@ -41,13 +47,14 @@ class Family:
     kind: str
     help: str
     unit: str = ""
-    rows: list[tuple[str, Mapping[str, str], float]] = field(default_factory=list)
+    rows: dict[tuple[str, tuple[tuple[str, str], ...]], float] = field(default_factory=dict)
+    """By suffix and labels."""
 
     def add(self, value: object, suffix: str = "", **labels: str) -> None:
-        """Add a sample, if the value is a finite number."""
+        """Add a sample, if the value is a finite number; of two with the same labels the first stays."""
         number = _number(value)
         if number is not None:
-            self.rows.append((suffix, labels, float(number)))
+            self.rows.setdefault((suffix, tuple(labels.items())), float(number))
 
 
 def openmetrics_wanted(accept: str) -> bool:
@@ -138,11 +145,9 @@ def _add_device(families: _Families, line: LineModel, side: Side, device: ShownD
     if sample.get("quality") in ("good", "partial") and device.enabled and fresh:
         for name, value in device.values.items():
             unit = unit_words(device.units.get(name, ""))
-            ending = f"_{unit}" if unit and not name.endswith(f"_{unit}") else ""
-            metric = f"{_DEVICE}_{_metric_part(name)}{ending}"
-            families.of(metric, "gauge", f"{name.replace('_', ' ')} as the device measured it last.", unit).add(
-                value, **labels
-            )
+            families.of(
+                _gauge(name, unit), "gauge", f"{name.replace('_', ' ')} as the device measured it last.", unit
+            ).add(value, **labels)
     stats = _mapping(side.extras.get((device.name, "stats")))
     families.of(f"{_DEVICE}_polls", "counter", "Polls since the daemon's start.").add(
         stats.get("polls"), "_total", **labels
@@ -170,6 +175,13 @@ def _add_device(families: _Families, line: LineModel, side: Side, device: ShownD
         ).add(device.good_ts / 1e3, **labels)
 
 
+def _gauge(name: str, unit: str) -> str:
+    """Return the name of a value's metric, which is none of our own."""
+    ending = f"_{unit}" if unit and not name.endswith(f"_{unit}") else ""
+    metric = f"{_DEVICE}_{_metric_part(name)}{ending}"
+    return f"{metric}_value" if metric in _OWN else metric
+
+
 def unit_words(unit: str) -> str:
     """Return a unit as it stands in the name of a metric; letters and digits alone where it is not known."""
     return _UNITS[unit] if unit in _UNITS else _metric_part(unit).strip("_")
@@ -189,8 +201,8 @@ def _written(family: Family, *, openmetrics: bool) -> Iterator[str]:
     yield f"# TYPE {name} {family.kind}"
     if openmetrics and family.unit and family.name.endswith(f"_{family.unit}"):
         yield f"# UNIT {name} {family.unit}"
-    for suffix, labels, value in family.rows:
-        shown = ",".join(f'{label}="{_escaped(text)}"' for label, text in labels.items())
+    for (suffix, labels), value in family.rows.items():
+        shown = ",".join(f'{label}="{_escaped(text)}"' for label, text in labels)
         yield f"{family.name}{suffix}{{{shown}}} {_figure(value)}"
 
 

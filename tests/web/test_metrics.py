@@ -128,6 +128,31 @@ def test_each_value_of_a_station_is_a_gauge_named_by_quantity_and_unit() -> None
     ]  # fmt: skip
 
 
+OWN_NAMES = {
+    "online": "1", "polls": "1", "polls_total": "1", "poll_errors": "1", "poll_errors_created": "1", "response": "s",
+    "response_seconds": "1", "response_seconds_count": "1", "last_good_timestamp": "s",
+}  # fmt: skip
+"""Values of a profile with their units that are named as metrics of our own."""
+
+
+@pytest.mark.needs("promtool")
+@pytest.mark.parametrize("name", OWN_NAMES)
+def test_a_value_named_as_a_metric_of_our_own_has_another_name(line: PublishedLine, name: str) -> None:
+    before = samples(line)
+    line.publish("device/mast/telemetry", sample(9, line.wall, 12.34, **{name: 55, "units": {name: OWN_NAMES[name]}}))
+    (new,) = samples(line).keys() - {each.replace("_meters_per_second", "") for each in before} - before.keys()
+    assert new.partition("{")[0].endswith("_value")
+    assert samples(line)[new] == 55
+    test_promtool_finds_nothing_wrong(line)
+
+
+def test_of_two_values_with_one_name_of_a_metric_the_first_is_shown(line: PublishedLine) -> None:
+    line.publish("device/mast/telemetry", sample(9, line.wall, 12.34, **{"Gust 1": 7, "gust-1": 8, "units": {}}))
+    assert samples(line)["lfs10d_device_gust_1{device=mast,line=line0}"] == 7
+    text = metrics.text([line.model], line.wall, openmetrics=False)
+    assert len(re.findall(r"^lfs10d_device_gust_1\{", text, re.MULTILINE)) == 1
+
+
 @pytest.mark.parametrize("value", [True, "7", None, [], math.inf, -math.inf, math.nan, 10**400])
 def test_what_is_no_number_is_absent(line: PublishedLine, value: object) -> None:
     line.publish("line/stats", {"load_pct": value, "exchanges": 1, "errors": [], "gap_us": 7, "store": value})
@@ -161,6 +186,6 @@ def test_which_format_is_wanted(accept: str, wanted: bool) -> None:  # noqa: FBT
 
 def test_a_figure_is_written_as_a_whole_number_where_it_is_one() -> None:
     family = metrics.Family("x", "gauge", "x")
-    for value in (3.0, 0.1 + 0.2, 1e200):
-        family.add(value)
+    for place, value in enumerate((3.0, 0.1 + 0.2, 1e200)):
+        family.add(value, place=str(place))
     assert [row.rpartition(" ")[2] for row in metrics._written(family, openmetrics=True)][2:] == ["3", "0.3", "1e+200"]
