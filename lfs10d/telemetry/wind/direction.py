@@ -79,11 +79,12 @@ def spread(seen: int) -> Spread | None:
     if not seen:
         return None
     bits = f"{seen >> 1:0{CIRCLE}b}"[::-1]  # one digit per degree, the first is that of 1
-    directions = [place for place, bit in enumerate(bits, 1) if bit == "1"]
-    following = [*directions[1:], directions[0] + CIRCLE]
-    calms = [after - direction for direction, after in zip(directions, following, strict=True)]
-    widest = calms.index(max(calms))
-    return Spread(CIRCLE - calms[widest], compass(following[widest]), directions[widest])
+    first = bits.index("1")
+    calms = list(map(len, (bits[first + 1 :] + bits[: first + 1]).split("1")[:-1]))  # after each direction, to the next
+    widest = max(calms)
+    place = calms.index(widest)
+    end = first + place + sum(calms[:place])
+    return Spread(CIRCLE - 1 - widest, compass(end + widest + 2), compass(end + 1))
 
 
 class DirectionSeries(HeldSeries):
@@ -124,9 +125,8 @@ class DirectionSeries(HeldSeries):
             return spread(self._bits(first, last))
         newest = blocks.stop * BLOCK
         seen = self._open_seen if last == len(self._times) else self._bits(newest, last)
-        for block in range(blocks.start, blocks.stop):
-            seen |= self._seen_in(block)
-        if first < blocks.start * BLOCK and self._seen_in(blocks.start - 1) & ~seen:
+        seen |= self._seen_in(blocks.start, blocks.stop)
+        if first < blocks.start * BLOCK and self._seen_in(blocks.start - 1, blocks.start) & ~seen:
             seen |= self._bits(first, blocks.start * BLOCK)
         return spread(seen)
 
@@ -136,8 +136,14 @@ class DirectionSeries(HeldSeries):
         last = max(first, bisect_left(self._times, end - self._origin))
         return first, last, slice(-(-first // BLOCK), min(last // BLOCK, self._closed))
 
-    def _seen_in(self, block: int) -> int:
-        return int.from_bytes(self._seen[block * SEEN_BYTES : (block + 1) * SEEN_BYTES], "little")
+    def _seen_in(self, first: int, last: int) -> int:
+        """Return the directions seen in these blocks: they lie one behind the other, and are laid over one another."""
+        seen, blocks = int.from_bytes(self._seen[first * SEEN_BYTES : last * SEEN_BYTES], "little"), last - first
+        while blocks > 1:
+            blocks = (blocks + 1) // 2
+            width = blocks * SEEN_BYTES * 8
+            seen = seen >> width | seen & ((1 << width) - 1)
+        return seen
 
     def _bits(self, first: int, last: int) -> int:
         seen, scale = 0, self._scale
@@ -154,19 +160,18 @@ class DirectionSeries(HeldSeries):
         return Sums(sum(time for _, time in pairs), north, east)
 
     def _settle(self, held: int) -> None:
-        self._open_covered, self._open_first, self._open_second = self._open_and(held)
+        angle = radians(self._newest_kept / self._scale)
+        self._open_covered += held
+        self._open_first += cos(angle) * held
+        self._open_second += sin(angle) * held
 
     def _open(self, until: int) -> Sums:
-        return self._open_and(until + self._origin - self.newest)
-
-    def _open_and(self, held: int) -> Sums:
-        """Return the sums of the newest block if its newest value holds so long."""
-        angle = radians(self._newest_kept / self._scale)
+        held, angle = until + self._origin - self.newest, radians(self._newest_kept / self._scale)
         north, east = self._open_first + cos(angle) * held, self._open_second + sin(angle) * held
         return Sums(self._open_covered + held, north, east)
 
     def _took(self, at: int, kept: float) -> None:  # noqa: ARG002 - a direction's time is of no further use
-        self._open_seen |= 1 << compass(kept / self._scale)
+        self._open_seen |= 1 << (round(kept / self._scale) % CIRCLE or CIRCLE)
 
     def _gap(self) -> None:
         """No direction spoils another."""
