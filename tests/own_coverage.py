@@ -1,8 +1,8 @@
 """Every pure module is covered by its own tests alone, branch by branch: `python -m tests.own_coverage [NAME ...]`.
 
 Which modules are pure stands in `pyproject.toml`, in the contract of import-linter. Each is measured in a process of
-its own, so that nothing counts which other tests happen to call. Names (`modbus/hunt`) choose some of them. It ends
-with 1 and names what is missing: a test file, a line, a branch, or a test that passes. A module that only declares
+its own, so that nothing counts which other tests happen to call. Names (`modbus/frame_search`) choose some of them. It
+ends with 1 and names what is missing: a test file, a line, a branch, or a test that passes. A module that only declares
 (data without methods, protocols) needs no test file.
 """
 

@@ -10,7 +10,7 @@ Rules
    heard is given 200, 400, 1000 ms on its first polls. A late answer counts with the time it took.
 5. A probe of an OFFLINE device waits 200 ms or what was learned, every fourth one 1 s.
 6. A device that is silent at the start, or when the port is back, is polled `START_POLLS` times at once. Then it is
-   doubtful, as an OFFLINE one is: asked within the share of probes, so that the absent cost the present little; when
+   doubtful, as an OFFLINE one is: asked within the share of probes, so that absent devices barely slow the others; when
    the first other one answers, at once but for 200 ms only.
 7. A device that answers badly (bytes came, but no right frame) is polled as one that answers well, however it is: bad
    answers are cheap. Of one that was never heard it is not known how long it takes: it is given 200 ms.

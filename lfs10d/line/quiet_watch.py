@@ -1,7 +1,7 @@
 """Keeps the line quiet after an answer where a second one may follow, to hear it. Pure. Durations in s.
 
-A second answer that runs into what a neighbour is asked or says is never heard whole, and costs the neighbour its
-value each time. So the line itself must be silent for a moment.
+A second answer that collides with the request or the reply of a neighbour is never received whole, and costs the
+neighbour its value each time. So the line itself must be silent for a moment.
 
 Rules
 -----

@@ -4,7 +4,7 @@ Rules
 -----
 1. In this order: jobs without a share (requests); jobs within their share of the line (scans, changes) and probes
    (`lfs10d.line.probing`); polls (`lfs10d.line.poll_queue`). While no device answers, polls go before probes.
-2. A slave id that a job excludes is polled by nobody while the job runs.
+2. A slave id that a job excludes is not polled while the job runs.
 3. When the port is lost every device is offline and gets one reading; nothing is due until it is back, then every
    device is due at once.
 4. A device that is never heard, or probed in turn with others, and is silent right after another was silent, is asked

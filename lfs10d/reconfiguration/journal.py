@@ -66,7 +66,7 @@ class CommandRecord(_Record):
 
     @property
     def finished(self) -> CommandRecord:
-        """The same once it has its result: a repeat says itself where the result goes."""
+        """Return it without the address of its result, as kept once it has one: a repeat brings its own."""
         return self.model_copy(update={"topic": None, "correlation": None})
 
 
@@ -77,7 +77,7 @@ class _Facts(_Record):
 
 
 class ReaddressFacts(_Facts):
-    """Nothing."""
+    """What a re-address needs besides: nothing."""
 
 
 class BaudrateFacts(_Facts):
@@ -224,7 +224,7 @@ class Journal:
         return numbered
 
     def amend(self, number: int, moves: tuple[Move, ...]) -> None:
-        """Record where the sensors of a change are looked for from now on."""
+        """Record at which places the sensors of a change are looked for from now on."""
         self._save(changes=self._with(number, lambda change: change.model_copy(update={"moves": moves})))
 
     def set_pending(self, number: int, pending: tuple[str, ...]) -> None:

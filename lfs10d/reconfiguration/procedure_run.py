@@ -12,7 +12,7 @@ from lfs10d.modbus.pending import PendingRequests
 
 
 class Wire(Protocol):
-    """What changes of sensors need of the line; see `lfs10d.line.line.Line`."""
+    """The methods of the line that changes of sensors use; see `lfs10d.line.line.Line`."""
 
     @property
     def pending(self) -> PendingRequests:
@@ -42,7 +42,7 @@ class ProcedureRun:
         self._procedure: Procedure | None = None
 
     def begin(self, steps: Steps, clock: ProcedureClock, **settings: Any) -> None:  # noqa: ANN401 - those of Procedure
-        """Have a procedure done on the line."""
+        """Start a procedure on the line."""
         self._procedure = Procedure(steps, clock, self._on_await, **settings)
         self._wire.submit(self._procedure)
 
@@ -61,7 +61,7 @@ class ProcedureRun:
             self._wire.resume_procedure(self._procedure, result)
 
     def stop(self) -> None:
-        """Send no new frame, and give the line back."""
+        """Send no new frame, and release the line."""
         if self._procedure is not None:
             self._procedure.halt()
         self.resume()

@@ -35,7 +35,7 @@ class Readdress:
         self._runner = runner
 
     def fit(self, device: str, to: int) -> SlaveConfig | Result:
-        """Return the device that may get this id as far as is known here, or why the line need not even be asked."""
+        """Return the device that may get this id, or the rejection that needs no exchange on the line."""
         now = self._runner.running()
         slave = now.slave(device)
         if slave is None:
@@ -96,7 +96,7 @@ class Readdress:
         command: CommandRecord,
         profile: Profile,
     ) -> Result:
-        """Put on the disk what came of it; return the result."""
+        """Record the outcome on disk; return the result."""
         runner = self._runner
         result = readdress_answers.result(device, wish, report, profile)
         if report.ending is ReaddressEnding.TWINS:
@@ -122,7 +122,7 @@ class Readdress:
         change: OpenReaddress,
         record: ResultRecord | None,
     ) -> None:
-        """Put on the disk where the sensor is, or that it is still to be found."""
+        """Record on disk where the sensor is, or that it is still to be found."""
         runner = self._runner
         if report.ending is ReaddressEnding.MOVED:
             await runner.save_endpoint(device, wish.new)

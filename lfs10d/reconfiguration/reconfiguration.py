@@ -69,7 +69,7 @@ class Reconfiguration:
         runner.reservations.update()
 
     def recall(self) -> None:
-        """Have the commands of earlier lives remembered for their repeats, and those that have no result yet."""
+        """Restore the commands of earlier runs: those with a result for their repeats, and those without one yet."""
         self._runner.recall()
 
     # -- one at a time
@@ -104,7 +104,7 @@ class Reconfiguration:
         return self._runner.reservations.reserved
 
     def new_run(self) -> ProcedureRun:
-        """Return what runs procedures on the line, one after the other."""
+        """Return a runner of procedures on the line, one after the other."""
         return self._runner.new_run()
 
     # -- the commands

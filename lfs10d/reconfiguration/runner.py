@@ -50,7 +50,7 @@ OVERTAKEN = "the daemon ended before this change was finished; a later request h
 
 
 class Recall(Protocol):
-    """Remembers a command of an earlier life; see `lfs10d.commands.responder.Responder.recall`."""
+    """Remembers a command of an earlier run; see `lfs10d.commands.responder.Responder.recall`."""
 
     def __call__(
         self, name: str, command: Command, result: Result | None, *, forget_in: float, respond: bool = False
@@ -111,7 +111,7 @@ class ChangeRunner:
     # -- procedures on the line
 
     def new_run(self) -> ProcedureRun:
-        """Return what runs procedures on the line, one after the other."""
+        """Return a runner of procedures on the line, one after the other."""
         return ProcedureRun(self.wire())
 
     async def profile(self, reference: str) -> Profile:
@@ -189,7 +189,7 @@ class ChangeRunner:
     # -- the journal
 
     async def journalled(self, step: Callable[[], T]) -> T:
-        """Have a step of the journal done in a thread, after the one before it; it is not cut short."""
+        """Run a step of the journal in a thread, after the one before it; it is not cancelled."""
         if self._writing is not None:
             await asyncio.wait([self._writing])
         self._writing = asyncio.ensure_future(run_in_thread(step, "journal"))
@@ -259,11 +259,11 @@ class ChangeRunner:
     # -- what holds from now on
 
     async def change(self, edit: Edit) -> None:
-        """Put another configuration into force, on the disk first; raises StateError where the disk refuses it."""
+        """Apply another configuration, saved to disk first; raises StateError if it cannot be written."""
         await self._change(edit)
 
     async def save_endpoint(self, device: str, endpoint: Endpoint, added: Values | None = None) -> None:
-        """Have a device polled where it was found, on the disk first; `added` is the entry of a new one."""
+        """Poll a device where it was found, saved to disk first; `added` is the entry of a new one."""
 
         def edit(now: Effective) -> Changes:
             if now.slave(device) is None:
@@ -283,7 +283,7 @@ class ChangeRunner:
     # -- commands of earlier lives
 
     def recall(self) -> None:
-        """Have the commands of earlier lives remembered for their repeats, and those that have no result yet."""
+        """Restore the commands of earlier runs: those with a result for their repeats, and those without one yet."""
         now = self.timestamp()
         for record in self.journal.answers:
             forget_in = max(0.0, (record.at + REMEMBERED_FOR_MS - now) / 1000)
@@ -293,12 +293,12 @@ class ChangeRunner:
                 self._recall(change.asked.name, command_of(change.asked), None, forget_in=inf)
 
     def _respond(self, record: ResultRecord) -> None:
-        """Answer a command of an earlier life, and its repeats."""
+        """Answer a command of an earlier run, and its repeats."""
         forget_in = REMEMBERED_FOR_MS / 1000
         command, result = command_of(record.asked), result_of(record)
         self._recall(record.asked.name, command, result, forget_in=forget_in, respond=True)
 
     async def stop(self) -> None:
-        """Begin nothing any more; put on the disk what was only noted."""
+        """Start no further change; write to disk what was only noted."""
         self._tasks.cancel_all()
         await self._save_noted()

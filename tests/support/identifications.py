@@ -63,7 +63,7 @@ def interview(
     profiles: Sequence[Profile] = PROFILES,
     first: Outcome | None = None,
 ) -> tuple[FoundDevice | None, list[ReadRegisters]]:
-    """Hold an interview with a device; return what was found, and what was asked."""
+    """Identify a device; return what was found, and what was asked."""
     asked: list[ReadRegisters] = []
     steps = Identification(FoundDevice(slave, 9600), profiles, CODEC, first).steps()
     try:

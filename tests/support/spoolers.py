@@ -44,7 +44,7 @@ def sample(seq: int, *, clock: ClockState = "synced", ts: int | None = None) -> 
 
 @dataclass
 class Place:
-    """A stowage and what it told."""
+    """A spooler and what it reported."""
 
     folder: Path
     limits: Limits = ROOMY
@@ -123,7 +123,7 @@ async def until(claim: Callable[[], bool], what: str) -> None:
 
 @contextlib.asynccontextmanager
 async def working(place: Place) -> AsyncIterator[Place]:
-    """Start and stop a stowage."""
+    """Start and stop a spooler."""
     place.spooler.start()
     try:
         yield place

@@ -40,7 +40,7 @@ from lfs10d.reconfiguration.procedures.recognition import recognise
 
 @dataclass(frozen=True, slots=True)
 class AdoptWish:
-    """What is wanted: the sensor at slave id `factory` at one of `candidates` and at `line_rate`.
+    """The adoption to make: the sensor at slave id `factory` gets one of `candidates` and the `line_rate`.
 
     `rates` are those of its profile, in the order in which it is looked for.
     """
@@ -65,7 +65,7 @@ class AdoptReport:
 
 
 def adopt(wish: AdoptWish, query: IdentityQuery, echo_known: Callable[[], bool]) -> Generator[Step, Any, AdoptReport]:
-    """Carry it out; see the rules."""
+    """Adopt one factory-new sensor by the rules above."""
     try:
         looked = yield from _check_before_write(wish, query, echo_known)
         if looked.readdress.ending is not ReaddressEnding.FREE or looked.old is None or looked.to is None:

@@ -33,7 +33,7 @@ FIRST_PAUSE = 1.0
 
 
 class BaudrateEnding(StrEnum):
-    """What came of it. All before `MOVED` mean that nothing was written."""
+    """The outcome of a change of rate. All before `MOVED` mean that nothing was written."""
 
     ABSENT = "absent"
     DEAF = "deaf"
@@ -86,7 +86,7 @@ class RateSensor:
 
 @dataclass(frozen=True, slots=True)
 class RateWish:
-    """What is wanted."""
+    """The change of rate to make."""
 
     sensors: tuple[RateSensor, ...]
     old: int
@@ -126,7 +126,7 @@ class WriteRates:
 
 
 def change_rate(wish: RateWish, echo_known: Callable[[], bool]) -> Generator[Step, Any, BaudrateReport]:
-    """Carry it out; see the rules."""
+    """Move every sensor to another rate by the rules above."""
     try:
         refusal = yield from _check_before_write(wish, echo_known)
         if refusal is not None:
@@ -187,7 +187,7 @@ def _one_by_one(wish: RateWish, where: dict[str, int | None]) -> Generator[Step,
 
 
 def _twins(wish: RateWish, last: int, where: dict[str, int | None]) -> Generator[Step, Any, BaudrateReport]:
-    """Bring all back, as the last one written is two."""
+    """Bring all sensors back, because the last one written turned out to be two."""
     report = yield from roll_back(wish.touched(last), wish.old, wish.to, where)
     names = (wish.sensors[last].name,)
     return replace(report, ended=BaudrateEnding.TWINS, names=names) if report.restored else report

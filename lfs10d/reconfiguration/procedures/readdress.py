@@ -63,7 +63,7 @@ ECHO_READS = 12
 
 
 class ReaddressEnding(StrEnum):
-    """What came of it. All before `MOVED` mean that nothing was written."""
+    """The outcome of a re-address. All before `MOVED` mean that nothing was written."""
 
     TAKEN = "taken"
     ABSENT = "absent"
@@ -114,7 +114,7 @@ class IdWrite:
 
 @dataclass(frozen=True, slots=True)
 class ReaddressWish:
-    """What is wanted: the sensor at `old` at slave id `to`; `rates` are those of its profile."""
+    """The re-address to make: from `old` to slave id `to`; `rates` are those of its profile."""
 
     old: Endpoint
     to: int
@@ -123,14 +123,14 @@ class ReaddressWish:
 
     @property
     def new(self) -> Endpoint:
-        """Where it is to answer."""
+        """The new place of the sensor."""
         return Endpoint(slave=self.to, baudrate=self.old.baudrate)
 
 
 def readdress(
     wish: ReaddressWish, query: IdentityQuery, echo_known: Callable[[], bool]
 ) -> Generator[Step, Any, ReaddressReport]:
-    """Carry it out; see the rules."""
+    """Give a sensor another slave id by the rules above."""
     try:
         refusal, before = yield from check_before_write(wish, query, echo_known)
         if refusal is not None:
