@@ -12,6 +12,7 @@ one reading with the port's fault, which takes it offline.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 from typing import Final, assert_never
 
 from lfs10d.reading import (
@@ -71,7 +72,9 @@ class Station:
         """Last sample number used of each device that was removed."""
         self._devices = {info.name: self._new_device(info, now) for info in devices}
         self._wind = WindStation(line.name, daemon.boot, devices, now)
-        self._states_due: float | None = None
+        self._held_back: dict[str, float] = {}
+        """When the states are due that were held back, by device: monotonic s."""
+        self._states_due = inf
         self.stats_due = now.mono + STATS_EVERY
         """When `tick` is to be told what waits for the broker: monotonic s."""
 
@@ -107,12 +110,12 @@ class Station:
         `backlog` is what waits for the broker, wanted from `stats_due` on.
         """
         published = self._watch_clock(now)
-        if self._states_due is not None and self._states_due <= now.mono:
-            for device in self._devices.values():
-                state = device.due_state(now)
+        if self._states_due <= now.mono:
+            for name in [name for name, due in self._held_back.items() if due <= now.mono]:
+                state = self._devices[name].due_state(now)
                 if state is not None:
                     published.append(state)
-            self._states_due = self._next_state()
+                self._hold_back(name)
         if self.stats_due <= now.mono:
             self.stats_due += STATS_EVERY
             if self.stats_due <= now.mono:  # the process was stopped: missed statistics are not made up
@@ -123,14 +126,18 @@ class Station:
             published += self._wind.tick(now)
         return published
 
-    def _next_state(self) -> float | None:
-        dues = (device.state_due for device in self._devices.values())
-        return min((due for due in dues if due is not None), default=None)
+    def _hold_back(self, name: str) -> None:
+        """Note whether, and until when, the state of a device is held back."""
+        due = self._devices[name].state_due
+        if due is not None:
+            self._held_back[name] = due
+        elif self._held_back.pop(name, None) is None:
+            return
+        self._states_due = min(self._held_back.values(), default=inf)
 
     def due(self) -> float:
         """Return the monotonic time at which `tick` is wanted next."""
-        due = min(self.stats_due, self._wind.due)
-        return due if self._states_due is None else min(self._states_due, due)
+        return min(self.stats_due, self._wind.due, self._states_due)
 
     def burst(self, now: Instant, backlog: BacklogStats = NOTHING_WAITS) -> list[Publication]:
         """Return every retained topic in its newest form, `B/availability` excepted."""
@@ -174,7 +181,9 @@ class Station:
                 published += device.reconfigure(info, now)
             configured[info.name] = device
         self._devices = configured
-        self._states_due = self._next_state()
+        self._held_back, self._states_due = {}, inf
+        for name in configured:
+            self._hold_back(name)
         published += self._wind.configure(devices, now)
         published += self._line.reconfigure(line)
         list_now = self._device_list()
@@ -248,9 +257,7 @@ class Station:
         if reading.fault is None or reading.fault.code not in PORT_CODES:
             self._line.counters.polled(reading, since_last)
         self._wind.on_reading(reading, now)
-        due = device.state_due
-        if due is not None and (self._states_due is None or due < self._states_due):
-            self._states_due = due
+        self._hold_back(reading.device)
         return published
 
     def _mask(self, now: Instant) -> list[Publication]:

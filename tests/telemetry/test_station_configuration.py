@@ -138,3 +138,14 @@ def test_another_pace_of_states_is_taken_up_by_a_reload() -> None:
     running.configure(LINE, [replace(slow, state_every=5.0)], instant(3.0))
     assert running.due() == 8.0
     assert [each.topic for each in running.tick(instant(8.0))] == ["device/a/state"]
+
+
+def test_a_state_that_a_burst_has_shown_meanwhile_is_not_published_again() -> None:
+    slow = replace(ONE_VALUE, state_every=10.0)
+    running = station(slow)
+    running.on_event(good("a", 1.0), instant(1.0))
+    running.on_event(good("a", 2.0), instant(2.0))
+    assert running.due() == 11.0
+    running.burst(instant(3.0))
+    assert running.tick(instant(11.0)) == []
+    assert running.due() == 30.0
