@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -36,3 +37,17 @@ def test_every_page_of_the_documentation_is_in_the_wheel() -> None:
     build = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"]
     pages = {f"docs/{each.name}" for each in (ROOT / "docs").glob("*.md")}
     assert pages <= set(build["wheel"]["shared-data"])
+
+
+def test_the_source_archive_has_what_its_tests_import() -> None:
+    build = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"]
+    imported = set()
+    for file in (ROOT / "tests").rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.Import):
+                imported |= {each.name.partition(".")[0] for each in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                imported.add(node.module.partition(".")[0])
+    ours = {f"/{name}" for name in imported if (ROOT / name).is_dir()}
+    assert {"/bench", "/lfs10d", "/tests"} <= ours
+    assert ours <= set(build["sdist"]["include"])
