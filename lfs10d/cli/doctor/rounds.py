@@ -83,10 +83,15 @@ def running(file: Path, proc: Path = PROC) -> Iterator[int]:
             folder = (process / "cwd").readlink() if wanted else Path("/")
         except OSError:
             continue
-        if any(word.endswith("lfs10d") for word in words[:4]) and "run" in words:
+        if _is_python(words[0]) and any(word.endswith("lfs10d") for word in words[:4]) and "run" in words:
             config = config_of(words)
             if (str((folder / config).absolute()) if config else "") == wanted:
                 yield int(process.name)
+
+
+def _is_python(program: str) -> bool:
+    """Tell a daemon from `sudo lfs10d run` and others that have started one and wait for it."""
+    return Path(program).name.startswith("python")
 
 
 async def _sensors(file: Path, loaded: LoadedConfig, login: Login, seen: port.PortState) -> list[Finding]:

@@ -81,5 +81,9 @@ def test_daemons_of_one_file_are_found_among_the_processes(tmp_path: Path) -> No
     process(6, "/usr/bin/python3 /usr/bin/lfs10d run -c other.yaml")
     process(7, "/usr/bin/python3 /usr/bin/lfs10d watch -c site.yaml")
     process(8, "/usr/bin/python3 /usr/bin/lfs10d run")
+    process(9, "sudo lfs10d run -c site.yaml")
+    process(10, "timeout 60 lfs10d run")
+    process(11, "/opt/lfs10d/bin/python -m lfs10d run -c roof.yaml")
     assert list(rounds.running(tmp_path / "site.yaml", tmp_path / "proc")) == [4, 5]
     assert list(rounds.running(Path("/etc/lfs10d/lfs10d.yaml"), tmp_path / "proc")) == [8]
+    assert list(rounds.running(tmp_path / "roof.yaml", tmp_path / "proc")) == [11]
