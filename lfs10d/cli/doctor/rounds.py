@@ -81,12 +81,23 @@ def running(file: Path, proc: Path = PROC) -> Iterator[int]:
         try:
             words = (process / "cmdline").read_text("utf-8", "replace").split("\0")
             folder = (process / "cwd").readlink() if wanted else Path("/")
+            inside = _in_a_container((process / "status").read_text("utf-8", "replace"))
         except OSError:
+            continue
+        if inside:
             continue
         if _is_python(words[0]) and any(word.endswith("lfs10d") for word in words[:4]) and "run" in words:
             config = config_of(words)
             if (str((folder / config).absolute()) if config else "") == wanted:
                 yield int(process.name)
+
+
+def _in_a_container(status: str) -> bool:
+    """Tell from a process' status whether it is in a container of ours: the paths it was given are not ours.
+
+    It has a number in each namespace from this one down to its own (proc(5), NSpid).
+    """
+    return any(len(line.split()) > 2 for line in status.splitlines() if line.startswith("NSpid:"))  # noqa: PLR2004  # the key and one number
 
 
 def _is_python(program: str) -> bool:

@@ -70,11 +70,12 @@ def test_check_online_looks_at_port_and_broker_too(
 
 
 def test_daemons_of_one_file_are_found_among_the_processes(tmp_path: Path) -> None:
-    def process(number: int, words: str) -> None:
+    def process(number: int, words: str, inside: str = "") -> None:
         folder = tmp_path / "proc" / str(number)
         folder.mkdir(parents=True)
         (folder / "cmdline").write_text(words.replace(" ", "\0"))
         (folder / "cwd").symlink_to(tmp_path)
+        (folder / "status").write_text(f"Name:\tlfs10d\nNSpid:\t{number}{inside}\nThreads:\t2\n")
 
     process(4, f"{sys.executable} /opt/lfs10d/bin/lfs10d run -c site.yaml")
     process(5, f"/usr/bin/python3 -sP /usr/bin/lfs10d run --config={tmp_path}/site.yaml")
@@ -83,6 +84,7 @@ def test_daemons_of_one_file_are_found_among_the_processes(tmp_path: Path) -> No
     process(8, "/usr/bin/python3 /usr/bin/lfs10d run")
     process(9, "sudo lfs10d run -c site.yaml")
     process(10, "timeout 60 lfs10d run")
+    process(12, "/usr/bin/python3 /usr/bin/lfs10d run", inside="\t1")
     process(11, "/opt/lfs10d/bin/python -m lfs10d run -c roof.yaml")
     assert list(rounds.running(tmp_path / "site.yaml", tmp_path / "proc")) == [4, 5]
     assert list(rounds.running(Path("/etc/lfs10d/lfs10d.yaml"), tmp_path / "proc")) == [8]
