@@ -24,7 +24,7 @@ from lfs10d.schema.fields import Name
 from lfs10d.web import metrics
 from lfs10d.web.actions import DEEPEST_DATA, Answer
 from lfs10d.web.connection import LARGEST_HEAD
-from lfs10d.web.guard import HEADER, HEADERS, HostList, Token, Verdict, cookies_of, same_origin, set_cookie
+from lfs10d.web.guard import HEADER, HEADERS, HostList, Token, Verdict, cookies_of, same_origin, set_cookie, viewer_of
 from lfs10d.web.pruned import pruned
 from lfs10d.web.viewers import Viewers
 
@@ -301,9 +301,7 @@ def _problem(code: int, name: str, words: str) -> Response:
 
 
 def _client(request: Request) -> str:
-    """Return the address of a viewer; of IPv6 the network, for each has a whole one."""
-    host = request.client.host if request.client else "?"
-    return ":".join(host.split(":")[:4]) if host.count(":") > 3 else host  # noqa: PLR2004 - 64 of 128 bits
+    return viewer_of(request.client.host if request.client else "?")
 
 
 def _over_tls(request: Request) -> bool:

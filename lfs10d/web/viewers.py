@@ -14,6 +14,7 @@ from starlette.responses import PlainTextResponse, Response, StreamingResponse
 
 from lfs10d.web.actions import LineActions
 from lfs10d.web.feed import Feed
+from lfs10d.web.guard import viewer_of
 from lfs10d.web.line_model import LineModel
 from lfs10d.web.site_model import SiteModel, Stream, event_bytes
 
@@ -22,6 +23,8 @@ EVERY: Final = 0.5
 AT_LEAST_EVERY: Final = 2.0
 """s: a viewer who hears nothing for longer shows that it is not live."""
 MOST_VIEWERS: Final = 64
+MOST_OF_ONE: Final = 40
+"""Viewers of one address: nobody keeps all others out."""
 BEHIND: Final = 60
 """Events that wait for a viewer before its stream is ended; it comes back and resumes."""
 RETRY: Final = b"retry: 2000\n\n"
@@ -35,7 +38,8 @@ class Viewers:
         self._feeds = feeds
         self._actions: dict[str, LineActions] = {}
         self._stream = Stream(secrets.token_hex(4))
-        self._queues: set[asyncio.Queue[bytes | None]] = set()
+        self._queues: dict[asyncio.Queue[bytes | None], str] = {}
+        """Of each open stream, with its viewer's address."""
         self._sent_at = 0.0
         self._looked_at = 0.0
 
@@ -101,29 +105,31 @@ class Viewers:
         event = self._stream.add(data)
         for queue in list(self._queues):
             if queue.qsize() >= BEHIND:
-                self._queues.discard(queue)
+                self._queues.pop(queue, None)
                 queue.put_nowait(None)
             else:
                 queue.put_nowait(event)
 
     async def events(self, request: Request) -> Response:
         """Return the stream, from where the viewer lost it, or from the whole."""
-        if len(self._queues) >= MOST_VIEWERS:
+        address = viewer_of(request.client.host if request.client else "?")
+        own = list(self._queues.values()).count(address)
+        if len(self._queues) >= MOST_VIEWERS or own >= MOST_OF_ONE:
             return PlainTextResponse("Too many viewers.\n", 503, headers={"retry-after": "10"})
         last = request.headers.get("last-event-id")
         headers = {"cache-control": "no-store", "x-accel-buffering": "no"}
-        return StreamingResponse(self._events(last), media_type="text/event-stream", headers=headers)
+        return StreamingResponse(self._events(last, address), media_type="text/event-stream", headers=headers)
 
-    async def _events(self, last: str | None) -> AsyncIterator[bytes]:
+    async def _events(self, last: str | None, address: str) -> AsyncIterator[bytes]:
         queue: asyncio.Queue[bytes | None] = asyncio.Queue()
         missed = self._stream.since(last)
         whole = self.whole() if missed is None else ""
         if missed is None:
             missed = [event_bytes("state", whole, self._stream.last_id)]
-        self._queues.add(queue)
+        self._queues[queue] = address
         try:
             yield RETRY + b"".join(missed)
             while (event := await queue.get()) is not None:
                 yield event
         finally:
-            self._queues.discard(queue)
+            self._queues.pop(queue, None)

@@ -9,7 +9,7 @@ import time
 import pytest
 
 from lfs10d.web import app, connection
-from lfs10d.web.viewers import MOST_VIEWERS
+from lfs10d.web.viewers import MOST_OF_ONE, MOST_VIEWERS
 from tests.support.pages import PageServer, parsed, received
 
 
@@ -29,19 +29,29 @@ def test_two_hundred_idle_connections_keep_nobody_out(server: PageServer) -> Non
                 each.close()
 
 
-def test_streams_are_limited_and_the_page_is_still_there(server: PageServer) -> None:
+def stream(server: PageServer, address: str) -> socket.socket:
+    """Return a stream of a viewer at another address of this machine, with the status line read."""
+    viewer = socket.create_connection(("127.0.0.1", server.port), timeout=10.0, source_address=(address, 0))
+    viewer.sendall(f"GET /api/events HTTP/1.1\r\nHost: {server.host}\r\n\r\n".encode())
+    return viewer
+
+
+def test_streams_are_limited_in_all_and_of_one_address_and_the_page_is_still_there(server: PageServer) -> None:
     streams = []
+
+    def opened(address: str) -> bool:
+        streams.append(stream(server, address))
+        return streams[-1].recv(65536).startswith(b"HTTP/1.1 200")
+
     try:
-        for _ in range(MOST_VIEWERS):
-            stream = server.connect()
-            streams.append(stream)
-            stream.sendall(f"GET /api/events HTTP/1.1\r\nHost: {server.host}\r\n\r\n".encode())
-            assert stream.recv(65536).startswith(b"HTTP/1.1 200")
-        assert server.ask("GET /api/events")[0] == 503
+        assert all(opened("127.0.0.2") for _ in range(MOST_OF_ONE))
+        assert not opened("127.0.0.2")
+        assert all(opened("127.0.0.3") for _ in range(MOST_VIEWERS - MOST_OF_ONE)), "another is not kept out"
+        assert not opened("127.0.0.4")
         assert server.ask("GET /healthz")[0] == 200
     finally:
-        for stream in streams:
-            stream.close()
+        for each in streams:
+            each.close()
 
 
 def test_who_sends_slowly_is_disconnected(server: PageServer, monkeypatch: pytest.MonkeyPatch) -> None:

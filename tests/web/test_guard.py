@@ -19,6 +19,7 @@ from lfs10d.web.guard import (
     loopback,
     same_origin,
     set_cookie,
+    viewer_of,
 )
 
 TOKEN = "correct-horse-battery"  # noqa: S105 - of a test
@@ -51,6 +52,12 @@ def test_a_foreign_name_is_refused(host: str | None) -> None:
 
 def test_without_an_own_address_only_names_count() -> None:
     assert not HostList([]).allows("10.0.0.5", None)
+
+
+def test_a_viewer_is_an_address_and_of_ipv6_a_whole_network() -> None:
+    assert [viewer_of(each) for each in ("192.0.2.7", "2001:db8:1:2:3:4:5:6", "::1")] == [
+        "192.0.2.7", "2001:db8:1:2", "::1",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(
