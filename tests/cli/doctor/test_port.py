@@ -124,6 +124,14 @@ def test_the_system_s_files_are_read(system: System) -> None:
     assert (seen.running, seen.container, seen.is_device) == (frozenset({"ModemManager"}), True, False)
 
 
+def test_brltty_beside_a_ch340_of_the_system_is_a_fault(system: System) -> None:
+    system.adapter()
+    system.file("proc/17/comm", "brltty\n")
+    seen = replace(system.look("/dev/serial/by-id/usb-CH340-port0"), is_device=True)
+    (found,) = [each for each in judge(seen, service=False) if "brltty" in each.text]
+    assert (found.level, "remove brltty" in found.advice) == ("fail", True)
+
+
 @pytest.mark.parametrize("mark", [".dockerenv", "run/.containerenv", "run/systemd/container"])
 def test_every_kind_of_container_is_known(mark: str, system: System) -> None:
     system.file(mark, "systemd-nspawn")
