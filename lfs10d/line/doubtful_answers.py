@@ -4,28 +4,37 @@ A second answer may come as soon as the next request is out, and looks like the 
 
 Rules
 -----
-1. After an exchange in which bytes came that are no right frame the slave is left alone for `WATCHED`: what was asked
+1. An answer is *clean* if nothing that looks like it had come from its slave, or whoever spoke for it, for `WATCHED`
+   when it was asked; where it is known to be answered twice, for as long as that takes. Only what is not clean may be a
+   second answer.
+2. After an exchange in which bytes came that are no right frame the slave is left alone for `WATCHED`: what was asked
    then may be answered twice as well.
-2. An answer to a request that came sooner than `WATCHED` after the slave's exchange before is *doubtful* if hardly any
-   of the last answers took as long, or if other bytes came with it. It counts as not given: the slave is left alone for
-   `WATCHED` (its time-out where that is longer), and asked again. A doubtful answer teaches no usual time.
-3. Where leaving it alone showed nothing `VAIN` times in a row, its noise is trusted for `TRUST`, doubled each time up
+3. An answer that is not clean is *doubtful* if hardly any of the last answers took as long, if another frame of the
+   slave or other bytes came with it; a clean one only if what came with it may be an answer that was broken, and that
+   not `VAIN` times in a row. It counts as not given: the slave is left alone for `WATCHED` (its time-out where that is
+   longer), and asked again. A doubtful answer teaches no usual time.
+4. Where leaving it alone showed nothing `VAIN` times in a row, its noise is trusted for `TRUST`, doubled each time up
    to `TRUST_MOST`: some lines make noise before each answer, some lose 2 of 100. Broken answers are trusted only
-   `APART` from each other.
-4. Any other answer to such a request is *proved* when the slave was read again, after `WATCHED` at the latest. A second
-   frame of the slave before that shows that nobody knows which of the two it was. It is a matter of order, not of the
-   usual times: on a busy machine bytes may lie unread for long.
+   `APART` from each other, and none for `TRUST_MOST` after a second answer.
+5. Any other answer that is not clean has to be proved (`lfs10d.line.unproved_answers`). It is so too when nothing of
+   the slave came for `WATCHED`, though it was not asked. A second frame of the slave before that shows that nobody
+   knows which of the two it was.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections import deque
+from collections.abc import Collection
+from dataclasses import dataclass, field
 from math import inf
 
-from lfs10d.line.device import CONFIDENT_FROM, ResponseTimes
+from lfs10d.line.device import CONFIDENT_FROM, LEARNED_FROM, ResponseTimes
 from lfs10d.line.quiet_watch import spoilt
+from lfs10d.line.unproved_answers import UnprovedAnswers
 from lfs10d.modbus.duplicates import WATCHED, Duplicates
 from lfs10d.modbus.outcome import Outcome
+from lfs10d.modbus.request import ReadRegisters, Request
+from lfs10d.reading import FaultCode
 
 LEAST_MARGIN = 0.002
 """In s: answers that differ by no more than this, or half their length if that is more, took as long."""
@@ -39,19 +48,38 @@ TRUST = 10.0
 """How long noise raises no doubt after one in vain, in s; doubled after each."""
 TRUST_MOST = 600.0
 """The longest such time in s."""
+OWN_MOST = 0.25
+"""An own answer is awaited for no longer than this after the one that came, in s."""
+TARDY = 1.0
+"""The same where the slave is answered twice, and some answer of it has come after its time."""
+YOUNG = 1.25
+"""While few answers are known the slowest of all is taken to be so many times as slow."""
+EXCEPTION_LOOK = -1
+"""In place of its number of data bytes."""
+FRAME_LEAST = 5
+"""Characters of an answer that are no data: slave id, function, count, check."""
 
 
 @dataclass(slots=True)
 class _SlaveTrust:
-    ended: float = -inf
-    """When bytes came last in an exchange with it."""
+    spoke: float = -inf
+    """When anything came last from it, or in an exchange with it, but for plain answers."""
+    answered: dict[object, float] = field(default_factory=dict)
+    """When each look of a plain answer came last: a second one looks the same."""
+    second_at: float = -inf
+    """When its last right frame came that is no answer."""
     broken_at: float = -inf
-    proved_at: float = -inf
-    """Until when a second frame of the slave shows that the last one may not have been its own."""
-    own_by: float = -inf
-    """When the slave's own would have come, by the usual times."""
-    doubted_at: int | None = None
-    """How many extra answers were known when noise raised a doubt that is not settled yet."""
+    took: deque[float] = field(default_factory=lambda: deque(maxlen=LEARNED_FROM))
+    """How long its last answers took that were believed."""
+    unproved: UnprovedAnswers = field(default_factory=UnprovedAnswers)
+    held_until: float = -inf
+    """Until when a second frame of the slave shows that an unproved answer may not have been its own."""
+    proved: bool = True
+    """Nothing was unproved any more when its last exchange was over, that one left out."""
+    doubted: bool = False
+    """Noise raised a doubt that is not settled yet."""
+    in_a_row: int = 0
+    """So many of the last answers, one after the other, were doubtful."""
     vain: int = 0
     """How many doubts in a row were in vain."""
     trust: float = TRUST
@@ -65,64 +93,148 @@ class DoubtfulAnswers:
         self._duplicates = duplicates
         self._slaves: dict[int, _SlaveTrust] = {}
 
-    def exchanged(self, outcome: Outcome, usual: ResponseTimes, timeout: float) -> bool:
-        """Take an exchange that is over; whether its answer must not be believed. `usual` are the answers before."""
-        slave, began = outcome.request.slave, outcome.began
-        if began is None or not outcome.heard:
-            return False
+    def _state(self, slave: int) -> _SlaveTrust:
         state = self._slaves.get(slave)
         if state is None:
             state = self._slaves[slave] = _SlaveTrust()
-        before, state.ended = state.ended, outcome.ended
-        state.proved_at = state.own_by = -inf
+        return state
+
+    def spoke(self, slave: int, at: float, *, second: bool = False) -> None:
+        """Note a frame to or from a slave which is no answer to us; `second`: one too many."""
+        state = self._state(slave)
+        if second:
+            state.second_at = at
+        if not (second and self._duplicates.known(slave)):
+            state.spoke = max(state.spoke, at)
+
+    def exchanged(
+        self, outcome: Outcome, usual: ResponseTimes, timeout: float, *, tardy: bool = False, explained: bool = False
+    ) -> bool:
+        """Take an exchange that is over; whether its answer must not be believed. `usual` are the answers before.
+
+        `tardy`: some answer of the slave has come after its time. `explained`: noise is another master's doing.
+        """
+        slave, began = outcome.request.slave, outcome.began
+        self._late(outcome)
+        if began is None:
+            return False
+        state = self._state(slave)
+        spoke = max(state.spoke, state.answered.get(_wanted(outcome.request), -inf))
+        apart = began - spoke >= self._duplicates.watched(slave)
+        clean = apart and state.unproved.own_by <= began
+        if not outcome.heard:
+            state.proved = not state.unproved
+            state.held_until = max(state.held_until, outcome.ended + WATCHED)
+            return False
         self._settle(slave, state, outcome.ended)
+        if clean:
+            state.unproved.forget()
+        beside = _beside(outcome)
+        look = _look(outcome)
+        if look is None or outcome.late or _broken_answer(outcome, beside, explained=False):
+            state.spoke = outcome.ended
+        else:
+            state.answered[look] = outcome.ended
+        if look is not None and not beside:
+            state.unproved.answered(began, look)
+        state.proved = not state.unproved
+        state.held_until = max(outcome.ended + WATCHED, state.unproved.own_by)
         if outcome.answer is None:
-            if spoilt(outcome):
+            if not explained and spoilt(outcome):
                 self._broken(slave, state, outcome)
             return False
-        if began - before >= WATCHED:
-            return False
-        noisy = spoilt(outcome) and outcome.ended >= state.trusted_until
-        if not noisy and not _unusual(outcome, usual):
-            state.own_by = _own_by(outcome, usual)
-            state.proved_at = -inf if state.own_by == -inf else outcome.ended + WATCHED
-            return False
-        state.doubted_at = self._duplicates.extras(slave) if noisy else None
-        self._duplicates.rest(slave, outcome.ended + max(WATCHED, timeout))
-        return True
+        if self._doubted(state, outcome, beside, None if clean else usual, explained=explained):
+            rest = outcome.ended + max(WATCHED, timeout)
+            self._duplicates.rest(slave, rest)
+            state.held_until = max(state.held_until, rest)
+            return True
+        if not clean:
+            may_be_late = tardy and self._duplicates.extras(slave) > 0
+            self._prove(state, outcome, outcome.ended + TARDY if may_be_late else _own_by(outcome, state.took))
+        state.took.append(outcome.turnaround or 0.0)
+        return False
 
-    def proved_at(self, slave: int) -> float:
-        """Return when the slave's last answer is proved (rule 4); -inf where it is so by its own time."""
-        state = self._slaves.get(slave)
-        return -inf if state is None else state.proved_at
+    def _late(self, outcome: Outcome) -> None:
+        for late in outcome.late:
+            if late.request.slave != outcome.request.slave:
+                self.spoke(late.request.slave, outcome.ended)
+
+    def _doubted(
+        self, state: _SlaveTrust, outcome: Outcome, beside: bytes, usual: ResponseTimes | None, *, explained: bool
+    ) -> bool:
+        """Whether an answer is doubtful (rule 3); a clean one has no `usual`."""
+        known = self._trusted(state, outcome.ended)
+        noise = bool(beside) and (bool(state.unproved) or not known)
+        doubted = state.in_a_row < VAIN and _broken_answer(outcome, beside, explained=explained)
+        if usual is not None and not doubted:
+            second = outcome.began is not None and state.second_at >= outcome.began
+            doubted = (noise and not explained) or second or _unusual(outcome, usual)
+        state.doubted = doubted and bool(beside)
+        state.in_a_row = state.in_a_row + 1 if doubted else 0
+        return doubted
+
+    def _prove(self, state: _SlaveTrust, outcome: Outcome, own_by: float) -> None:
+        """Count an answer as unproved where the slave's own may still come."""
+        if state.unproved:  # if one of those is a second one, this may be the own of the one before
+            own_by = max(own_by, state.unproved.own_by + _length(outcome))
+        if own_by > outcome.ended:
+            state.unproved.add(_look(outcome), outcome.ended, own_by)
+            state.held_until = max(state.held_until, own_by)
+
+    def proved(self, slave: int) -> bool:
+        """Whether no answer of the slave was unproved when its last exchange was over, that one's left out."""
+        return self._state(slave).proved
+
+    def unproved(self, slave: int) -> bool:
+        """Whether the answer of the slave's last exchange, or one before, is unproved."""
+        return bool(self._state(slave).unproved)
+
+    def overdue(self, slave: int, now: float) -> bool:
+        """Whether answers of the slave have been unproved for too long."""
+        return self._state(slave).unproved.overdue(now)
+
+    def held_until(self, slave: int) -> float:
+        """Return until when what is unproved is held back, if the slave is not asked again before."""
+        return self._state(slave).held_until
 
     def own_by(self, slave: int) -> float:
-        """Return when the slave's own answer would have come by the usual times; -inf where that is over."""
-        state = self._slaves.get(slave)
-        return -inf if state is None else state.own_by
+        """Return until when an own answer of the slave may still come in place of an unproved one."""
+        return self._state(slave).unproved.own_by
 
-    def doubt(self, slave: int, now: float) -> bool:
-        """Doubt an answer that is not proved, for broken bytes came behind it; False where noise is trusted."""
-        state = self._slaves[slave]
-        if now < state.trusted_until:
-            return False
-        state.doubted_at = self._duplicates.extras(slave)
-        self._duplicates.rest(slave, now + WATCHED)
+    def decided(self, slave: int) -> None:
+        """Note that the slave's unproved answers were given up."""
+        self._state(slave).unproved.forget()
+
+    def doubt(self, slave: int, now: float, *, silent: bool) -> bool:
+        """Doubt the unproved answers of a slave, for broken bytes came behind them, or it was `silent`.
+
+        False where noise is trusted.
+        """
+        state = self._state(slave)
+        if not silent:
+            if self._trusted(state, now):
+                return False
+            state.doubted = True
+            self._duplicates.rest(slave, now + WATCHED)
+        state.unproved.forget()
         return True
 
     def _broken(self, slave: int, state: _SlaveTrust, outcome: Outcome) -> None:
         near = outcome.asked - state.broken_at < APART
         state.broken_at = outcome.ended
-        if near or outcome.ended >= state.trusted_until:
-            state.doubted_at = self._duplicates.extras(slave)
+        if near or not self._trusted(state, outcome.ended):
+            state.doubted = True
             self._duplicates.rest(slave, outcome.ended + WATCHED)
+
+    def _trusted(self, state: _SlaveTrust, now: float) -> bool:
+        return now < state.trusted_until and now - state.second_at > TRUST_MOST
 
     def _settle(self, slave: int, state: _SlaveTrust, now: float) -> None:
         """Trust the slave's noise if the doubt was in vain."""
-        known, state.doubted_at = state.doubted_at, None
-        if known is None:
+        doubted, state.doubted = state.doubted, False
+        if not doubted:
             return
-        if self._duplicates.extras(slave) != known:
+        if self._duplicates.extras(slave):
             state.vain = 0
             return
         state.vain += 1
@@ -131,19 +243,47 @@ class DoubtfulAnswers:
             state.trust = min(2 * state.trust, TRUST_MOST)
 
 
+def _look(outcome: Outcome) -> object:
+    """Return what tells the answer of an exchange from those to other requests; None without one."""
+    request = outcome.request
+    if outcome.fault is not None and outcome.fault.code is FaultCode.EXCEPTION and not outcome.may_follow:
+        return request.function, EXCEPTION_LOOK
+    return None if outcome.answer is None else _wanted(request)
+
+
+def _wanted(request: Request) -> object:
+    """Return what tells the answer to a request from those to others."""
+    return request.function, request.data_bytes if isinstance(request, ReadRegisters) else request
+
+
+def _beside(outcome: Outcome) -> bytes:
+    """Return what came with an answer and belongs to nothing, our own request left out: the adapter may return it."""
+    return b"".join(data for data, _ in outcome.strays).replace(outcome.sent, b"") if outcome.strays else b""
+
+
+def _broken_answer(outcome: Outcome, beside: bytes, *, explained: bool) -> bool:
+    """Whether what came with the answer may be another one, broken: it begins as one, or is as long, unexplained."""
+    request = outcome.request
+    size = FRAME_LEAST + (request.data_bytes if isinstance(request, ReadRegisters) else 0)
+    return bytes((request.slave, request.function)) in beside or (len(beside) >= size and not explained)
+
+
+def _length(outcome: Outcome) -> float:
+    """Return how long an answer that came took from its first to its last byte, as it was read."""
+    return outcome.ended - (outcome.sent_end or 0.0) - (outcome.turnaround or 0.0)
+
+
 def _unusual(outcome: Outcome, usual: ResponseTimes) -> bool:
-    if not usual or outcome.turnaround is None or outcome.sent_end is None:
+    if not usual or outcome.turnaround is None:
         return False
-    length = outcome.ended - outcome.sent_end - outcome.turnaround
-    margin = max(LEAST_MARGIN, length / 2)
+    margin = max(LEAST_MARGIN, _length(outcome) / 2)
     alike = ALIKE if len(usual) >= CONFIDENT_FROM else 1
     return usual.count_near(outcome.turnaround, margin) < alike
 
 
-def _own_by(outcome: Outcome, usual: ResponseTimes) -> float:
-    """Return when an answer to the same request would be over that takes as long as the slowest; -inf where it was."""
-    if usual.p99 is None or outcome.turnaround is None or outcome.sent_end is None:
-        return -inf
-    length = outcome.ended - outcome.sent_end - outcome.turnaround
-    latest = outcome.sent_end + usual.p99 + LEAST_MARGIN
-    return min(latest + length, outcome.ended + WATCHED) if latest >= outcome.ended else -inf
+def _own_by(outcome: Outcome, took: Collection[float]) -> float:
+    """Return when an answer to the same request would begin that takes longer than the slowest by half their spread."""
+    slowest, fastest = max(took, default=0.0), min(took, default=0.0)
+    late = slowest if len(took) >= CONFIDENT_FROM else YOUNG * slowest
+    own_by = (outcome.sent_end or 0.0) + late + max(LEAST_MARGIN, (slowest - fastest) / 2)
+    return min(own_by, outcome.ended + OWN_MOST)

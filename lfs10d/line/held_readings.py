@@ -31,15 +31,21 @@ class HeldReadings:
         """Hold these back until then; their slave's own answer would have come by `own_by`."""
         self._held.extend((until, own_by, reading) for reading in readings)
 
-    def holds(self, device: str, at: float) -> bool:
-        """Whether the own answer to a reading of a device, which is held back, may have come at `at`."""
-        return any(reading.device == device and reading.at < at <= own_by for _, own_by, reading in self._held)
+    def extend(self, device: str, until: float, own_by: float) -> None:
+        """Hold the readings of a device that are held back for longer: until then, or until proved."""
+        for place, (over, _, reading) in enumerate(self._held):
+            if reading.device == device and over > -inf:
+                self._held[place] = max(over, until), own_by, reading
 
-    def spoil(self, device: str, at: float, fault: Fault) -> None:
-        """Let the readings of a device fail that were held back at `at`: what was heard then may be its own answer."""
+    def holds(self, device: str, at: float) -> bool:
+        """Whether the own answer to a reading of a device, which is held back, may have come at `at` or later."""
+        return any(reading.device == device and at <= own_by for _, own_by, reading in self._held)
+
+    def spoil(self, device: str, fault: Fault, *, at: float | None = None) -> None:
+        """Let the readings of a device fail that are held back, or only those that were so at `at`."""
         for place, (until, _, reading) in enumerate(self._held):
-            if reading.device == device and reading.at < at <= until:
-                failed = replace(reading, values=None, rtt=None, fault=fault)
+            if reading.device == device and (at is None or reading.at < at <= until):
+                failed = reading if reading.values is None else replace(reading, values=None, rtt=None, fault=fault)
                 self._held[place] = -inf, -inf, failed
 
     def released(self, now: float = inf, device: str | None = None) -> Iterator[Reading]:

@@ -7,10 +7,11 @@ from collections.abc import Iterable, Mapping
 from lfs10d.line.device import Device
 from lfs10d.line.doubtful_answers import DoubtfulAnswers
 from lfs10d.line.held_readings import HeldReadings
-from lfs10d.line.quiet_watch import QuietWatch, spoilt
+from lfs10d.line.quiet_watch import QuietWatch
+from lfs10d.line.unproved_answers import PROVED_WITHIN
 from lfs10d.modbus import diagnosis
 from lfs10d.modbus.exchange import FAULT_HEARD
-from lfs10d.modbus.frames import EXCEPTION_FLAG
+from lfs10d.modbus.frames import EXCEPTION_FLAG, Codec
 from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.overhearing import Overhearing
 from lfs10d.modbus.pending import PendingRequests
@@ -30,6 +31,9 @@ class SecondAnswers:
         self._asked_by_another: dict[int, float] = {}
         self._quiet = QuietWatch(pending.duplicates, 0.0)
         self._doubts = DoubtfulAnswers(pending.duplicates)
+        self._doubted: dict[int, float] = {}
+        """The slaves whose last answer was not believed, with the last bit of its request: another answer to that, and
+        nothing else being owed, is one too many."""
         self.held = HeldReadings()
 
     @property
@@ -40,32 +44,81 @@ class SecondAnswers:
     def watch(self, devices: Mapping[int, Device]) -> None:
         """Watch these devices, by slave id, from now on."""
         self._devices = devices
+        self._doubted = {slave: sent_end for slave, sent_end in self._doubted.items() if slave in devices}
         self._overhearing.listen_to({slave: device.spec.codec for slave, device in devices.items()})
 
     def is_doubtful(self, outcome: Outcome, timeout: float) -> bool:
         """Take an outcome at the line's rate; whether its answer may be a second one to the request before."""
+        for late in outcome.late:
+            if late.request.slave in self._doubted:
+                self._spoil(late.request.slave, outcome.ended, outcome.heard[-FAULT_HEARD:])
         device = self._devices.get(outcome.request.slave)
         if device is None:
             return False
+        self._doubted.pop(device.slave, None)
         by_another = self._asked_by_another.get(outcome.request.slave, float("-inf")) >= outcome.asked
         if by_another and outcome.answer is not None:  # it began before the exchange, which saw the rest of it only
             self._pending.duplicates.rest(device.slave, outcome.ended + timeout)
             return True
-        if outcome.ended - max(self._asked_by_another.values(), default=float("-inf")) <= EXPLAINED:
-            return False
-        self._quiet.exchanged(outcome, online=device.online)
-        doubtful = self._doubts.exchanged(outcome, device.response_times, timeout)
-        broken = outcome.strays and spoilt(outcome)
-        if broken and diagnosis.stranger(outcome.request, device.spec.codec, outcome.heard) is None:
-            self._doubt_held(outcome.strays[0][1], outcome)
+        explained = outcome.ended - max(self._asked_by_another.values(), default=float("-inf")) <= EXPLAINED
+        if not explained:
+            self._quiet.exchanged(outcome, online=device.online)
+        tardy = self._pending.tardy(device.slave)
+        doubtful = self._doubts.exchanged(outcome, device.response_times, timeout, tardy=tardy, explained=explained)
+        if doubtful and outcome.sent_end is not None:
+            self._doubted[device.slave] = outcome.sent_end
+            self._pending.unanswered(outcome.request, device.spec.codec, outcome.sent_end)
+        if outcome.strays and _broken(outcome, device.spec.codec):
+            self._doubt_held(outcome, explained=explained)
+        elif device.online and outcome.began is not None and not outcome.heard and not tardy:
+            self._doubt_held(outcome, explained=explained, silent=True)
+        self._demand_proof(device, outcome)
         return doubtful
 
-    def _doubt_held(self, broken_at: float, outcome: Outcome) -> None:
-        """Let the readings fail whose slaves' own answers may be what came broken in this exchange from then on."""
+    def _doubt_held(self, outcome: Outcome, *, explained: bool, silent: bool = False) -> None:
+        """Let the readings fail whose slaves' own answers may be what came broken in this exchange.
+
+        Or, of the slave that was `silent`, what was not heard because our request fell into it. When it came nobody
+        knows: it may have lain unread.
+        """
         for slave, device in self._devices.items():
-            if self.held.holds(device.name, broken_at) and self._doubts.doubt(slave, outcome.ended):
+            its = slave == outcome.request.slave if silent else True
+            told = not explained or self._pending.duplicates.extras(slave) > 0
+            held = its and told and self.held.holds(device.name, outcome.asked)
+            if held and self._doubts.doubt(slave, outcome.ended, silent=silent):
                 fault = Fault(FaultCode.COLLISION, diagnosis.RUN_INTO, heard=outcome.heard[-FAULT_HEARD:])
-                self.held.spoil(device.name, broken_at, fault)
+                self.held.spoil(device.name, fault)
+
+    def _spoil(self, slave: int, at: float, heard: bytes) -> None:
+        """Let the readings of a slave fail that are held back: a frame of it, heard at `at`, is one too many."""
+        fault = Fault(FaultCode.COLLISION, diagnosis.UNDECIDED, heard=heard)
+        self.held.spoil(self._devices[slave].name, fault, at=at)
+        self._doubts.decided(slave)
+
+    def _demand_proof(self, device: Device, outcome: Outcome) -> None:
+        """Have a slave asked its barrier where its answers are unproved for long; left alone if that does not help."""
+        slave, now = device.slave, outcome.ended
+        self._pending.barrier_first(slave, wanted=self._doubts.overdue(slave, now))
+        if self._doubts.overdue(slave, now if device.spec.profile.barrier is None else now - PROVED_WITHIN):
+            self._pending.duplicates.rest(slave, self._doubts.held_until(slave))
+
+    def prove(self, outcome: Outcome, readings: list[Reading]) -> list[Reading]:
+        """Take the readings of an outcome; return those that are to be published, and hold back the others."""
+        slave = outcome.request.slave
+        device = self._devices.get(slave)
+        if device is None:
+            return readings
+        doubts = self._doubts
+        until, own_by = doubts.held_until(slave), doubts.own_by(slave)
+        proved: list[Reading] = []
+        if doubts.proved(slave) or not doubts.unproved(slave):
+            proved += self.held.released(device=device.name)
+        else:
+            self.held.extend(device.name, until, own_by)
+        if doubts.unproved(slave):
+            self.held.hold(readings, until, own_by)
+            return proved
+        return proved + readings
 
     def on_answer(self, outcome: Outcome) -> list[AnsweredTwice]:
         """Take an outcome that the scheduler knows of: a second answer may follow it, or none does any more."""
@@ -81,18 +134,6 @@ class SecondAnswers:
         self._quiet.answered(device.slave, outcome.ended)
         return [AnsweredTwice(outcome.ended, device.name, device.slave, None)] if ended else []
 
-    def prove(self, outcome: Outcome, readings: list[Reading]) -> list[Reading]:
-        """Take the readings of an outcome; return those that are to be published, and hold back the others."""
-        proved: list[Reading] = []
-        until = self._doubts.proved_at(outcome.request.slave)
-        for reading in readings:
-            proved += self.held.released(device=reading.device)
-            if reading.values is None or until <= outcome.ended:
-                proved.append(reading)
-            else:
-                self.held.hold([reading], until, self._doubts.own_by(outcome.request.slave))
-        return proved
-
     def on_strays(self, strays: Iterable[tuple[bytes, float]], outcome: Outcome | None = None) -> list[AnsweredTwice]:
         """Take what was heard and belongs to no exchange, or is left over by `outcome`, with the times of its pieces.
 
@@ -106,17 +147,29 @@ class SecondAnswers:
             if frame.request is not None:
                 self._pending.asked_by_another(frame.request, codec, frame.at)
                 self._asked_by_another[frame.slave] = frame.at
+                self._doubts.spoke(frame.slave, frame.at)
                 continue
-            size, exception = codec.size(len(frame.body)), bool(frame.body[1] & EXCEPTION_FLAG)
+            size = codec.size(len(frame.body))
+            exception = frame.body[2] if frame.body[1] & EXCEPTION_FLAG else None
             owed = self._pending.overheard(frame.slave, size, exception=exception, now=frame.at)
-            if owed or frame.slave == owing:
+            if owed and frame.slave in self._doubted:
+                owed = self._pending.owes_besides(frame.slave, self._doubted[frame.slave])
+                self._spoil(frame.slave, frame.at, codec.wrap(frame.body))
+            second = not owed and frame.slave != owing
+            self._doubts.spoke(frame.slave, frame.at, second=second)
+            if not second:
                 continue
             twice = self._pending.duplicates.second(frame.slave, frame.at, misplaced=owing is not None)
             self._quiet.second(frame.slave, frame.at)
-            self.held.spoil(
-                device.name, frame.at, Fault(FaultCode.COLLISION, diagnosis.UNDECIDED, heard=codec.wrap(frame.body))
-            )
+            self._spoil(frame.slave, frame.at, codec.wrap(frame.body))
             if twice is not None:
                 fault = Fault(FaultCode.DUPLICATE_ID, diagnosis.twice(twice), heard=codec.wrap(frame.body))
                 events.append(AnsweredTwice(frame.at, device.name, frame.slave, fault))
         return events
+
+
+def _broken(outcome: Outcome, codec: Codec) -> bool:
+    """Whether anything came in an exchange that is part of no right frame, our own request left out."""
+    strays = b"".join(data for data, _ in outcome.strays).replace(outcome.sent, b"")
+    frames = codec.frames(strays, outcome.request.slave, codec.answer_size(outcome.request))
+    return sum(end - begin for begin, end, _ in frames) < len(strays)

@@ -35,6 +35,9 @@ AWAKE_BEFORE = 0.00025
 sorted, which brings the code back into the processor's caches, and the last byte is read when it comes, not 0.2 ms
 later. The next silence begins at that moment."""
 
+STALE_LOOK = 0.001
+"""A look at the port that is older than this (s) is taken again: another program had the processor meanwhile."""
+
 
 UNHURRIED_AFTER = 0.0001
 """Who waits for an answer while nobody waits for the line looks so long after its last byte, in s: all of it is there
@@ -262,12 +265,15 @@ class Bus:
                 return Wait(action.until, listen=True, hurried=self._hurried)
             if isinstance(action, Settled):
                 return self._settled(action.outcome)
+            looked = self._clock()
             if self.port.waiting():  # the last look before we speak
                 data = self.port.read()
                 now = self._clock()
                 exchange.received(data, now)
                 continue
-            begun = self._clock()
+            begun = now = self._clock()
+            if begun - looked > STALE_LOOK:
+                continue
             self.port.write(action.frame)
             now = self._clock()
             exchange.sent(begun, now)

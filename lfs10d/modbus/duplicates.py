@@ -93,6 +93,13 @@ class Duplicates:
         longest = 1.25 * state.delay + MARGIN
         return longest if longest <= AWAITED_MOST else None
 
+    def watched(self, slave: int) -> float:
+        """Return how long after its last answer a slave must have been silent for a second one to be over, in s."""
+        state = self._slaves.get(slave)
+        if state is None or state.extras < TELLING:
+            return WATCHED
+        return 1.25 * state.delay + MARGIN
+
     def extras(self, slave: int) -> int:
         """Return how many extra answers of this slave were heard."""
         state = self._slaves.get(slave)

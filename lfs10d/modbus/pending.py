@@ -34,7 +34,7 @@ from lfs10d.modbus.duplicates import Duplicates
 from lfs10d.modbus.frames import Codec
 from lfs10d.modbus.other_master import OtherMaster
 from lfs10d.modbus.outcome import LateAnswer, Outcome
-from lfs10d.modbus.request import ReadRegisters, Request
+from lfs10d.modbus.request import NOT_FINAL, ReadRegisters, Request
 from lfs10d.reading import FaultCode
 
 QUIET_LEAST = 1.0
@@ -74,6 +74,7 @@ class PendingRequests:
         self._quiet_until: dict[int, float] = {}
         self._tardy: set[int] = set()
         self._baudrate: int | None = None
+        self._barrier_first: set[int] = set()
         self.duplicates = Duplicates()
         self.other_master = OtherMaster()
 
@@ -98,6 +99,17 @@ class PendingRequests:
         """Whether an answer of `slave` has ever come after its time, whoever was asked meanwhile."""
         return slave in self._tardy
 
+    def barrier_first(self, slave: int, *, wanted: bool) -> None:
+        """Have the next value of a slave preceded by the barrier, which proves what was answered before, or not."""
+        if wanted:
+            self._barrier_first.add(slave)
+        else:
+            self._barrier_first.discard(slave)
+
+    def owes_besides(self, slave: int, sent_end: float) -> bool:
+        """Whether a slave may still answer another request than the one whose last bit left at `sent_end`."""
+        return any(each.sent_end != sent_end for each in self.earlier(slave))
+
     def next_request(
         self,
         request: Request,
@@ -118,6 +130,7 @@ class PendingRequests:
         if until is not None:
             return until
         confusable = isinstance(request, ReadRegisters) and self.confusable(request, codec)
+        barrier_first = barrier_first or slave in self._barrier_first
         if barrier is not None and (barrier_first or confusable) and self._tells(barrier, request, codec):
             return barrier
         if confusable:
@@ -171,16 +184,20 @@ class PendingRequests:
         self._remember(Pending(request, codec, now, ours=False), lingers=None)
         self.other_master.asked(request.slave, now)
 
-    def overheard(self, slave: int, frame: int, *, exception: bool, now: float) -> bool:
+    def overheard(self, slave: int, frame: int, *, exception: int | None, now: float) -> bool:
         """Note a right answer of `slave`, of `frame` characters, which is none to us; whether it owed one.
 
-        What another master asked is answered by it. While one asks, it may have asked more than was heard.
+        What another master asked is answered by it, but for exceptions that do not end it (rule 6). While one asks, it
+        may have asked more than was heard.
         """
         owed = False
         for each in self.earlier(slave):
-            fits = each.codec.shapes(each.request)[exception].size == frame
+            fits = each.codec.shapes(each.request)[exception is not None].size == frame
             if fits and not each.ours:
-                self._drop(slave, [each], now)
+                if exception in NOT_FINAL:
+                    self._lingers[each] = now + QUIET_LEAST
+                else:
+                    self._drop(slave, [each], now)
                 self.other_master.answered(slave, now)
                 return True
             owed = owed or fits or not each.ours
@@ -190,6 +207,10 @@ class PendingRequests:
         """Note that the exchange of `request` was cut off at `now`: it may have been sent."""
         if request.slave:
             self._remember(Pending(request, codec, now), lingers=now + max(2 * timeout, QUIET_LEAST))
+
+    def unanswered(self, request: Request, codec: Codec, sent_end: float) -> None:
+        """Note that what answered a request, whose last bit left at `sent_end`, may have been another's answer."""
+        self._remember(Pending(request, codec, sent_end), lingers=None)
 
     def on_outcome(self, outcome: Outcome, codec: Codec, timeout: float, now: float) -> None:
         """Learn from an exchange that is over at `now`; `timeout` in s is the one it had."""

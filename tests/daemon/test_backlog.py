@@ -52,8 +52,9 @@ def numbers(view: View, device: str, boot: str) -> list[int]:
 
 
 def answered_by(line: SimulatedLine, slave: int) -> int:
-    """Return how many requests a slave has answered."""
-    return sum(request.frame[0] == slave and bool(request.answers) for request in list(line.log))
+    """Return how many requests for its value a slave has answered."""
+    answers = [answer for request in list(line.log) for answer in request.answers]
+    return sum(bool(answer.values) and answer.sensor.slave == slave for answer in answers)
 
 
 def test_lives_killed_and_ended_while_the_broker_is_away_are_delivered_in_order_by_the_next(
@@ -81,8 +82,8 @@ def test_lives_killed_and_ended_while_the_broker_is_away_are_delivered_in_order_
     assert time.monotonic() - began < ENDS_WITHIN
     ended = committed(site)["slave-1"] - killed
     measured = answered_by(line, 1) - asked
-    assert measured >= 8
-    assert ended >= 0.6 * measured, "an answer in doubt, or a late one, is asked for again"
+    assert ended >= 20
+    assert ended >= 0.9 * measured, "an answer in doubt, or a late one, is asked for again"
 
     third = site.run()
     third.ready()

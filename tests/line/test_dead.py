@@ -34,7 +34,7 @@ def test_8_of_32_dead_leave_the_others_94_percent_of_their_rate(rigs: Rigs, *, s
     rates = [len(rig.good(slave, since=60.0)) / len(alone().good(slave, since=30.0)) for slave in LIVING]
     assert sum(rates) / len(rates) >= 0.94
     # Which of the shy come right behind a probe is chance: one may lose a few polls more than another.
-    assert min(rates) >= (0.92 if shy else 0.94)
+    assert min(rates) >= (0.93 if shy else 0.94)
     probes = [exchange for exchange in rig.exchanges if exchange.purpose is Purpose.PROBE and exchange.at > 60.0]
     assert sum(exchange.at - exchange.asked for exchange in probes) <= 0.05 * 60.0 + 1.0
 

@@ -3,59 +3,15 @@
 from __future__ import annotations
 
 import itertools
-from math import inf
 
 import pytest
 
-from lfs10d.line.device import CONFIDENT_FROM, ResponseTimes
-from lfs10d.line.doubtful_answers import LEAST_MARGIN, TRUST, TRUST_MOST, VAIN, DoubtfulAnswers
-from lfs10d.modbus.duplicates import WATCHED, Duplicates
-from lfs10d.modbus.outcome import Outcome
+from lfs10d.line.doubtful_answers import TRUST, TRUST_MOST, VAIN
+from lfs10d.modbus.duplicates import WATCHED
 from lfs10d.modbus.request import ReadRegisters
 from lfs10d.reading import Fault, FaultCode
+from tests.support.doubted_slaves import SENT, TOOK, Line, jittery
 from tests.support.outcomes import ended
-
-USUAL = 0.02
-TOOK = 0.038
-"""Request 8 ms, turnaround 20 ms, answer 10 ms."""
-
-
-class Line:
-    """A slave that always took 20 ms; each exchange is told by its begin."""
-
-    def __init__(self, learned: int = CONFIDENT_FROM) -> None:
-        self.duplicates = Duplicates()
-        self.doubts = DoubtfulAnswers(self.duplicates)
-        self.usual = ResponseTimes()
-        for _ in range(learned):
-            self.usual.learn(USUAL)
-
-    def ask(
-        self,
-        began: float,
-        turnaround: float = USUAL,
-        *,
-        code: FaultCode | None = None,
-        unsolicited: int = 0,
-        heard: bytes = b"x",
-        timeout: float = 0.1,
-    ) -> bool:
-        outcome: Outcome = ended(
-            ReadRegisters(1, 1, 2),
-            asked=began,
-            began=began,
-            sent_end=began + 0.008,
-            turnaround=None if code else turnaround,
-            ended=began + 0.018 + turnaround,
-            answer=None if code else (1, 2),
-            fault=Fault(code, "failed") if code else None,
-            heard=heard,
-            unsolicited=unsolicited,
-        )
-        return self.doubts.exchanged(outcome, self.usual, timeout)
-
-    def alone_until(self, now: float) -> float | None:
-        return self.duplicates.rests_until(1, now)
 
 
 @pytest.mark.parametrize(("turnaround", "doubtful"), [(0.02, False), (0.016, False), (0.014, True), (0.026, True)])
@@ -81,42 +37,9 @@ def test_well_after_the_exchange_before_none_is_nor_while_no_usual_time_is_known
 def test_of_many_answers_two_must_have_taken_as_long_of_few_one(learned: int, outliers: int, doubtful: bool) -> None:  # noqa: FBT001
     line = Line(learned)
     for _ in range(outliers):
-        line.usual.learn(0.06)
+        line.learn(0.06)
     assert not line.ask(1.0)
     assert line.ask(1.05, 0.06) is doubtful
-
-
-def proved_after(usual: list[float], turnaround: float, began: float = 1.05) -> tuple[float, float]:
-    """Return how long after its end an answer of 10 ms is proved, and the slave's own would have come."""
-    line = Line(0)
-    for each in usual:
-        line.usual.learn(each)
-    line.ask(1.0)
-    assert not line.ask(began, turnaround)
-    ended = began + 0.018 + turnaround
-    return line.doubts.proved_at(1) - ended, line.doubts.own_by(1) - ended
-
-
-def test_an_answer_is_held_for_as_long_as_bytes_may_lie_unread_and_its_own_comes_by_the_usual_times() -> None:
-    """The own answer would begin behind it, at the usual time at the latest, and be as long."""
-    late = [0.02] * 50 + [0.04] * 50
-    assert proved_after(late, 0.02) == pytest.approx((WATCHED, 0.04 + LEAST_MARGIN - 0.02))
-    assert proved_after([0.02, 0.02, 0.5], 0.02) == pytest.approx((WATCHED, WATCHED))
-
-
-@pytest.mark.parametrize(
-    ("usual", "turnaround", "began"),
-    [([0.02] * 100, 0.02, 1.05), ([0.02, 0.04] * 50, 0.04, 1.05), ([0.02, 0.04] * 50, 0.02, 1.3), ([], 0.02, 1.05)],
-)
-def test_it_is_so_at_once_where_none_could_follow_it_or_nothing_was_asked_before(
-    usual: list[float], turnaround: float, began: float
-) -> None:
-    assert proved_after(usual, turnaround, began) == (-inf, -inf)
-
-
-def test_of_one_that_never_answered_nothing_is_to_be_proved() -> None:
-    assert Line().doubts.proved_at(7) == -inf
-    assert Line().doubts.own_by(7) == -inf
 
 
 def test_it_is_left_alone_for_as_long_as_a_second_answer_may_take_or_its_own() -> None:
@@ -136,7 +59,7 @@ def test_after_bytes_in_place_of_an_answer_it_is_left_alone(code: FaultCode) -> 
 
 def test_after_silence_or_an_exception_it_is_not() -> None:
     line = Line()
-    line.ask(1.0, code=FaultCode.TIMEOUT, heard=b"")
+    line.ask(1.0, code=FaultCode.TIMEOUT)
     line.ask(1.1, code=FaultCode.EXCEPTION)
     assert line.alone_until(1.13) is None
 
@@ -153,7 +76,7 @@ def test_noise_raises_a_doubt_and_is_trusted_ever_longer_where_that_was_in_vain(
     doubts: list[float] = []
     for n in range(40_000):
         at = n * 0.1
-        if line.alone_until(at) is None and line.ask(at, unsolicited=2):
+        if line.alone_until(at) is None and line.ask(at, beside=bytes(2)):
             doubts.append(at)
     pauses = [later - earlier for earlier, later in itertools.pairwise(doubts)]
     assert max(pauses[: VAIN - 1]) < 1.0  # in vain once proves nothing: a second answer may come now and then only
@@ -166,11 +89,12 @@ def test_where_a_second_answer_came_noise_is_not_trusted() -> None:
     line = Line()
     line.ask(1.0)
     line.duplicates.answered(1, 1.038)
-    assert line.ask(1.05, unsolicited=2)
+    assert line.ask(1.05, beside=bytes(2))
     line.duplicates.answered(1, 1.088)
     line.duplicates.second(1, 1.12)
+    line.duplicates.answered(1, 1.438)
     assert not line.ask(1.4)
-    assert line.ask(1.45, unsolicited=2)
+    assert line.ask(1.45, beside=bytes(2))
 
 
 def test_where_broken_answers_are_rare_they_are_trusted_once_some_were_in_vain() -> None:
@@ -185,14 +109,30 @@ def test_where_broken_answers_are_rare_they_are_trusted_once_some_were_in_vain()
     assert line.alone_until(5.15) is not None
 
 
-def test_broken_bytes_behind_an_answer_raise_a_doubt_until_that_was_in_vain_often_enough() -> None:
+def test_broken_bytes_behind_an_unproved_answer_raise_no_doubt_where_noise_is_trusted() -> None:
+    for second, doubtful in ((False, False), (True, True)):
+        line = jittery()
+        for n in range(VAIN):
+            line.ask(2.0 + n, 0.03, code=FaultCode.CRC)
+        if second:
+            line.doubts.spoke(1, 5.0, second=True)
+        line.ask(6.0, 0.03)
+        line.ask(6.05, 0.03)
+        assert line.doubts.doubt(1, 6.1, silent=False) is doubtful
+        assert line.doubts.unproved(1) is not doubtful
+        assert line.doubts.doubt(1, 6.1, silent=True)
+
+
+def test_a_clean_answer_is_believed_beside_noise_but_not_beside_what_may_be_a_broken_one() -> None:
+    for beside, doubtful in ((b"\x07" * 3, False), (b"\x01\x03\x04", True), (b"\x07" * 9, True), (SENT, False)):
+        assert Line().ask(1.0, beside=beside) is doubtful
+
+
+def test_what_is_explained_by_another_master_raises_no_doubt_unless_it_begins_as_an_answer() -> None:
+    for beside, doubtful in ((b"\x07" * 30, False), (b"\x01\x03\x04", True)):
+        line = Line()
+        line.ask(1.0)
+        assert line.ask(1.05, beside=beside, explained=True) is doubtful
     line = Line()
-    doubts = 0
-    for n in range(VAIN + 2):
-        line.ask(1.0 + n)
-        at = 1.05 + n
-        if line.doubts.doubt(1, at):
-            doubts += 1
-            assert line.alone_until(at) == pytest.approx(at + WATCHED)
-        line.ask(1.3 + n)
-    assert doubts == VAIN
+    line.ask(1.0, code=FaultCode.CRC, explained=True, beside=bytes(3))
+    assert line.alone_until(1.1) is None

@@ -127,3 +127,14 @@ def test_what_it_was_asked_may_be_answered_still() -> None:
     assert duplicates.rests_until(1, 1.5) == 2.0
     duplicates.answered(1, 3.0)
     assert duplicates.rests_until(1, 3.0) == 3.0 + WATCHED
+
+
+def test_a_slave_is_watched_for_as_long_as_its_second_answer_takes_where_that_is_known() -> None:
+    duplicates = Duplicates()
+    assert duplicates.watched(1) == WATCHED
+    for at in (1.0, 2.0):
+        assert duplicates.watched(1) == WATCHED
+        duplicates.answered(1, at)
+        duplicates.second(1, at + 0.4)
+    assert duplicates.watched(1) == pytest.approx(1.25 * 0.4 + MARGIN)
+    assert duplicates.watched(2) == WATCHED

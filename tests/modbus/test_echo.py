@@ -61,3 +61,12 @@ def test_at_each_opening_of_the_port_it_is_learned_anew() -> None:
     learner.observed(True)  # noqa: FBT003 - an observation
     learner.observed(True)  # noqa: FBT003 - an observation
     assert learner.state is Echo.UNKNOWN
+
+
+def test_only_what_was_observed_is_proved_not_what_is_configured() -> None:
+    assert not EchoLearner("off").proved
+    learner = EchoLearner()
+    assert not learner.proved
+    for _ in range(AGREEING):
+        learner.observed(False)  # noqa: FBT003 - an observation
+    assert learner.proved

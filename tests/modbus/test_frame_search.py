@@ -216,3 +216,21 @@ def test_a_head_that_began_before_the_start_is_no_beginning() -> None:
     search.feed(ANSWER[:2], 0.0)
     assert search.seek(expected) is None
     assert not search.begins(expected)
+
+
+def test_what_belongs_to_no_frame_is_given_in_pieces_with_the_times_at_which_they_were_read() -> None:
+    search, _, caught = fed(b"ab", b"cd" + ANSWER[:4], ANSWER[4:] + b"e", b"f")
+    assert caught is not None
+    assert search.pieces(0) == [(b"ab", 0.0), (b"cd" + ANSWER[:4], 1.0), (ANSWER[4:] + b"e", 2.0), (b"f", 3.0)]
+    search.claim(caught)
+    assert search.pieces(0) == [(b"ab", 0.0), (b"cd", 1.0), (b"e", 2.0), (b"f", 3.0)]
+    assert search.pieces(1) == [(b"b", 0.0), (b"cd", 1.0), (b"e", 2.0), (b"f", 3.0)]
+
+
+def test_what_belongs_to_no_frame_between_two_positions() -> None:
+    search, _, caught = fed(b"abcd", ANSWER, b"ef")
+    assert caught is not None
+    search.claim(caught)
+    assert search.unclaimed_between(1, 14) == b"bcde"
+    assert search.unclaimed_between(0, 6) == b"abcd"
+    assert search.unclaimed_between(5, 15) == b"ef"

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lfs10d.modbus.outcome import LateAnswer
-from lfs10d.modbus.pending import EQUALS_KEPT, OTHER_RATE
+from lfs10d.modbus.pending import EQUALS_KEPT, OTHER_RATE, QUIET_LEAST
 from lfs10d.modbus.request import ReadRegisters, Request, WriteRegister
 from lfs10d.reading import Fault, FaultCode
 from tests.support.outcomes import ended
@@ -220,21 +220,56 @@ def test_after_an_exception_that_does_not_end_it_a_request_stays_pending(excepti
 def test_another_masters_request_is_pending_until_its_answer_is_heard() -> None:
     line = Line()
     pending = line.pending
-    assert not pending.overheard(1, 9, exception=False, now=0.0)
+    assert not pending.overheard(1, 9, exception=None, now=0.0)
     pending.asked_by_another(WIND, RTU, 1.0)
     assert pending.confusable(WIND, RTU)
-    assert pending.overheard(1, 7, exception=False, now=1.1)  # of another shape: something is owed, but not this
-    assert pending.overheard(1, 9, exception=False, now=1.2)
+    assert pending.overheard(1, 7, exception=None, now=1.1)  # of another shape: something is owed, but not this
+    assert pending.overheard(1, 9, exception=None, now=1.2)
     assert pending.earlier(1) == ()
     pending.asked_by_another(WIND, RTU, 2.0)
-    assert pending.overheard(1, 5, exception=True, now=2.1)
+    assert pending.overheard(1, 5, exception=2, now=2.1)
     assert pending.earlier(1) == ()
+
+
+@pytest.mark.parametrize("exception", [5, 10, 11])
+def test_an_exception_that_does_not_end_it_leaves_another_masters_request_pending_too(exception: int) -> None:
+    pending = Line().pending
+    pending.asked_by_another(WIND, RTU, 1.0)
+    assert pending.overheard(1, 5, exception=exception, now=1.1)
+    assert [each.request for each in pending.earlier(1)] == [WIND]
+    pending.on_outcome(ended(WHO, answer=(7,), answered=True, sent_end=1.2), RTU, 0.2, 1.3)
+    assert pending.lingering_until(WIND, RTU, 1.3) == pytest.approx(1.1 + QUIET_LEAST)
+    assert pending.lingering_until(WIND, RTU, 2.2) is None
+
+
+def test_what_may_have_been_answered_by_another_stays_pending_until_a_barrier_is_answered() -> None:
+    line = Line()
+    pending = line.pending
+    pending.unanswered(WIND, RTU, 1.0)
+    assert pending.confusable(WIND, RTU)
+    assert not pending.owes_besides(1, 1.0)
+    assert pending.owes_besides(1, 2.0)
+    pending.on_outcome(ended(WHO, answer=(7,), answered=True, sent_end=1.2), RTU, 0.2, 1.3)
+    assert pending.earlier(1) == ()
+
+
+def test_the_barrier_goes_first_where_that_is_wanted() -> None:
+    pending = Line().pending
+
+    def following() -> object:
+        return pending.next_request(WIND, RTU, 0.0, barrier=WHO, timeout=0.2)
+
+    assert following() == WIND
+    pending.barrier_first(1, wanted=True)
+    assert following() == WHO
+    pending.barrier_first(1, wanted=False)
+    assert following() == WIND
 
 
 def test_a_request_of_ours_is_not_answered_by_what_is_overheard() -> None:
     line = Line()
     line.silent(WIND, 0.0)
-    assert line.pending.overheard(1, 9, exception=False, now=0.1)
+    assert line.pending.overheard(1, 9, exception=None, now=0.1)
     assert [each.request for each in line.pending.earlier(1)] == [WIND]
 
 

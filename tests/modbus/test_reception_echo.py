@@ -122,3 +122,26 @@ def test_an_echo_in_many_pieces_is_left_over_as_it_came() -> None:
     for at in range(5):
         ear.take(REQUEST[at : at + 1], 0.05 + at * TIMING.character)
     assert ear.leftover() == REQUEST[:5]
+
+
+def test_our_own_request_is_no_stray_once() -> None:
+    ear = reception()
+    ear.take(b"x" + REQUEST + b"y", 0.02)
+    assert ear.strays == ((b"x", 0.02), (b"y", 0.02))
+    quiet = reception()
+    quiet.take(b"xy", 0.02)
+    assert quiet.strays == ((b"xy", 0.02),)
+    echoed = reception(echo=Echo.ON)
+    echoed.take(REQUEST, 0.01)
+    echoed.take(REQUEST, 0.02)  # another's: ours has come back
+    assert echoed.strays == ((REQUEST, 0.02),)
+
+
+def test_what_answers_another_masters_request_is_displaced() -> None:
+    """It was heard to ask the same slave right behind us."""
+    ear = reception(echo=Echo.ON)
+    ear.take(REQUEST, 0.01)
+    ear.take(REQUEST, 0.02)
+    ear.take(ANSWER, 0.04)
+    assert ear.answer is None
+    assert ear.displaced is not None

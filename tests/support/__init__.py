@@ -4,6 +4,8 @@ The wire (`modbus`)
     `exchanges`          an exchange in virtual time: the request, bytes for it, a shell that carries it out
     `receptions`         bytes received in pieces, sorted into replies and noise
     `pending_lines`      requests that are still unanswered, and what happens to them
+    `doubted_slaves`     a slave whose exchanges are told one by one to those who doubt answers
+    `late_readers`       random lines with second answers, read late, and what was published wrongly of them
     `outcomes`           outcomes of exchanges, for tests of what receives them
     `ports`              a serial port on a pty
     `far_end`            the device's end of that pty

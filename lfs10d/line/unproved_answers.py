@@ -1,0 +1,64 @@
+"""The answers of one slave that may be second ones to the request before, until it shows. Pure. Times in s.
+
+A second answer that comes when the next answer is due looks like that answer; the slave's own then follows it, and is
+in turn taken for the answer to the request behind. So it does not show by itself that they are out of step.
+
+Rules
+-----
+1. An answer is *unproved* while the slave's own may still come: until the time that an answer usually takes is over.
+2. It is proved when that time was over before the slave was asked again, and that was answered with nothing broken
+   beside it: the line was looked at, and nothing was there.
+3. An answer that looks otherwise than all that are unproved, with nothing broken beside it, proves them: a slave
+   answers in order, so a right answer that was still to come would have come before it.
+4. While neither happens the next answers are unproved too, and none of them is proved before the last one is: each may
+   be the own answer to the request before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+from math import inf
+
+PROVED_WITHIN = 0.3
+"""Where answers are unproved for longer than this, in s, the slave is asked something that proves them."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Unproved:
+    look: Hashable
+    ended: float
+    own_by: float
+
+
+class UnprovedAnswers:
+    """One slave's, the oldest first."""
+
+    def __init__(self) -> None:
+        self._answers: tuple[_Unproved, ...] = ()
+
+    def __bool__(self) -> bool:
+        """Whether any answer is unproved."""
+        return bool(self._answers)
+
+    @property
+    def own_by(self) -> float:
+        """Until when an own answer may still come; -inf where none may."""
+        return max((each.own_by for each in self._answers), default=-inf)
+
+    def answered(self, began: float, look: Hashable) -> None:
+        """Note the answer to the request begun at `began`, with nothing broken beside it: rules 2 and 3."""
+        if began >= self.own_by or all(each.look != look for each in self._answers):
+            self._answers = ()
+
+    def add(self, look: Hashable, ended: float, own_by: float) -> None:
+        """Note an answer, whole at `ended`, in whose place the slave's own may still come until `own_by`."""
+        self._answers = (*self._answers, _Unproved(look, ended, own_by))
+
+    def overdue(self, now: float) -> bool:
+        """Whether the oldest waits for its proof for too long."""
+        return bool(self._answers) and now - self._answers[0].ended > PROVED_WITHIN
+
+    def forget(self) -> None:
+        """Forget them: what becomes of them is decided."""
+        self._answers = ()
