@@ -205,14 +205,14 @@ class DoubtfulAnswers:
         """Note that the slave's unproved answers were given up."""
         self._state(slave).unproved.forget()
 
-    def doubt(self, slave: int, now: float, *, silent: bool) -> bool:
+    def doubt(self, slave: int, now: float, *, silent: bool, own: bool) -> bool:
         """Doubt the unproved answers of a slave, for broken bytes came behind them, or it was `silent`.
 
-        False where noise is trusted.
+        False where noise is trusted, which it is in the exchange of another slave only; `own`: it was this one's.
         """
         state = self._state(slave)
         if not silent:
-            if self._trusted(state, now):
+            if not own and self._trusted(state, now):
                 return False
             state.doubted = True
             self._duplicates.rest(slave, now + WATCHED)

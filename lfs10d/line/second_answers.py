@@ -82,10 +82,10 @@ class SecondAnswers:
         knows: it may have lain unread.
         """
         for slave, device in self._devices.items():
-            its = slave == outcome.request.slave if silent else True
+            own = slave == outcome.request.slave
             told = not explained or self._pending.duplicates.extras(slave) > 0
-            held = its and told and self.held.holds(device.name, outcome.asked)
-            if held and self._doubts.doubt(slave, outcome.ended, silent=silent):
+            held = (own or not silent) and told and self.held.holds(device.name, outcome.asked)
+            if held and self._doubts.doubt(slave, outcome.ended, silent=silent, own=own):
                 fault = Fault(FaultCode.COLLISION, diagnosis.RUN_INTO, heard=outcome.heard[-FAULT_HEARD:])
                 self.held.spoil(device.name, fault)
 

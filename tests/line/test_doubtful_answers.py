@@ -118,9 +118,10 @@ def test_broken_bytes_behind_an_unproved_answer_raise_no_doubt_where_noise_is_tr
             line.doubts.spoke(1, 5.0, second=True)
         line.ask(6.0, 0.03)
         line.ask(6.05, 0.03)
-        assert line.doubts.doubt(1, 6.1, silent=False) is doubtful
+        assert line.doubts.doubt(1, 6.1, silent=False, own=False) is doubtful
         assert line.doubts.unproved(1) is not doubtful
-        assert line.doubts.doubt(1, 6.1, silent=True)
+        assert line.doubts.doubt(1, 6.1, silent=False, own=True)
+        assert line.doubts.doubt(1, 6.1, silent=True, own=True)
 
 
 def test_a_clean_answer_is_believed_beside_noise_but_not_beside_what_may_be_a_broken_one() -> None:

@@ -103,7 +103,7 @@ def test_given_up_they_are_forgotten_and_the_slave_is_left_alone_unless_it_was_s
     for silent in (True, False):
         line = jittery()
         line.ask(1.05, 0.03)
-        assert line.doubts.doubt(1, 1.2, silent=silent)
+        assert line.doubts.doubt(1, 1.2, silent=silent, own=True)
         assert not line.doubts.unproved(1)
         assert (line.alone_until(1.25) is None) is silent
     line = jittery()
