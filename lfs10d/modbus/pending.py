@@ -100,11 +100,15 @@ class PendingRequests:
         return slave in self._tardy
 
     def barrier_first(self, slave: int, *, wanted: bool) -> None:
-        """Have the next value of a slave preceded by the barrier, which proves what was answered before, or not."""
+        """Have the next poll of a slave preceded by the barrier, which proves what was answered before, or not."""
         if wanted:
             self._barrier_first.add(slave)
         else:
             self._barrier_first.discard(slave)
+
+    def wants_barrier(self, slave: int) -> bool:
+        """Whether the next poll of a slave is to be preceded by the barrier."""
+        return slave in self._barrier_first
 
     def owes_besides(self, slave: int, sent_end: float) -> bool:
         """Whether a slave may still answer another request than the one whose last bit left at `sent_end`."""
@@ -130,7 +134,6 @@ class PendingRequests:
         if until is not None:
             return until
         confusable = isinstance(request, ReadRegisters) and self.confusable(request, codec)
-        barrier_first = barrier_first or slave in self._barrier_first
         if barrier is not None and (barrier_first or confusable) and self._tells(barrier, request, codec):
             return barrier
         if confusable:

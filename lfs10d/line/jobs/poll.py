@@ -108,7 +108,9 @@ class Poll:
             now,
             barrier=None if barrier is None else _read(device.slave, barrier.register, barrier.count, barrier.function),
             timeout=usual,
-            barrier_first=self._barrier_due or (self._waking and device.gap.sleeps),
+            barrier_first=self._barrier_due
+            or (self._waking and device.gap.sleeps)
+            or self._pending.wants_barrier(device.slave),
         )
         if isinstance(request, float):
             return Hold(request)
