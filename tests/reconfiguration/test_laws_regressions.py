@@ -62,6 +62,10 @@ ALONE: dict[str, tuple[list[Ails], list[Any]]] = {
         [WELL] * 3,
         [("plug", 19200, READS_NEW, DONE), ("adopt", 0, 0, DONE), ("plug", 19200, WELL, DONE)],
     ),
+    "a change of the rate waits for no proof of an answer at the rate before": (
+        [late(0.35), ("silent", {"first": 4.0, "last": 9.0}), WELL],
+        [("baudrate", False, 0, DONE)],
+    ),
 }
 TWINNED: dict[str, tuple[list[Ails], tuple[Ails, Ails | None], float, list[Any]]] = {
     "a slow one of two that part is heard at the new id": (
