@@ -14,6 +14,7 @@ from lfs10d.cli.demo.broker import LOOPBACK
 from lfs10d.cli.demo.processes import PYTHON, Child, Children
 
 USUAL_PORT: Final = 8073
+_KEY_FILE: Final = "web-token"
 _ADDRESS: Final = re.compile(r"http://[0-9.:]+/")
 
 
@@ -27,9 +28,10 @@ class Page:
 
 @dataclass(frozen=True, slots=True)
 class StartingPage:
-    """The page's process and the token it was given."""
+    """The page's process, the file it takes its lines from, and the token it was given."""
 
     child: Child
+    configuration: Path
     token: str
 
 
@@ -37,33 +39,43 @@ def begin_page(children: Children, configuration: Path) -> StartingPage | None:
     """Start the page's process; None where its extra is not installed."""
     if not (importlib.util.find_spec("starlette") and importlib.util.find_spec("uvicorn")):
         return None
-    token, token_file = secrets.token_hex(8), children.folder / "web-token"
+    token, token_file = secrets.token_hex(8), children.folder / _KEY_FILE
     token_file.touch(mode=0o600)
     token_file.write_text(token)
-    port = USUAL_PORT if _is_free(USUAL_PORT) else 0
-    child = children.start(
+    child = _start(children, configuration, USUAL_PORT if _is_free(USUAL_PORT) else 0)
+    return StartingPage(child, configuration, token)
+
+
+def _start(children: Children, configuration: Path, port: int) -> Child:
+    return children.start(
         "page",
         *(*PYTHON, "-m", "lfs10d", "web", "-c", str(configuration)),
-        *("--listen", f"{LOOPBACK}:{port}", "--token-file", str(token_file)),
+        *("--listen", f"{LOOPBACK}:{port}", "--token-file", str(children.folder / _KEY_FILE)),
     )
-    return StartingPage(child, token)
 
 
 async def finish_page(children: Children, starting: StartingPage | None) -> Page | None:
     """Wait for the page; None where there is none, or it does not start."""
     if starting is None:
         return None
+    address = await _address(children, starting.child)
+    if address is None:  # another program took the usual port in between, such as a second demo
+        address = await _address(children, _start(children, starting.configuration, 0))
+    return None if address is None else Page(address, starting.token)
 
-    def address() -> str | None:
-        found = _ADDRESS.search(starting.child.log.read_text(errors="replace"))
+
+async def _address(children: Children, child: Child) -> str | None:
+    """Wait for the address that the page prints; None where it does not start, and is ended."""
+
+    def printed() -> str | None:
+        found = _ADDRESS.search(child.log.read_text(errors="replace"))
         return None if found is None else found[0]
 
-    await children.ready(starting.child, lambda: address() is not None)
-    found = address()
-    if found is None:
-        await children.discard(starting.child)
-        return None
-    return Page(found, starting.token)
+    await children.ready(child, lambda: printed() is not None)
+    address = printed()
+    if address is None:
+        await children.discard(child)
+    return address
 
 
 def _is_free(port: int) -> bool:

@@ -23,6 +23,7 @@ from lfs10d.cli.demo import parent_guard
 from lfs10d.errors import FailedError
 from lfs10d.system.logs import escape
 
+DAEMON: Final = "daemon"
 LOOK_AGAIN: Final = 0.02
 START_WITHIN: Final = 20.0
 """Seconds a child may take to be ready; none takes two on an idle machine."""
@@ -110,9 +111,9 @@ class Children:
         await _end([child], OTHERS_END_WITHIN)
 
     async def end(self) -> None:
-        """End all: first the daemon, started last, that it can still say goodbye to the others."""
-        await _end(self._started[-1:], DAEMON_ENDS_WITHIN)
-        await _end(self._started[:-1], OTHERS_END_WITHIN)
+        """End all: first the daemon, that it can still say goodbye to the others."""
+        await _end([child for child in self._started if child.name == DAEMON], DAEMON_ENDS_WITHIN)
+        await _end([child for child in self._started if child.name != DAEMON], OTHERS_END_WITHIN)
 
 
 async def _end(children: list[Child], within: float) -> None:

@@ -15,7 +15,7 @@ import click
 from lfs10d.cli.demo import texts
 from lfs10d.cli.demo.broker import Broker, start_broker
 from lfs10d.cli.demo.page import Page, begin_page, finish_page
-from lfs10d.cli.demo.processes import PYTHON, Children, temporary_folder
+from lfs10d.cli.demo.processes import DAEMON, PYTHON, Children, temporary_folder
 from lfs10d.cli.demo.scenario import BAUDRATE, LINE, configuration, faults, slaves
 from lfs10d.cli.login import log_in
 from lfs10d.cli.render.live_state import LiveState
@@ -116,7 +116,7 @@ async def _start(children: Children, wanted: str) -> tuple[Watch, Broker, Page |
         raise FailedError(f"the demo's simulated line does not start: {simulator.last_words()}")
     configuration_file.write_text(configuration(link, broker.port, broker.speaks))
     page = begin_page(children, configuration_file)
-    daemon = children.start("daemon", *ours, "run", "-c", str(configuration_file), "--state-dir", str(children.folder))
+    daemon = children.start(DAEMON, *ours, "run", "-c", str(configuration_file), "--state-dir", str(children.folder))
     watch = Watch(log_in(configuration_file, "demo", username=None, password_file=None))
     await watch.connect()
     if not await children.ready(daemon, lambda: watch.online):

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import importlib.util
 import json
 import re
+import socket
 import urllib.request
 from pathlib import Path
 
 import pytest
 
+from lfs10d.cli.demo import page
 from lfs10d.cli.demo.page import begin_page, finish_page
 from lfs10d.cli.demo.processes import Children
 
@@ -27,10 +30,10 @@ async def _shown(folder: Path) -> tuple[str, str, int]:
     configuration.write_text("line: {port: /dev/null}\nslaves: [2]\nmqtt: {host: 127.0.0.1, port: 1}\n")
     children = Children(folder)
     try:
-        page = await finish_page(children, begin_page(children, configuration))
-        assert page is not None
-        text = await asyncio.to_thread(_read, page.address + "healthz")
-        return page.address, text, (folder / "web-token").stat().st_mode & 0o777
+        running = await finish_page(children, begin_page(children, configuration))
+        assert running is not None
+        text = await asyncio.to_thread(_read, running.address + "healthz")
+        return running.address, text, (folder / "web-token").stat().st_mode & 0o777
     finally:
         await children.end()
 
@@ -40,6 +43,19 @@ def test_the_page_is_on_the_loopback_and_its_token_is_for_us_alone(tmp_path: Pat
     assert re.fullmatch(r"http://127\.0\.0\.1:\d+/", address)
     assert json.loads(text)["status"] == "ok"
     assert mode == 0o600
+
+
+def test_where_another_took_the_usual_port_at_the_last_moment_it_is_on_another(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(page, "_is_free", lambda _: True)
+    with socket.socket() as other:
+        with contextlib.suppress(OSError):  # a demo on this machine has it already
+            other.bind(("127.0.0.1", page.USUAL_PORT))
+            other.listen()
+        address, text, _ = asyncio.run(_shown(tmp_path))
+        assert not address.endswith(f":{page.USUAL_PORT}/")
+        assert json.loads(text)["status"] == "ok"
 
 
 def test_without_its_extra_there_is_no_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
