@@ -293,7 +293,9 @@ def _fall_ill(made: Recording) -> None:
     tell(line, heal)
     for name in ("laser-a", "pump"):
         view.wait(f"device/{name}/error", lambda error: not error["active"] and error["last_code"])
-        view.wait(f"device/{name}/state", good)
+    for name in ILL:
+        if any(unit.name == name for unit in made.units):
+            view.wait(f"device/{name}/state", good)
 
 
 LINES: dict[str, tuple[Sequence[Unit], Framing, Format]] = {
