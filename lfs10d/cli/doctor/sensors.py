@@ -101,7 +101,7 @@ def _settings(line: LineConfig, baudrate: int) -> PortSettings:
 def _at_another_rate(line: LineConfig, specs: Sequence[DeviceSpec]) -> Iterator[Finding]:
     """Ask at the other rates that the profiles know; yield where somebody answers."""
     rates = {rate for spec in specs if spec.profile.baudrate is not None for rate in spec.profile.baudrate.codes}
-    for rate in 2 * sorted(rates - {line.baudrate}):  # once more where nobody answered: a busy machine reads late
+    for rate in 6 * sorted(rates - {line.baudrate}):  # again where nobody answered: a reply may be lost, or read late
         readings = _polled(_settings(line, rate), specs)
         names = [name for name, reading in readings.items() if reading.fault is None]
         if names:
