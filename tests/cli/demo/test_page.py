@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import importlib.util
 import json
 import re
@@ -50,11 +49,12 @@ def test_where_another_took_the_usual_port_at_the_last_moment_it_is_on_another(
 ) -> None:
     monkeypatch.setattr(page, "_is_free", lambda _: True)
     with socket.socket() as other:
-        with contextlib.suppress(OSError):  # a demo on this machine has it already
-            other.bind(("127.0.0.1", page.USUAL_PORT))
-            other.listen()
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        taken = other.getsockname()[1]
+        monkeypatch.setattr(page, "USUAL_PORT", taken)
         address, text, _ = asyncio.run(_shown(tmp_path))
-        assert not address.endswith(f":{page.USUAL_PORT}/")
+        assert not address.endswith(f":{taken}/")
         assert json.loads(text)["status"] == "ok"
 
 
