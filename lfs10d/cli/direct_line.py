@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from collections.abc import Iterable
 from queue import Empty, SimpleQueue
@@ -48,7 +49,12 @@ class DirectLine:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Free the port."""
+        """Free the port after the exchange under way, so that who opens it next does not hear its answer."""
+        freed = threading.Event()
+        self._poller.pause(freed.set)
+        self._thread.wake()
+        if self._thread.is_alive():
+            freed.wait(STOPS_WITHIN)
         self._thread.stop()
         self._thread.join(STOPS_WITHIN)
 
@@ -71,7 +77,7 @@ class DirectLine:
         if isinstance(message, BaseException):
             raise message
         for event in message:
-            if isinstance(event, PortChanged) and event.fault is not None:
+            if isinstance(event, PortChanged) and event.fault is not None and not event.freed:
                 error = PortBusyError if event.fault.code is FaultCode.PORT_BUSY else PortLostError
                 raise error(self.path, event.fault.message.removeprefix(f"{self.path}: "))
         return message

@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
+import click
+
 import lfs10d
 from lfs10d.cli import SERVICE_FILE
 from lfs10d.cli.doctor import broker, host, port, program, sensors
@@ -115,6 +117,8 @@ async def _sensors(file: Path, loaded: LoadedConfig, login: Login, seen: port.Po
             return [warn("sensors", f"a daemon holds the port and does not reply: {error}", "see broker, above")]
         if not seen.is_device or seen.holder:
             return [fail("sensors", "cannot be read", "see port, above")]
+        asked = sum(slave.enabled for slave in loaded.config.slaves)
+        click.echo(f"asking {asked} sensors on {loaded.config.line.port}; a silent one takes seconds", err=True)
         return await asyncio.to_thread(sensors.by_asking, loaded)
     finally:
         await watch.disconnect()

@@ -20,6 +20,7 @@ from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Reading
 
 ATTEMPTS: Final = 3
+"""How often a sensor that does not answer is asked."""
 PATIENCE: Final = 8.0
 """s for each sensor at most, where the line is asked directly; a silent one takes 2 of them."""
 ADVICE: Final[Mapping[str, str]] = {
@@ -101,7 +102,7 @@ def _settings(line: LineConfig, baudrate: int) -> PortSettings:
 def _at_another_rate(line: LineConfig, specs: Sequence[DeviceSpec]) -> Iterator[Finding]:
     """Ask at the other rates that the profiles know; yield where somebody answers."""
     rates = {rate for spec in specs if spec.profile.baudrate is not None for rate in spec.profile.baudrate.codes}
-    for rate in 6 * sorted(rates - {line.baudrate}):  # again where nobody answered: a reply may be lost, or read late
+    for rate in sorted(rates - {line.baudrate}):
         readings = _polled(_settings(line, rate), specs)
         names = [name for name, reading in readings.items() if reading.fault is None]
         if names:
@@ -127,20 +128,19 @@ def _spec(loaded: LoadedConfig, slave: SlaveConfig, profile: Profile) -> DeviceS
 
 
 def _polled(settings: PortSettings, specs: Sequence[DeviceSpec]) -> dict[str, Reading]:
+    """Ask each until it answers, `ATTEMPTS` times at most: a reply may be lost, or slower than the first time limit."""
     readings: dict[str, Reading] = {}
-    rules = PollRules(retries=1, offline_after=ATTEMPTS, probe_interval_max=1.0)
+    attempts = {spec.name: ATTEMPTS for spec in specs}
+    rules = PollRules(retries=0, offline_after=ATTEMPTS, probe_interval_max=1.0)
     with DirectLine(settings) as line:
         line.poll(specs, rules)
         until = time.monotonic() + PATIENCE * len(specs)
-        while time.monotonic() < until and any(_unsettled(readings.get(spec.name)) for spec in specs):
+        while any(attempts.values()) and time.monotonic() < until:
             for event in line.events(0.1):
-                if isinstance(event, Reading):
+                if isinstance(event, Reading) and attempts[event.device]:
                     readings[event.device] = event
+                    attempts[event.device] = 0 if event.fault is None else attempts[event.device] - 1
     return readings
-
-
-def _unsettled(reading: Reading | None) -> bool:
-    return reading is None or (reading.fault is not None and reading.online)
 
 
 def answers(specs: Sequence[DeviceSpec], readings: Mapping[str, Reading], port: str) -> Iterator[Finding]:

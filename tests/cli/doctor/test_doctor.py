@@ -46,6 +46,18 @@ def test_sensors_at_another_rate_are_found_and_the_cure_is_a_line_of_the_file(
     assert advice == ["set line.baudrate to 19200; then lfs10d request line/baudrate can move them"]
 
 
+@pytest.mark.needs("mosquitto")
+def test_a_sensor_slower_than_the_first_time_limit_is_found(
+    lfs10d: Lfs10d, sensors: PtyLine, mosquitto: Mosquitto, tmp_path: Path
+) -> None:
+    sensors.line.add(Sensor(2))
+    sensors.line.add(Sensor(3, turnaround=0.3))
+    configured(tmp_path, sensors.path, mosquitto.port, "[2, 3]")
+    done = lfs10d("doctor", "-c", "site.yaml")
+    assert "ok    sensors       2 of 2 reply well (read now; no daemon runs)" in done.stdout
+    assert f"asking 2 sensors on {sensors.path}" in done.stderr
+
+
 def test_a_broken_file_is_a_finding_and_the_rest_is_looked_at(lfs10d: Lfs10d, tmp_path: Path) -> None:
     (tmp_path / "site.yaml").write_text("line: 7\n")
     done = lfs10d("doctor", "-c", "site.yaml")
