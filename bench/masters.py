@@ -44,7 +44,9 @@ def command(master: Master, row: Row, folder: Path, port: Path, broker: int, dae
 
 def start(words: list[str], errors: Path) -> subprocess.Popen[str]:
     """Start a master; what it complains of goes to a file."""
-    environment = {**os.environ, **AS_A_SERVICE}
+    # An installed daemon finds its modules compiled.
+    inherited = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    environment = {**inherited, **AS_A_SERVICE}
     with errors.open("w") as complaints:
         return subprocess.Popen(
             words, stdout=subprocess.PIPE, stderr=complaints, text=True, cwd=HERE.parent, env=environment

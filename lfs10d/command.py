@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Literal, TypeAlias
+
+from lfs10d.system.dataclass import dataclass
 
 Identifier: TypeAlias = str | int
 RequestClass: TypeAlias = Literal["always", "polling", "sensors", "registers"]

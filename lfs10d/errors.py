@@ -16,7 +16,7 @@ A failing poll is no error but a value: `lfs10d.reading.Fault`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from lfs10d.system.dataclass import dataclass
 
 
 class Lfs10dError(Exception):

@@ -6,10 +6,12 @@ Times are monotonic seconds of the line thread's clock; durations are seconds.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 from types import MappingProxyType
 from typing import Final, Literal, Never, TypeAlias
+
+from lfs10d.system.dataclass import dataclass
 
 Number: TypeAlias = int | float
 

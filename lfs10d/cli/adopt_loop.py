@@ -14,9 +14,9 @@ Rules
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Final
 
+from lfs10d.system.dataclass import dataclass
 from lfs10d.system.logs import escape
 
 RETRY_AFTER: Final = 1.0

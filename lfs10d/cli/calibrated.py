@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from lfs10d.daemon.state_directory import state_directory
 from lfs10d.errors import ConfigError, StateError
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Fault, Value
+from lfs10d.system.dataclass import dataclass
 
 
 def calibration_option(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import secrets
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,6 +17,7 @@ from lfs10d.daemon.state_directory import service_unit
 from lfs10d.errors import ConfigError
 from lfs10d.mqtt.settings import BrokerSettings
 from lfs10d.mqtt.topics import Topics
+from lfs10d.system.dataclass import dataclass
 from lfs10d.system.secret import Secret, leave_no_core
 
 DENIED: Final = "permission denied"

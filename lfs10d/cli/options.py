@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
 from math import inf
 from typing import Any
 
@@ -14,6 +13,7 @@ from lfs10d.modbus.port_settings import PARITIES, PortSettings
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.library import builtin_names
 from lfs10d.schema.quantities import BAUDRATES, duration_text, seconds
+from lfs10d.system.dataclass import dataclass
 
 TIMEOUTS = (0.01, 10.0)
 """The shortest and the longest time-out, in s."""

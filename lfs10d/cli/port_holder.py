@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from lfs10d.cli import SERVICE_FILE
 from lfs10d.config.loader import load
 from lfs10d.errors import ConfigError
 from lfs10d.modbus.port_lock import PROC, Holder, holder
+from lfs10d.system.dataclass import dataclass
 from lfs10d.system.logs import escape
 
 DAEMON = "lfs10d"

@@ -6,7 +6,7 @@ import json
 import sys
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ from lfs10d.modbus.frames import Checksum, Codec
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import ALIVE_CODES, Exchanged, Fault, FaultCode, Reading, UartCounters, Value
+from lfs10d.system.dataclass import dataclass
 from lfs10d.system.logs import escape
 
 ATTEMPTS = 3

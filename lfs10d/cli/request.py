@@ -7,7 +7,6 @@ import json
 import re
 import secrets
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +32,7 @@ from lfs10d.mqtt.messages import Filter
 from lfs10d.profiles.library import builtin_names
 from lfs10d.schema.fields import Name
 from lfs10d.schema.quantities import duration_text
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.publication import DEVICES
 
 USUAL_TIMEOUT = 10.0

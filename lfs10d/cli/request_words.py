@@ -6,7 +6,6 @@ import inspect
 import json
 import textwrap
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Annotated, Any, Final, get_args, get_origin
 
 from pydantic.fields import FieldInfo
@@ -14,6 +13,7 @@ from pydantic.fields import FieldInfo
 from lfs10d.commands.handlers.registry import HANDLERS
 from lfs10d.schema.fields import Choice, Duration, FieldKind, Flag
 from lfs10d.schema.quantities import duration_text
+from lfs10d.system.dataclass import dataclass
 
 WIDTH: Final = 79
 """Columns of a line, so that none is broken on a terminal of 80."""

@@ -6,7 +6,7 @@ import json
 import os
 import shlex
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ from lfs10d.line.jobs.scan_plan import FIRST_TIMEOUT, ScanPlan
 from lfs10d.modbus.frames import Checksum, Codec, Framing
 from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.reading import FaultCode, Value
+from lfs10d.system.dataclass import dataclass
 
 LOOK_EVERY = 0.1
 """Seconds between two updates of the progress."""

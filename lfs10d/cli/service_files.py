@@ -5,10 +5,10 @@ from __future__ import annotations
 import stat
 import subprocess
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from lfs10d.errors import FailedError
+from lfs10d.system.dataclass import dataclass
 from lfs10d.system.shipped import shipped
 from lfs10d.system.unit_file import for_installation, for_user, is_unchanged, marked
 

@@ -6,7 +6,7 @@ import contextlib
 import json
 import signal
 import threading
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.recorded import load_recording
 from lfs10d.simulator.wire import SECOND, Format, Framing, Parity
+from lfs10d.system.dataclass import dataclass
 
 DURATION = DurationType("5ms, 1s or 2m")
 

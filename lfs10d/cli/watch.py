@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import os
 import time
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -22,6 +21,7 @@ from lfs10d.cli.render.spinner import spinning
 from lfs10d.daemon.state_directory import status_places
 from lfs10d.errors import BrokerError, FailedError
 from lfs10d.mqtt.messages import Filter, Incoming
+from lfs10d.system.dataclass import dataclass
 from lfs10d.system.regular_file import read_regular
 from lfs10d.telemetry import publication
 

@@ -15,12 +15,13 @@ Rules
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from math import inf
 from typing import Generic, TypeVar
 
 from lfs10d.command import Command, Identifier, RequestClass, Result, rejected
 from lfs10d.commands.message import LARGEST, LARGEST_CORRELATION, NoParameters, Parameters, parameters_of, read
+from lfs10d.system.dataclass import dataclass
 
 RATE = 20.0
 """Requests a second, in the long run."""

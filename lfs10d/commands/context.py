@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Coroutine, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 from lfs10d.command import Command, Result
 from lfs10d.commands.admission import CommandSpec
 from lfs10d.commands.reads import ReadResult
+from lfs10d.system.dataclass import dataclass
 
 if TYPE_CHECKING:  # `lfs10d request` reads from the handlers what there is to ask, and speaks to no line
     from lfs10d.config.live_config import LiveConfig

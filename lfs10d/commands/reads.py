@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass
 from itertools import count
 
 from lfs10d.reading import Fault, Reading
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.publication import Payload, Publication, PublicationKind
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from dataclasses import dataclass
 from typing import Protocol
 
 from lfs10d.command import Command, Result
 from lfs10d.commands.admission import Admission, Admitted
 from lfs10d.commands.message import response
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry import command_log
 
 log = logging.getLogger(__name__)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from lfs10d.modbus.description import describe
 from lfs10d.modbus.frames import Codec
@@ -11,6 +10,7 @@ from lfs10d.modbus.request import READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Exchanged, Fault
 from lfs10d.system.clock import Instant
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.publication import TRACE, VERSION, Publication, PublicationKind
 
 LONGEST = 600

@@ -7,8 +7,10 @@ mapping of keys of `SlaveConfig`, without its name, to values as the program use
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any, TypeAlias
+
+from lfs10d.system.dataclass import dataclass
 
 OPTIONS = ("interval", "enabled", "label", "response_timeout")
 """What a request may change of a device, in the order of the file."""

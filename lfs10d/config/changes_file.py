@@ -7,7 +7,6 @@ changed by it. One that cannot be read at all stays where it is, and nothing is 
 from __future__ import annotations
 
 import contextlib
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -22,6 +21,7 @@ from lfs10d.schema.document import LARGEST_FILE, decode, parse
 from lfs10d.schema.fields import Choice, Name, Whole, plain_error
 from lfs10d.schema.quantities import BAUDRATES, duration_text
 from lfs10d.schema.yaml12 import render
+from lfs10d.system.dataclass import dataclass
 from lfs10d.system.disk import Disk
 
 FILE_NAME = "changes.yaml"

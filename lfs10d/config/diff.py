@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from lfs10d.config.loader import leaves
 from lfs10d.config.models import Config, SlaveConfig
+from lfs10d.system.dataclass import dataclass
 
 RESTART_KEYS = frozenset({"line.name", "mqtt.base_topic"})
 """Left for a restart: under them stands every topic."""

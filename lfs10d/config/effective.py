@@ -8,7 +8,7 @@ devices never poll one id.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 from lfs10d.config.changes import Changes, FileValues, Place
@@ -22,6 +22,7 @@ from lfs10d.errors import ConfigError
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.schema.document import path_text
+from lfs10d.system.dataclass import dataclass
 
 CHANGED = Origin("changes.yaml")
 """Of a value that a request changed."""

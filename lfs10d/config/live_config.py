@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from typing import Protocol, TypeAlias
 
@@ -19,6 +19,7 @@ from lfs10d.config.loader import LoadedConfig
 from lfs10d.config.merge import DroppedChange
 from lfs10d.config.reload import ConfigFiles, ReloadPlan, imprint, plan, read
 from lfs10d.errors import StateError
+from lfs10d.system.dataclass import dataclass
 from lfs10d.system.threads import run_in_thread
 
 Edit: TypeAlias = "Callable[[Effective], Changes]"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import socket
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +28,7 @@ from lfs10d.profiles.profile import Profile
 from lfs10d.schema.document import Document, decode, parse, path_text
 from lfs10d.schema.fields import quoted, shown
 from lfs10d.schema.messages import KeyPath
+from lfs10d.system.dataclass import dataclass
 from lfs10d.system.regular_file import read_regular
 from lfs10d.system.secret import Secret
 

@@ -14,10 +14,11 @@ Rules
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from lfs10d.config.changes import OPTIONS, Changes, DeviceChange, FileValues, Place, Rate, Values, Verified, value_of
+from lfs10d.system.dataclass import dataclass
 
 _NOTHING: Values = {}
 _UNSAID = object()

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from lfs10d.config.diff import difference
 from lfs10d.config.loader import LoadedConfig, load
 from lfs10d.config.models import MqttConfig
+from lfs10d.system.dataclass import dataclass
 from lfs10d.system.regular_file import read_regular
 
 

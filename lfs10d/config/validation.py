@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from difflib import get_close_matches
 
 from lfs10d.config.models import Config, SlaveConfig, device_name
 from lfs10d.profiles.profile import Profile
 from lfs10d.schema.messages import KeyPath
 from lfs10d.schema.quantities import duration_text
+from lfs10d.system.dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 import string
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
+from lfs10d.system.dataclass import dataclass
 from lfs10d.system.disk import Disk
 
 LENGTH = 8

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from lfs10d.commands.dispatcher import Dispatcher
 from lfs10d.commands.line_access import LineAccess
 from lfs10d.config.live_config import LiveConfig
@@ -17,6 +15,7 @@ from lfs10d.mqtt.uplink import Uplink
 from lfs10d.reconfiguration.baudrate_watch import BaudrateWatch
 from lfs10d.reconfiguration.reconfiguration import Reconfiguration
 from lfs10d.system.clock import Clock
+from lfs10d.system.dataclass import dataclass
 from lfs10d.system.systemd import Notifier
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from lfs10d.config.models import Config, LineConfig, SlaveConfig
 from lfs10d.line.read_plan import part_of_polls
@@ -11,6 +10,7 @@ from lfs10d.modbus.frames import Checksum, Codec, Framing
 from lfs10d.modbus.request import ReadRegisters
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.profile import Profile
+from lfs10d.system.dataclass import dataclass
 
 ASSUMED_TURNAROUND = 0.005
 """Seconds a slave thinks before it answers, where a figure is wanted before it was measured."""

@@ -30,7 +30,7 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right, insort
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 from math import ceil
 
@@ -39,6 +39,7 @@ from lfs10d.line.request_gap import RequestGap
 from lfs10d.modbus.frames import Codec
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import ALIVE_CODES, SILENT_CODES, START_POLLS, Fault
+from lfs10d.system.dataclass import dataclass
 
 BAD_ANSWER_PATIENCE = 0.1
 """How long one that was never heard and answers badly is waited for once bytes came that begin no answer, in s."""

@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import field
 from math import inf
 
 from lfs10d.line.device import CONFIDENT_FROM, LEARNED_FROM, ResponseTimes
@@ -35,6 +35,7 @@ from lfs10d.modbus.duplicates import WATCHED, Duplicates
 from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.request import ReadRegisters, Request
 from lfs10d.reading import FaultCode
+from lfs10d.system.dataclass import dataclass
 
 LEAST_MARGIN = 0.002
 """In s: answers that differ by no more than this, or half their length if that is more, took as long."""

@@ -16,13 +16,14 @@ Rules
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from math import inf
 
 from lfs10d.line.quota import Quota
 from lfs10d.modbus.duplicates import WATCHED, Duplicates
 from lfs10d.modbus.outcome import Outcome
 from lfs10d.reading import FaultCode
+from lfs10d.system.dataclass import dataclass
 
 REACH = 0.2
 """What is spoilt so long after an answer may have been spoilt by a second one, in s."""

@@ -16,7 +16,6 @@ Times are monotonic s, durations s.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from math import ceil
 
 from lfs10d.profiles.blocks import Block
@@ -24,6 +23,7 @@ from lfs10d.profiles.profile import Profile
 from lfs10d.profiles.values import Value
 from lfs10d.reading import Fault, FaultCode
 from lfs10d.reading import Value as Published
+from lfs10d.system.dataclass import dataclass
 
 ABSENT_AGAIN = 600.0
 """So long after it was refused an absent value is read again, in s."""

@@ -16,7 +16,6 @@ Rules
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import TypeAlias
 
 from lfs10d.line.device import Device, DeviceSpec, Health, PollRules
@@ -35,6 +34,7 @@ from lfs10d.modbus.pending import PendingRequests
 from lfs10d.modbus.request import ReadRegisters
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.reading import Fault, FaultCode, Purpose, Reading
+from lfs10d.system.dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,8 +17,9 @@ Rules
 from __future__ import annotations
 
 from collections.abc import Hashable
-from dataclasses import dataclass
 from math import inf
+
+from lfs10d.system.dataclass import dataclass
 
 PROVED_WITHIN = 0.3
 """Where answers are unproved for longer than this, in s, the slave is asked something that proves them."""

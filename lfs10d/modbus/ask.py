@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from lfs10d.modbus.echo import Echo
 from lfs10d.modbus.frames import Codec
 from lfs10d.modbus.request import Request
 from lfs10d.modbus.timing import LineTiming
+from lfs10d.system.dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ time there is no wait.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -23,6 +23,7 @@ from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.modbus.request import ReadRegisters
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.reading import Fault, FaultCode, PortChanged, UartCounters
+from lfs10d.system.dataclass import dataclass
 
 REOPEN_FIRST = 0.2
 """How long after the loss of the port it is tried again first, in s; doubled up to the last."""

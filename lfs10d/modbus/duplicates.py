@@ -14,7 +14,7 @@ Rules
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from lfs10d.system.dataclass import dataclass
 
 WATCHED = 0.15
 """How long a slave is left alone after an answer to see whether another one follows, in s."""

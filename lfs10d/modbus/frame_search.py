@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from lfs10d.modbus.frames import Codec, Shape
+from lfs10d.system.dataclass import dataclass
 
 KEPT = 1024
 """Characters kept while the line babbles: more than twice the longest frame (513, ASCII)."""

@@ -15,7 +15,6 @@ import re
 from binascii import Error as NotHexError
 from binascii import a2b_hex, b2a_hex
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from enum import StrEnum
 from functools import lru_cache
 from struct import unpack
@@ -42,6 +41,7 @@ from lfs10d.modbus.request import (
     ReadRegisters,
     Request,
 )
+from lfs10d.system.dataclass import dataclass
 
 EXCEPTION_FLAG = 0x80
 """Added to the function code of a refused request (Modbus Application Protocol V1.1b3, section 7)."""

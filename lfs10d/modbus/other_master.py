@@ -14,9 +14,11 @@ Rules
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import pairwise
 from math import ceil
+
+from lfs10d.system.dataclass import dataclass
 
 KEPT = 6
 """So many of its requests are remembered."""

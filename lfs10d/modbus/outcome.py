@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from lfs10d.modbus.request import NOT_FINAL, Request
 from lfs10d.reading import Fault
+from lfs10d.system.dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True)

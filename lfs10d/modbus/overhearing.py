@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 
 from lfs10d.modbus.frames import EXCEPTION_FLAG, Codec, Framing
 from lfs10d.modbus.request import BIT_READS, READ_BITS_MAX, READ_COUNT_MAX, READS, ReadRegisters
+from lfs10d.system.dataclass import dataclass
 
 KEPT = 600
 """Characters kept of a frame whose end has not come: more than the longest has (513, ASCII)."""

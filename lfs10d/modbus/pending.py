@@ -28,7 +28,6 @@ Rules
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 from lfs10d.modbus.duplicates import Duplicates
 from lfs10d.modbus.frames import Codec
@@ -36,6 +35,7 @@ from lfs10d.modbus.other_master import OtherMaster
 from lfs10d.modbus.outcome import LateAnswer, Outcome
 from lfs10d.modbus.request import NOT_FINAL, ReadRegisters, Request
 from lfs10d.reading import FaultCode
+from lfs10d.system.dataclass import dataclass
 
 QUIET_LEAST = 1.0
 """How long a slave is left alone where no barrier can tell, at least; in s."""

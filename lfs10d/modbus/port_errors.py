@@ -12,10 +12,10 @@ import os
 import pwd
 import stat
 import termios
-from dataclasses import dataclass
 from pathlib import Path
 
 from lfs10d.errors import PortBusyError, PortError, PortLostError
+from lfs10d.system.dataclass import dataclass
 from lfs10d.system.logs import escape
 
 GROUP_MAY_USE = stat.S_IRGRP | stat.S_IWGRP

@@ -12,9 +12,9 @@ import fcntl
 import os
 import struct
 import termios
-from dataclasses import dataclass
 from pathlib import Path
 
+from lfs10d.system.dataclass import dataclass
 from lfs10d.system.logs import escape
 
 PROC = Path("/proc")

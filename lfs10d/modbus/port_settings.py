@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from lfs10d.schema.quantities import BAUDRATES
+from lfs10d.system.dataclass import dataclass
 
 PARITIES = ("none", "even", "odd")
 DATABITS = (7, 8)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TypeAlias
+
+from lfs10d.system.dataclass import dataclass
 
 READ_COILS = 0x01
 READ_DISCRETE_INPUTS = 0x02

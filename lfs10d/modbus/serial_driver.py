@@ -12,11 +12,11 @@ import math
 import os
 import struct
 import termios
-from dataclasses import dataclass
 from pathlib import Path
 
 from lfs10d.modbus.port_settings import Rs485
 from lfs10d.reading import UartCounters
+from lfs10d.system.dataclass import dataclass
 
 SYSFS = Path("/sys")
 

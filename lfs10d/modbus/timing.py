@@ -6,7 +6,7 @@ All times are seconds.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from lfs10d.system.dataclass import dataclass
 
 SILENT_INTERVAL_CHARACTERS = 3.5
 """t3.5: least silence between two frames, in characters (Modbus over Serial Line V1.02, section 2.5.1.1)."""

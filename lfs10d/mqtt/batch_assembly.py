@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from lfs10d.mqtt.encoding import array, encode, packet_size
 from lfs10d.mqtt.messages import Accepted
 from lfs10d.outbox.backlog import BATCH_BYTES
 from lfs10d.outbox.items import HistoryBatch
+from lfs10d.system.dataclass import dataclass
 
 SAMPLES_AT_ONCE = 16
 """Samples serialised in one go; a whole batch would take a millisecond."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from lfs10d.mqtt.topics import Topics
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry import publication
 
 QUIET_LEAST, QUIET_MOST = 0.05, 0.5

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
 from lfs10d.mqtt.reasons import Disconnect
 from lfs10d.mqtt.settings import Version
+from lfs10d.system.dataclass import dataclass
 
 RECEIVE_MAXIMUM_UNSAID = 65_535
 """What the broker takes where it says nothing (MQTT 5.0, section 3.2.2.3.3)."""

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import islice
 
 from lfs10d.mqtt.topics import Topics
+from lfs10d.system.dataclass import dataclass
 
 QUIET = 0.5
 """Seconds without a retained message, once the broker has answered, after which the broker has sent them all."""

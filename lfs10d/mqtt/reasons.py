@@ -5,11 +5,11 @@ from __future__ import annotations
 import socket
 import ssl
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 
 from lfs10d.errors import BrokerError, Lfs10dError
 from lfs10d.mqtt.settings import BrokerSettings
+from lfs10d.system.dataclass import dataclass
 
 NO_MATCHING_SUBSCRIBERS = 0x10
 """The broker took a message that nobody listens to (MQTT 5.0, section 3.4.2.1)."""

@@ -23,10 +23,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from lfs10d.mqtt.reasons import Disconnect, DisconnectReason
 from lfs10d.mqtt.settings import Version
+from lfs10d.system.dataclass import dataclass
 
 AWAY_EVERY = 1.0
 """Seconds from the beginning of one attempt to the next where a node is not there."""

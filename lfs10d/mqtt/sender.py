@@ -9,7 +9,6 @@ import asyncio
 import logging
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import islice
 
 from lfs10d.mqtt.batch_assembly import BatchAssembly, room_for_batch
@@ -22,6 +21,7 @@ from lfs10d.outbox.items import HistoryBatch, LiveSample, LossNotice, Message, O
 from lfs10d.outbox.outbox import IN_FLIGHT_MOST, Outbox
 from lfs10d.outbox.refusals import Refusal, refusal_of
 from lfs10d.outbox.suspects import Culprit
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry import publication
 
 log = logging.getLogger(__name__)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from enum import StrEnum
 
 from lfs10d.config.models import MqttConfig
 from lfs10d.schema.addresses import node_text
+from lfs10d.system.dataclass import dataclass
 from lfs10d.system.secret import Secret
 
 

@@ -6,9 +6,10 @@ responses and the filters. Pure.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from lfs10d.mqtt.messages import Incoming
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry import publication
 
 ONLINE = "online"

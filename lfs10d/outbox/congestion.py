@@ -6,7 +6,7 @@ periods of 10 s in a row.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from lfs10d.system.dataclass import dataclass
 
 PERIOD = 10.0
 """Seconds of a period."""

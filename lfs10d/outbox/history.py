@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from bisect import insort
 from collections.abc import Container, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 from lfs10d.outbox.losses import Key
 from lfs10d.system.clock_step import ClockState, corrects
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.publication import Sample
 
 

@@ -5,12 +5,13 @@ Topics are under `B`. Two items are never equal, whatever they say: each is one 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeAlias
 
 from lfs10d.outbox.history import QueuedSample
 from lfs10d.outbox.losses import Loss
 from lfs10d.system.clock_step import ClockState
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.publication import EVENT, Publication, iso_time
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TypeAlias
 
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.publication import Sample
 
 MOST_RANGES = 8

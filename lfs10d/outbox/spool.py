@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import islice
 
 from lfs10d.outbox.history import History, QueuedSample
 from lfs10d.outbox.recent_acks import AGAIN_WITHIN
 from lfs10d.outbox.store.sample_file import StoredRow
+from lfs10d.system.dataclass import dataclass
 
 PAGE_ROWS = 3200
 """Samples of a page: for up to 32 devices its batches are full."""

@@ -13,7 +13,8 @@ Brokers end a connection for one message: too large, denied. By MQTT 3.1.1 none 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+
+from lfs10d.system.dataclass import dataclass
 
 ABOUT_AS_LARGE = 0.9
 """A message of this part of a suspect's size proves that it is not its size."""

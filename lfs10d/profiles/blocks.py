@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from lfs10d.profiles.cells import Cell
 from lfs10d.profiles.contents import BIT_FUNCTIONS
 from lfs10d.profiles.values import ReadFunction, Value
 from lfs10d.reading import Fault, FaultCode
 from lfs10d.reading import Value as Published
+from lfs10d.system.dataclass import dataclass
 
 MOST_BITS = 2000
 """Bits of one read (Modbus Application Protocol V1.1b3, sections 6.1 and 6.2)."""

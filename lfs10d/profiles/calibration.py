@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from decimal import Decimal
 from typing import cast
 
 from lfs10d.reading import Number
+from lfs10d.system.dataclass import dataclass
 
 DIGITS = 7
 """Significant digits of a calibrated number: as many as a float32 carries."""

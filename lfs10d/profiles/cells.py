@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 from math import inf, isfinite, isnan
 from typing import NamedTuple
@@ -22,6 +21,7 @@ from lfs10d.profiles.registers import (
     spell,
 )
 from lfs10d.reading import Fault, FaultCode, Number, Value
+from lfs10d.system.dataclass import dataclass
 
 _EXPONENT = 0x7F80_0000
 _SIGN = 0x8000_0000

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from lfs10d.profiles.cells import Part
 from lfs10d.profiles.registers import SIGNED, WORDS, RegisterType, float_bits
 from lfs10d.schema.fields import FieldKind
+from lfs10d.system.dataclass import dataclass
 
 BIT_FUNCTIONS = (1, 2)
 """Functions that read coils and discrete inputs: booleans."""

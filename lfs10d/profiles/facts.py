@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from typing import Annotated, TypeAlias
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
@@ -11,6 +10,7 @@ from pydantic_core import InitErrorDetails
 
 from lfs10d.profiles.manual_numbers import hint_for_number
 from lfs10d.schema.fields import FieldError, FieldKind, Text, Whole, plain_error, shown
+from lfs10d.system.dataclass import dataclass
 
 Place: TypeAlias = tuple[str | int, ...]
 

@@ -10,12 +10,12 @@ The layouts of a 32-bit value ABCD (A the most significant byte) in two register
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from typing import Literal, TypeAlias
 
 from lfs10d.reading import Number
+from lfs10d.system.dataclass import dataclass
 
 RegisterType: TypeAlias = Literal[
     "int16", "uint16", "int32", "uint32", "int64", "uint64", "float32", "float64", "bcd", "string", "bool"

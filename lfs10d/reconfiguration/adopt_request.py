@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from lfs10d.profiles.library import builtin_names
+from lfs10d.system.dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ import logging
 from collections import Counter
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -29,6 +29,7 @@ from lfs10d.config.effective import Edit, Effective
 from lfs10d.config.models import LineConfig
 from lfs10d.line.device import Device
 from lfs10d.schema.fields import Choice, Whole
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.publication import CONFIG, LINE_STATE, EventType, device_of, device_topic
 
 log = logging.getLogger(__name__)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from typing import Annotated, Any
 
 from pydantic import TypeAdapter
 
 from lfs10d.schema.fields import FieldError, FieldKind, one_line
+from lfs10d.system.dataclass import dataclass
 
 
 @dataclass(frozen=True)

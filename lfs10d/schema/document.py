@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import yaml
@@ -23,6 +23,7 @@ from lfs10d.errors import ConfigError, Problem
 from lfs10d.schema.fields import Hexadecimal, quoted, shown
 from lfs10d.schema.messages import KeyPath, in_words, keys_at, missing, unknown_key
 from lfs10d.schema.yaml12 import DEEPEST_NESTING, FORMS, TAG, Loader
+from lfs10d.system.dataclass import dataclass
 
 LARGEST_FILE = 256 * 1024
 """Bytes: three times a file with every key of 255 slaves written out."""

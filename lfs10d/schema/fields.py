@@ -11,13 +11,14 @@ import re
 import unicodedata
 from abc import abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from lfs10d.schema.quantities import DURATION_PATTERN, SIZE_PATTERN, duration_text, seconds, size, size_text
+from lfs10d.system.dataclass import dataclass
 
 _SHOWN_CHARACTERS = 40
 

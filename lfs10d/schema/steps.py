@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from lfs10d.schema.fields import Duration
 from lfs10d.schema.quantities import DURATION_PATTERN, duration_text
+from lfs10d.system.dataclass import dataclass
 
 
 @dataclass(frozen=True)

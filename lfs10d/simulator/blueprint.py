@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Final
 
 from lfs10d.profiles.profile import Profile
 from lfs10d.profiles.settings import Setting
 from lfs10d.simulator.signals import READ_HOLDING, Signal, signal_of
 from lfs10d.simulator.wire import Check, Framing
+from lfs10d.system.dataclass import dataclass
 
 READ_INPUT: Final = 4
 WRITE_SINGLE: Final = 6

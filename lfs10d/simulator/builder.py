@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 from lfs10d.simulator.blueprint import LFS10, Blueprint
 from lfs10d.simulator.fault_file import FaultFile, SlaveEntry
@@ -15,6 +15,7 @@ from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.signals import READ_HOLDING
 from lfs10d.simulator.wind import Wind
 from lfs10d.simulator.wire import Format, Framing
+from lfs10d.system.dataclass import dataclass
 
 LAST_ID = 255
 

@@ -7,11 +7,11 @@ same cannot be told apart.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final, Protocol, TypeAlias
 
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format, misheard
+from lfs10d.system.dataclass import dataclass
 
 MASTER: Final = "master"
 NOISE: Final = "noise"

@@ -8,12 +8,13 @@ seeded random source, so a run can be repeated exactly.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import StrEnum
 from random import Random
 from typing import Literal, TypeAlias
 
 from lfs10d.simulator.wire import nanoseconds
+from lfs10d.system.dataclass import dataclass
 
 
 class FaultKind(StrEnum):

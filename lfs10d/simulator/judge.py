@@ -12,11 +12,12 @@ In ASCII only the last holds; a colon begins a frame anew and CR LF ends it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 from typing import Final
 
 from lfs10d.simulator.wire import SECOND, Format, Framing, unseal
+from lfs10d.system.dataclass import dataclass
 
 ROUNDING: Final = 2
 """Nanoseconds by which two times may be off because a master's clock is a float and ours is whole."""

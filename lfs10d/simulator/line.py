@@ -7,7 +7,7 @@ collects what has arrived by a time. In virtual time and on a pseudo terminal it
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from heapq import heappop, heappush
 from random import Random
 
@@ -17,6 +17,7 @@ from lfs10d.simulator.memory import Measured, numbers
 from lfs10d.simulator.sensor import Reply, Sensor
 from lfs10d.simulator.wind import Unique
 from lfs10d.simulator.wire import Format, Framing, nanoseconds, unseal
+from lfs10d.system.dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ import re
 from array import array
 from bisect import bisect_right
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from datetime import datetime
 from pathlib import Path
 from typing import Final
@@ -26,6 +26,7 @@ from typing import Final
 from lfs10d.errors import ConfigError, Problem
 from lfs10d.schema.fields import quoted
 from lfs10d.simulator.wire import SECOND
+from lfs10d.system.dataclass import dataclass
 
 LARGEST_FILE: Final = 64_000_000
 """Bytes: a day at 4 Hz for eight sensors has about 20 million."""

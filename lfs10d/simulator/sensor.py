@@ -17,7 +17,7 @@ echo_losing          new              at once             none
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from random import Random
 from typing import Final
 
@@ -44,6 +44,7 @@ from lfs10d.simulator.memory import (
 )
 from lfs10d.simulator.wind import Unique, WindSource
 from lfs10d.simulator.wire import Format, Framing, nanoseconds, seal
+from lfs10d.system.dataclass import dataclass
 
 BROADCAST: Final = 0
 WILDCARD_ID: Final = 255

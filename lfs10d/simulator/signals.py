@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping
-from dataclasses import dataclass
 from decimal import Decimal
 from typing import Final, Literal, TypeAlias
 
 from lfs10d.profiles.values import Value
+from lfs10d.system.dataclass import dataclass
 
 Type: TypeAlias = Literal[
     "float32", "float64", "uint16", "int16", "uint32", "int32", "uint64", "int64", "bcd", "string", "bool"

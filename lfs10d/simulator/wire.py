@@ -7,8 +7,10 @@ Times are integer nanoseconds; a frame's *body* is slave id, function and data, 
 from __future__ import annotations
 
 from binascii import unhexlify
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Final, Literal, TypeAlias
+
+from lfs10d.system.dataclass import dataclass
 
 Framing: TypeAlias = Literal["rtu", "ascii"]
 Check: TypeAlias = Literal["crc", "sum"]

@@ -12,12 +12,12 @@ import os
 import subprocess
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
 from lfs10d.system import clock_step
 from lfs10d.system.clock_step import ClockState
+from lfs10d.system.dataclass import dataclass
 from lfs10d.system.threads import run_in_thread
 
 MARK = Path("/run/systemd/timesync/synchronized")

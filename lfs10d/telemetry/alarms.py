@@ -17,10 +17,11 @@ Each change says whether the error object must be published. Times are epoch mil
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Final, get_args
 
 from lfs10d.reading import PORT_CODES, Fault, FaultCode, LineFaultCode
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.publication import VERSION
 
 HEARD_LIMIT = 32

@@ -5,12 +5,12 @@ For `docs/mqtt.md` and for the tests; like `lfs10d.telemetry.payloads` it is not
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any
 
 from pydantic import Field, TypeAdapter
 
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry import publication
 from lfs10d.telemetry.payloads import (
     Availability,

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Iterable
-from dataclasses import dataclass
 from math import ceil, floor
 
 from lfs10d.reading import PORT_CODES, Exchanged, FaultCode, Purpose, Reading, UartCounters
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.publication import VERSION, BacklogStats
 
 WINDOW = 30

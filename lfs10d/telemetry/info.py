@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from lfs10d.reading import NOTHING
 from lfs10d.system.clock_step import ClockState
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.publication import VERSION
 
 

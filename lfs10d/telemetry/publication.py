@@ -7,13 +7,14 @@ and the tests, are in `lfs10d.telemetry.payloads`: building them costs megabytes
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 from typing import Literal, TypeAlias
 
 from lfs10d.reading import NOTHING, FaultCode, Value
 from lfs10d.system.clock_step import ClockState
+from lfs10d.system.dataclass import dataclass
 
 VERSION = 1
 """`v` of every payload that is an object."""

@@ -7,13 +7,14 @@ import secrets
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any, Final
 
 from lfs10d.cli.client import CommandClient
 from lfs10d.cli.login import Login
 from lfs10d.cli.request import UNLIMITED, USUAL_TIMEOUT
 from lfs10d.errors import BrokerError, FailedError
+from lfs10d.system.dataclass import dataclass
 from lfs10d.web.mounting import Mounting
 from lfs10d.web.pruned import pruned
 from lfs10d.web.words import answer

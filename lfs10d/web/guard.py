@@ -20,10 +20,10 @@ import ipaddress
 import re
 from collections import deque
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
+from lfs10d.system.dataclass import dataclass
 from lfs10d.system.secret import Secret
 
 COOKIE: Final = "lfs10d_session"

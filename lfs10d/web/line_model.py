@@ -8,10 +8,11 @@ from __future__ import annotations
 import re
 from collections import deque
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Final, TypeGuard
 
 from lfs10d.cli.render.live_state import LiveState, ShownDevice
+from lfs10d.system.dataclass import dataclass
 from lfs10d.web.curve import Curve, Point
 from lfs10d.web.pruned import pruned
 from lfs10d.web.words import explained, meaning

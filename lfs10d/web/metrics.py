@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Final
 
 from lfs10d import __version__
 from lfs10d.cli.render.live_state import ShownDevice
+from lfs10d.system.dataclass import dataclass
 from lfs10d.web.line_model import LineModel, Side
 from lfs10d.web.pruned import MOST_NUMBER
 

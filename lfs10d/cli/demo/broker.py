@@ -8,13 +8,13 @@ import shutil
 import socket
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Final
 
 from lfs10d.cli.demo.processes import PYTHON, Children
 from lfs10d.errors import FailedError
+from lfs10d.system.dataclass import dataclass
 
 LOOPBACK: Final = "127.0.0.1"
 USUAL_PORT: Final = 1883

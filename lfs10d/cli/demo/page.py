@@ -6,12 +6,12 @@ import importlib.util
 import re
 import secrets
 import socket
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from lfs10d.cli.demo.broker import LOOPBACK
 from lfs10d.cli.demo.processes import PYTHON, Child, Children
+from lfs10d.system.dataclass import dataclass
 
 USUAL_PORT: Final = 8073
 _KEY_FILE: Final = "web-token"

@@ -15,12 +15,12 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from lfs10d.cli.demo import parent_guard
 from lfs10d.errors import FailedError
+from lfs10d.system.dataclass import dataclass
 from lfs10d.system.logs import escape
 
 DAEMON: Final = "daemon"

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
+
+from lfs10d.system.dataclass import dataclass
 
 BASE_TOPIC: Final = "lfs10d"
 LINE: Final = "line0"

@@ -10,7 +10,7 @@ import ssl
 import statistics
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Final
 
 from lfs10d.cli.doctor.finding import Finding, fail, ok, warn
@@ -22,6 +22,7 @@ from lfs10d.mqtt.messages import Accepted, Filter, Incoming
 from lfs10d.mqtt.reasons import REFUSED_FROM, Disconnect, reason_in_words
 from lfs10d.mqtt.settings import BrokerSettings
 from lfs10d.mqtt.tls import tls_context
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.homeassistant.gateway import config_topic, object_id
 
 REACHED_WITHIN: Final = 5.0

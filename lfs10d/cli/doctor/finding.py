@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
 
 import click
 
+from lfs10d.system.dataclass import dataclass
 from lfs10d.system.logs import escape
 
 Level: TypeAlias = Literal["ok", "warn", "fail"]

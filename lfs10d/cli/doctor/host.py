@@ -9,13 +9,13 @@ import statistics
 import subprocess
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from lfs10d.cli.doctor.finding import Finding, fail, ok, warn
 from lfs10d.cli.doctor.port import Root, there
 from lfs10d.system.clock_step import ClockState
+from lfs10d.system.dataclass import dataclass
 
 SLOW_SYNC: Final = 0.2
 """s for one write with fsync: from here on a change takes noticeably long."""

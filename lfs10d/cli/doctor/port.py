@@ -6,13 +6,13 @@ import grp
 import re
 import stat
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from lfs10d.cli.doctor.finding import Finding, fail, ok, warn
 from lfs10d.cli.port_holder import daemon_behind
 from lfs10d.modbus.port_lock import holder
+from lfs10d.system.dataclass import dataclass
 
 CH340: Final = "1a86:7523"
 """brltty takes this adapter for a Braille display, up to Debian 12 and Ubuntu 22.04."""

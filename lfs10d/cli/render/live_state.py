@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from math import isfinite
 from typing import Any, Final, TypeGuard
 
 from lfs10d.cli.render.response import BESIDES
 from lfs10d.reading import FaultCode, Value
+from lfs10d.system.dataclass import dataclass
 
 MOVES_WITHIN: Final = 3.0
 """s over which a value's movement is measured."""

@@ -6,7 +6,6 @@ A line is a tuple of pieces, each a text and its style in rich's words ("" is pl
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from datetime import tzinfo
 from typing import Final, TypeAlias
 
@@ -14,6 +13,7 @@ from lfs10d.cli.local_time import since_text, zone_name
 from lfs10d.cli.render.error_words import BESIDE_GOOD, OF_THE_LINE, in_words
 from lfs10d.cli.render.live_state import LiveState, ShownDevice
 from lfs10d.cli.render.value_text import with_unit
+from lfs10d.system.dataclass import dataclass
 from lfs10d.system.logs import escape
 
 Piece: TypeAlias = tuple[str, str]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import TypeAlias
 
 from lfs10d.modbus.frames import EXCEPTION_NAMES
@@ -14,6 +13,7 @@ from lfs10d.profiles.registers import span
 from lfs10d.profiles.settings import Setting
 from lfs10d.profiles.values import Value
 from lfs10d.schema.quantities import duration_text
+from lfs10d.system.dataclass import dataclass
 
 Row: TypeAlias = tuple[str, ...]
 

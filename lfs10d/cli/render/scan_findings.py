@@ -6,7 +6,7 @@ import json
 import os
 import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,7 @@ from lfs10d.modbus.frames import EXCEPTION_NAMES, Framing
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import NOTHING, Value
 from lfs10d.schema.quantities import duration_text
+from lfs10d.system.dataclass import dataclass
 
 if TYPE_CHECKING:  # as in `lfs10d.commands.context`
     from lfs10d.line.jobs.identification import FoundDevice

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from lfs10d.reading import FaultCode
+from lfs10d.system.dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
@@ -16,6 +15,7 @@ from lfs10d.commands.message import Parameters
 from lfs10d.line.jobs.scan_ids import LAST_ID, ids_of
 from lfs10d.schema.fields import Choice, FieldKind, Flag, Whole
 from lfs10d.schema.quantities import BAUDRATES
+from lfs10d.system.dataclass import dataclass
 
 if TYPE_CHECKING:  # as in `lfs10d.commands.context`
     from lfs10d.line.jobs.identification import FoundDevice

@@ -23,7 +23,7 @@ Rules
 from __future__ import annotations
 
 from collections.abc import Generator, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from enum import IntEnum
 from typing import TypeAlias
 
@@ -35,6 +35,7 @@ from lfs10d.profiles.blocks import NO_VALUE_NOW, Block
 from lfs10d.profiles.library import builtin_names
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Fault, FaultCode, Value
+from lfs10d.system.dataclass import dataclass
 
 TRIES = 5
 """How often a read is asked once something spoilt it."""

@@ -6,12 +6,12 @@ outcome of what it asked; between the two and after them others may have had the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol, TypeAlias
 
 from lfs10d.modbus.ask import Ask
 from lfs10d.modbus.outcome import Outcome
 from lfs10d.reading import Purpose
+from lfs10d.system.dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True)

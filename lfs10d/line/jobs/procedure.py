@@ -9,7 +9,6 @@ until the configuration says who has them. Where the port is lost `LineLostError
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
 from math import inf
 from typing import Any, TypeAlias
 
@@ -17,6 +16,7 @@ from lfs10d.line.jobs.job import Continue, Done, Hold, Next, Requeue
 from lfs10d.modbus.ask import Ask
 from lfs10d.modbus.outcome import Outcome
 from lfs10d.reading import Purpose
+from lfs10d.system.dataclass import dataclass
 
 SLICE = 0.25
 """The longest stay at another rate than the line's, in s; one question may take longer."""

@@ -14,7 +14,6 @@ Rules
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
 from typing import TypeAlias
 
 from lfs10d.line.device import FIRST_TIMEOUTS
@@ -28,6 +27,7 @@ from lfs10d.modbus.pending import PendingRequests
 from lfs10d.modbus.request import ReadRegisters, Request, WriteRegister
 from lfs10d.profiles.profile import BUSY_EXCEPTIONS, Profile
 from lfs10d.reading import Fault, FaultCode, Purpose
+from lfs10d.system.dataclass import dataclass
 
 BUSY_PAUSE = 0.3
 """A busy slave is left alone for so long, in s; so is one whose register does not hold yet what was written."""

@@ -17,7 +17,7 @@ Rules
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf
 
 from lfs10d.line.jobs.identification import FoundDevice, Identification, shortest_answer, speaks, spoilt, strangers
@@ -26,6 +26,7 @@ from lfs10d.line.jobs.scan_plan import LAST_TIMEOUT, RESERVED_FROM, ScanPlan
 from lfs10d.modbus.ask import Ask
 from lfs10d.modbus.outcome import Outcome
 from lfs10d.reading import Fault, FaultCode, Purpose
+from lfs10d.system.dataclass import dataclass
 
 PATIENT_TIMEOUT = 0.4
 """How long an id is waited for while it is identified, or asked once more, in s."""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from lfs10d.line.jobs.identification import first_read
 from lfs10d.modbus.frames import Codec
 from lfs10d.modbus.request import ReadRegisters
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.profile import Profile
+from lfs10d.system.dataclass import dataclass
 
 FIRST_TIMEOUT = 0.1
 """How long each id is waited for, in s: twenty times the usual turnaround, USB adapter included."""

@@ -7,10 +7,11 @@ clock. A sample's `ts` is counted from its era's base, so that setting the clock
 from __future__ import annotations
 
 import sqlite3
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from lfs10d.outbox.store.row import DamagedError, Series, check
 from lfs10d.system.clock_step import ClockState, corrects
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.publication import Sample
 
 EVEN_WITHIN = 20

@@ -15,10 +15,10 @@ from __future__ import annotations
 import contextlib
 import sqlite3
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from lfs10d.outbox.store.row import DamagedError
+from lfs10d.system.dataclass import dataclass
 from lfs10d.system.regular_file import create_private, make_private
 
 APPLICATION_ID = 0x4C465364

@@ -20,11 +20,11 @@ import json
 import struct
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TypeAlias
 
 from lfs10d.profiles.registers import shortest
 from lfs10d.reading import NOTHING, FaultCode, Value
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.publication import Quality, Sample
 
 Cell: TypeAlias = int | float | bytes | str | None

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass
 from pathlib import Path
 
 from lfs10d.outbox.losses import Loss, joined
@@ -26,6 +25,7 @@ from lfs10d.outbox.store.row import (
     values_of,
 )
 from lfs10d.system.clock_step import ClockState
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.publication import Sample
 from lfs10d.telemetry.wind.record import WindRecord, device_of_source, is_record
 

@@ -20,7 +20,6 @@ import sqlite3
 from collections import deque
 from collections.abc import Callable, Collection, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
@@ -30,6 +29,7 @@ from lfs10d.outbox.store.database import ForeignError, Limits
 from lfs10d.outbox.store.row import DamagedError
 from lfs10d.outbox.store.sample_file import SampleFile, StoredRow, StoreEntry
 from lfs10d.system.clock_step import ClockState
+from lfs10d.system.dataclass import dataclass
 from lfs10d.system.disk import Disk
 
 T = TypeVar("T")

@@ -15,7 +15,6 @@ Rules
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
 from typing import Any
 
 from lfs10d.line.jobs.procedure import Await, LineLostError, Step
@@ -36,6 +35,7 @@ from lfs10d.reconfiguration.procedures.readdress import (
     write,
 )
 from lfs10d.reconfiguration.procedures.recognition import recognise
+from lfs10d.system.dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ Rules
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from enum import StrEnum
 from typing import Any
 
@@ -25,6 +25,7 @@ from lfs10d.line.jobs.procedure import Await, LineLostError, Step
 from lfs10d.reconfiguration.journal import Endpoint
 from lfs10d.reconfiguration.procedures.identity_query import PATIENT, IdentityQuery
 from lfs10d.reconfiguration.procedures.readdress import ECHO_READS, TRIES, VERIFY, present, verify, write
+from lfs10d.system.dataclass import dataclass
 
 ROLL_BACK = 60.0
 """How long sensors are moved back, in s."""

@@ -12,7 +12,7 @@ Rules
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 from lfs10d.line.jobs.identification import shortest_answer, strangers
 from lfs10d.line.jobs.job import Hold
@@ -26,6 +26,7 @@ from lfs10d.profiles.blocks import Block
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import FaultCode
 from lfs10d.reconfiguration.journal import Endpoint
+from lfs10d.system.dataclass import dataclass
 
 QUICK = 0.2
 """The usual time-out, in s."""

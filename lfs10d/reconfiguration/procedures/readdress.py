@@ -29,7 +29,7 @@ silent            silent, garbage                            not_verified, stays
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import StrEnum
 from itertools import takewhile
 from typing import Any
@@ -43,6 +43,7 @@ from lfs10d.reading import FaultCode
 from lfs10d.reconfiguration.journal import Endpoint
 from lfs10d.reconfiguration.procedures.identity_query import PATIENT, SILENCE, IdentityQuery, IdentityReply
 from lfs10d.reconfiguration.procedures.recognition import look_for_twins
+from lfs10d.system.dataclass import dataclass
 
 VERIFY = 5.0
 """How long after the write both places are read, in s."""

@@ -21,7 +21,7 @@ Rules
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 from lfs10d.line.jobs.identification import rate_fits
@@ -33,6 +33,7 @@ from lfs10d.profiles.values import Value
 from lfs10d.reading import Fault, FaultCode
 from lfs10d.reconfiguration.journal import Endpoint
 from lfs10d.reconfiguration.procedures.identity_query import PATIENT, QUICK, SILENCE, IdentityQuery, IdentityReply
+from lfs10d.system.dataclass import dataclass
 
 READS = 3
 """How often a value is read."""

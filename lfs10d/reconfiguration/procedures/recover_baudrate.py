@@ -9,7 +9,6 @@ sensor answers at the old rate too there are two of that slave id, and one of th
 from __future__ import annotations
 
 from collections.abc import Generator, Mapping, Sequence
-from dataclasses import dataclass
 from math import inf
 from typing import Any
 
@@ -25,6 +24,7 @@ from lfs10d.reconfiguration.procedures.baudrate import (
     write_back,
 )
 from lfs10d.reconfiguration.procedures.identity_query import PATIENT
+from lfs10d.system.dataclass import dataclass
 
 PATIENT_EVERY = 4
 """In every fourth round a lost sensor gets a long time-out, at each rate in turn: it may be slow."""

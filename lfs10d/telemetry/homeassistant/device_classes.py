@@ -8,8 +8,9 @@ with a class that does not take its unit is refused there as a whole, so such a 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Final
+
+from lfs10d.system.dataclass import dataclass
 
 MEASUREMENT: Final = "measurement"
 

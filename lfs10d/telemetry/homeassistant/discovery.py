@@ -7,9 +7,9 @@ but its platform; after that it is left out. A payload that is cleared removes i
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Final, TypeAlias
 
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.homeassistant.entities import Component, device_components, line_components
 from lfs10d.telemetry.homeassistant.gateway import (
     ORIGIN,

@@ -12,10 +12,10 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
 
 from lfs10d.reading import FaultCode
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.homeassistant.device_classes import MEASUREMENT, sensor_class
 from lfs10d.telemetry.homeassistant.gateway import (
     DiscoveredDevice,

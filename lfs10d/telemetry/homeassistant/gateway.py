@@ -8,8 +8,9 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias
+
+from lfs10d.system.dataclass import dataclass
 
 ORIGIN: Final = "lfs10d"
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Final
 
 from pydantic_core import from_json
 
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.homeassistant.discovery import Platforms, platforms
 from lfs10d.telemetry.homeassistant.gateway import config_topic, is_about, object_id
 

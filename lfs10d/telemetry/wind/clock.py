@@ -7,11 +7,11 @@ until it changes by more than clocks differ from one look to the next: when the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 from lfs10d.system.clock import Instant
 from lfs10d.system.clock_step import ClockState
+from lfs10d.system.dataclass import dataclass
 
 EVEN_WITHIN: Final = 20
 """Milliseconds by which the distance of the clocks may change before it is taken anew."""

@@ -9,10 +9,10 @@ from __future__ import annotations
 from array import array
 from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import asin, atan2, cos, degrees, hypot, radians, sin, sqrt
 from typing import ClassVar, Final
 
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.wind.series import BLOCK, GAP, HeldSeries, Sums
 
 RESULTANT_LEAST: Final = 0.05

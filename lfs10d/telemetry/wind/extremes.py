@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import inf
 from typing import Final, NamedTuple
+
+from lfs10d.system.dataclass import dataclass
 
 
 class Peak(NamedTuple):

@@ -11,11 +11,12 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import pairwise, starmap
 from typing import Final
 
 from lfs10d.reading import Number, Value
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.info import WindValues
 from lfs10d.telemetry.wind.direction import VARIABLE_BELOW, VARIABLE_FROM, DirectionSeries, Vector
 from lfs10d.telemetry.wind.extremes import Extremes, Peak

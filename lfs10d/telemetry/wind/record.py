@@ -7,10 +7,10 @@ the new time gives it, which may have been recorded under the old time already: 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 from lfs10d.reading import Value
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.publication import HISTORY, RECORD, Sample, device_of, device_topic
 
 EVEN_WITHIN: Final = 1000

@@ -10,11 +10,11 @@ from __future__ import annotations
 from array import array
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import inf, sqrt
 from operator import mul
 from typing import Final
 
+from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.wind.extremes import NOTHING_FOUND, Extremes, Found, Peak
 from lfs10d.telemetry.wind.series import BLOCK, GAP, SCALE, HeldSeries, Sums
 
