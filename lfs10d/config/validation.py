@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from difflib import get_close_matches
 
 from lfs10d.config.models import Config, SlaveConfig, device_name
 from lfs10d.profiles.profile import Profile
-from lfs10d.schema.messages import KeyPath
+from lfs10d.schema.messages import KeyPath, nearest
 from lfs10d.schema.quantities import duration_text
 from lfs10d.system.dataclass import dataclass
 
@@ -112,6 +111,6 @@ def _against_profile(config: Config, index: int, slave: SlaveConfig, profile: Pr
 
 def unknown_value(name: str, profile: Profile) -> str:
     """Return what to say of a name that none of the profile's values has."""
-    near = get_close_matches(name, profile.value_names, n=1, cutoff=0.6)
+    near = nearest(name, profile.value_names)
     what = f"is no value of profile {profile.name}; "
-    return what + (f"did you mean {near[0]}?" if near else f"its values: {', '.join(profile.value_names)}")
+    return what + (f"did you mean {near}?" if near else f"its values: {', '.join(profile.value_names)}")

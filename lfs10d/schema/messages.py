@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import difflib
+from collections.abc import Iterable
 from typing import TypeAlias, get_args, get_origin
 
 from pydantic import BaseModel
@@ -14,11 +14,18 @@ KeyPath: TypeAlias = tuple[str | int, ...]
 """Where a value stands: keys of mappings and indexes of lists."""
 
 
+def nearest(word: str, known: Iterable[str]) -> str | None:
+    """Return which known word was probably meant, None if none is near."""
+    from difflib import get_close_matches  # noqa: PLC0415  # only where something is misspelled
+
+    return next(iter(get_close_matches(word, list(known), n=1)), None)
+
+
 def unknown_key(key: str, known: tuple[str, ...]) -> str:
     """Return what to say of a key that is not one of those known in its place."""
-    near = difflib.get_close_matches(key, known, n=1, cutoff=0.6)
+    near = nearest(key, known)
     if near:
-        return f"is not a known key; did you mean {near[0]}?"
+        return f"is not a known key; did you mean {near}?"
     return f"is not a known key; known here: {', '.join(known)}" if known else "is not a known key"
 
 

@@ -36,7 +36,7 @@ def test_it_is_always_heard_and_always_answered(tmp_path: Path, baudrate: int) -
 
 def test_it_gives_up_a_dead_sensor_and_polls_on(tmp_path: Path) -> None:
     with PacedLine(tmp_path, "--baudrate", "19200", "--sensors", "3", "--dead", "2") as line:
-        mine = polled(line, "--baudrate", "19200", "--ids", "1-3", "--timeout", "50")
+        mine = polled(line, "--baudrate", "19200", "--ids", "1-3", "--timeout", "200")
         counts = line.close()
     assert mine["timeouts"] == counts["unanswered"] > 0
     assert mine["good"] == counts["answered"] > 0
