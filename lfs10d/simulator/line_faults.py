@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final
 
 from lfs10d.simulator.burst import NOISE, SECOND_MASTER
@@ -48,12 +49,22 @@ def stray(
 
 def second_master(
     line: SimulatedLine, body: bytes, first: float, every: float, check: Check = "crc", *, last: float | None = None
-) -> None:
-    """Let another master send this request from `first` to before `last`, `every` so many seconds, deaf to the line."""
+) -> Callable[[], None]:
+    """Let another master send this request from `first` to before `last`, `every` so many seconds, deaf to the line.
+
+    Return the function that ends it.
+    """
     frame = seal(body, line.framing, check)
     end = None if last is None else nanoseconds(last)
+    gone = False
+
+    def leave() -> None:
+        nonlocal gone
+        gone = True
 
     def ask(now: int) -> None:
+        if gone:
+            return
         ended = now + line.format.span(len(frame))
         burst = line.speak(SECOND_MASTER, frame, now)
         request = HeardRequest(SECOND_MASTER, frame, now, ended, None, JudgeReport.HEARD)
@@ -62,3 +73,4 @@ def second_master(
             line.at_nanosecond(now + nanoseconds(every), ask)
 
     line.at(first, ask)
+    return leave

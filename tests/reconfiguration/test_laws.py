@@ -9,69 +9,23 @@ each time, and one that fails is made shorter. Those that once failed are in tes
 
 from __future__ import annotations
 
-import os
 from typing import Any
 
-from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.support.lives import Bench
-from tests.support.story import FOREIGN, Story
-
-SEARCHED = os.environ.get("LFS10D_EXAMPLES")
-"""So many stories are searched for one that fails; None: see above."""
-AILMENTS: list[tuple[str, dict[str, Any]]] = [
-    ("none", {}),
-    ("none", {}),
-    ("none", {}),
-    ("none", {}),
-    ("dip_locked", {"answer": "echo", "reads": "old"}),
-    ("dip_locked", {"answer": "echo", "reads": "new"}),
-    ("dip_locked", {"answer": "exception", "reads": "old", "code": 3}),
-    ("dip_locked", {"answer": "exception", "reads": "new", "code": 3}),
-    ("stores_but_ignores", {}),
-    ("power_cycle", {}),
-    ("at_once", {}),
-    ("slow_flash", {"delay": 1.0}),
-    ("slow_flash", {"delay": 5.0}),
-    ("echo_losing", {}),
-    ("silent", {}),
-    ("silent", {"first": 4.0, "last": 9.0}),
-    ("silent", {"first": 8.0}),
-    ("exception", {"code": 4}),
-    ("late", {"delay": 0.35}),
-    ("late", {"delay": 0.75}),
-]
-SPEAKING = [sensor_fault for sensor_fault in AILMENTS if sensor_fault[0] != "silent"]
-ENDS = st.one_of(
-    st.just(("finish", 0)),
-    st.just(("finish", 0)),
-    st.tuples(st.just("crash"), st.integers(0, 18)),
-    st.tuples(st.just("leave"), st.integers(1, 400)),
-    st.tuples(st.just("sigterm"), st.integers(1, 260)),
-)
-DONE = st.just(("finish", 0))
-NAMES = st.sampled_from(["s3", "s3", "s4", "s5"])
-TARGETS = st.sampled_from([3, 4, 5, 9, 10, 200])
-READDRESS = st.tuples(st.just("readdress"), NAMES, TARGETS, ENDS)
-BAUDRATE = st.tuples(st.just("baudrate"), st.booleans(), st.just(0), ENDS)
-ADOPT = st.tuples(st.just("adopt"), st.just(0), st.just(0), ENDS)
-PLUG = st.tuples(st.just("plug"), st.sampled_from([9600, 19200]), st.sampled_from(SPEAKING), DONE)
-ALIEN = st.tuples(st.just("foreign"), st.sampled_from([9600, 19200]), st.sampled_from(FOREIGN), DONE)
-HAPPENINGS = st.one_of(
-    st.tuples(st.just("power"), st.integers(0, 6), st.just(0), DONE),
-    st.tuples(st.just("heal"), st.integers(0, 6), st.just(0), DONE),
-    st.tuples(st.just("wait"), st.sampled_from([0.3, 2.0, 20.0]), st.just(0), DONE),
-    st.tuples(st.just("unplug"), st.sampled_from([0.3, 2.0, 6.0]), st.just(0), DONE),
-)
-THREE = st.lists(st.sampled_from(AILMENTS), min_size=3, max_size=3)
-CHECKS = settings(
-    max_examples=int(SEARCHED or 40),
-    derandomize=SEARCHED is None,
-    database=None,
-    phases=[Phase.generate, *([Phase.shrink] if SEARCHED else [])],
-    deadline=None,
-    suppress_health_check=list(HealthCheck),
+from tests.support.story import Story
+from tests.support.story_steps import (
+    ADOPT,
+    ALIEN,
+    BAUDRATE,
+    CHECKS,
+    HAPPENINGS,
+    PLUG,
+    READDRESS,
+    SPEAKING,
+    THREE,
 )
 
 

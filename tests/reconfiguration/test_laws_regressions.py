@@ -86,6 +86,12 @@ TWINNED: dict[str, tuple[list[Ails], tuple[Ails, Ails | None], float, list[Any]]
         0.04,
         [("baudrate", True, 0, DONE)],
     ),
+    "the second answer of a late twin does not hide that the first one has stored a rate": (
+        [STORES, WELL, WELL],
+        (WELL, None),
+        0.035,
+        [("baudrate", False, 0, DONE)],
+    ),
     "one that waits for its power cycle is not taken for its slow twin at the new rate": (
         [POWER_CYCLE, WELL, WELL],
         (late(0.35), None),

@@ -78,6 +78,15 @@ def test_a_second_master_goes_when_its_time_is_over(bench: Maker) -> None:
     assert [request.begun for request in line.line.log] == [1_000_000_000, 2_000_000_000]
 
 
+def test_a_second_master_goes_when_it_is_sent_away(bench: Maker) -> None:
+    line = bench(Sensor(1), Sensor(2))
+    leave = second_master(line.line, bytes.fromhex("020300050001"), 1.0, 1.0)
+    line.listen(0.5)
+    leave()
+    line.listen(6.0)
+    assert [request.begun for request in line.line.log] == [1_000_000_000]
+
+
 def test_a_second_master_falls_into_the_first(bench: Maker) -> None:
     line = bench(Sensor(1), Sensor(2))
     second_master(line.line, bytes.fromhex("020300050001"), 1.004, 10.0)

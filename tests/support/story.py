@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from lfs10d.simulator.blueprint import Blueprint
+from lfs10d.simulator.line_faults import second_master
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
+from tests.support.ails import NO_AIL, Ail, ail, has_a_twin
+from tests.support.foreigners import Foreigner, Stranger
 from tests.support.lives import Bench, Life
 from tests.support.volatile_disk import PowerCutError
 
@@ -16,29 +18,6 @@ IDS = (3, 4, 5)
 RATES = 9600 + 19200
 LONGEST = 4000
 """Turns of 50 ms after which a request counts as never answered."""
-FOREIGN: list[dict[int, int]] = [
-    {0: 3, 1: 225, 2: 0, 3: 7, 4: 9, 5: 700},
-    {1: 225, 2: 0, 4: 1, 5: 1},
-    {1: 0x414F, 2: 0xD70A, 4: 9, 5: 1},
-    {1: 0x414F, 2: 0xD70A, 4: 1, 5: 9},
-    {0: 87, 2000: 1, 2001: 2},
-]
-"""The registers of devices that are no LFS10, as they come at the factory's id."""
-
-
-class Foreigner(Sensor):
-    """A device of another kind that takes any write; `written` is how many came."""
-
-    written = 0
-
-    def __init__(self, words: dict[int, int], baudrate: int) -> None:
-        anything = range(1 << 16)
-        kind = Blueprint("foreign", (), words, dict.fromkeys(words, anything))
-        super().__init__(1, blueprint=kind, format=Format(baudrate))
-
-    def _write(self, *args: Any) -> bytes:  # noqa: ANN401 - passed on
-        self.written += 1
-        return super()._write(*args)
 
 
 @dataclass
@@ -53,15 +32,19 @@ class Asked:
 
 
 class Story:
-    """One run. `ails` are those of `s3`, `s4` and `s5`, of a twin of s3 and of a stranger at 9 if there are."""
+    """One run. `ails` are those of `s3`, `s4` and `s5`, of a twin of s3 and of a stranger at 9 if there are.
+
+    `besides` are further ones of the three.
+    """
 
     def __init__(
         self,
         bench: Bench,
-        ails: Sequence[tuple[str, dict[str, Any]]],
+        ails: Sequence[Ail],
         *,
-        twin: tuple[str, dict[str, Any]] | None = None,
-        stranger: tuple[str, dict[str, Any]] | None = None,
+        besides: Sequence[Ail] = (NO_AIL,) * 3,
+        twin: Ail | None = None,
+        stranger: Ail | None = None,
         turnaround: float = 0.005,
     ) -> None:
         self.bench = bench
@@ -73,17 +56,19 @@ class Story:
         self.asked: list[Asked] = []
         self.told: list[tuple[str, Any]] = []
         """Events of the lives that are over."""
+        self.leave: Callable[[], None] = lambda: None
+        """Ends the other master, if there is one."""
         self.twin: Sensor | None = None
         self.hushed = ails[0][0] == "silent"
         """Nobody can hear s3 beside its twin, for some time or ever: then the daemon may take the twin for it."""
-        for sensor, sensor_fault in zip(bench.line.sensors, ails, strict=True):
-            _ail(sensor, sensor_fault)
-        for slave, its in ((3, twin), (9, stranger)):
+        for sensor, one, other in zip(bench.line.sensors, ails, besides, strict=True):
+            ail(sensor, one, other)
+        for slave, its, kind in ((3, twin, Sensor), (9, stranger, Stranger)):
             if its is not None:
-                other = bench.line.add(Sensor(slave, format=Format(9600), turnaround=turnaround))
-                _ail(other, its)
-                self.others.append(other)
-                self.twin = other if slave == 3 else self.twin
+                added = bench.line.add(kind(slave, format=Format(9600), turnaround=turnaround))
+                ail(added, its)
+                self.others.append(added)
+                self.twin = added if slave == 3 else self.twin
         self.reunited = False
         self.before = self._ids()
         bench.go(self.life, 3.0)
@@ -99,7 +84,6 @@ class Story:
 
     def step(self, what: str, one: Any, more: Any, end: tuple[str, int]) -> None:  # noqa: ANN401 - as it wants
         """Let one thing happen, and judge."""
-        bench = self.bench
         match what:
             case "readdress":
                 self.ask("device/readdress", end, device=one, to=more)
@@ -107,13 +91,24 @@ class Story:
                 self.ask("line/baudrate", end, to=RATES - self.rate, power_cycle=one)
             case "adopt":
                 self.ask("line/adopt", end)
+            case _:
+                self._happen(what, one, more)
+        self.check()
+
+    def _happen(self, what: str, one: Any, more: Any) -> None:  # noqa: ANN401 - as it wants
+        bench = self.bench
+        match what:
             case "plug":
                 self.newcomers.append(bench.line.add(Sensor(1, format=Format(one))))
-                _ail(self.newcomers[-1], more)
+                ail(self.newcomers[-1], more)
                 self.before = self._ids()
             case "foreign":
-                self.foreigners.append(Foreigner(more, one))
-                bench.line.add(self.foreigners[-1])
+                words, its = more
+                self.foreigners.append(Foreigner(words, one))
+                ail(bench.line.add(self.foreigners[-1]), its)
+            case "master":
+                self.leave()
+                self.leave = second_master(bench.line, bytes(one), bench.clock.now + 0.01, more)
             case "power":
                 self._powered()
                 self.sensors[one % len(self.sensors)].power_cycle()
@@ -126,7 +121,6 @@ class Story:
                 bench.go(self.life, one)
                 bench.port.replug()
                 bench.go(self.life, 3.0)
-        self.check()
 
     def ask(self, name: str, end: tuple[str, int], **parameters: Any) -> Asked:  # noqa: ANN401 - any JSON
         """Send a request, and end the daemon as `end` says: at its answer, at a step on the disk, after some turns."""
@@ -135,6 +129,7 @@ class Story:
         self.asked.append(asked)
         self.hushed |= self.by_name["s3"].deaf_until > bench.clock.now * 1e9  # its flash is not done yet
         pair = self._pair() if (name, parameters.get("device")) == ("device/readdress", "s3") else ()
+        pair += tuple(each for each in self.sensors if each.faults and has_a_twin(each))
         together = [each.slave for each in pair]
         how, after = end
         if how == "crash":
@@ -165,7 +160,7 @@ class Story:
         if self.twin is None or (one.slave, one.format) != (self.twin.slave, self.twin.format):
             return ()
         pair = (one, self.twin)
-        mute = any(each.deaf_until > now or any(ail.kind == "silent" for ail in each.faults) for each in pair)
+        mute = any(each.deaf_until > now or any(fault.kind == "silent" for fault in each.faults) for each in pair)
         return () if mute else pair
 
     @property
@@ -185,7 +180,8 @@ class Story:
         self.bench.go(self.life, 1.0)
 
     def mend(self, seconds: float = 200.0) -> None:
-        """Heal everybody, switch the power of all off and on, take the others off, and wait until nothing is open."""
+        """Heal all, power them anew, take the others and the other master off; wait until nothing is open."""
+        self.leave()
         self._powered()
         for sensor in self.sensors:
             sensor.clear_faults()
@@ -227,6 +223,7 @@ class Story:
         for name, sensor in self.by_name.items():
             self._known(name, sensor)
         assert not any(each.written for each in self.foreigners), "nothing is written to another kind of device"
+        assert not any(each.written for each in self.others if isinstance(each, Stranger)), "nor to a stranger"
         for asked in self.asked:
             assert len(self.answers_of(asked)) <= 1, "no request is answered twice"
 
@@ -308,9 +305,3 @@ class Story:
 
     def _writes(self) -> int:
         return sum(request.body[1:2] == b"\x06" for request in self.bench.line.log)
-
-
-def _ail(sensor: Sensor, sensor_fault: tuple[str, dict[str, Any]]) -> None:
-    kind, particulars = sensor_fault
-    if kind != "none":
-        sensor.add_fault(kind, **particulars)

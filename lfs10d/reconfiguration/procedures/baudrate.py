@@ -240,9 +240,9 @@ def restore_rate(sensor: RateSensor, rate: int, other: int) -> Generator[Step, A
         _, at, _ = yield from write_rate(sensor, other, rate)
         if at != rate:
             return at
-        # Of two of this id the other one may have stored the rate and be here still.
+        # Of two of this id the other one may have stored the rate and be here still, and answer after this one.
         reply = yield from sensor.query.read_register(sensor.at(rate), PATIENT, register=sensor.register)
-        if reply.register == sensor.code(rate):
+        if reply.register == sensor.code(rate) and not sensor.query.answered_twice(sensor.at(rate)):
             return rate
     return rate if (yield from write_back(sensor, rate)) else None
 

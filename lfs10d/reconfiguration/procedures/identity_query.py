@@ -7,12 +7,15 @@ Rules
 2. A slave that must be left alone for the moment is waited for.
 3. Echoes of writes prove nothing and are ignored.
 4. A slave whose answers have come late gets a long time-out, whichever request they came during.
+5. A slave to which a second answer came is asked anything, writes too, only when there was time for another one since
+   its last answer: else that is taken for the next one, or destroys it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import field, replace
+from math import inf
 
 from lfs10d.line.jobs.identification import shortest_answer, strangers
 from lfs10d.line.jobs.job import Hold
@@ -74,6 +77,8 @@ class IdentityQuery:
         self.timeout = QUICK
         self.id_register = profile.slave_id.register
         self._pending = pending
+        self._answered: dict[int, float] = {}
+        """When each slave answered last, in s."""
         self.line_rate = line_rate
 
     def read_register(
@@ -84,7 +89,7 @@ class IdentityQuery:
         allowed = yield from self._allowed(identity, endpoint, timeout)
         if allowed is not None:
             return allowed
-        return self._reply((yield self._ask(identity, endpoint, timeout)))
+        return self._reply((yield from self.put(self._ask(identity, endpoint, timeout))))
 
     def knowing(self, baudrate: int, code: int | None) -> IdentityQuery:
         """Return the same with the content of the rate's register for a rate that the profile has no code for.
@@ -108,7 +113,19 @@ class IdentityQuery:
         until = self._pending.left_alone_until(endpoint.slave, self.clock.now)
         if until is not None:
             yield Hold(until)
-        return self._reply((yield self._ask(self._values_of(endpoint, block), endpoint, timeout)), values=True)
+        asked = self._ask(self._values_of(endpoint, block), endpoint, timeout)
+        return self._reply((yield from self.put(asked)), values=True)
+
+    def put(self, ask: Ask) -> Generator[Step, Outcome, Outcome]:
+        """Ask a slave; wait before where a second answer may follow its last one."""
+        slave, duplicates = ask.request.slave, self._pending.duplicates
+        until = self._answered.get(slave, -inf) + duplicates.watched(slave)
+        if duplicates.extras(slave) and until > self.clock.now:
+            yield Hold(until)
+        outcome: Outcome = yield ask
+        if outcome.answered:
+            self._answered[slave] = outcome.ended
+        return outcome
 
     def answered_twice(self, endpoint: Endpoint) -> bool:
         """Whether a second answer came to requests to this slave id: see `lfs10d.modbus.duplicates`."""
@@ -171,7 +188,7 @@ class IdentityQuery:
             if isinstance(allowed, float):
                 yield Hold(allowed)
                 continue
-            reply = self._reply((yield self._ask(other, endpoint, timeout)), values=True)
+            reply = self._reply((yield from self.put(self._ask(other, endpoint, timeout))), values=True)
             if not reply.answers or reply.exception in NOT_FINAL:
                 return reply
 

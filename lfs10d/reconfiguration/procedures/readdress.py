@@ -37,7 +37,6 @@ from typing import Any
 from lfs10d.line.jobs.job import Hold
 from lfs10d.line.jobs.procedure import Await, LineLostError, Step
 from lfs10d.modbus.ask import Ask
-from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.request import WriteRegister
 from lfs10d.reading import FaultCode
 from lfs10d.reconfiguration.journal import Endpoint
@@ -218,9 +217,8 @@ def write(endpoint: Endpoint, register: int, value: int, query: IdentityQuery) -
     """Write once; return the code of an exception, if one came."""
     request = WriteRegister(endpoint.slave, register, value, query.profile.write_function)
     baudrate = None if endpoint.baudrate == query.line_rate else endpoint.baudrate
-    outcome: Outcome = yield Ask(
-        request, query.codec, WRITE_TIMEOUT, None, baudrate, request_gap=query.profile.request_gap
-    )
+    asked = Ask(request, query.codec, WRITE_TIMEOUT, None, baudrate, request_gap=query.profile.request_gap)
+    outcome = yield from query.put(asked)
     fault = outcome.fault
     if fault is not None and fault.code is FaultCode.EXCEPTION:
         return fault.exception_code

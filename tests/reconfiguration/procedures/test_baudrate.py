@@ -241,6 +241,16 @@ def test_the_one_of_two_that_stayed_forgets_the_rate_it_stored(pretence: Pretenc
     assert [sensor.stored.get(4, 1) for sensor in pretence.sensors] == [1, 1]
 
 
+def test_where_second_answers_came_the_rate_is_stored_whatever_the_first_of_two_says(pretence: Pretence) -> None:
+    sensor = RateSensor("s1", 1, pretence.query())
+    pretence.sensor(1, baudrate=19200)
+    pretence.pending.duplicates.answered(1, -1.0)
+    for at in (-0.9, -0.8):
+        pretence.pending.duplicates.second(1, at)
+    assert pretence.carry_out(restore_rate(sensor, 9600, 19200)) == 9600
+    assert [write.value for write in pretence.writes] == [1, 1]
+
+
 def test_so_with_a_power_cycle(pretence: Pretence) -> None:
     sensors = line(pretence, "stores")
     pretence.sensor(1)

@@ -8,14 +8,15 @@ from pathlib import Path
 import pytest
 
 from lfs10d.modbus.ask import Ask
+from lfs10d.modbus.duplicates import WATCHED
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.outcome import LateAnswer, Outcome
-from lfs10d.modbus.request import ReadRegisters
+from lfs10d.modbus.request import ReadRegisters, WriteRegister
 from lfs10d.profiles.library import load_profile, parse_profile
 from lfs10d.reading import FaultCode
 from lfs10d.reconfiguration.journal import Endpoint
 from lfs10d.reconfiguration.procedures.identity_query import PATIENT, QUICK, IdentityReply, quiet
-from tests.support.sensors import Pretence
+from tests.support.sensors import EXCHANGE, Pretence
 
 RTU = Codec(Framing.RTU)
 HERE = Endpoint(slave=3, baudrate=9600)
@@ -236,3 +237,27 @@ def test_a_place_is_answered_twice_after_two_second_answers() -> None:
     assert not query.answered_twice(here)
     pretence.pending.duplicates.second(3, 1.7)
     assert query.answered_twice(here)
+
+
+def test_where_a_second_answer_may_follow_nothing_is_asked_before_it_could_have_come(pretence: Pretence) -> None:
+    pretence.sensor(3)
+    query = pretence.query()
+    pretence.carry_out(query.read_register(HERE))
+    pretence.carry_out(query.read_register(HERE))
+    assert pretence.clock.now == pytest.approx(2 * EXCHANGE), "no second answer is known yet"
+    pretence.pending.duplicates.answered(3, 1.0, barrier=True)
+    pretence.pending.duplicates.second(3, 1.04)
+    pretence.clock.now = 2.0
+    pretence.carry_out(query.read_register(HERE))
+    pretence.carry_out(query.put(Ask(WriteRegister(3, 4, 1), RTU, QUICK)))
+    assert pretence.clock.now == pytest.approx(2.0 + WATCHED + 2 * EXCHANGE)
+
+
+def test_after_a_silence_no_second_answer_is_waited_for(pretence: Pretence) -> None:
+    pretence.pending.duplicates.answered(3, 0.0, barrier=True)
+    pretence.pending.duplicates.second(3, 0.04)
+    query = pretence.query()
+    pretence.clock.now = 1.0
+    for _ in range(2):
+        assert pretence.carry_out(query.put(Ask(WIND, RTU, QUICK))).answer is None
+    assert pretence.clock.now == pytest.approx(1.0 + 2 * QUICK)
