@@ -10,7 +10,8 @@ Rules
 4. What waits in a long record is added up now and then, before it is forgotten.
 5. A reading comes later than it was measured: it may wait for others, or until it is known to be the right answer. So
    figures are of the latest time by which no reading can be missing: that of the newest one, or a moment ago. That is
-   their `ts`, and they are those of all samples up to then.
+   their `ts`, and they are those of all samples up to then. A record is published when a reading from after its end is
+   there, or a moment after its end.
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ LOOK_EVERY: Final = 1000
 ADDED_UP_AFTER: Final = LONG + MINUTE // 2
 """Milliseconds of a long record after which they are added up; a little less than what is kept."""
 
-LATE: Final = 500
+LATE: Final = 1500
 """Milliseconds by which a reading comes late at most, but for what it waits for others (`mqtt.hold`)."""
 
 _RUNNING_OUT: Final = (
@@ -78,6 +79,7 @@ class DeviceWind:
         "_late",
         "_look_at",
         "_next_at",
+        "_record_at",
         "_samples",
         "_settings",
         "_shown",
@@ -98,6 +100,8 @@ class DeviceWind:
         self._wind = MeasuredWind(settings.values)
         self._next_at = at + _milliseconds(settings.every)
         self._look_at: float = inf
+        self._record_at: float = inf
+        """When the span that is recorded next is over."""
         self._shown: dict[str, object] = {}
         self._samples: object = 0
         self._spans = _spans(settings, at)
@@ -116,12 +120,16 @@ class DeviceWind:
             held_until = self._wind.held_until
             if at < held_until < self._look_at:
                 self._look_at = held_until
-        return self._look_at + self._late
+        return at if at >= self._record_at else self._look_at + self._late
 
     def due(self, moment: WindMoment) -> float:
         """Return when `tick` is wanted next, in ms."""
-        record = inf if self._spans is None else min(self._spans.due(moment.shift), self._added_until + ADDED_UP_AFTER)
-        return min(self._next_at, self._late + min(self._look_at, record))
+        if self._spans is None:
+            return min(self._next_at, self._late + self._look_at)
+        self._record_at = over = self._spans.due(moment.shift)
+        record = over if over <= self._wind.newest else over + self._late
+        look_at = min(self._look_at, self._added_until + ADDED_UP_AFTER)
+        return min(self._next_at, record, self._late + look_at)
 
     def tick(self, moment: WindMoment) -> list[Publication]:
         """Return what is due."""
@@ -173,7 +181,7 @@ class DeviceWind:
         self._hold, self._late = _hold(info), _late(settings)
         self._next_at = min(self._next_at, moment.at + _milliseconds(settings.every))
         if settings.records != records:
-            self._spans = _spans(settings, moment.at)
+            self._spans, self._record_at = _spans(settings, moment.at), inf
             self._added, self._added_until = WindTotals(), moment.at
         if before.enabled and not info.enabled:
             self._wind.end(moment.at)

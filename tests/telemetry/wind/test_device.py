@@ -266,13 +266,32 @@ def test_figures_are_of_all_samples_up_to_the_time_that_the_message_says_however
         assert each["samples"] == len(naive.measured(cast("int", each["from"]), cast("int", each["to"])))
 
 
+def test_a_record_waits_for_the_proof_of_its_last_samples_and_no_longer_than_a_reading_from_after_its_end() -> None:
+    line = weather()
+    line.run(599, gusty)
+    line.run(600.9)
+    assert line.all("record") == []
+    for at in (599.5, 599.9, 600.2):  # held back together, until the last of them was proved
+        line.station.on_reading(reading("a", at, wind_speed=5.0), line.instant(600.9))
+    line.run(600.91)
+    [record] = line.all("record")
+    assert record["samples"] == 601
+    line.run(1210)
+    assert len(line.all("record")) == 2
+    line.station.on_reading(reading("a", 1799.9, wind_speed=5.0), line.instant(1800.9))
+    line.run(1801.49)
+    assert len(line.all("record")) == 2
+    line.run(1801.51)  # nothing came from after its end
+    assert line.newest("record")["samples"] == 1
+
+
 def test_a_message_says_the_time_of_the_newest_sample_or_that_of_a_moment_ago() -> None:
     line = weather(with_wind(ANEMOMETER, hold=0.1))
     line.station.on_reading(reading("a", 9.8, wind_speed=5.0), line.instant(9.9))
     line.run(10.5)
     assert times(line, "wind") == [pytest.approx(9.8, abs=0.001)]
     line.run(20.5)
-    assert times(line, "wind")[1:] == [pytest.approx(20 - 0.6, abs=0.01)]
+    assert times(line, "wind")[1:] == [pytest.approx(20 - 1.6, abs=0.01)]
     line.station.on_reading(reading("a", 30.0, wind_speed=5.0), line.instant(30.0))
     [burst] = line.station.burst("a", line.instant(29.99))
     assert cast("dict[str, object]", burst.payload)["ts"] == line.instant(30.0).ts()
