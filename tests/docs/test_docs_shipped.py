@@ -18,7 +18,7 @@ SOURCES = "lfs10d/"
 def installed() -> dict[PurePosixPath, Path]:
     """Return each file of the wheel's documentation by its place below it, folders included."""
     wheel = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"]["wheel"]
-    found = {}
+    found: dict[PurePosixPath, Path] = {}
     for source, target in wheel["shared-data"].items():
         place, file = PurePosixPath(target), ROOT / source
         if place.is_relative_to(DOCUMENTATION):
