@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 import socket
 from collections.abc import Callable, Mapping, Sequence
+from typing import Literal
 
 from paho.mqtt.client import Client, MQTTMessage
 from paho.mqtt.enums import CallbackAPIVersion, MQTTErrorCode, MQTTProtocolVersion
@@ -36,6 +37,9 @@ PASSES = 16
 RETAINED_QOS_0 = 0x31
 """First byte of a PUBLISH of QoS 0 that is retained and no repetition (MQTT 5.0, section 3.3.1)."""
 
+PACKET_ID = 2
+"""Bytes of a packet id."""
+
 _ANSWERS = (
     PacketTypes.CONNACK,
     PacketTypes.PUBACK,
@@ -62,6 +66,14 @@ def every_reason(known: Mapping[int, Mapping[str, list[int]]]) -> dict[int, dict
 
 
 ReasonCode.names = every_reason(ReasonCode.names)
+
+_TAKEN = {
+    b"": ReasonCode(PacketTypes.PUBACK),
+    b"\x10": ReasonCode(PacketTypes.PUBACK, "No matching subscribers"),
+}
+"""What follows the packet id in a PUBACK by which a broker takes a message (MQTT 5.0, section 3.4.2.1)."""
+
+_NOTHING_MORE = Properties(PacketTypes.PUBACK)  # type: ignore[no-untyped-call]  # paho leaves it untyped
 
 
 class _Trouble(logging.Logger):
@@ -122,6 +134,18 @@ class BoundedClient(Client):
         message.payload, message.retain = bytes(packet[begin:]), True
         if self.on_message is not None:
             self.on_message(self, self._userdata, message)
+        return MQTTErrorCode.MQTT_ERR_SUCCESS
+
+    def _handle_pubackcomp(self, cmd: Literal["PUBACK", "PUBCOMP"]) -> MQTTErrorCode:
+        # Two come for each sample, without properties. paho makes a reason code and properties of each anew.
+        packet = self._in_packet["packet"]
+        reason = _TAKEN.get(bytes(packet[PACKET_ID:])) if cmd == "PUBACK" and len(packet) >= PACKET_ID else None
+        if reason is None:
+            return super()._handle_pubackcomp(cmd)
+        with self._out_message_mutex:
+            packet_id = int.from_bytes(packet[:PACKET_ID], "big")
+            if packet_id in self._out_messages:
+                return self._do_on_publish(packet_id, reason, _NOTHING_MORE)
         return MQTTErrorCode.MQTT_ERR_SUCCESS
 
     def _packet_read(self) -> MQTTErrorCode:

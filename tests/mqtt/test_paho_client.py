@@ -10,7 +10,9 @@ from contextlib import AbstractAsyncContextManager
 from typing import TypeAlias
 
 import pytest
-from paho.mqtt.enums import CallbackAPIVersion, LogLevel, MQTTErrorCode
+from paho.mqtt.client import MQTTMessage
+from paho.mqtt.enums import CallbackAPIVersion, LogLevel, MQTTErrorCode, MQTTProtocolVersion
+from paho.mqtt.exception import MQTTException
 from paho.mqtt.packettypes import PacketTypes
 from paho.mqtt.reasoncodes import ReasonCode
 
@@ -236,6 +238,53 @@ def test_a_long_packet_is_passed_over_in_turns() -> None:
     client._passing_over = 100
     assert client.read() is MQTTErrorCode.MQTT_ERR_AGAIN
     assert client._passing_over == 84
+
+
+class Acknowledged(BoundedClient):
+    """A client that has published packet 7, and is told what the broker says to it."""
+
+    def __init__(self) -> None:
+        super().__init__(CallbackAPIVersion.VERSION2, protocol=MQTTProtocolVersion.MQTTv5)
+        self.heard: list[tuple[int, int]] = []
+        self.on_publish = lambda _client, _userdata, mid, reason, _properties: self.heard.append((mid, reason.value))
+        self._sent = MQTTMessage(7, b"t")
+        self._sent.qos = 1
+        self._out_messages[7] = self._sent
+
+    def hears(self, body: bytes) -> MQTTErrorCode:
+        self._in_packet["packet"] = bytearray(body)
+        return self._handle_pubackcomp("PUBACK")
+
+    @property
+    def waiting(self) -> bool:
+        return bool(self._out_messages) or not self._sent.info.is_published()
+
+
+@pytest.mark.parametrize(
+    ("body", "reason"),
+    [
+        (b"\x00\x07", 0),
+        (b"\x00\x07\x10", 0x10),
+        (b"\x00\x07\x00", 0),
+        (b"\x00\x07\x10\x00", 0x10),
+        (b"\x00\x07\x97", 0x97),
+    ],
+)
+def test_an_acknowledgement_comes_with_its_reason_and_once(body: bytes, reason: int) -> None:
+    client = Acknowledged()
+    for _ in range(2):
+        assert client.hears(body) is MQTTErrorCode.MQTT_ERR_SUCCESS
+    assert client.heard == [(7, reason)]
+    assert not client.waiting
+
+
+def test_an_acknowledgement_of_what_was_not_published_is_passed_over() -> None:
+    client = Acknowledged()
+    for body in (b"\x00\x08", b"\x00\x08\x10"):
+        assert client.hears(body) is MQTTErrorCode.MQTT_ERR_SUCCESS
+    assert client.waiting
+    with pytest.raises(MQTTException, match="wrong size of packet"):
+        client.hears(b"\x07")
 
 
 def test_only_errors_of_paho_are_kept() -> None:
