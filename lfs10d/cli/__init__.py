@@ -107,6 +107,16 @@ def config_option(function: Callable[..., Any], text: str = "The configuration f
     )(function)
 
 
+def state_option(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add `--state-dir DIRECTORY`, passed on as `state_dir: Path | None`, for verbs that read what the daemon keeps."""
+    return click.option(
+        "--state-dir",
+        type=click.Path(path_type=Path, readable=False),  # whether it can be read is reported in our words
+        metavar="DIRECTORY",
+        help="Where the daemon keeps state. Default: as `lfs10d run` has it.",
+    )(function)
+
+
 def json_option(function: Callable[..., Any]) -> Callable[..., Any]:
     """Add `--json`, passed on as `as_json: bool`."""
     return click.option("--json", "as_json", is_flag=True, help="Print JSON for programs.")(function)

@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from lfs10d.cli import config_option
+from lfs10d.cli import config_option, state_option
 from lfs10d.cli.effective_file import with_changes
 from lfs10d.config.effective import Effective
 from lfs10d.config.loader import load
@@ -23,8 +23,8 @@ from lfs10d.system.dataclass import dataclass
 
 
 def calibration_option(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Add `-c FILE`, passed on as `config: Path`; `calibrations_of` takes it."""
-    return config_option(function, "Whose `calibration` is shown beside raw values.")
+    """Add `-c FILE` and `--state-dir`, passed on as `config: Path` and `state_dir`; `calibrations_of` takes them."""
+    return config_option(state_option(function), "Whose `calibration` is shown beside raw values.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,21 +75,22 @@ UNFINISHED = "line.port"
 """What is wrong with a file that does not name its port yet, as the sample: it cannot be about this port."""
 
 
-def calibrations_of(port: str, file: Path) -> Calibrations:
+def calibrations_of(port: str, file: Path, state_dir: Path | None) -> Calibrations:
     """Return the calibrations that a configuration has for the line at `port`; called by a verb.
 
+    `state_dir` is where a person says that the daemon keeps its state, None for the usual place.
     Raises ConfigError if a person named the file and it is not valid. Prints on standard error what cannot be known
     and why; then raw values alone are shown. A file that nobody named, and that is not there or does not name a port
     yet, has no calibration.
     """
     named = click.get_current_context().get_parameter_source("config") is click.core.ParameterSource.COMMANDLINE
-    calibrations, trouble = _found(port, file, named=named)
+    calibrations, trouble = _found(port, file, state_dir, named=named)
     if trouble is not None:
         click.echo(f"lfs10d: {trouble}; raw values alone are shown", err=True)
     return calibrations
 
 
-def _found(port: str, file: Path, *, named: bool) -> tuple[Calibrations, str | None]:
+def _found(port: str, file: Path, state_dir: Path | None, *, named: bool) -> tuple[Calibrations, str | None]:
     try:
         loaded = load(file, files=False)
     except ConfigError as error:
@@ -100,9 +101,9 @@ def _found(port: str, file: Path, *, named: bool) -> tuple[Calibrations, str | N
     line = loaded.config.line
     if os.path.realpath(line.port) != os.path.realpath(port):
         return NONE, f"{file} is for another port, {line.port}" if named else None
-    directory = state_directory(file, line.name, chosen=None, environment=os.environ)
+    directory = state_directory(file, line.name, chosen=state_dir, environment=os.environ)
     try:
-        return _by_place(with_changes(loaded, directory, chosen=False))
+        return _by_place(with_changes(loaded, directory, chosen=state_dir is not None))
     except StateError as error:
         if not any(slave.calibration for slave in loaded.config.slaves):
             return NONE, None

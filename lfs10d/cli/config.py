@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from lfs10d.cli import EXIT_FAILED, config_option, json_option
+from lfs10d.cli import EXIT_FAILED, config_option, json_option, state_option
 from lfs10d.cli.effective_file import with_changes
 from lfs10d.cli.json_text import json_text
 from lfs10d.cli.render.table import columns
@@ -57,12 +57,7 @@ def _print_schema(context: click.Context, _: click.Parameter, wanted: bool) -> N
     callback=_print_schema,
     help="Print the JSON Schema of the file; nothing is read.",
 )
-@click.option(
-    "--state-dir",
-    type=click.Path(path_type=Path, readable=False),  # whether it can be read is told in our words
-    metavar="DIRECTORY",
-    help="Where the daemon keeps state. Default: as `lfs10d run` has it.",
-)
+@state_option
 @json_option
 def command(config: Path, state_dir: Path | None, *, merged: bool, as_json: bool) -> int:
     """Print the effective configuration, each value with its origin.

@@ -90,14 +90,14 @@ def command(**values: Any) -> int:  # noqa: ANN401  # twelve options; `_ReadOpti
     raw and calibrated.
     """
     line = take(values)
-    config = values.pop("config")
+    config, state_dir = values.pop("config"), values.pop("state_dir")
     profile = load_profile(values.pop("profile_name"), relative_to=Path())
     if line.framing.value not in profile.framings:
         raise click.UsageError(f"profile {profile.name} does not support {line.framing.value}")
     first, last = profile.ids
     if not first <= values["slave"] <= last:
         raise click.UsageError(f"profile {profile.name} has ids {first} to {last}, not {values['slave']}")
-    calibrations = calibrations_of(line.port, config)
+    calibrations = calibrations_of(line.port, config, state_dir)
     options = _ReadOptions(line=line, profile=profile, calibrations=calibrations, **values)
     try:
         return _read(options)

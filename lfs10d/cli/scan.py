@@ -119,7 +119,7 @@ def command(
         rates = tuple(dict.fromkeys((*rates, *(rate for each in own.values() for rate in each.rates))))
     included = (load_profile(name, relative_to=Path()) for name in builtin_names())
     known = (*own.values(), *by_evidence(each for each in included if each not in own.values()))
-    calibrations = calibrations_of(line.port, options["config"])
+    calibrations = calibrations_of(line.port, options["config"], options["state_dir"])
     search = ScanPlan(
         ids,
         tuple(line.timing(rate) for rate in rates),

@@ -35,12 +35,12 @@ def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return path
 
 
-def called(file: Path, port: str | None = None, *, named: bool = True) -> Calibrations:
+def called(file: Path, port: str | None = None, *, named: bool = True, state_dir: Path | None = None) -> Calibrations:
     """Look as a verb does that was given `-c`, or finds the file by itself."""
     source = click.core.ParameterSource.COMMANDLINE if named else click.core.ParameterSource.DEFAULT
     with click.Context(command) as context:
         context.set_parameter_source("config", source)
-        return calibrations_of(port or str(file.parent / "line0"), file)
+        return calibrations_of(port or str(file.parent / "line0"), file, state_dir)
 
 
 def speed(calibrations: Calibrations, slave: int, raw: float | None = 10.0) -> dict[str, object]:
@@ -174,6 +174,15 @@ def test_without_the_changes_nothing_is_calibrated(file: Path, capsys: pytest.Ca
     file.write_text(TEXT.replace(", calibration: {wind_speed: {scale: 1.01, offset: 0.06}}", ""))
     assert called(file) == NONE
     assert capsys.readouterr().err == ""
+
+
+def test_the_state_may_be_elsewhere(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    save(file, Verified(Place(7, 19200), file=3))
+    elsewhere = (file.parent / "state").rename(file.parent / "elsewhere")
+    assert speed(called(file), 7) == {}
+    assert speed(called(file, state_dir=elsewhere), 7) == {"wind_speed": 10.16}
+    assert called(file, state_dir=file.parent / "nowhere") == NONE
+    assert f"the state directory {file.parent / 'nowhere'} cannot be read: it is not there" in capsys.readouterr().err
 
 
 def save(file: Path, verified: Verified) -> None:

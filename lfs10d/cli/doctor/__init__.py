@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from lfs10d.cli import EXIT_FAILED, config_option, event_loop, json_option
+from lfs10d.cli import EXIT_FAILED, config_option, event_loop, json_option, state_option
 from lfs10d.cli.login import login_options
 
 EXAMPLES = """\b
@@ -21,9 +21,12 @@ Examples:
 
 @click.command("doctor", epilog=EXAMPLES)
 @config_option
+@state_option
 @login_options
 @json_option
-def command(config: Path, username: str | None, password_file: Path | None, *, as_json: bool) -> int:
+def command(
+    config: Path, state_dir: Path | None, username: str | None, password_file: Path | None, *, as_json: bool
+) -> int:
     """Look at program, configuration, port, broker, clock, disk, service and sensors, and say what to do.
 
     Where the daemon runs it is asked; where it does not, the sensors are. Nothing is changed. Exit code 1 if
@@ -32,7 +35,7 @@ def command(config: Path, username: str | None, password_file: Path | None, *, a
     from lfs10d.cli.doctor import rounds  # noqa: PLC0415  # so that --help is quick
     from lfs10d.cli.doctor.finding import lines, summary  # noqa: PLC0415
 
-    findings = event_loop.run(rounds.examine(config, username, password_file))
+    findings = event_loop.run(rounds.examine(config, state_dir, username, password_file))
     if as_json:
         click.echo(json.dumps([asdict(each) for each in findings], indent=2))
     else:

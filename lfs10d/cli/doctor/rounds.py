@@ -28,18 +28,20 @@ from lfs10d.system import clock
 PROC: Final = Path("/proc")
 
 
-async def examine(file: Path, username: str | None, password_file: Path | None) -> list[Finding]:
-    """Return all findings for the line of a configuration file."""
+async def examine(
+    file: Path, state_dir: Path | None, username: str | None, password_file: Path | None
+) -> list[Finding]:
+    """Return all findings for the line of a configuration file; `state_dir` is where somebody says its state is."""
     findings = [*program.versions()]
     try:
         loaded = load(file, files=False)
     except ConfigError as error:
-        findings += [*program.broken(error), *_host(file, None)]
+        findings += [*program.broken(error), *_host(file, None, state_dir)]
         return findings
     findings += program.configuration(loaded, socket.gethostname())
     seen = await asyncio.to_thread(port.look, loaded.config.line.port)
     findings += port.judge(seen, service=service_unit(file) is not None)
-    findings += await asyncio.to_thread(lambda: list(_host(file, loaded)))
+    findings += await asyncio.to_thread(lambda: list(_host(file, loaded, state_dir)))
     try:
         login = log_in(file, "doctor", username=username, password_file=password_file, needed=False)
     except ConfigError as error:
@@ -64,11 +66,11 @@ def needed(config: Config) -> float:
     return samples + sum(1 / max(interval, config.mqtt.state_every) for interval in intervals)
 
 
-def _host(file: Path, loaded: LoadedConfig | None) -> Iterator[Finding]:
+def _host(file: Path, loaded: LoadedConfig | None, state_dir: Path | None) -> Iterator[Finding]:
     installed = Path(lfs10d.__file__).stat().st_mtime
     yield from host.clock(clock.look(), time.time(), installed)
     if loaded is not None:
-        directory = state_directory(file, loaded.config.line.name, chosen=None, environment=os.environ)
+        directory = state_directory(file, loaded.config.line.name, chosen=state_dir, environment=os.environ)
         yield from host.disk(host.look_at_disk(directory, int(loaded.config.store.max_size)))
     unit = service_unit(file)
     if unit is not None:

@@ -58,6 +58,17 @@ def test_a_sensor_slower_than_the_first_time_limit_is_found(
     assert f"asking 2 sensors on {sensors.path}" in done.stderr
 
 
+@pytest.mark.needs("mosquitto")
+def test_the_disk_that_is_looked_at_is_that_of_the_state_directory_named(
+    lfs10d: Lfs10d, sensors: PtyLine, mosquitto: Mosquitto, tmp_path: Path
+) -> None:
+    sensors.line.add(Sensor(2))
+    configured(tmp_path, sensors.path, mosquitto.port, "[2]")
+    (tmp_path / "elsewhere").mkdir()
+    done = lfs10d("doctor", "-c", "site.yaml", "--state-dir", "elsewhere")
+    assert f"ok    disk          {tmp_path}/elsewhere can be written" in done.stdout
+
+
 def test_a_broken_file_is_a_finding_and_the_rest_is_looked_at(lfs10d: Lfs10d, tmp_path: Path) -> None:
     (tmp_path / "site.yaml").write_text("line: 7\n")
     done = lfs10d("doctor", "-c", "site.yaml")
