@@ -44,6 +44,15 @@ def test_what_stays_is_the_same_device_by_the_new_rules(devices: Devices) -> Non
     assert (kept.rules, kept.gap.configured) == (rules, 0.5)
 
 
+def test_a_calibrated_device_is_the_same_and_read_by_its_new_profile(devices: Devices) -> None:
+    kept = devices["slave-1"]
+    profile = kept.spec.profile.calibrated({"wind_speed": (2, 0)})
+    assert devices.replace([replace(spec(1), profile=profile), spec(2)], RULES, port_lost=False) == []
+    assert devices["slave-1"] is kept
+    (block,) = kept.reads.reads(0.0, 1.0)
+    assert block.decode((0x4000, 0x0000)) == {"wind_speed": 4.0}
+
+
 def test_another_interval_needs_another_grid_and_no_other_device(devices: Devices) -> None:
     kept = devices["slave-1"]
     (fresh,) = devices.replace([spec(1, 2.0), spec(2)], RULES, port_lost=False)

@@ -128,6 +128,12 @@ TWINNED: dict[str, tuple[list[Ails], tuple[Ails, Ails | None], float, list[Any]]
         0.005,
         [("wait", 6.0, 0, DONE), ("readdress", "s3", 10, ("sigterm", 228))],
     ),
+    "to one that is silent its twin, taken for it and moved away, is brought back": (
+        [SILENT, WELL, WELL],
+        (WELL, None),
+        0.005,
+        [("readdress", "s3", 9, DONE), ("readdress", "s3", 3, DONE)],
+    ),
 }
 
 

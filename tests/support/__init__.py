@@ -38,7 +38,8 @@ Physical changes of sensors (`reconfiguration`)
     `lives`              reconfiguration on a simulated line: a daemon's life, its crash, its next life
     `newcomers`          such a line, into which a new sensor is plugged
     `story`              requests, faults, crashes and power cuts in any order, for laws (hypothesis)
-    `story_steps`        what can happen in a story
+    `happenings`         what happens in one but requests
+    `story_steps`        what can happen in one, for hypothesis to draw from
     `ails`               the faults of sensors in a story
     `foreigners`         devices in a story that are not to be written to, and count how often they are
 

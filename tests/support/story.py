@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from lfs10d.simulator.line_faults import second_master
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from tests.support.ails import NO_AIL, Ail, ail, has_a_twin
 from tests.support.foreigners import Foreigner, Stranger
+from tests.support.happenings import happen
 from tests.support.lives import Bench, Life
 from tests.support.volatile_disk import PowerCutError
 
@@ -70,7 +70,11 @@ class Story:
                 self.others.append(added)
                 self.twin = added if slave == 3 else self.twin
         self.reunited = False
-        self.before = self._ids()
+        self.gaps = 0
+        """Requests begun too early right after a power cut, which takes no time."""
+        self.alone = True
+        """No other master has ever come: where one speaks at another rate nobody can keep the silence of that rate."""
+        self.before = self.ids()
         bench.go(self.life, 3.0)
 
     # -- what happens
@@ -92,35 +96,8 @@ class Story:
             case "adopt":
                 self.ask("line/adopt", end)
             case _:
-                self._happen(what, one, more)
+                happen(self, what, one, more)
         self.check()
-
-    def _happen(self, what: str, one: Any, more: Any) -> None:  # noqa: ANN401 - as it wants
-        bench = self.bench
-        match what:
-            case "plug":
-                self.newcomers.append(bench.line.add(Sensor(1, format=Format(one))))
-                ail(self.newcomers[-1], more)
-                self.before = self._ids()
-            case "foreign":
-                words, its = more
-                self.foreigners.append(Foreigner(words, one))
-                ail(bench.line.add(self.foreigners[-1]), its)
-            case "master":
-                self.leave()
-                self.leave = second_master(bench.line, bytes(one), bench.clock.now + 0.01, more)
-            case "power":
-                self._powered()
-                self.sensors[one % len(self.sensors)].power_cycle()
-            case "heal":
-                self.sensors[one % len(self.sensors)].clear_faults()
-            case "wait":
-                bench.go(self.life, one)
-            case "unplug":
-                bench.port.unplug()
-                bench.go(self.life, one)
-                bench.port.replug()
-                bench.go(self.life, 3.0)
 
     def ask(self, name: str, end: tuple[str, int], **parameters: Any) -> Asked:  # noqa: ANN401 - any JSON
         """Send a request, and end the daemon as `end` says: at its answer, at a step on the disk, after some turns."""
@@ -130,7 +107,7 @@ class Story:
         self.hushed |= self.by_name["s3"].deaf_until > bench.clock.now * 1e9  # its flash is not done yet
         pair = self._pair() if (name, parameters.get("device")) == ("device/readdress", "s3") else ()
         pair += tuple(each for each in self.sensors if each.faults and has_a_twin(each))
-        together = [each.slave for each in pair]
+        together = [(each.slave, each.words[5]) for each in pair]
         how, after = end
         if how == "crash":
             bench.files.steps_left = bench.files.steps + after
@@ -146,7 +123,7 @@ class Story:
         if how == "sigterm":
             self.life.end()
             assert self.answers_of(asked), "SIGTERM answers what is under way"
-        assert [each.slave for each in pair] == together, "of two sensors of one id none is moved"
+        assert [(each.slave, each.words[5]) for each in pair] == together, "of two sensors of one id none is moved"
         dead, bench.files.steps_left = self._dead, None
         if how in ("leave", "sigterm") or dead:
             self.restart()
@@ -178,14 +155,19 @@ class Story:
         self.bench.cut()
         self.life = self.bench.begin()
         self.bench.go(self.life, 1.0)
+        self.gaps = self.bench.line.judge.gap_violations
 
     def mend(self, seconds: float = 200.0) -> None:
         """Heal all, power them anew, take the others and the other master off; wait until nothing is open."""
         self.leave()
-        self._powered()
+        self.powered()
         for sensor in self.sensors:
             sensor.clear_faults()
             sensor.power_cycle()
+        if self.twin is not None:
+            known = {3, self.life.place("s3"), *self.life.physical.reserved()}
+            assert self.twin.slave in known, "the twin of s3 is not lost either"
+            assert self._at_rate("s3", self.twin)
         for other in (*self.others, *self.foreigners):
             self.bench.line.sensors.remove(other)
         self.restart()
@@ -193,7 +175,7 @@ class Story:
         while self.bench.clock.now < begun + (seconds if self._open else 5.0):
             self.bench.turn(self.life)
 
-    def _powered(self) -> None:
+    def powered(self) -> None:
         """Note whether s3 and its twin may meet again at a power cycle, before the daemon had the time to part them."""
         self.reunited |= any("s3" in change.devices and not change.answered for change in self._open)
 
@@ -209,7 +191,8 @@ class Story:
         """The line's."""
         return self.life.running.now.config.line.baudrate
 
-    def _ids(self) -> dict[int, int]:
+    def ids(self) -> dict[int, int]:
+        """Return the slave id of everybody."""
         return {id(sensor): sensor.slave for sensor in self.sensors}
 
     def answers_of(self, asked: Asked) -> list[dict[str, Any]]:
@@ -219,6 +202,8 @@ class Story:
 
     def check(self) -> None:
         """Judge: ids, places, rates and responses."""
+        early = self.bench.line.judge.gap_violations - self.gaps
+        assert not (self.alone and early), "a silence precedes each request"
         self._apart()
         for name, sensor in self.by_name.items():
             self._known(name, sensor)
@@ -229,10 +214,11 @@ class Story:
 
     def _apart(self) -> None:
         """Nobody who had another id than somebody else has the same now."""
-        now = self._ids()
+        now = self.ids()
         for one, its in now.items():
             for other, others in now.items():
-                together = self.reunited and self.twin and {one, other} == {id(self.by_name["s3"]), id(self.twin)}
+                unknown = self.reunited or self.hushed
+                together = unknown and self.twin and {one, other} == {id(self.by_name["s3"]), id(self.twin)}
                 if one < other and its == others and not together:
                     assert self.before[one] == self.before[other], "two sensors that had different ids share one"
         self.before = now

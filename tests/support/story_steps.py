@@ -110,7 +110,7 @@ MASTER = st.tuples(
     st.sampled_from([0.137, 0.25, 0.37, 1.0, 2.3]),
     DONE,
 )
-"""Another master comes (and the one before goes): what it asks, and how often."""
+"""Another master comes at the line's rate (and the one before goes): what it asks, and how often."""
 THREE = st.lists(st.sampled_from(AILMENTS), min_size=3, max_size=3)
 CHECKS = settings(
     max_examples=int(SEARCHED or 40),

@@ -162,6 +162,14 @@ def test_the_fault_of_a_bad_value_shows_the_last_bytes_that_were_heard() -> None
     assert rig.poll.fault.heard == bytes(23) + frame
 
 
+def test_an_answer_of_another_length_is_malformed_and_tried_again() -> None:
+    rig = Rig()
+    assert rig.hears(0.0, VALUE[:1], heard=b"\x01\x03\x02") == Requeue(0.02)
+    assert rig.poll.failed_attempts == [FaultCode.MALFORMED]
+    assert rig.hears(0.1, VALUE[:1], heard=b"\x01\x03\x02") == Done()
+    assert rig.poll.fault == Fault(FaultCode.MALFORMED, "1 registers came, 2 were requested", heard=b"\x01\x03\x02")
+
+
 def test_a_refused_barrier_will_do_unless_the_refusal_may_be_an_older_ones() -> None:
     rig = Rig()
     rig.hears(0.0, code=FaultCode.CRC)
