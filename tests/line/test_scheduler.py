@@ -11,6 +11,7 @@ import pytest
 from lfs10d.line.device import PollRules
 from lfs10d.line.jobs.job import Hold, Requeue
 from lfs10d.line.scheduler import Rest
+from lfs10d.modbus.duplicates import WATCHED
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.reading import Fault, FaultCode, Purpose
 from tests.support.schedules import GONE, RTU, T9600, TAKES, Rig, Task, asking, spec
@@ -47,6 +48,22 @@ def test_an_outcome_without_a_question_is_a_mistake() -> None:
     rig = Rig(spec(1))
     with pytest.raises(RuntimeError, match=r"^an outcome without an Ask$"):
         rig.scheduler.on_outcome(rig.outcome(asking(1)), 1.0)
+
+
+def test_while_a_second_answer_is_awaited_nobody_is_asked() -> None:
+    rig = Rig(spec(1), spec(2, 0.0))
+    duplicates = rig.scheduler.pending.duplicates
+    duplicates.answered(1, -1.0)
+    duplicates.second(1, -0.9)
+    ask = asking(1)
+    rig.scheduler.submit(Task(ask), 0.0)
+    assert rig.ask() == ask
+    outcome = rig.outcome(ask)
+    rig.settle(ask)
+    rig.scheduler.second_answers.on_answer(outcome)
+    assert rig.scheduler.next(rig.now) == Rest(rig.now + WATCHED)
+    rig.now += WATCHED
+    assert rig.ask() is not None
 
 
 def test_another_interval_is_another_grid_of_the_same_device() -> None:

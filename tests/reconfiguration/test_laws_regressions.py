@@ -122,6 +122,12 @@ TWINNED: dict[str, tuple[list[Ails], tuple[Ails, Ails | None], float, list[Any]]
         0.005,
         [("baudrate", False, 0, DONE), ("baudrate", False, 0, DONE)],
     ),
+    "one whose twin is deaf since the change before moves without it": (
+        [WELL, WELL, WELL],
+        (slow(5.0), None),
+        0.005,
+        [("baudrate", False, 0, DONE), ("baudrate", False, 0, DONE)],
+    ),
     "one that is silent has its twin taken for it at a change of the id": (
         [("silent", {"first": 8.0}), WELL, WELL],
         (WELL, WELL),

@@ -61,6 +61,8 @@ class Story:
         self.twin: Sensor | None = None
         self.hushed = ails[0][0] == "silent"
         """Nobody can hear s3 beside its twin, for some time or ever: then the daemon may take the twin for it."""
+        self.twin_missed = False
+        """The twin was deaf when a request came: then nobody can know that it did not move with s3."""
         for sensor, one, other in zip(bench.line.sensors, ails, besides, strict=True):
             ail(sensor, one, other)
         for slave, its, kind in ((3, twin, Sensor), (9, stranger, Stranger)):
@@ -104,7 +106,8 @@ class Story:
         bench = self.bench
         asked = Asked(name, {"id": len(self.asked), **parameters})
         self.asked.append(asked)
-        self.hushed |= self.by_name["s3"].deaf_until > bench.clock.now * 1e9  # its flash is not done yet
+        self.hushed |= self._is_deaf(self.by_name["s3"])  # its flash is not done yet
+        self.twin_missed |= self.twin is not None and self._is_deaf(self.twin)
         pair = self._pair() if (name, parameters.get("device")) == ("device/readdress", "s3") else ()
         pair += tuple(each for each in self.sensors if each.faults and has_a_twin(each))
         together = [(each.slave, each.words[5]) for each in pair]
@@ -131,13 +134,16 @@ class Story:
             assert self.answers_of(asked), "a request is answered"
         return asked
 
+    def _is_deaf(self, sensor: Sensor) -> bool:
+        return sensor.deaf_until > self.bench.clock.now * 1e9
+
     def _pair(self) -> tuple[Sensor, ...]:
         """Return s3 and its twin where both can be heard at one id and rate, else nothing."""
-        one, now = self.by_name["s3"], self.bench.clock.now * 1e9
+        one = self.by_name["s3"]
         if self.twin is None or (one.slave, one.format) != (self.twin.slave, self.twin.format):
             return ()
         pair = (one, self.twin)
-        mute = any(each.deaf_until > now or any(fault.kind == "silent" for fault in each.faults) for each in pair)
+        mute = any(self._is_deaf(each) or any(fault.kind == "silent" for fault in each.faults) for each in pair)
         return () if mute else pair
 
     @property
@@ -164,7 +170,7 @@ class Story:
         for sensor in self.sensors:
             sensor.clear_faults()
             sensor.power_cycle()
-        if self.twin is not None:
+        if self.twin is not None and not self.twin_missed:
             known = {3, self.life.place("s3"), *self.life.physical.reserved()}
             assert self.twin.slave in known, "the twin of s3 is not lost either"
             assert self._at_rate("s3", self.twin)
