@@ -115,15 +115,23 @@ async def _sensors(file: Path, loaded: LoadedConfig, login: Login, seen: port.Po
         await watch.find()
         live, source = watch.best()
     except (BrokerError, FailedError) as error:
-        if seen.held_by_daemon:
-            return [warn("sensors", f"a daemon holds the port and does not reply: {error}", "see broker, above")]
-        if not seen.is_device or seen.holder:
-            return [fail("sensors", "cannot be read", "see port, above")]
-        asked = sum(slave.enabled for slave in loaded.config.slaves)
-        click.echo(f"asking {asked} sensors on {loaded.config.line.port}; a silent one takes seconds", err=True)
-        return await asyncio.to_thread(sensors.by_asking, loaded)
+        return await _asked(loaded, seen, str(error))
     finally:
         await watch.disconnect()
-    if not source.alive:
-        return [fail("sensors", source.words, "start the daemon: sudo systemctl start lfs10d")]
-    return [ok("daemon", source.words), *sensors.by_daemon(live, time.time())]
+    if source.alive:
+        return [ok("daemon", source.words), *sensors.by_daemon(live, time.time())]
+    asked = await _asked(loaded, seen, source.words)
+    unit = service_unit(file)
+    start = f"lfs10d run -c {file}" if unit is None else f"sudo systemctl start {unit}"
+    return asked if seen.held_by_daemon else [fail("daemon", source.words, f"start it: {start}"), *asked]
+
+
+async def _asked(loaded: LoadedConfig, seen: port.PortState, silence: str) -> list[Finding]:
+    """Return what is to be said of the sensors where no daemon does; `silence` is why, in words."""
+    if seen.held_by_daemon:
+        return [warn("sensors", f"a daemon holds the port and does not reply: {silence}", "see broker, above")]
+    if not seen.is_device or seen.holder:
+        return [fail("sensors", "cannot be read", "see port, above")]
+    asked = sum(slave.enabled for slave in loaded.config.slaves)
+    click.echo(f"asking {asked} sensors on {loaded.config.line.port}; a silent one takes seconds", err=True)
+    return await asyncio.to_thread(sensors.by_asking, loaded)

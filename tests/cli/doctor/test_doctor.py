@@ -36,6 +36,21 @@ def test_without_a_daemon_it_asks_the_sensors_themselves(
 
 
 @pytest.mark.needs("mosquitto")
+def test_where_a_daemon_was_and_is_no_more_it_says_so_and_asks_the_sensors(
+    lfs10d: Lfs10d, sensors: PtyLine, mosquitto: Mosquitto, tmp_path: Path
+) -> None:
+    sensors.line.add(Sensor(2))
+    configured(tmp_path, sensors.path, mosquitto.port, "[2, 7]")
+    mosquitto.publish("lfs10d/site/availability", "offline", retain=True)
+    mosquitto.publish("lfs10d/site/devices", '[{"name": "slave-2", "id": 2}]', retain=True)
+    lines = lfs10d("doctor", "-c", "site.yaml").stdout.splitlines()
+    where = next(place for place, line in enumerate(lines) if line.startswith("fail  daemon        NOT LIVE: "))
+    assert lines[where + 1].endswith("-> start it: lfs10d run -c site.yaml")
+    assert lines[where + 2].startswith("fail  sensor        slave-7 (slave id 7): timeout: no answer")
+    assert "ok    sensors       1 of 2 reply well (read now; no daemon runs)" in lines
+
+
+@pytest.mark.needs("mosquitto")
 def test_sensors_at_another_rate_are_found_and_the_cure_is_a_line_of_the_file(
     lfs10d: Lfs10d, sensors: PtyLine, mosquitto: Mosquitto, tmp_path: Path
 ) -> None:
