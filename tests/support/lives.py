@@ -119,7 +119,9 @@ class Life:
             now=lambda: Instant(bench.clock.now, EPOCH + bench.clock.now, "synced"),
         )
         config, profiles = self.physical.polled(), self.running.loaded.profiles
-        bench.port = SimulatedPort(bench.line, bench.clock, port_settings(config.line), echo=bench.echo)
+        bench.port = SimulatedPort(
+            bench.line, bench.clock, port_settings(config.line), echo=bench.echo, latency=bench.latency
+        )
         bus = Bus(bench.port, line_rules(config.line), bench.clock)
         scheduler = Scheduler(timing_of(config.line), bench.clock.now)
         scheduler.replace(
@@ -215,13 +217,21 @@ class Bench:
         self.line = SimulatedLine()
         self.port = SimulatedPort(self.line, self.clock, PortSettings("/dev/simulated", 9600))
         self.echo = False
+        self.latency = 0.0
+        """How long the adapter holds back what it received, at most, in s."""
         self.dark = False
 
     def sensors(
-        self, *slaves: int, names: bool = True, baudrate: int = 9600, poll: str = "{interval: 1s}", echo: bool = False
+        self,
+        *slaves: int,
+        names: bool = True,
+        baudrate: int = 9600,
+        poll: str = "{interval: 1s}",
+        echo: bool = False,
+        latency: float = 0.0,
     ) -> Life:
         """Put sensors on the line, configure them as `s<id>`, and begin a life."""
-        self.echo = echo
+        self.echo, self.latency = echo, latency
         self.line = SimulatedLine([Sensor(slave, format=Format(baudrate)) for slave in slaves], format=Format(baudrate))
         entries = ", ".join(f"{{id: {slave}, name: s{slave}}}" for slave in slaves) if names else ""
         self.file.write_text(

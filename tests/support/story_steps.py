@@ -111,6 +111,17 @@ MASTER = st.tuples(
     DONE,
 )
 """Another master comes at the line's rate (and the one before goes): what it asks, and how often."""
+FREE = st.tuples(st.just("readdress"), NAMES, st.sampled_from([10, 200, 33]), ENDS)
+"""To an id that mostly nobody has."""
+
+
+def many(*others: st.SearchStrategy[Any]) -> st.SearchStrategy[list[Any]]:
+    """Return strategies for stories that are requests in the main, most of them to free ids, and these things."""
+    happening = HAPPENINGS.map(tuple)  # counts once
+    each = st.one_of(FREE, FREE, FREE, READDRESS, BAUDRATE, BAUDRATE, ADOPT, ADOPT, happening, *others)
+    return st.lists(each, min_size=2, max_size=6)
+
+
 THREE = st.lists(st.sampled_from(AILMENTS), min_size=3, max_size=3)
 CHECKS = settings(
     max_examples=int(SEARCHED or 40),
