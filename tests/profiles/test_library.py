@@ -278,3 +278,11 @@ def test_the_wind_vane_of_the_page_is_a_profile_that_a_simulated_vane_plays() ->
 
 def test_the_page_shows_the_wind_vane_as_it_is() -> None:
     assert f"```yaml\n{WIND_VANE.read_text()}```\n" in PAGE.read_text()
+
+
+def test_every_included_profile_names_its_model_and_its_maker_where_one_is_known() -> None:
+    """Home Assistant shows both; the inverters' and lasers' documents name no maker, the PR-3000 has many."""
+    profiles = [load_profile(name, relative_to=Path()) for name in builtin_names()]
+    assert [profile.name for profile in profiles if profile.model is None] == []
+    without = {profile.name for profile in profiles if profile.manufacturer is None}
+    assert without == {"lfs10", "ld-e", "eh600", "pr-3000-fsjt"}
