@@ -178,7 +178,10 @@ def _content(file: IO[bytes]) -> str:
 
 
 def serve(control: socket.socket) -> list[str] | None:
-    """Fork one process for each order; return the arguments in that process, None at the end of the orders."""
+    """Fork one process for each order; return the arguments in that process, None at the end of the orders.
+
+    What runs then is killed: tests that were killed themselves leave no daemon that finds the next one's terminal.
+    """
     startup.begin()
     for name in MODULES:
         importlib.import_module(name)
@@ -200,6 +203,8 @@ def serve(control: socket.socket) -> list[str] | None:
             if control in found:
                 message, files, _, _ = socket.recv_fds(control, ORDER, 4)
                 if not message:
+                    for pid in running:
+                        os.kill(pid, signal.SIGKILL)
                     return None
                 if pid := os.fork():
                     running[pid] = socket.socket(fileno=files[3])
