@@ -12,6 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -142,9 +143,9 @@ class View:
         found: list[dict[str, Any]] = []
         for each in self.heard:
             if each.topic == f"{self.base}/device/{device}/telemetry":
-                found.append(json.loads(each.payload))
+                found.append(_content(each.payload))
             elif each.topic == f"{self.base}/device/{device}/history":
-                found += json.loads(each.payload)
+                found += _content(each.payload)
         return list({(one["boot"], one["seq"]): one for one in found}.values()) if once else found
 
     def wait_samples(
@@ -161,6 +162,12 @@ class View:
     def clear(self) -> None:
         """Forget all that was heard."""
         self.listener.heard.clear()
+
+
+@lru_cache(maxsize=20_000)
+def _content(payload: bytes) -> Any:  # noqa: ANN401 - plain data of any shape
+    """Parse a message once, however often who waits for something looks at all that was heard; not to be changed."""
+    return json.loads(payload)
 
 
 def _parsed(payload: bytes) -> Any:  # noqa: ANN401 - plain data of any shape
