@@ -19,6 +19,8 @@ pytestmark = pytest.mark.needs("mosquitto")
 pytestmark = pytest.mark.long
 
 B = "lfs10d/line0"
+SPARSE = {"interval": "500ms"}
+"""A change waits so that the others keep nine tenths of their polls: the rarer these are, the sooner it is over."""
 
 
 @pytest.fixture
@@ -74,7 +76,7 @@ def test_a_sensor_that_was_moved_is_found_kept_and_told(
     site: Site, view: View, mosquitto: Mosquitto, asked: Callable[..., None]
 ) -> None:
     site.line((1, 2))
-    site.write()
+    site.write(poll=SPARSE)
     run = started(site, view)
     view.wait("device/slave-2/state", good)
     asked("device/readdress", device="slave-2", to=9)

@@ -25,6 +25,8 @@ from tests.support.sites import Site, View, eventually, good, tell
 pytestmark = pytest.mark.long
 
 BASE = "lfs10d/line0"
+SPARSE = {"interval": "500ms"}
+"""A change waits so that the others keep nine tenths of their polls: the rarer these are, the sooner it is over."""
 
 
 def places(served: PtyLine) -> list[int]:
@@ -70,7 +72,7 @@ def published(view: View, mosquitto: Mosquitto, name: str, payload: dict[str, An
 @pytest.mark.needs("mosquitto_pub")
 def test_a_sensor_gets_another_id_by_either_way(site: Site, mosquitto: Mosquitto, view: View) -> None:
     served = site.line((1, 2))
-    site.write()
+    site.write(poll=SPARSE)
     run = site.run()
     view.wait("device/slave-2/state", good)
     request = {"id": "m1", "device": "slave-2", "to": 9, "dry_run": True}
@@ -108,7 +110,7 @@ def test_the_intent_is_on_the_disk_before_the_first_byte_of_the_write(
     site: Site, mosquitto: Mosquitto, view: View
 ) -> None:
     site.line((1, 2))
-    site.write()
+    site.write(poll=SPARSE)
     trace = site.folder / "trace"
     run = site.run()
     view.wait("device/slave-2/state", good)
@@ -146,7 +148,7 @@ def test_at_sigterm_a_change_ends_is_answered_and_settled_at_the_next_start(
     site: Site, mosquitto: Mosquitto, view: View
 ) -> None:
     served = site.line((1, 2))
-    site.write()
+    site.write(poll=SPARSE)
     request = {"id": "t1", "device": "slave-2", "to": 9}
     run = site.run()
     view.wait("device/slave-2/state", good)
