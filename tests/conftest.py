@@ -13,6 +13,7 @@ minute: each worker begins in another folder, and finds written what the others 
 
 from __future__ import annotations
 
+import gc
 import os
 import re
 from collections.abc import Callable, Iterator
@@ -47,6 +48,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if hasattr(config, "workerinput"):  # a worker of xdist's: every one finds the same order
         long = {item.path for item in items if item.get_closest_marker("long")}
         items.sort(key=lambda item: (item.path not in long, sha256(str(item.path).encode()).digest()))
+
+
+def pytest_collection_finish() -> None:
+    """Let the collector of garbage pass over the thousands of tests that stay to the end."""
+    gc.freeze()
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
