@@ -6,6 +6,7 @@
     |-- ConfigError             exit 78; carries every problem, each with file, line and column
     |-- PortError               the port cannot be used now; tried again for ever; exit 69 for client verbs
     |   |-- PortLostError       absent, denied, hung up: published as `port_lost`
+    |   |   `-- PortGoneError   of these, absent or hung up: after a hang-up its absence is no news
     |   `-- PortBusyError       locked by another program: published as `port_busy`
     |-- BrokerError             the broker cannot be used now; `run` tries again for ever; exit 69 for client verbs
     |-- StateError              the state directory cannot be used; exit 1 for verbs, `storage_full` for `run`
@@ -58,6 +59,10 @@ class PortError(Lfs10dError):
 
 class PortLostError(PortError):
     """The port is absent, denied or hung up: published as `port_lost`."""
+
+
+class PortGoneError(PortLostError):
+    """The device is not there: unplugged, reset, or never plugged in."""
 
 
 class PortBusyError(PortError):

@@ -12,7 +12,7 @@ from dataclasses import replace
 from math import inf
 from typing import Literal, NamedTuple, TypeAlias
 
-from lfs10d.errors import PortBusyError, PortError
+from lfs10d.errors import PortBusyError, PortError, PortGoneError
 from lfs10d.modbus.ask import Ask, LineContext
 from lfs10d.modbus.echo import Echo, EchoLearner
 from lfs10d.modbus.exchange import Exchange, Listen, Quiet, Settled
@@ -92,6 +92,7 @@ class Bus:
         self._reopen_at = -inf
         self._pause = REOPEN_FIRST
         self._fault: Fault | None = None
+        self._unplugged = False
 
     def _timing(self, settings: PortSettings) -> LineTiming:
         return LineTiming.of(
@@ -136,13 +137,15 @@ class Bus:
         return PortChanged(now, None)
 
     def _lost(self, error: PortError, now: float) -> PortChanged | None:
-        """Close the port; report it once per reason."""
+        """Close the port; report it once per reason. That an unplugged one is absent is the same reason."""
+        hung_up, gone = self.open, isinstance(error, PortGoneError)
         self.close()
         code = FaultCode.PORT_BUSY if isinstance(error, PortBusyError) else FaultCode.PORT_LOST
         fault = Fault(code, str(error))
-        if fault == self._fault:
+        if self._fault is not None and (fault == self._fault or (gone and self._unplugged)):
             return None
         self._fault = fault
+        self._unplugged = hung_up and gone
         return PortChanged(now, fault)
 
     @property

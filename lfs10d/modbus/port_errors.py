@@ -14,7 +14,7 @@ import stat
 import termios
 from pathlib import Path
 
-from lfs10d.errors import PortBusyError, PortError, PortLostError
+from lfs10d.errors import PortBusyError, PortError, PortGoneError, PortLostError
 from lfs10d.system.dataclass import dataclass
 from lfs10d.system.logs import escape
 
@@ -48,6 +48,7 @@ _ADVICE = {
 """What each errno of open(2) or of a first look at the device means here."""
 
 _MISSING = frozenset({errno.ENOENT, errno.ENOTDIR})
+_GONE = _MISSING | {errno.ENODEV, errno.ENXIO, errno.EIO}
 _USED_ELSEWHERE = frozenset({errno.EBUSY, errno.EWOULDBLOCK})
 
 
@@ -78,13 +79,13 @@ def refusal(path: str, code: int, facts: PortErrorFacts) -> PortError:
     """Return the error for an errno met while opening or setting a port."""
     if code in _USED_ELSEWHERE:
         return PortBusyError(path, f"in use by {facts.holder or 'another program'}: end that, or free the port there")
-    return PortLostError(path, _words(code, facts))
+    return (PortGoneError if code in _GONE else PortLostError)(path, _words(code, facts))
 
 
-def hung_up(path: str, code: int) -> PortLostError:
+def hung_up(path: str, code: int) -> PortGoneError:
     """Return the error for an errno met on an open port (0: the end of a hung-up one)."""
     reason = f" ({os.strerror(code)})" if code else ""
-    return PortLostError(path, f"hung up{reason}: the adapter was unplugged or reset; plug it in again")
+    return PortGoneError(path, f"hung up{reason}: the adapter was unplugged or reset; plug it in again")
 
 
 def number_of(error: OSError | termios.error) -> int:

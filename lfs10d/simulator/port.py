@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, Protocol
 
-from lfs10d.errors import PortBusyError, PortLostError
+from lfs10d.errors import PortBusyError, PortGoneError
 from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.reading import UartCounters
 from lfs10d.simulator.adapter import Adapter
@@ -86,9 +86,9 @@ class SimulatedPort:
         self._sent_by = 0
 
     def open(self) -> None:
-        """Open it; PortLostError while unplugged, PortBusyError while another program has it."""
+        """Open it; PortGoneError while unplugged, PortBusyError while another program has it."""
         if not self.plugged:
-            raise PortLostError(self.settings.path, "no such device; is the adapter plugged in?")
+            raise PortGoneError(self.settings.path, "no such device; is the adapter plugged in?")
         if self.locked:
             raise PortBusyError(self.settings.path, "locked by another program; end that program")
         self._open, self._hung_up = True, False
@@ -204,7 +204,7 @@ class SimulatedPort:
 
     def _demand(self) -> None:
         if self.lost() or not self._open:
-            raise PortLostError(self.settings.path, "hung up; is the adapter plugged in?")
+            raise PortGoneError(self.settings.path, "hung up; is the adapter plugged in?")
 
 
 def run(turn: Callable[[float], Turn], port: SimulatedPort, clock: VirtualClock, until: float) -> None:

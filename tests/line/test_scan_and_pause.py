@@ -13,7 +13,7 @@ from lfs10d.line.jobs.scan_plan import ScanPlan
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.library import builtin_names, load_profile
-from lfs10d.reading import FaultCode
+from lfs10d.reading import Fault, FaultCode
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from tests.support.lines import Rig, Rigs
@@ -128,13 +128,13 @@ def test_after_a_pause_it_is_told_that_the_port_is_still_gone(rigs: Rigs) -> Non
     rig = rigs(2).run(1.0)
     rig.port.unplug()
     rig.run(3.0)
-    gone = rig.port_changes[-1].fault
     paused(rig)
     rig.run(10.0)
     told = len(rig.port_changes)
     rig.poller.resume()
     rig.run(20.0)
-    assert [change.fault for change in rig.port_changes[told:]] == [gone]
+    absent = Fault(FaultCode.PORT_LOST, "/dev/simulated: no such device; is the adapter plugged in?")
+    assert [change.fault for change in rig.port_changes[told:]] == [absent]
     assert rig.codes(1) == {FaultCode.PORT_LOST: 1}
     rig.port.replug()
     rig.run(23.0).prove()

@@ -7,7 +7,7 @@ from math import inf
 
 import pytest
 
-from lfs10d.errors import PortBusyError, PortLostError
+from lfs10d.errors import PortBusyError, PortGoneError, PortLostError
 from lfs10d.modbus.ask import Ask
 from lfs10d.modbus.bus import AWAKE_BEFORE, RATE_SETTLE, REOPEN_FIRST, UNHURRIED_AFTER, Bus, LineRules, Wait
 from lfs10d.modbus.echo import Echo
@@ -242,6 +242,22 @@ def test_the_loss_of_the_port_is_told_once_per_reason_and_it_is_opened_again(rig
     rig.clock.now += 0.8
     rig.opened()
     assert rig.bus.open
+
+
+def test_an_adapter_that_is_unplugged_is_one_loss_each_time_until_the_reason_is_another(rig: Rig) -> None:
+    absent = PortGoneError("tty", "absent")
+    told = []
+    for later in ([absent, absent], [absent, PortLostError("tty", "denied"), absent, PortGoneError("tty", "silent")]):
+        rig.port.trouble = PortGoneError("tty", "hung up")
+        told.append(rig.step(0.5, b"\x00"))
+        for rig.port.trouble in later:
+            rig.clock.now += 1.0
+            told.append(rig.bus.reopen(rig.clock.now))
+        rig.port.trouble = None
+        rig.clock.now += 1.0
+        rig.opened()
+    words = [step.fault.message[5:] for step in told if isinstance(step, PortChanged) and step.fault]
+    assert words == ["hung up", "hung up", "denied", "absent", "silent"]
 
 
 def test_a_port_that_is_lost_at_another_rate_comes_back_at_its_own(rig: Rig) -> None:

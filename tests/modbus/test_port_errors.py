@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from lfs10d.errors import PortBusyError, PortLostError
+from lfs10d.errors import PortBusyError, PortGoneError, PortLostError
 from lfs10d.modbus.port_errors import PortErrorFacts, hung_up, look, number_of, refusal
 
 FACTS = PortErrorFacts(user="wind", group="dialout")
@@ -41,6 +41,15 @@ def test_each_cause_has_its_words_and_what_to_do(code: int, words: str) -> None:
     assert isinstance(error, PortLostError)
     assert str(error).startswith("/dev/ttyUSB0: ")
     assert words in error.message
+
+
+@pytest.mark.parametrize(
+    ("code", "gone"),
+    [(errno.ENOENT, True), (errno.ENODEV, True), (errno.EIO, True), (errno.EACCES, False), (errno.ENOTTY, False)],
+)
+def test_a_device_that_is_not_there_is_gone(code: int, *, gone: bool) -> None:
+    assert isinstance(refusal("/dev/ttyUSB0", code, FACTS), PortGoneError) is gone
+    assert isinstance(hung_up("/dev/ttyUSB0", code), PortGoneError)
 
 
 def test_a_dangling_link_says_where_it_leads() -> None:
