@@ -28,6 +28,10 @@ def slow(delay: float) -> Ails:
     return ("slow_flash", {"delay": delay})
 
 
+def gateway(rate: float, delay: float) -> Ails:
+    return ("gateway", {"rate": rate, "code": 5, "delay": delay})
+
+
 ALONE: dict[str, tuple[list[Ails], list[Any]]] = {
     "what a life noted whose power was cut does not reach the disk of the next": (
         [WELL, WELL, WELL],
@@ -141,6 +145,28 @@ TWINNED: dict[str, tuple[list[Ails], tuple[Ails, Ails | None], float, list[Any]]
         [("readdress", "s3", 9, DONE), ("readdress", "s3", 3, DONE)],
     ),
 }
+
+
+GATEWAYS: dict[str, tuple[list[Ails], list[Ails], list[Any]]] = {
+    "one that stored an id while a gateway refuses its register stays open": (
+        [("silent", {"first": 4.0, "last": 9.0}), READS_NEW, WELL],
+        [gateway(0.1, 0.3), gateway(0.3, 0.3), gateway(0.3, 0.05)],
+        [("adopt", 0, 0, DONE), ("readdress", "s4", 10, DONE)],
+    ),
+    "an id that one behind a gateway may have stored is not given to another": (
+        [("silent", {"first": 4.0, "last": 9.0}), READS_NEW, WELL],
+        [gateway(0.1, 0.3), gateway(0.3, 0.3), gateway(0.3, 0.3)],
+        [("adopt", 0, 0, DONE), ("readdress", "s4", 10, DONE), ("readdress", "s3", 10, DONE)],
+    ),
+}
+
+
+@pytest.mark.parametrize("tale", GATEWAYS)
+def test_a_line_behind_gateways(bench: Bench, tale: str) -> None:
+    ails, besides, steps = GATEWAYS[tale]
+    story = Story(bench, ails, besides=besides)
+    story.tell(steps)
+    story.newcomers_known()
 
 
 @pytest.mark.parametrize("tale", ALONE)

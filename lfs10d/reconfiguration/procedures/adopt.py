@@ -127,7 +127,7 @@ def _newcomer(wish: AdoptWish, query: IdentityQuery) -> Generator[Step, Any, Ado
         if reply.silent:
             continue
         ending, why, code = ReaddressEnding.BOTH, "", None
-        if reply.answers:
+        if reply.answers or reply.exception is not None:
             recognition = yield from recognise(endpoint, reply, query)
             why, code = recognition.why or "", recognition.rate_code
             if not recognition.spoilt:  # the values of two differ, though both answer the same id

@@ -98,8 +98,4 @@ def _still_there(
     if before is None:
         return None
     reply = yield from query.read_register(before)
-    return (
-        ReaddressReport(ReaddressEnding.LOCKED, reply.register)
-        if reply.answers and reply.register != new.slave
-        else None
-    )
+    return ReaddressReport(ReaddressEnding.LOCKED, reply.register) if reply.register not in (None, new.slave) else None

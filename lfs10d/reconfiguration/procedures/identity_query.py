@@ -24,7 +24,7 @@ from lfs10d.modbus.ask import Ask
 from lfs10d.modbus.frames import Codec
 from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.pending import PendingRequests
-from lfs10d.modbus.request import NOT_FINAL, ReadRegisters
+from lfs10d.modbus.request import ReadRegisters
 from lfs10d.profiles.blocks import Block
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import FaultCode
@@ -43,9 +43,10 @@ PATIENT = 1.0
 class IdentityReply:
     """What one place answered.
 
-    `answers`: a right frame of its own, with `register` as the content of its id register, or `exception`.
-    `noise`: other bytes came. Neither: silence. `words` are the registers of an answered read of values; replies are
-    compared without them.
+    `answers`: a right frame of its own, with `register` as the content of its id register, or `exception`. An exception
+    that does not end a request (05, 0A, 0B) is no answer: it may be a gateway's, and says nothing of the sensor.
+    `noise`: other bytes came. None of these: silence. `words` are the registers of an answered read of values; replies
+    are compared without them.
     """
 
     answers: bool = False
@@ -57,7 +58,7 @@ class IdentityReply:
     @property
     def silent(self) -> bool:
         """Nothing at all was received."""
-        return not (self.answers or self.noise)
+        return not (self.answers or self.noise) and self.exception is None
 
 
 SILENCE = IdentityReply()
@@ -189,7 +190,7 @@ class IdentityQuery:
                 yield Hold(allowed)
                 continue
             reply = self._reply((yield from self.put(self._ask(other, endpoint, timeout))), values=True)
-            if not reply.answers or reply.exception in NOT_FINAL:
+            if not reply.answers:
                 return reply
 
     def _reply(self, outcome: Outcome, *, values: bool = False) -> IdentityReply:
@@ -204,7 +205,7 @@ class IdentityQuery:
                 return IdentityReply(answers=True, noise=extra, words=outcome.answer)
             return IdentityReply(answers=True, noise=extra, register=outcome.answer[0])
         if fault is not None and fault.code is FaultCode.EXCEPTION and not outcome.ambiguous:
-            return IdentityReply(answers=True, exception=fault.exception_code)
+            return IdentityReply(answers=not outcome.may_follow, exception=fault.exception_code)
         return IdentityReply(noise=not quiet(outcome))
 
 

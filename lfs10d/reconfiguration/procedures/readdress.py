@@ -10,7 +10,8 @@ Rules
    where two had the old id and the one that stayed has stored the new one is its old id written back: it would come
    to the other's at its next power-up.
 3. An echo, an exception, silence after the write: all of them are only hints. For up to `VERIFY` both places are
-   read, and once more right after that; what they answer then counts.
+   read, and once more right after that; what they answer then counts. An exception of a gateway is no answer, and where
+   the register cannot be read the sensor may have stored the new id, whatever ending.
 
 ================= ================== ======================= ==========================
 new id            old id             its register            ending
@@ -22,6 +23,7 @@ garbage           answers                                    duplicate_id
 silent            answers            exception to the write  refused
 silent            answers            as before               dip_switch
 silent            answers            the new id              power_cycle_needed, open
+silent            answers            refused                 not_verified, stays open
 silent            silent, garbage                            not_verified, stays open
 ================= ================== ======================= ==========================
 """
@@ -270,7 +272,7 @@ def read_both(
     at_old = SILENCE
     for _ in range(TRIES):
         at_old = _nearer(at_old, (yield from query.read_register(old)))
-        if at_old.answers:
+        if at_old.register is not None:
             break
     return ReaddressFinding(at_new, at_old, spoilt >= TRIES)
 
@@ -290,7 +292,7 @@ def undo_stored_id(
 
 
 def _nearer(one: IdentityReply, other: IdentityReply) -> IdentityReply:
-    return max(one, other, key=lambda reply: (reply.answers, reply.noise))
+    return max(one, other, key=lambda reply: (reply.register is not None, reply.answers, reply.noise, not reply.silent))
 
 
 def judge(found: ReaddressFinding, register_before: int | None, exception: int | None, to: int) -> ReaddressReport:
@@ -306,6 +308,9 @@ def judge(found: ReaddressFinding, register_before: int | None, exception: int |
         ending = ReaddressEnding.NOWHERE
     elif exception is not None:
         ending = ReaddressEnding.REFUSED
+    elif old.register is None:
+        ending = ReaddressEnding.NOWHERE
     else:
         ending = ReaddressEnding.PENDING if old.register == to != register_before else ReaddressEnding.LOCKED
-    return ReaddressReport(ending, old.register, exception, stays_open=ending in STAYS_OPEN or old.register == to)
+    may_obey = old.answers and old.register in (None, to)  # at its next power-up
+    return ReaddressReport(ending, old.register, exception, stays_open=ending in STAYS_OPEN or may_obey)

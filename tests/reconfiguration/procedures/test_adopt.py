@@ -152,6 +152,7 @@ def test_two_newcomers_that_part_when_brought_to_the_lines_rate_are_told(pretenc
     ("facts", "why"),
     [
         ({"exception": 2}, "it refuses register 0x0005 (exception 02)"),
+        ({"exception": 11}, "it refuses register 0x0005 (exception 0B)"),
         ({"stored": {5: 700}}, "its register 0x0005 says 700, not 1"),
         ({"stored": {4: 9}}, "its register 0x0004 says 9, which is no rate"),
     ],

@@ -11,7 +11,7 @@ from lfs10d.modbus.ask import Ask
 from lfs10d.modbus.duplicates import WATCHED
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.outcome import LateAnswer, Outcome
-from lfs10d.modbus.request import ReadRegisters, WriteRegister
+from lfs10d.modbus.request import NOT_FINAL, ReadRegisters, WriteRegister
 from lfs10d.profiles.library import load_profile, parse_profile
 from lfs10d.reading import FaultCode
 from lfs10d.reconfiguration.journal import Endpoint
@@ -75,6 +75,14 @@ def test_silence_noise_and_a_refusal_are_told_apart(pretence: Pretence) -> None:
     refusal = pretence.carry_out(pretence.query().read_register(Endpoint(slave=5, baudrate=9600)))
     assert refusal == IdentityReply(answers=True, exception=2)
     assert not refusal.silent
+
+
+@pytest.mark.parametrize("code", NOT_FINAL)
+def test_what_a_gateway_refuses_is_no_answer_of_the_sensor_and_no_silence(pretence: Pretence, code: int) -> None:
+    pretence.sensor(3, exception=code)
+    reply = pretence.carry_out(pretence.query().read_register(HERE))
+    assert reply == IdentityReply(exception=code)
+    assert not reply.silent
 
 
 def reply_to(pretence: Pretence, outcome: Outcome) -> tuple[IdentityReply, float]:
