@@ -5,8 +5,9 @@
 `needs("program", ...)` marks a test that starts a program: where it is absent the test fails in CI (`CI` is
 set) and is skipped elsewhere, with one line that says what to install.
 
-Where several workers share the tests, files with tests marked `long` begin first, so that none is waited for in the
-end; the others are mixed by a hash of their names, so that those that wait and those that compute go on side by side.
+Where several workers share the tests, files of folders whose tests wait for other programs take turns with the others,
+so that from the beginning to the end most workers wait while the rest compute. Of both kinds the longest of the files
+marked `long(seconds)` begin first, so that none is waited for in the end; the rest are mixed by a hash of their names.
 Every worker collects all tests. In a new clone pytest rewrites the assertions of each file first, which takes half a
 minute: each worker begins in another folder, and finds written what the others have done.
 """
@@ -29,6 +30,10 @@ from tests.support.brokers import Authority, Mosquitto, path_of
 settings.register_profile("ours", max_examples=int(os.environ.get("LFS10D_EXAMPLES", "100")), deadline=None)
 settings.load_profile("ours")  # without a deadline: a busy machine is no failure
 
+TESTS = Path(__file__).parent
+WAITING = frozenset({"bench", "cli", "daemon", "devices", "mqtt", "soak", "web"})
+"""The folders whose tests wait for other programs rather than compute."""
+
 
 def pytest_configure(config: pytest.Config) -> None:
     """Let each worker collect the folders in an order of its own; what is found is sorted afterwards."""
@@ -46,8 +51,17 @@ def _collected(path: Path) -> bool:
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     if hasattr(config, "workerinput"):  # a worker of xdist's: every one finds the same order
-        long = {item.path for item in items if item.get_closest_marker("long")}
-        items.sort(key=lambda item: (item.path not in long, sha256(str(item.path).encode()).digest()))
+        seconds = {item.path: mark.args[0] for item in items if (mark := item.get_closest_marker("long"))}
+        turns: dict[Path, float] = {}
+        for waits in (True, False):
+            files = {item.path for item in items if _waits(item.path) is waits}
+            ordered = sorted(files, key=lambda file: (-seconds.get(file, 0), sha256(str(file).encode()).digest()))
+            turns.update({file: number / len(ordered) for number, file in enumerate(ordered)})
+        items.sort(key=lambda item: (turns[item.path], str(item.path)))
+
+
+def _waits(file: Path) -> bool:
+    return file.relative_to(TESTS).parts[0] in WAITING
 
 
 def pytest_collection_finish() -> None:

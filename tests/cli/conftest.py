@@ -64,6 +64,6 @@ def at_terminal(tmp_path: Path) -> AtTerminal:
 
 @pytest.fixture
 def sensors(tmp_path: Path) -> Iterator[PtyLine]:
-    """Give a line without sensors on a pseudo terminal; `tell` it to `add` some."""
-    with PtyLine(SimulatedLine(seed=1), link=tmp_path / "line0") as line:
+    """Give a line without sensors on a pseudo terminal, as punctual as is permitted; `tell` it to `add` some."""
+    with PtyLine(SimulatedLine(seed=1), link=tmp_path / "line0", realtime=True) as line:
         yield line

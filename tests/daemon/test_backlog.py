@@ -20,6 +20,8 @@ from lfs10d.simulator.wire import nanoseconds
 from tests.support.brokers import Mosquitto
 from tests.support.sites import ENDS_WITHIN, Site, View, eventually, good
 
+pytestmark = pytest.mark.long(80)
+
 COMMITTED_WITHIN = 8.0
 """Seconds after which a sample is on the disk while the broker is away: 3 s of youth, 5 s between two commits."""
 

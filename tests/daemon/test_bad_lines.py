@@ -20,7 +20,7 @@ from soak.attestation import Oracle, epoch_of, parsed
 from soak.troubles import KINDS
 from tests.support.sites import Site, View, eventually, tell
 
-pytestmark = pytest.mark.needs("mosquitto")
+pytestmark = [pytest.mark.needs("mosquitto"), pytest.mark.long(55)]
 
 SLAVES = (1, 2, 3, 4)
 RATE = 115200

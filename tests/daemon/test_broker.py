@@ -17,6 +17,8 @@ import pytest
 from tests.support.brokers import Mosquitto
 from tests.support.sites import PATIENCE, Site, View, eventually, good
 
+pytestmark = pytest.mark.long(50)
+
 LIVE_FOR = 3.0
 """Seconds after which a sample is history (contract, section 3)."""
 

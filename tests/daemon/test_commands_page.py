@@ -17,7 +17,7 @@ from tests.support import forked
 from tests.support.brokers import Mosquitto
 from tests.support.sites import Site, View, eventually, good, tell
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.long(50)
 
 BASE = "lfs10d/line0"
 QUICK = [number for number, step in enumerate(WALK) if not step.slow]

@@ -16,7 +16,7 @@ from tests.support.sites import Run, Site, View, eventually, good, tell
 
 pytestmark = pytest.mark.needs("mosquitto")
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.long(90)
 
 B = "lfs10d/line0"
 SPARSE = {"interval": "500ms"}

@@ -22,7 +22,7 @@ from tests.support import forked
 from tests.support.brokers import Mosquitto
 from tests.support.sites import Site, View, eventually, good, tell
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.long(150)
 
 BASE = "lfs10d/line0"
 SPARSE = {"interval": "500ms"}

@@ -12,7 +12,7 @@ from tests.support.answering_brokers import Capricious
 from tests.support.brokers import Mosquitto
 from tests.support.sites import Site, View, eventually, good
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.long(120)
 
 HISTORY_WITHIN = 40.0
 """Seconds in which the backlog of these tests is out: it begins 10 s after a connect, also after a second and third."""

@@ -16,7 +16,7 @@ from tests.support import forked
 from tests.support.brokers import Mosquitto
 from tests.support.sites import Site, View, eventually, good, tell
 
-pytestmark = pytest.mark.needs("mosquitto_pub")
+pytestmark = [pytest.mark.needs("mosquitto_pub"), pytest.mark.long(55)]
 
 BASE = "lfs10d/line0"
 

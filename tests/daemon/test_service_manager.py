@@ -15,6 +15,8 @@ import pytest
 from lfs10d.simulator.faults import FaultKind
 from tests.support.sites import Run, Site, View, eventually, good
 
+pytestmark = pytest.mark.long(30)
+
 START = "from lfs10d.__main__ import main; main()"
 
 LINE_WEDGES = f"""

@@ -15,7 +15,7 @@ CHECKS: tuple[Check, ...] = ("crc", "sum")
 
 pytestmark = pytest.mark.needs("mosquitto")
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.long(25)
 
 
 def test_every_device_has_its_topics_and_is_online(recording: Recording) -> None:

@@ -7,7 +7,7 @@ import pytest
 from soak.family import LIVES_DIFFER, Account, run_family
 from soak.troubles import FAMILY
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.long(20)
 
 EXCHANGES = 20_000
 SEED = 11

@@ -156,7 +156,7 @@ def change(rigs: Rigs, rig: Rig, step: list[tuple[int, float, bool, str]] | str,
                     requested(rig, slave, number)
 
 
-@pytest.mark.long
+@pytest.mark.long(6)
 @given(STEPS)
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_changes_at_any_moment_wedge_nothing(

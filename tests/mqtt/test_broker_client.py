@@ -21,6 +21,8 @@ from tests.support.broker_clients import PATIENCE, Witness, connecting, settings
 from tests.support.brokers import Mosquitto
 from tests.support.old_brokers import Answer, OldBroker
 
+pytestmark = pytest.mark.long(20)
+
 Serving: TypeAlias = Callable[[Answer], AbstractAsyncContextManager[int]]
 
 

@@ -19,6 +19,8 @@ from tests.support.brokers import Mosquitto
 from tests.support.old_brokers import OldBroker
 from tests.support.uplinks import B, Site, online, running, sample, seqs, until
 
+pytestmark = pytest.mark.long(40)
+
 # Coming
 
 

@@ -15,7 +15,7 @@ from tests.support.lives import Bench
 from tests.support.newcomers import adopted, plugged, writes
 from tests.support.volatile_disk import PowerCutError
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.long(6)
 
 
 @pytest.mark.parametrize("baudrate", [9600, 19200])

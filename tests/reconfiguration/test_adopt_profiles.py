@@ -15,7 +15,7 @@ from lfs10d.simulator.wire import Format
 from tests.support.lives import Bench
 from tests.support.newcomers import adopted, plugged, writes
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.long(1)
 
 
 RENKE = """\

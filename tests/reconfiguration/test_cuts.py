@@ -17,7 +17,7 @@ from lfs10d.simulator.wire import Format
 from tests.support.lives import Bench, Life
 from tests.support.volatile_disk import PowerCutError
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.long(15)
 
 LONGEST = 3000
 """Turns of 50 ms after which a change counts as endless."""

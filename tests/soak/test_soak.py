@@ -17,6 +17,8 @@ from soak.plan import Act, Due, Kind, Step
 from soak.report import figures
 from soak.run import Soak
 
+pytestmark = pytest.mark.long(30)
+
 ROOT = Path(__file__).parents[2]
 
 PLAN = [

@@ -14,7 +14,7 @@ from tests.support.chromium import chromium
 from tests.support.page_states import HOSTILE, STATES, ShownLine
 from tests.support.pages import TOKEN, PageServer, serving
 
-pytestmark = pytest.mark.needs("chromium")
+pytestmark = [pytest.mark.needs("chromium"), pytest.mark.long(45)]
 READ_FAILS = {"status": "failed", "words": "It failed: does not answer. Check power, the plug, and the wires."}
 IN_TIME = 15_000
 """ms: a loaded machine is slow."""

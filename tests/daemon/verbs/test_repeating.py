@@ -15,7 +15,7 @@ from tests.support.brokers import Mosquitto
 from tests.support.shells import BASE, Shell, typed
 from tests.support.sites import Run, Site, eventually, tell
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.long(210)
 
 REPEAT = ("line/adopt", "--repeat")
 FIRST = "Plug in a sensor. Ctrl-C when all are adopted.\n"
