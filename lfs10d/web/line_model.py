@@ -276,15 +276,15 @@ class LineModel:
         side = self.side(source)
         for name, device in side.live.devices.items():
             if names is None or name in names:
-                shown = self._device(side, device, wall)
-                # The status file has no wind statistics: those published before are not beside its live values.
-                yield name, {**shown, "wind": None} if source.kind == "status" else shown
+                yield name, self._device(side, device, wall)
 
     def _device(self, side: Side, device: ShownDevice, wall: float) -> dict[str, Any]:
         name = device.name
         sample = side.samples.get(name, {})
         age = side.live.age(device, wall)
         stats, config, wind = (self._mqtt.extras.get((name, leaf)) for leaf in _DEVICE_LEAVES)
+        if side is self._status:  # what was published before stands beside no value of now
+            wind = sample["wind"] if isinstance(sample.get("wind"), dict) else None
         errors = sample.get("errors")
         return {
             "name": name,

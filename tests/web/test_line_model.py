@@ -195,6 +195,18 @@ def test_while_the_broker_is_away_the_status_file_is_shown() -> None:
     assert "mast" in line.model.changed
 
 
+def test_while_the_broker_is_away_gust_mean_and_direction_are_those_of_the_status_file() -> None:
+    line = PublishedLine()
+    line.measure(1)
+    line.publish("device/mast/wind", {"v": 1, "gust_10m": 9.0, "lull_10m": 1.0})
+    line.model.link.connected = False
+    line.wall += 1
+    written = status(line.wall)
+    written["devices"][0]["wind"] = {"unit": "m/s", "gust_10m": 7.5, "mean_10m": 5.5, "direction_2m": 210}
+    line.model.on_status("/run/status.json", written, now=1.0)
+    assert line.device["wind"] == {"unit": "m/s", "gust_10m": 7.5, "mean_10m": 5.5, "direction_2m": 210}
+
+
 def test_a_status_file_that_is_written_no_more_is_not_live_and_the_newer_of_both_is_shown() -> None:
     line = PublishedLine()
     line.measure(1, 3.0)

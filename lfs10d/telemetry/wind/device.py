@@ -65,7 +65,7 @@ _RUNNING_OUT: Final = (
     ("coverage_10m", LONG, ("mean_10m", "direction_10m")),
 )
 
-SHOWN: Final = ("unit", "mean_2m", "mean_10m", "gust_3s", "gust_10m", "direction_10m")
+SHOWN: Final = ("unit", "mean_2m", "mean_10m", "gust_3s", "gust_10m", "direction_2m", "direction_10m")
 """Figures of a live view."""
 
 
