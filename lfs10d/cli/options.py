@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection
 from math import inf
 from typing import Any
@@ -19,6 +20,8 @@ TIMEOUTS = (0.01, 10.0)
 """The shortest and the longest time-out, in s."""
 
 
+_NUMBER = re.compile(r"[0-9]{1,15}(\.[0-9]{1,20})?")
+
 # What an argument may be
 
 PORT = click.Path(readable=False)
@@ -35,7 +38,10 @@ class SlaveId(click.IntRange):
 
 
 class DurationType(click.ParamType):  # type: ignore[type-arg]  # generic in newer versions of click alone
-    """A duration such as 200ms, in s; `example` is what to write, `least` and `most` are the limits in s."""
+    """A duration such as 200ms or a number of s, in s.
+
+    `example` is what to write, `least` and `most` are the limits in s.
+    """
 
     name = "duration"
 
@@ -44,8 +50,9 @@ class DurationType(click.ParamType):  # type: ignore[type-arg]  # generic in new
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:  # noqa: ANN401  # click's
         """Return the seconds; raises click.BadParameter."""
+        text = str(value)
         try:
-            duration = seconds(str(value))
+            duration = seconds(float(text) if _NUMBER.fullmatch(text) else text)
         except ValueError:
             self.fail(f"{value!r} is not a duration; write {self._example}", param, ctx)
         if not self._least <= duration <= self._most:

@@ -43,6 +43,7 @@ UNLIMITED = frozenset({"line/scan", "line/baudrate", "line/adopt", "device/readd
 IDS = ("id", "transaction")
 """Parameters that are text whatever is typed."""
 _HEXADECIMAL = re.compile(r"0x[0-9A-Fa-f]{1,8}")
+_LEADING_ZEROS = re.compile(r"0[0-9]{1,19}")
 
 EXAMPLES = """\b
 Examples:
@@ -275,17 +276,24 @@ def content_of(arguments: Iterable[str], form: type[Parameters] | None) -> dict[
 def _value(key: str, text: str, form: type[Parameters] | None) -> Any:  # noqa: ANN401  # any JSON
     readings = list(_readings(text))
     if form is not None:
-        return next((value for value in readings if _fits(key, value, form)), readings[-1])
+        return next((value for value in (*readings, _items(text)) if _fits(key, value, form)), readings[-1])
     return readings[-1]
 
 
+def _items(text: str) -> list[Any]:
+    """Return what a text with commas means as a list."""
+    return [list(_readings(item.strip()))[-1] for item in text.split(",")]
+
+
 def _readings(text: str) -> Iterator[Any]:
-    """Yield what the text may mean: null, the text itself, a hexadecimal number, JSON; where nothing fits, the last."""
+    """Yield what the text may mean: null, the text itself, a number as in YAML, JSON; where nothing fits, the last."""
     if text == "null":
         yield None
     yield text
     if _HEXADECIMAL.fullmatch(text):  # as registers are written in manuals and profiles
         yield int(text, 16)
+    if _LEADING_ZEROS.fullmatch(text):
+        yield int(text)
     try:
         yield json.loads(text, parse_constant=_refuse)
     except (ValueError, RecursionError):

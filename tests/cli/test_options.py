@@ -7,7 +7,7 @@ from typing import Any
 import click
 import pytest
 
-from lfs10d.cli.options import baudrate_of, take
+from lfs10d.cli.options import DurationType, baudrate_of, take
 from lfs10d.modbus.port_settings import PortSettings
 
 
@@ -48,3 +48,14 @@ def test_a_rate_is_one_of_the_known_ones() -> None:
     for text in ("", "9601", "9600.0", "²"):
         with pytest.raises(click.BadParameter, match="is not one of 1200"):
             baudrate_of(text)
+
+
+@pytest.mark.parametrize(("text", "duration"), [("250ms", 0.25), ("2m", 120.0), ("5", 5.0), ("0.5", 0.5), ("0", 0.0)])
+def test_a_duration_is_a_number_of_seconds_or_has_a_unit(text: str, duration: float) -> None:
+    assert DurationType("10s").convert(text, None, None) == duration
+
+
+@pytest.mark.parametrize("text", ["", "-1", "1e3", "inf", ".5", "5 s", "soon", "²"])
+def test_what_is_no_duration_is_refused(text: str) -> None:
+    with pytest.raises(click.BadParameter, match="is not a duration; write 10s"):
+        DurationType("10s").convert(text, None, None)

@@ -26,6 +26,7 @@ class Everything(Parameters):
     timeout: Annotated[float | None, Duration(0.01, 10, auto="learned")] = None
     duration: Annotated[float, Duration(0.1, 600)] = Field(default=30.0, alias="for")
     ids: str | list[int] = "1-255"
+    rates: list[int] | None = None
 
 
 @pytest.mark.parametrize(
@@ -50,6 +51,11 @@ class Everything(Parameters):
         ("for=5", 5),
         ("ids=1-8,12", "1-8,12"),
         ("ids=[1,2]", "[1,2]"),
+        ("to=010", 10),
+        ("rates=[9600]", [9600]),
+        ("rates=9600", [9600]),
+        ("rates=9600, 19200", [9600, 19200]),
+        ("rates=null", None),
     ],
 )
 def test_a_value_is_read_as_the_form_of_the_request_wants_it(argument: str, value: object) -> None:
@@ -71,6 +77,8 @@ def test_a_value_is_read_as_the_form_of_the_request_wants_it(argument: str, valu
         ('{"a": 1}', {"a": 1}),
         ("mast-top", "mast-top"),
         ("1-8", "1-8"),
+        ("1,8", "1,8"),
+        ("08", 8),
         ("NaN", "NaN"),
         ("-Infinity", "-Infinity"),
         ("", ""),
@@ -82,7 +90,9 @@ def test_where_the_form_is_not_known_a_value_is_json_or_else_text(text: str, val
     assert (content["x"], type(content["x"])) == (value, type(value))
 
 
-@pytest.mark.parametrize(("argument", "value"), [("to=300", 300), ("to=nine", "nine"), ("dry_run=1", 1), ("what=1", 1)])
+@pytest.mark.parametrize(
+    ("argument", "value"), [("to=300", 300), ("to=nine", "nine"), ("dry_run=1", 1), ("what=1", 1), ("rates=a,b", "a,b")]
+)
 def test_what_no_reading_makes_right_is_left_to_the_daemon_to_refuse(argument: str, value: object) -> None:
     assert list(content_of([argument], Everything).values()) == [value]
 
