@@ -51,7 +51,7 @@ ERROR_CODES: Final = {
     "not_verified": "Not known whether it took effect: the sensor does not answer and is being searched for, or a "
     "register has another content.",
     "rolled_back": "It failed half-way, and everything was restored.",
-    "line_error": "The line failed: bytes came, but no valid reply.",
+    "line_error": "The line failed: bytes came, but no valid reply; or the port is lost or paused for another program.",
     "storage_full": "The change could not be written to disk, so it was not made.",
     "timeout": "The device did not answer.",
     "too_large": "The payload has more than 4096 bytes, or the Correlation Data more than 1024 (then not returned).",

@@ -49,7 +49,7 @@ MEANINGS: Final[Mapping[str, tuple[str, str]]] = {
     "refused": ("the device refused it", "Is this the right profile for the device?"),
     "not_verified": ("not known whether it took effect", "The daemon looks for the sensor; wait, or check its wires."),
     "rolled_back": ("failed half-way; everything is as before", "Look at the line, then try again."),
-    "line_error": ("only broken answers came", "Check termination, ground and shield, then try again."),
+    "line_error": ("the line failed", "Look at the errors of the line and the sensor, then try again."),
     "rate_limited": ("too many requests", "Wait a second, then try again."),
     "cancelled": ("it was cancelled", "Start it again when you are ready."),
     "internal": ("an internal error of lfs10d", "See the log of the daemon, and please report it."),

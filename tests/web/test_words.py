@@ -51,6 +51,13 @@ def test_an_active_error_is_explained_and_no_error_is_none() -> None:
                 "Wait for its end, or cancel the scan; then try again."
             ),
         ),
+        (
+            {"status": "rejected", "error": {"code": "line_error", "message": "the port is freed for another program"}},
+            (
+                "Nothing was changed: the line failed. The port is freed for another program. "
+                "Look at the errors of the line and the sensor, then try again."
+            ),
+        ),
         ({"status": "failed", "error": {"code": "new", "message": ""}}, "It failed: new."),
         ({"status": "failed", "error": "nonsense"}, "It failed: None."),
     ],
