@@ -147,7 +147,7 @@ TWINNED: dict[str, tuple[list[Ails], tuple[Ails, Ails | None], float, list[Any]]
 }
 
 
-GATEWAYS: dict[str, tuple[list[Ails], list[Ails], list[Any]]] = {
+BESIDES: dict[str, tuple[list[Ails], list[Ails], list[Any]]] = {
     "one that stored an id while a gateway refuses its register stays open": (
         [("silent", {"first": 4.0, "last": 9.0}), READS_NEW, WELL],
         [gateway(0.1, 0.3), gateway(0.3, 0.3), gateway(0.3, 0.05)],
@@ -158,12 +158,27 @@ GATEWAYS: dict[str, tuple[list[Ails], list[Ails], list[Any]]] = {
         [gateway(0.1, 0.3), gateway(0.3, 0.3), gateway(0.3, 0.3)],
         [("adopt", 0, 0, DONE), ("readdress", "s4", 10, DONE), ("readdress", "s3", 10, DONE)],
     ),
+    "a slave that another master asks in a rhythm is not waited for without an end": (
+        [late(0.35), WELL, WELL],
+        [WELL] * 3,
+        [
+            ("master", (3, 3, 0, 1, 0, 1), 1.0, DONE),
+            ("baudrate", False, 0, ("crash", 0)),
+            ("readdress", "s3", 10, DONE),
+        ],
+    ),
 }
 
 
-@pytest.mark.parametrize("tale", GATEWAYS)
-def test_a_line_behind_gateways(bench: Bench, tale: str) -> None:
-    ails, besides, steps = GATEWAYS[tale]
+def test_a_late_twin_beside_a_repeater_is_not_left_with_another_rate_stored(bench: Bench) -> None:
+    besides: list[Ails] = [("repeated", {"rate": 0.3, "delay": 0.037}), ("twin", {"delay": 0.02}), WELL]
+    story = Story(bench, [WELL] * 3, besides=besides, twin=STORES, turnaround=0.052)
+    story.tell([("baudrate", False, 0, DONE), ("readdress", "s3", 10, DONE)])
+
+
+@pytest.mark.parametrize("tale", BESIDES)
+def test_a_line_with_gateways_or_another_master(bench: Bench, tale: str) -> None:
+    ails, besides, steps = BESIDES[tale]
     story = Story(bench, ails, besides=besides)
     story.tell(steps)
     story.newcomers_known()

@@ -8,7 +8,8 @@ Rules
    is touched. Each next one is written when the one before answers at the new rate.
 3. If a later one fails, those already moved are moved back, for up to `ROLL_BACK`; so are those that have stored the
    new rate since an earlier change and wait for their power cycle. One that answers at both rates since the write is
-   two sensors: they are moved back too. The other of two may be deaf just then: all are looked for once more.
+   two sensors: they are moved back too. The other of two may be deaf just then: all are looked for once more. Or it has
+   stored the rate and answers later: each that was moved back is written once more, where both hear it.
 4. With `power_cycle` all are written and none is expected at the new rate yet; each register must say the new rate.
 5. A sensor that is lost is looked for until it is found, and brought to the line's rate (see `recover_baudrate`).
 """
@@ -240,10 +241,7 @@ def restore_rate(sensor: RateSensor, rate: int, other: int) -> Generator[Step, A
         _, at, _ = yield from write_rate(sensor, other, rate)
         if at != rate:
             return at
-        # Of two of this id the other one may have stored the rate and be here still, and answer after this one.
-        reply = yield from sensor.query.read_register(sensor.at(rate), PATIENT, register=sensor.register)
-        if reply.register == sensor.code(rate) and not sensor.query.answered_twice(sensor.at(rate)):
-            return rate
+    # Of two of this id the other one may have stored the rate and be here still, whatever the first to answer says.
     return rate if (yield from write_back(sensor, rate)) else None
 
 

@@ -3,7 +3,8 @@
 Rules
 -----
 1. The register of the slave id is read. While an older read of that shape may still be answered, a read of the
-   values goes first: its answer, having another length, proves that nothing older is to come.
+   values goes first: its answer, having another length, proves that nothing older is to come. Where that is never so,
+   for another master asks the slave all the time, it is given up after `BARRIERS` such reads.
 2. A slave that must be left alone for the moment is waited for.
 3. Echoes of writes prove nothing and are ignored.
 4. A slave whose answers have come late gets a long time-out, whichever request they came during.
@@ -35,6 +36,10 @@ QUICK = 0.2
 """The usual time-out, in s."""
 SLOW_FROM = 0.1
 """A sensor that took longer than this, in s, gets the time-out `PATIENT` from then on."""
+BARRIERS = 4
+"""After so many reads of the values another of the id is not tried."""
+HEARD_WITHIN = 0.05
+"""So long after its last byte the answer to another master may not be known yet, in s."""
 PATIENT = 1.0
 """Time-out for one that is slow, or must not be missed, in s."""
 
@@ -180,7 +185,8 @@ class IdentityQuery:
         """Wait, and read what must go before `request`; return the reply that came in place of an answer, if any."""
         other = self._values_of(endpoint)
         barrier = other if self.codec.shapes(other)[0] != self.codec.shapes(request)[0] else None
-        while True:
+        barriers, waited = 0, False
+        while barriers < BARRIERS:
             allowed = self._pending.next_request(
                 request, self.codec, self.clock.now, barrier=barrier, timeout=self.timeout
             )
@@ -189,9 +195,16 @@ class IdentityQuery:
             if isinstance(allowed, float):
                 yield Hold(allowed)
                 continue
+            if barriers and not waited:
+                waited = True
+                yield Hold(self.clock.now + HEARD_WITHIN)
+                continue
+            waited = False
             reply = self._reply((yield from self.put(self._ask(other, endpoint, timeout))), values=True)
             if not reply.answers:
                 return reply
+            barriers += 1
+        return IdentityReply(noise=True)
 
     def _reply(self, outcome: Outcome, *, values: bool = False) -> IdentityReply:
         if outcome.turnaround is not None and outcome.turnaround > SLOW_FROM:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import cast
 
 import pytest
 
+from lfs10d.line.jobs.job import Hold
 from lfs10d.modbus.ask import Ask
 from lfs10d.modbus.duplicates import WATCHED
 from lfs10d.modbus.frames import Codec, Framing
@@ -15,7 +17,14 @@ from lfs10d.modbus.request import NOT_FINAL, ReadRegisters, WriteRegister
 from lfs10d.profiles.library import load_profile, parse_profile
 from lfs10d.reading import FaultCode
 from lfs10d.reconfiguration.journal import Endpoint
-from lfs10d.reconfiguration.procedures.identity_query import PATIENT, QUICK, IdentityReply, quiet
+from lfs10d.reconfiguration.procedures.identity_query import (
+    BARRIERS,
+    HEARD_WITHIN,
+    PATIENT,
+    QUICK,
+    IdentityReply,
+    quiet,
+)
 from tests.support.sensors import EXCHANGE, Pretence
 
 RTU = Codec(Framing.RTU)
@@ -142,6 +151,39 @@ def test_while_the_values_are_not_answered_the_id_is_not_asked_again(pretence: P
     pretence.carry_out(query.read_register(HERE))
     assert pretence.carry_out(query.read_register(HERE)).silent
     assert pretence.requests == [WHO, WIND]
+
+
+def asked_all_the_time(pretence: Pretence) -> Callable[[Ask], Outcome]:
+    """Return what carries out an exchange while another master asks the slave something of the id's shape."""
+    carry_out = pretence.outcome
+
+    def outcome(ask: Ask) -> Outcome:
+        came = carry_out(ask)
+        pretence.pending.asked_by_another(ReadRegisters(3, 1, 1), RTU, pretence.clock.now)
+        return came
+
+    return outcome
+
+
+def test_where_another_master_asks_all_the_time_the_id_is_given_up(
+    pretence: Pretence, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pretence.sensor(3)
+    monkeypatch.setattr(pretence, "outcome", asked_all_the_time(pretence))
+    pretence.pending.asked_by_another(ReadRegisters(3, 1, 1), RTU, 0.0)
+    assert pretence.carry_out(pretence.query().read_register(HERE)) == IdentityReply(noise=True)
+    assert pretence.requests == [WIND] * BARRIERS
+
+
+def test_an_answer_to_another_master_may_be_known_a_little_later(pretence: Pretence) -> None:
+    pretence.sensor(3)
+    pretence.pending.asked_by_another(ReadRegisters(3, 1, 1), RTU, 0.0)
+    steps = pretence.query().read_register(HERE)
+    outcome = pretence.outcome(cast("Ask", next(steps)))
+    pretence.pending.asked_by_another(ReadRegisters(3, 1, 1), RTU, pretence.clock.now)
+    assert steps.send(outcome) == Hold(pretence.clock.now + HEARD_WITHIN)
+    assert pretence.pending.overheard(3, 7, exception=None, now=pretence.clock.now)
+    assert cast("Ask", next(steps)).request == WHO
 
 
 def test_without_a_second_shape_the_slave_is_left_alone_first(pretence: Pretence) -> None:
