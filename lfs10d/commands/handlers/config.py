@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated
 
+from pydantic import Field
+
 from lfs10d.command import Command, RefusedError, Result, ok, rejected
 from lfs10d.commands.admission import CommandSpec
 from lfs10d.commands.context import Context, Handler
@@ -24,8 +26,10 @@ _KEY_OF_A_DEVICE = 3
 class WhichChange(Parameters):
     """A device, or a key: `slaves.mast-top.interval`, or `interval` beside a device."""
 
-    device: Annotated[str, Name()] = ""
-    key: Annotated[str, Text(LONGEST_KEY)] = ""
+    device: Annotated[str, Name()] | None = Field(None, description="All changes of this device.")
+    key: Annotated[str, Text(LONGEST_KEY)] | None = Field(
+        None, description="Or one: `slaves.mast-top.interval`, or `interval` beside a device."
+    )
 
     @property
     def place(self) -> tuple[str, str | None]:
@@ -39,7 +43,7 @@ class WhichChange(Parameters):
         parts = self.key.split(".")
         if self.device and len(parts) == 1:
             return self.device, parts[0]
-        if parts[0] == "slaves" and len(parts) in {2, _KEY_OF_A_DEVICE} and self.device in {"", parts[1]}:
+        if parts[0] == "slaves" and len(parts) in {2, _KEY_OF_A_DEVICE} and self.device in {None, parts[1]}:
             return parts[1], parts[2] if len(parts) == _KEY_OF_A_DEVICE else None
         raise refuse("invalid_param", f"key: no request changed {quoted(self.key)}", param="key")
 

@@ -7,6 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
+from pydantic import Field
+
 from lfs10d.command import Command, ErrorCode, RefusedError, Result, failed, ok
 from lfs10d.commands.admission import CommandSpec
 from lfs10d.commands.context import Context, Handler
@@ -40,10 +42,10 @@ class NewDevice(Parameters):
     """A device to be polled."""
 
     slave: SlaveId
-    name: Annotated[str, Name()] = ""
+    name: Annotated[str, Name()] | None = Field(None, description="Without: `slave-5` for slave id 5.")
     label: Label = None
     profile: Annotated[str, FilePath()] = "lfs10"
-    interval: Interval = 1.0
+    interval: Interval | None = Field(None, description="Without: `poll.interval` of the configuration.")
     probe: Annotated[bool, Flag()] = True
 
     @property
@@ -55,7 +57,7 @@ class NewDevice(Parameters):
     def entry(self) -> dict[str, Any]:
         """What is said of it."""
         stated = {key: getattr(self, key) for key in STATED if key in self.model_fields_set}
-        return {"id": self.slave, **stated}
+        return {"id": self.slave, **{key: value for key, value in stated.items() if value is not None}}
 
 
 class Options(Parameters):

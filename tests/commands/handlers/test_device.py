@@ -100,9 +100,10 @@ def test_what_answers_is_added_with_what_was_said_of_it(asked: Asked, fake: Fake
     assert fake.holding.now.changes.of("roof").added_at == Place(9)
 
 
-def test_what_is_not_said_is_as_for_everybody(asked: Asked, fake: FakeContext) -> None:
+@pytest.mark.parametrize("nothing", [{}, {"name": None, "label": None, "interval": None}])
+def test_what_is_not_said_is_as_for_everybody(asked: Asked, fake: FakeContext, nothing: dict[str, None]) -> None:
     fake.at = {9}
-    _, data = asked("device/add", slave=9)
+    _, data = asked("device/add", slave=9, **nothing)
     assert (data["device"], data["profile"], data["interval"], data["label"]) == ("slave-9", "lfs10", 2.0, None)
     assert fake.holding.now.changes.of("slave-9").added == {"id": 9}
 
