@@ -28,7 +28,6 @@ def happen(story: Story, what: str, one: Any, more: Any) -> None:  # noqa: ANN40
             ail(bench.line.add(story.foreigners[-1]), its)
         case "master":
             story.leave()
-            story.judges_gaps = False
             bench.line.format = Format(story.rate)
             story.leave = second_master(bench.line, bytes(one), bench.clock.now + 0.01, more)
         case "power":

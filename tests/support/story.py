@@ -74,10 +74,6 @@ class Story:
                 self.others.append(added)
                 self.twin = added if slave == 3 else self.twin
         self.reunited = False
-        self.gaps = 0
-        """Requests begun too early right after a power cut, which takes no time."""
-        self.judges_gaps = not latency
-        """Nobody can keep the silence before what an adapter holds back, or of another master at another rate."""
         self.before = self.ids()
         bench.go(self.life, 3.0)
 
@@ -163,7 +159,6 @@ class Story:
         self.bench.cut()
         self.life = self.bench.begin()
         self.bench.go(self.life, 1.0)
-        self.gaps = self.bench.line.judge.gap_violations
 
     def mend(self, seconds: float = 200.0) -> None:
         """Heal all, power them anew, take the others and the other master off; wait until nothing is open."""
@@ -210,8 +205,6 @@ class Story:
 
     def check(self) -> None:
         """Judge: ids, places, rates and responses."""
-        early = self.bench.line.judge.gap_violations - self.gaps
-        assert not (self.judges_gaps and early), "a silence precedes each request"
         self._apart()
         for name, sensor in self.by_name.items():
             self._known(name, sensor)
