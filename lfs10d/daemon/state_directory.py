@@ -52,13 +52,14 @@ def _home(environment: Mapping[str, str]) -> Path:
 def status_file(file: Path, line: str, environment: Mapping[str, str], *, root: bool = False) -> Path | None:
     """Return where the daemon of a configuration file writes its status; None where there is no place for it.
 
-    `root`: the user is root, who may write where the verbs look first; run by hand (by sudo) there is no session.
+    `root`: the user is root, who may write where the verbs look first. Run by hand (by sudo) there is no session; then
+    the status of a service's file is there.
     """
     if given := environment.get("RUNTIME_DIRECTORY", "").partition(":")[0]:
         return Path(given, STATUS_FILE)
     if session := environment.get("XDG_RUNTIME_DIR"):
         return Path(session, f"lfs10d-{line}", STATUS_FILE)
-    return Path("/run", _service(file), STATUS_FILE) if root else None
+    return Path("/run", _service(file), STATUS_FILE) if root and in_system_folder(file) else None
 
 
 def status_places(file: Path, line: str, environment: Mapping[str, str]) -> tuple[Path, ...]:

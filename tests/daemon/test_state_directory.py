@@ -43,13 +43,20 @@ def test_the_status_is_written_where_there_is_a_place_for_it(environment: dict[s
     assert status_file(Path("lfs10d.yaml"), "line0", environment) == (None if file is None else Path(file))
 
 
-@pytest.mark.parametrize(("name", "folder"), [("/etc/lfs10d/lfs10d.yaml", "lfs10d"), ("roof.yaml", "lfs10d-roof")])
+@pytest.mark.parametrize(
+    ("name", "folder"), [("/etc/lfs10d/lfs10d.yaml", "lfs10d"), ("/etc/lfs10d/roof.yaml", "lfs10d-roof")]
+)
 def test_root_by_hand_without_a_session_writes_the_status_where_the_verbs_look_first(name: str, folder: str) -> None:
     written = status_file(Path(name), "any", {}, root=True)
     assert written == Path("/run", folder, "status.json")
     assert status_places(Path(name), "any", {})[0] == written
     session = {"XDG_RUNTIME_DIR": "/run/user/0"}
     assert status_file(Path(name), "any", session, root=True) == status_file(Path(name), "any", session)
+
+
+def test_root_without_a_session_writes_no_status_of_a_file_that_is_no_service_s() -> None:
+    """Two of one name in different folders would overwrite each other's."""
+    assert status_file(Path("/home/roof/lfs10d.yaml"), "any", {}, root=True) is None
 
 
 def test_a_verb_looks_at_the_service_s_place_first() -> None:
