@@ -28,9 +28,9 @@ _BACK = pow(STRIDE, -1, COUNT)
 KEPT_FOR = 3600.0
 """Seconds for which an answer is remembered; the longest absence of a broker and its catching up fit in."""
 
-NEXT_WITHIN = 1.9
-"""Seconds from an answer that was not believed to the sample of its poll: what is left of the longest time-out, a
-retry, and what a busy machine adds."""
+NEXT_WITHIN = 1.5
+"""Seconds from an answer that was not believed to the sample of its poll: what is left of the longest time-out, and
+a retry."""
 
 ROUNDING = 0.01
 """Seconds by which `ts`, whole milliseconds of another clock reading, may lie before the answer's end."""

@@ -94,8 +94,8 @@ def test_intervals_are_each_slaves_own(site: Site, view: View) -> None:
 
     assert len(view.samples("slave-2")) == 1
     times = [one["ts"] for one in view.samples("slave-3")]
-    assert len(times) / 2 <= (times[-1] - times[0]) / 400 + 1
-    assert (times[-1] - times[0]) / 400 < 2 * len(times)
+    intervals = (times[-1] - times[0]) / 400  # by its own clock: on a busy machine slave-1 needs longer for its 40
+    assert 0.8 <= (len(times) - 1) / intervals <= 1.3
 
 
 def test_a_slave_that_is_not_enabled_is_not_asked(site: Site, view: View) -> None:

@@ -24,7 +24,7 @@ from tests.support import forked
 from tests.support.brokers import Heard, Listener
 from tests.support.forked import Process
 
-PATIENCE = 60.0
+PATIENCE = 20.0
 """Seconds after which something awaited counts as not happening; no test waits this long when all is well."""
 ENDS_WITHIN = 2.0
 """Seconds from SIGTERM to the end (contract, section 2)."""

@@ -8,11 +8,14 @@ import pickle
 from collections.abc import Callable
 from dataclasses import field
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from lfs10d.system import dataclass as ours
+
+if TYPE_CHECKING:
+    from lfs10d.reading import Fault
 
 
 def classes(decorate: Callable[..., Any]) -> SimpleNamespace:
@@ -102,6 +105,13 @@ def test_replace_fields_order_and_copies_are_pythons() -> None:
     assert copy.deepcopy(frame) == frame
     assert OURS.Place(1, 2) < OURS.Place(1, 3)
     assert not hasattr(frame, "__dict__")
+
+
+if TYPE_CHECKING:
+
+    def change(fault: Fault) -> None:
+        """Be refused by the type checker: were `frozen` unknown to it, it would call the comment below needless."""
+        fault.message = "fine"  # type: ignore[misc]  # what is tried here
 
 
 @ours.dataclass(slots=True)
