@@ -199,10 +199,10 @@ class Value(Registered):
             refuse([((place,), why) for place, each in enumerate(contents) if (why := no_content(each, kind, width))])
         return contents
 
-    @field_validator("scale", "offset", "modulo", "range", "precision", "unit", mode="after")
+    @field_validator("scale", "offset", "modulo", "range", "precision", mode="after")
     @classmethod
     def _is_of_a_number(cls, wanted: Any, info: ValidationInfo) -> Any:  # noqa: ANN401 - a field's value
-        usual = {"scale": 1.0, "offset": 0.0, "unit": "1"}.get(str(info.field_name))
+        usual = {"scale": 1.0, "offset": 0.0}.get(str(info.field_name))
         if wanted != usual and says_text(info.data):
             refuse([((), "is of numbers, and this value is text or a boolean; leave it out")])
         return wanted

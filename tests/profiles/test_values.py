@@ -155,10 +155,7 @@ def test_a_number_that_its_calibration_makes_infinite_is_none() -> None:
             [(("map",), "words stand for whole numbers, and the type is float32")],
         ),
         (VALUE | {"map": {}}, [(("map",), "names no content")]),
-        (
-            VALUE | {"type": "int17", "byte": "low", "map": {0: "a"}, "unit": "1", "unavailable": [7]},
-            [(("type",), None)],
-        ),
+        (VALUE | {"type": "int17", "byte": "low", "map": {0: "a"}, "unavailable": [7]}, [(("type",), None)]),
     ],
 )
 def test_a_part_and_its_words_fit_the_type(data: dict[str, Any], wrong: list[tuple[Any, str | None]]) -> None:
