@@ -1,8 +1,9 @@
-"""What a visitor knows of a line, from MQTT and from the status file."""
+"""The state of a line as a live view has it, from MQTT."""
 
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import pytest
 
@@ -237,3 +238,41 @@ def test_since_when_a_device_and_the_line_fail_is_known_from_their_errors() -> N
     heard.tell("line/error", cleared)
     now = heard.live
     assert [heard.device("a").since, now.line_error_since, now.line_error_code, now.line_error] == [None] * 4
+
+
+# For the page
+
+
+def test_the_mark_of_a_device_changes_with_each_newer_sample_and_each_start_of_the_daemon() -> None:
+    heard = Heard("a")
+    assert heard.live.mark("a") == ("", -1)
+    heard.sample("a", 1.0)
+    assert heard.live.mark("a") == ("aaaaaaaa", 1)
+    heard.sample("a", 1.0, leaf="state", seq=1)
+    assert heard.live.mark("a") == ("aaaaaaaa", 1), "the same sample once more"
+    heard.sample("a", 2.0, seq=1, boot="bbbbbbbb")
+    assert heard.live.mark("a") == ("bbbbbbbb", 1)
+    assert heard.live.mark("unknown") == ("", -1)
+
+
+@pytest.mark.parametrize("ahead", [-30.0, 0.0, 2.5])
+def test_how_far_our_clock_is_ahead_is_learned_from_samples(ahead: float) -> None:
+    heard = Heard("a", ahead=ahead)
+    heard.sample("a", 1.0)
+    assert heard.live.ahead == pytest.approx(ahead, abs=0.001)
+
+
+@pytest.mark.parametrize(
+    ("sample", "value"),
+    [
+        ({"seq": 7, "ts": 1, "wind_speed": 4.5, "unit": "m/s", "rtt_ms": 18.2}, 4.5),
+        ({"seq": 7, "sky": "rain", "wet": True, "speed": None, "current": 3}, 3),
+        ({"seq": 7, "wind_speed": None}, None),
+        ({"seq": 7, "values": {"sky": "rain", "wind_speed": 4.5}}, 4.5),
+        ({"values": {}, "wind_speed": 4.5}, None),
+        ({"count": 10**400, "wind_speed": 4.5}, 4.5),
+        ({"count": float("inf"), "wind_speed": 4.5}, 4.5),
+    ],
+)
+def test_the_first_value_of_a_sample_is_its_first_number(sample: dict[str, Any], value: float | None) -> None:
+    assert LiveState.first_value(sample) == value

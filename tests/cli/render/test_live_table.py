@@ -252,6 +252,16 @@ def test_where_there_are_more_rows_than_lines_those_that_need_a_look_stay() -> N
     assert lines[-1].startswith("25 more (25 good): a taller window shows them")
 
 
+def test_where_there_are_more_rows_than_lines_the_one_that_just_moved_stays() -> None:
+    shown = live(*(entry(f"slave-{slave}", slave) for slave in range(1, 33)))
+    for seq, value in ((2, 1.0), (3, 9.0)):
+        spun = entry("slave-30", 30, seq=seq, values={"wind_speed": value})
+        others = [entry(f"slave-{slave}", slave) for slave in range(1, 33) if slave != 30]
+        shown.on_status({"ts": round(WALL * 1000), "devices": [*others, spun]}, now=float(seq))
+    lines = texts(screen(shown, HERE, (80, 9), now=3.0, wall=WALL))
+    assert [line.split()[:2] for line in lines if "slave" in line] == [["slave-1", "1"], [">", "slave-30"]]
+
+
 @given(st.integers(1, 200), st.integers(1, 60), st.integers(0, 40))
 def test_the_screen_fits_any_terminal(width: int, height: int, count: int) -> None:
     entries = [bad(f"slave-{slave}", slave) if slave % 3 else entry(f"slave-{slave}", slave) for slave in range(count)]
