@@ -10,7 +10,7 @@ from lfs10d.config.loader import LoadedConfig
 from lfs10d.config.models import default_line_name
 from lfs10d.errors import ConfigError, Problem
 from lfs10d.line.budget import ASSUMED_TURNAROUND, Budget
-from lfs10d.profiles.registers import spell
+from lfs10d.profiles.decimals import spell
 from lfs10d.schema.fields import quoted
 from lfs10d.schema.messages import KeyPath
 from lfs10d.schema.quantities import duration_text

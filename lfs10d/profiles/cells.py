@@ -8,18 +8,8 @@ from math import inf, isfinite, isnan
 from typing import NamedTuple
 
 from lfs10d.profiles.calibration import Calibration
-from lfs10d.profiles.registers import (
-    SMALLEST_FLOAT,
-    ByteOrder,
-    Linear,
-    RegisterType,
-    WordOrder,
-    float_bits,
-    float_of,
-    shortest,
-    span,
-    spell,
-)
+from lfs10d.profiles.decimals import SMALLEST_FLOAT, Linear, float_bits, float_of, shortest, span, spell
+from lfs10d.profiles.register_types import ByteOrder, RegisterType, WordOrder
 from lfs10d.reading import Fault, FaultCode, Number, Value
 from lfs10d.system.dataclass import dataclass
 

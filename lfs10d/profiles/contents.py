@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from lfs10d.profiles.cells import Part
-from lfs10d.profiles.registers import SIGNED, WORDS, RegisterType, float_bits
+from lfs10d.profiles.decimals import float_bits
+from lfs10d.profiles.register_types import SIGNED, WORDS, RegisterType
 from lfs10d.schema.fields import FieldKind
 from lfs10d.system.dataclass import dataclass
 

@@ -4,12 +4,26 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, TypeAlias, get_args
 
-from pydantic import Field, field_validator
+from pydantic import AfterValidator, Field, field_validator
 
-from lfs10d.profiles.facts import LAST_REGISTER, Fact, Place, Register, Registered, Sentence, refuse
+from lfs10d.profiles.facts import LAST_REGISTER, Fact, Place, Register, Registered, Sentence, pair_of, refuse
 from lfs10d.schema.fields import Whole
 
 SlaveId: TypeAlias = Annotated[int, Whole(1, 255)]
+
+
+def _ordered(ids: tuple[int, int]) -> tuple[int, int]:
+    if ids[0] > ids[1]:
+        refuse([((), "the first id is greater than the last")])
+    return ids
+
+
+SlaveIds: TypeAlias = Annotated[
+    tuple[SlaveId, SlaveId],
+    Field(strict=False),
+    pair_of("the first and the last slave id, such as [1, 247]"),
+    AfterValidator(_ordered),
+]
 Rate: TypeAlias = Literal[1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200]
 
 MOST_WORDS = 125

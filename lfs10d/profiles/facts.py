@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Annotated, TypeAlias
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic_core import InitErrorDetails
 
 from lfs10d.profiles.manual_numbers import hint_for_number
@@ -116,13 +116,32 @@ Scale: TypeAlias = Annotated[float, Factor()]
 Offset: TypeAlias = Annotated[float, Field(ge=-LARGEST_FACTOR, le=LARGEST_FACTOR)]
 
 
+PAIR = 2
+
+
+def pair_of(words: str) -> BeforeValidator:
+    """Return the check that a key has a list of two; `words` say which two, with an example."""
+
+    def two(value: object) -> object:
+        if not isinstance(value, list | tuple) or len(value) != PAIR:
+            refuse([((), f"must be {words}, not {shown(value)}")])
+        return value
+
+    return BeforeValidator(two)
+
+
 def _ordered(bounds: tuple[float, float]) -> tuple[float, float]:
     if not bounds[0] < bounds[1]:
         refuse([((), "the first number of a range must be less than the second")])
     return bounds
 
 
-Range: TypeAlias = Annotated[tuple[float, float], Field(strict=False), AfterValidator(_ordered)]
+Range: TypeAlias = Annotated[
+    tuple[float, float],
+    Field(strict=False),
+    pair_of("the least and the greatest number, such as [0, 60]"),
+    AfterValidator(_ordered),
+]
 
 
 class Facts(BaseModel):

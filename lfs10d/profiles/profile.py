@@ -14,7 +14,7 @@ from pydantic import AfterValidator, Field, PrivateAttr, ValidationInfo, field_v
 
 from lfs10d.profiles.blocks import Block, batch
 from lfs10d.profiles.contents import BIT_FUNCTIONS
-from lfs10d.profiles.device_facts import MOST_WORDS, Barrier, Factory, Identity, IdRegister, RateRegister, SlaveId
+from lfs10d.profiles.device_facts import MOST_WORDS, Barrier, Factory, Identity, IdRegister, RateRegister, SlaveIds
 from lfs10d.profiles.facts import Facts, Place, Register, Registered, Sentence, refuse
 from lfs10d.profiles.manual_numbers import hint_for_address
 from lfs10d.profiles.settings import Setting
@@ -30,12 +30,6 @@ BUSY_EXCEPTIONS = (6,)
 
 BYTE_COUNT = 1
 """Byte before the registers of an answer; it counts as data (Fuling DZB manual, appendix B)."""
-
-
-def _ids(ids: tuple[int, int]) -> tuple[int, int]:
-    if ids[0] > ids[1]:
-        refuse([((), "the first id is greater than the last")])
-    return ids
 
 
 def _unique(texts: tuple[str, ...]) -> tuple[str, ...]:
@@ -60,7 +54,7 @@ class Profile(Facts):
     `ids` are the first and the last slave id it can have, both included. `ascii_max_data` bounds the data
     bytes of an ASCII answer. `min_interval` is the shortest time between two polls in seconds, `request_gap` the
     silence before each request to it, counted from the end of the exchange with it before.
-    `busy_exceptions` are asked again later. `provenance` tells where a plain key's fact comes from.
+    `busy_exceptions` are asked again later. `provenance` has the source of a plain key's fact.
     """
 
     name: Annotated[str, Name()] = Field(description="What to call it, of a-z 0-9 _ -.")
@@ -68,9 +62,7 @@ class Profile(Facts):
     manufacturer: Sentence | None = Field(None, description="The manufacturer, for Home Assistant.")
     model: Sentence | None = Field(None, description="Its model, for Home Assistant; the title where it is not given.")
     sources: Annotated[tuple[Sentence, ...], Field(strict=False)] = Field((), description="The maker's documents.")
-    ids: Annotated[tuple[SlaveId, SlaveId], Field(strict=False), AfterValidator(_ids)] = Field(
-        (1, 247), description="First and last slave id it can have."
-    )
+    ids: SlaveIds = Field((1, 247), description="First and last slave id it can have.")
     broadcast: bool = Field(default=False, description="It obeys writes to slave 0; none is ever sent.")
     framings: Annotated[tuple[FramingName, ...], Field(strict=False), AfterValidator(_unique)] = Field(
         ("rtu",), description="rtu, ascii or both."
@@ -251,8 +243,8 @@ class Profile(Facts):
             for name, fact in facts
             if fact is not None and not isinstance(fact.register, Hexadecimal)  # no manual counts in hexadecimal
         )
-        words = ((value.name, value.doubt) for value in self.values)
-        return tuple(f"{name}: {hint}" for name, hint in (*hints, *words) if hint is not None)
+        own = ((value.name, doubt) for value in self.values for doubt in value.doubts)
+        return tuple(f"{name}: {hint}" for name, hint in (*hints, *own) if hint is not None)
 
     @property
     def rates(self) -> tuple[int, ...]:

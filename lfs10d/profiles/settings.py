@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
+from lfs10d.profiles.decimals import Linear, span, spell
 from lfs10d.profiles.facts import LAST_REGISTER, Range, Registered, Scale, Sentence, UnitText, Word, refuse
-from lfs10d.profiles.registers import Linear, span, spell
 from lfs10d.schema.fields import Whole
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import Field, PrivateAttr, ValidationInfo, field_validator
@@ -21,23 +22,18 @@ from lfs10d.profiles.contents import (
     width_of,
     words_of,
 )
-from lfs10d.profiles.facts import LAST_REGISTER, Offset, Range, Registered, Scale, UnitText, Word, refuse
+from lfs10d.profiles.decimals import Linear
+from lfs10d.profiles.facts import LAST_REGISTER, Offset, Range, Registered, Scale, UnitText, Word, pair_of, refuse
 from lfs10d.profiles.facts import RESERVED_NAMES as RESERVED
-from lfs10d.profiles.registers import (
-    INTEGERS,
-    SIGNED,
-    WORDS,
-    ByteOrder,
-    Linear,
-    RegisterType,
-    WordOrder,
-)
+from lfs10d.profiles.register_types import INTEGERS, SIGNED, WORDS, ByteOrder, RegisterType, WordOrder
 from lfs10d.reading import Number
-from lfs10d.schema.fields import Duration, Text, Whole, shown
+from lfs10d.schema.fields import Duration, Text, Whole, quoted, shown
 
 ReadFunction: TypeAlias = Literal[1, 2, 3, 4]
 
 TYPES_OF_NUMBERS = "int16, uint16, int32, uint32, int64, uint64, float32, float64, bcd or string"
+NO_UNIT = "1"
+"""The unit of a bare number, and of text and booleans."""
 WIND_SPEED = "wind_speed"
 """The name of a wind speed, and its device class."""
 LONGEST = {"bcd": 4, "string": 60}
@@ -45,7 +41,11 @@ LONGEST = {"bcd": 4, "string": 60}
 
 
 Contents: TypeAlias = Annotated[tuple[Annotated[int | float, RegisterContent()], ...], Field(strict=False)]
-Bits: TypeAlias = Annotated[tuple[Annotated[int, Whole(0, 63)], Annotated[int, Whole(0, 63)]], Field(strict=False)]
+Bits: TypeAlias = Annotated[
+    tuple[Annotated[int, Whole(0, 63)], Annotated[int, Whole(0, 63)]],
+    Field(strict=False),
+    pair_of("the first and the last bit, such as [3, 7]"),
+]
 MappedWord: TypeAlias = Annotated[str, Text(64)]
 
 
@@ -214,7 +214,7 @@ class Value(Registered):
             return unit
         if not says_text(info.data) and "map" in info.data:
             refuse([((), "is missing; write here: the unit of the number, '1' for a bare one")])
-        return "1"
+        return NO_UNIT
 
     @property
     def words(self) -> int:
@@ -227,13 +227,16 @@ class Value(Registered):
         return self.register + self.words
 
     @property
-    def doubt(self) -> str | None:
-        """What is valid and probably a mistake: a word for what its registers cannot hold; None without that."""
+    def doubts(self) -> Iterator[str]:
+        """What is valid and probably a mistake: a unit of a word or text, a word for what its registers cannot hold."""
+        if self.is_text and self.unit != NO_UNIT:
+            yield f"is text or a boolean, which has no unit: leave out unit {quoted(self.unit)}"
         width = width_of(self.type, self.length)
         part = part_of(self.bits, self.mask, self.byte, width)
         low, high = limits_of(self.type, part.width if part else width)
         never = [content for content in self.map or () if not low <= content <= high]
-        return f"map names {never[0]}, and the content is {low} to {high}" if never else None
+        if never:
+            yield f"map names {never[0]}, and the content is {low} to {high}"
 
     @property
     def is_text(self) -> bool:

@@ -252,7 +252,7 @@ class _NodeReader:
         data: dict[str | int, object] = {}
         lines: dict[str | int, int] = {}
         for key_node, value_node in node.value:
-            key = self.scalar(key_node, path) if isinstance(key_node, ScalarNode) else []
+            key = self.scalar(key_node, path) if isinstance(key_node, ScalarNode) else [key_node]
             if key is _UNREAD:
                 continue
             if isinstance(key, bool) or not isinstance(key, str | int):

@@ -46,7 +46,7 @@ def shown(value: object) -> str:
         case Mapping():
             return "a mapping"
         case _:
-            return "a list"
+            return "a list" if value else "an empty list"
 
 
 def quoted(text: str, longest: int = _SHOWN_CHARACTERS) -> str:

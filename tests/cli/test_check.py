@@ -87,6 +87,17 @@ def test_a_register_that_is_a_number_of_the_manual_is_a_warning_once_for_its_pro
     )
 
 
+def test_the_unit_of_a_value_in_words_is_a_warning_and_no_refusal() -> None:
+    words = SLOW.replace("40001, type: uint16", "7, type: uint16, map: {0: low, 1: full}")
+    Path("station.yaml").write_text(words)
+    code, _, err = check("line: {port: /dev/x}\nslaves: [{id: 3, profile: station.yaml}]\n")
+    assert code == 0
+    assert err == (
+        'lfs10d.yaml:2:10: slaves[0]: warning: profile "station.yaml": battery: is text or a boolean, which has no '
+        'unit: leave out unit "V"\n'
+    )
+
+
 def test_a_profile_with_a_bare_percent_sign_is_told_to_quote_it() -> None:
     Path("station.yaml").write_text(SLOW.replace("unit: V", "unit: %"))
     with pytest.raises(ConfigError) as caught:

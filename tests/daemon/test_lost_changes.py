@@ -12,15 +12,11 @@ import pytest
 
 from lfs10d.simulator.pty import PtyLine
 from tests.support.brokers import Mosquitto
-from tests.support.sites import Run, Site, View, eventually, good, tell
+from tests.support.sites import SPARSE, Run, Site, View, eventually, good, tell
 
-pytestmark = pytest.mark.needs("mosquitto")
-
-pytestmark = pytest.mark.long(90)
+pytestmark = [pytest.mark.needs("mosquitto"), pytest.mark.long(90)]
 
 B = "lfs10d/line0"
-SPARSE = {"interval": "500ms"}
-"""A change waits so that the others keep nine tenths of their polls: the rarer these are, the sooner it is over."""
 
 
 @pytest.fixture

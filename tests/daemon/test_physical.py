@@ -20,13 +20,11 @@ from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from tests.support import forked
 from tests.support.brokers import Mosquitto
-from tests.support.sites import Site, View, eventually, good, tell
+from tests.support.sites import SPARSE, Site, View, eventually, good, tell
 
 pytestmark = pytest.mark.long(150)
 
 BASE = "lfs10d/line0"
-SPARSE = {"interval": "500ms"}
-"""A change waits so that the others keep nine tenths of their polls: the rarer these are, the sooner it is over."""
 
 
 def places(served: PtyLine) -> list[int]:

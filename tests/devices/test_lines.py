@@ -13,9 +13,7 @@ from tests.support.sites import good
 
 CHECKS: tuple[Check, ...] = ("crc", "sum")
 
-pytestmark = pytest.mark.needs("mosquitto")
-
-pytestmark = pytest.mark.long(25)
+pytestmark = [pytest.mark.needs("mosquitto"), pytest.mark.long(25)]
 
 
 def test_every_device_has_its_topics_and_is_online(recording: Recording) -> None:

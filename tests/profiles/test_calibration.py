@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lfs10d.profiles.calibration import DIGITS, Calibration
-from lfs10d.profiles.registers import shortest
+from lfs10d.profiles.decimals import shortest
 
 SCALES = st.floats(0.5, 2).map(lambda scale: round(scale, 5))
 OFFSETS = st.floats(-10, 10).map(lambda offset: round(offset, 3))

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from lfs10d.profiles.calibration import Calibration
 from lfs10d.profiles.cells import Cell
-from lfs10d.profiles.registers import WORDS, ByteOrder, Linear, RegisterType, WordOrder
+from lfs10d.profiles.decimals import Linear
+from lfs10d.profiles.register_types import WORDS, ByteOrder, RegisterType, WordOrder
 from lfs10d.reading import Fault, FaultCode
 
 FORMATS: dict[RegisterType, str] = {"int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "float32": "f"}

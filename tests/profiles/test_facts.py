@@ -64,6 +64,15 @@ def test_a_range_goes_up() -> None:
         Bounded.model_validate({"range": [1, 1]})
 
 
+@pytest.mark.parametrize(("given", "shown"), [([], "an empty list"), ([1], "a list"), (7, "7")])
+def test_a_range_is_a_list_of_two(given: object, shown: str) -> None:
+    with pytest.raises(ValidationError) as caught:
+        Bounded.model_validate({"range": given})
+    (wrong,) = caught.value.errors()
+    assert wrong["loc"] == ("range",)
+    assert wrong["msg"] == f"must be the least and the greatest number, such as [0, 60], not {shown}"
+
+
 def test_each_problem_is_refused_at_its_own_place() -> None:
     refuse([])
     with pytest.raises(ValidationError) as caught:

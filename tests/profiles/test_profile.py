@@ -104,6 +104,9 @@ def test_a_profile_without_id_and_rate_registers_sets_neither(profile_of: Build)
 TOO_SHORT = {"max_words": 1, "values": TWO_VALUES}
 WRONG: list[tuple[dict[str, Any], tuple[int | str, ...], str]] = [
     ({"ids": [2, 1]}, ("ids",), "the first id is greater than the last"),
+    ({"ids": []}, ("ids",), "must be the first and the last slave id, such as [1, 247], not an empty list"),
+    ({"ids": [1, 2, 3]}, ("ids",), "must be the first and the last slave id, such as [1, 247], not a list"),
+    ({"ids": 5}, ("ids",), "must be the first and the last slave id, such as [1, 247], not 5"),
     ({"framings": []}, ("framings",), "must name at least one, each once"),
     ({"checksums": ["crc", "crc"]}, ("checksums",), "must name at least one, each once"),
     ({"ids": [1, 9], "factory": {"id": 10, "baudrate": 9600}}, ("factory", "id"), "10 is none of the ids 1 to 9"),

@@ -72,25 +72,33 @@ def test_a_mistake_is_told_at_its_place(data: dict[str, Any], place: str, messag
     assert found[1].startswith(message)
 
 
+NO_UNIT_WANTED = 'is text or a boolean, which has no unit: leave out unit "m"'
+
+
 @pytest.mark.parametrize(
-    ("keys", "doubt"),
+    ("keys", "doubts"),
     [
-        ({"byte": "high", "map": {0: "dry", 255: "x", 256: "wet"}}, "map names 256, and the content is 0 to 255"),
-        ({"bits": [3, 4], "map": {4: "wet"}}, "map names 4, and the content is 0 to 3"),
-        ({"mask": 0xF0, "map": {-1: "wet"}}, "map names -1, and the content is 0 to 15"),
-        ({"type": "int16", "map": {40000: "wet"}}, "map names 40000, and the content is -32768 to 32767"),
-        ({"type": "int16", "map": {-1: "wet"}}, None),
-        ({"type": None, "function": 1, "map": {2: "wet"}}, "map names 2, and the content is 0 to 1"),
-        ({"unit": "m"}, None),
+        ({"byte": "high", "map": {0: "dry", 255: "x", 256: "wet"}}, ["map names 256, and the content is 0 to 255"]),
+        ({"bits": [3, 4], "map": {4: "wet"}}, ["map names 4, and the content is 0 to 3"]),
+        ({"mask": 0xF0, "map": {-1: "wet"}}, ["map names -1, and the content is 0 to 15"]),
+        ({"type": "int16", "map": {40000: "wet"}}, ["map names 40000, and the content is -32768 to 32767"]),
+        ({"type": "int16", "map": {-1: "wet"}}, []),
+        ({"type": None, "function": 1, "map": {2: "wet"}}, ["map names 2, and the content is 0 to 1"]),
+        ({"unit": "m"}, []),
+        ({"unit": "1", "map": {0: "dry"}}, []),
+        ({"unit": "m", "map": {0: "dry"}}, [NO_UNIT_WANTED]),
+        ({"unit": "m", "map": {-1: "wet"}}, [NO_UNIT_WANTED, "map names -1, and the content is 0 to 65535"]),
+        ({"unit": "m", "type": "string", "length": 2}, [NO_UNIT_WANTED]),
+        ({"unit": "m", "type": None, "function": 2}, [NO_UNIT_WANTED]),
     ],
 )
-def test_a_word_for_what_the_registers_cannot_hold_is_doubted(keys: dict[str, Any], doubt: str | None) -> None:
+def test_a_word_that_cannot_come_and_the_unit_of_a_word_are_doubted(keys: dict[str, Any], doubts: list[str]) -> None:
     value = Value.model_validate({"name": "level", "register": 1, "type": "uint16"} | keys)
-    assert value.doubt == doubt
+    assert list(value.doubts) == doubts
     profile = Profile.model_validate(
         {"name": "p", "title": "P", "values": [{"name": "level", "register": 1, "type": "uint16"} | keys]}
     )
-    assert profile.doubts() == (() if doubt is None else (f"level: {doubt}",))
+    assert profile.doubts() == tuple(f"level: {doubt}" for doubt in doubts)
 
 
 @pytest.mark.parametrize(

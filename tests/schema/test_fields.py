@@ -85,7 +85,8 @@ def test_what_is_of_the_kind_is_taken(kind: FieldKind, value: object, meant: obj
         (Choice((9600,)), "9600", 'must be 9600, not text "9600"'),
         (Choice(("crc", "sum"), null=True), "lrc", 'must be crc, sum or null, not text "lrc"'),
         (Choice(("crc",)), None, "must be crc, not empty"),
-        (Choice(("crc",)), [], "must be crc, not a list"),
+        (Choice(("crc",)), [], "must be crc, not an empty list"),
+        (Choice(("crc",)), ["crc"], "must be crc, not a list"),
         (
             Duration(1.0, 2.0),
             "auto",
@@ -123,7 +124,14 @@ def test_the_refusal_says_what_is_wrong_and_what_would_be_right(kind: FieldKind,
 
 @pytest.mark.parametrize(
     ("value", "words"),
-    [(False, "false"), (float("inf"), ".inf"), (float("-inf"), "-.inf"), (float("nan"), ".nan"), ((), "a list")],
+    [
+        (False, "false"),
+        (float("inf"), ".inf"),
+        (float("-inf"), "-.inf"),
+        (float("nan"), ".nan"),
+        ((), "an empty list"),
+        ((1,), "a list"),
+    ],
 )
 def test_values_are_shown_as_they_are_written(value: object, words: str) -> None:
     assert shown(value) == words

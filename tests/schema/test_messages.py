@@ -74,7 +74,7 @@ def test_a_missing_key_is_answered_with_what_to_write() -> None:
         ({"bare": 6}, "must be at most 5, not 6"),
         ({"word": "c"}, "must be one of 'a' or 'b', not text \"c\""),
         ({"number": float("inf")}, "must be a finite number, not .inf"),
-        ([], "must be a mapping of keys to values, not a list"),
+        ([], "must be a mapping of keys to values, not an empty list"),
     ],
 )
 def test_an_error_says_what_would_be_right_and_what_was_found(content: object, words: str) -> None:

@@ -26,6 +26,8 @@ from tests.support.forked import Process
 
 PATIENCE = 20.0
 """Seconds after which something awaited counts as not happening; no test waits this long when all is well."""
+SPARSE = {"interval": "500ms"}
+"""A change waits so that the others keep nine tenths of their polls: the rarer these are, the sooner it is over."""
 ENDS_WITHIN = 2.0
 """Seconds from SIGTERM to the end (contract, section 2)."""
 

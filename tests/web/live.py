@@ -93,16 +93,18 @@ def mount(browser: Browser, whole: LivePage, folder: Path) -> None:
 
 def notice(page: Page) -> str:
     """Return what the page says of the line above its sensors, in words; empty where all is well."""
-    return page.evaluate("[...document.querySelectorAll('.notice')].map((each) => each.textContent).join(' ')")  # type: ignore[no-any-return]
+    words: str = page.evaluate("[...document.querySelectorAll('.notice')].map((each) => each.textContent).join(' ')")
+    return words
 
 
 def all_well(page: Page) -> bool:
     """Whether every sensor has a live, good value and nothing is said of the line."""
-    return page.evaluate(  # type: ignore[no-any-return]
+    well: bool = page.evaluate(
         """() => document.getElementById("banner").textContent === "Live" && !document.querySelector(".notice")
             && document.querySelectorAll(".card").length === 2
             && [...document.querySelectorAll(".card:not(.old) .state.good")].length === 2"""
     )
+    return well
 
 
 def outages(browser: Browser, whole: LivePage, folder: Path) -> None:
@@ -130,6 +132,7 @@ def outages(browser: Browser, whole: LivePage, folder: Path) -> None:
                 page.wait_for_timeout(3000)
                 began = time.monotonic()
                 kill()
+                # mypy does not infer the type of a lambda's parameter from its default.
                 gone.append(seconds_until(lambda word=word: word in notice(page), since=began))  # type: ignore[misc]
                 words = notice(page)
                 page.wait_for_timeout(4000)

@@ -7,9 +7,9 @@ from typing import TypeAlias
 
 from lfs10d.modbus.frames import EXCEPTION_NAMES
 from lfs10d.profiles.blocks import Block
+from lfs10d.profiles.decimals import span
 from lfs10d.profiles.facts import Fact
 from lfs10d.profiles.profile import Profile
-from lfs10d.profiles.registers import span
 from lfs10d.profiles.settings import Setting
 from lfs10d.profiles.values import Value
 from lfs10d.schema.quantities import duration_text

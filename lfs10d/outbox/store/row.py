@@ -22,7 +22,7 @@ import zlib
 from collections.abc import Mapping
 from typing import TypeAlias
 
-from lfs10d.profiles.registers import shortest
+from lfs10d.profiles.decimals import shortest
 from lfs10d.reading import NOTHING, FaultCode, Value
 from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.publication import Quality, Sample

@@ -25,7 +25,7 @@ from lfs10d.outbox.store.row import (
     unpack_rtt,
     values_of,
 )
-from lfs10d.profiles.registers import shortest
+from lfs10d.profiles.decimals import shortest
 from lfs10d.reading import FaultCode, Value
 from lfs10d.telemetry.publication import Quality, Sample
 

@@ -1,54 +1,15 @@
-"""Registers to numbers, against decoders written here with other means."""
+"""Numbers in decimals, against exact fractions."""
 
 from __future__ import annotations
 
 import struct
 from fractions import Fraction
-from itertools import product
 
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from lfs10d.profiles.registers import (
-    WORDS,
-    ByteOrder,
-    Linear,
-    RegisterType,
-    WordOrder,
-    float_of,
-    shortest,
-    span,
-    spell,
-)
-
-FORMATS: dict[RegisterType, str] = {"int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "float32": "f"}
-WIRE_ORDER: dict[tuple[WordOrder, ByteOrder], str] = {
-    ("high_first", "big"): "ABCD",
-    ("high_first", "little"): "BADC",
-    ("low_first", "big"): "CDAB",
-    ("low_first", "little"): "DCBA",
-}
-FIRST_MEASURABLE = 0x3586_37BD
-"""Bits of the float32 nearest to 1e-6, the smallest magnitude that is a measurement."""
-_MAGNITUDES = st.one_of(st.just(0), st.integers(FIRST_MEASURABLE, 0x7F7F_FFFF))
-MEASURABLE = st.builds(
-    lambda bits, sign: struct.unpack(">f", struct.pack(">I", bits | sign << 31))[0], _MAGNITUDES, st.integers(0, 1)
-)
-
-LAYOUTS = [
-    (kind, word_order, byte_order)
-    for kind, (word_order, byte_order) in product(FORMATS, WIRE_ORDER)
-    if WORDS[kind] > 1 or word_order == "high_first"
-]
-
-
-def registers_of(kind: RegisterType, word_order: WordOrder, byte_order: ByteOrder, number: float) -> tuple[int, ...]:
-    """Lay a number out as bytes, shuffle them as the layout's name says, cut them into registers."""
-    straight = struct.pack(">" + FORMATS[kind], number)
-    letters = WIRE_ORDER[word_order, byte_order] if len(straight) > 2 else {"big": "AB", "little": "BA"}[byte_order]
-    wire = bytes(straight["ABCD".index(letter)] for letter in letters)
-    return struct.unpack(f">{len(wire) // 2}H", wire)
+from lfs10d.profiles.decimals import Linear, float_of, shortest, span, spell
 
 
 def float_bits(number: float) -> int:
