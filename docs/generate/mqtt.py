@@ -211,9 +211,9 @@ def _requests() -> Iterator[str]:
 
 def _does(request: Handler) -> str:
     """Return the first sentence of what performs it; ValueError where it says nothing."""
-    words = inspect.getdoc(request.perform)
+    words = inspect.getdoc(request.work)
     if not words:
-        raise ValueError(f"{request.perform} has no docstring")
+        raise ValueError(f"{request.work} has no docstring")
     return " ".join(words.partition("\n\n")[0].split())
 
 

@@ -76,7 +76,7 @@ def _usual(value: object, kinds: Sequence[FieldKind]) -> str:
 
 def does(name: str) -> str:
     """Return in a sentence what a request does."""
-    return " ".join((inspect.getdoc(HANDLERS[name].perform) or "").partition("\n\n")[0].split()).replace("`", "")
+    return " ".join((inspect.getdoc(HANDLERS[name].work) or "").partition("\n\n")[0].split()).replace("`", "")
 
 
 def listing() -> Iterator[str]:

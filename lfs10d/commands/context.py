@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Coroutine, Mapping
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
-from lfs10d.command import Command, Result
+from lfs10d.command import Command, RefusedError, Result
 from lfs10d.commands.admission import CommandSpec
+from lfs10d.commands.message import Parameters
 from lfs10d.commands.reads import ReadResult
 from lfs10d.system.dataclass import dataclass
 
@@ -121,7 +122,14 @@ Perform: TypeAlias = "Callable[[Any, Context, Command], Coroutine[Any, Any, Resu
 
 @dataclass(frozen=True, slots=True)
 class Handler:
-    """One request: what admission must know, and what carries it out."""
+    """One request: what admission must know, and what carries it out; where that raises RefusedError, it is refused."""
 
     spec: CommandSpec
-    perform: Perform
+    work: Perform
+
+    async def perform(self, parameters: Parameters, context: Context, command: Command) -> Result:
+        """Carry it out and return its result."""
+        try:
+            return await self.work(parameters, context, command)
+        except RefusedError as error:
+            return error.result

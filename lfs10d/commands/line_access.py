@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 from collections import defaultdict
 from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager
 from functools import partial
 from math import inf
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
-from lfs10d.command import RefusedError, Result
+from lfs10d.command import RefusedError
 from lfs10d.commands.pause import FREED, LinePause
 from lfs10d.commands.reads import PendingReads, ReadResult, altered
 from lfs10d.commands.scanner import Scanner
@@ -28,33 +26,21 @@ from lfs10d.modbus.request import Request as RegisterRequest
 from lfs10d.mqtt.publisher import Publisher
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Event, Exchanged, Reading
+from lfs10d.reconfiguration.reconfiguration import Reconfiguration
 from lfs10d.system.clock import Instant
-from lfs10d.system.threads import run_in_thread
+from lfs10d.system.threads import ThreadFuture, run_in_thread
 from lfs10d.telemetry.publication import Publication
 
 J = TypeVar("J", bound=Job)
 
 
-class LineReservation(Protocol):
-    """The one scan or change of sensors at a time; see `lfs10d.reconfiguration.reconfiguration.Reconfiguration`."""
-
-    @property
-    def busy(self) -> Result | None:
-        """The rejection of whatever must wait until a scan or a change of sensors is over, None if nothing must."""
-        ...
-
-    def place(self, request: str) -> AbstractContextManager[None]:
-        """Reserve the line for a request; raises RefusedError while it is reserved."""
-        ...
-
-
 class LineAccess:
     """Used in the thread of the asyncio loop; what it submits runs in the line's."""
 
-    def __init__(self, line: Line, config: LiveConfig, publisher: Publisher, reservation: LineReservation) -> None:
+    def __init__(self, line: Line, config: LiveConfig, publisher: Publisher, reconfiguration: Reconfiguration) -> None:
         self._line = line
         self._config = config
-        self._reservation = reservation
+        self._reconfiguration = reconfiguration
         self._reads = PendingReads(line.read)
         self._trace: FrameTrace | None = None
         self._accesses: defaultdict[int, asyncio.Lock] = defaultdict(asyncio.Lock)
@@ -83,14 +69,14 @@ class LineAccess:
         """Search the line for devices; return the scan that is over. Raises RefusedError where it must wait."""
         if self.paused:
             raise RefusedError(FREED)
-        with self._reservation.place("line/scan"):
+        with self._reconfiguration.place("line/scan"):
             loaded = self._config.loaded
             plan = await run_in_thread(partial(settings.scan_plan, loaded, ids, rates, share=share), "profiles")
             return await self._scanner.scan(plan)
 
     async def pause(self, duration: float) -> None:
         """Free the port for another program for `duration` s; raises RefusedError where that must wait."""
-        if (busy := self._reservation.busy) is not None:
+        if (busy := self._reconfiguration.busy) is not None:
             raise RefusedError(busy)
         await self._pause.pause(duration)
 
@@ -119,18 +105,8 @@ class LineAccess:
 
     async def _run(self, job: Callable[[Callable[[J], None]], J]) -> J:
         """Submit the job that is built with its callback; return it when it is over."""
-        loop = asyncio.get_running_loop()
-        over: asyncio.Future[J] = loop.create_future()
-
-        def settle(done: J) -> None:
-            if not over.done():
-                over.set_result(done)
-
-        def on_over(done: J) -> None:
-            with contextlib.suppress(RuntimeError):  # the loop is closed: nothing waits any more
-                loop.call_soon_threadsafe(settle, done)
-
-        self._line.submit(job(on_over))
+        over: ThreadFuture[J] = ThreadFuture()
+        self._line.submit(job(over.set_result))
         return await over
 
     # -- what happens on the line

@@ -43,16 +43,16 @@ class Scanner:
         self._act = act
         self._announce = announce
         self._scan: Scan | None = None
-        self._over: asyncio.Future[None] | None = None
+        self._over = asyncio.Event()
+        """Set once the scan is over, or cancelled."""
 
     async def scan(self, plan: ScanPlan) -> Scan:
         """Scan, one at a time; return the scan when it is over, however it ended. Cancelling it ends it early."""
-        loop = asyncio.get_running_loop()
-        over: asyncio.Future[None] = loop.create_future()
+        loop, over = asyncio.get_running_loop(), asyncio.Event()
 
         def ended(_: Scan) -> None:
             with contextlib.suppress(RuntimeError):  # the loop is closed: nothing waits any more
-                loop.call_soon_threadsafe(_settle, over)
+                loop.call_soon_threadsafe(over.set)
 
         scan = Scan(plan, ended)
         self._scan, self._over = scan, over
@@ -63,27 +63,28 @@ class Scanner:
         except asyncio.CancelledError:  # the daemon is ending: what was found is returned all the same
             scan.cancel()
         finally:
-            self._scan = self._over = None
+            self._scan = None
             self._act(None)
         return scan
 
     def cancel(self) -> bool:
         """End the scan; whether there was one. Its last exchange may still be on the line."""
-        if self._scan is None or self._over is None:
+        if self._scan is None:
             return False
         self._scan.cancel()
-        _settle(self._over)
+        self._over.set()
         return True
 
-    async def _follow(self, scan: Scan, over: asyncio.Future[None]) -> None:
+    async def _follow(self, scan: Scan, over: asyncio.Event) -> None:
         """Publish its progress until it is over, and each id that seems to have two devices."""
         duplicates: set[tuple[int, int]] = set()
         self._publish_progress(scan, last := 0.0)
-        while not over.done():
-            await asyncio.wait([over], timeout=LOOK_EVERY)
+        while not over.is_set():
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(over.wait(), LOOK_EVERY)
             self._publish_duplicates(scan, duplicates)
             done = min(scan.progress.percent, LAST_STEP)
-            if not over.done() and done >= last + STEP:
+            if not over.is_set() and done >= last + STEP:
                 self._publish_progress(scan, last := done)
         if scan.complete:
             self._publish_progress(scan, 100.0)
@@ -107,8 +108,3 @@ class Scanner:
             if finding.duplicate and place not in published:
                 published.add(place)
                 self._announce("duplicate_id", {"slave": finding.slave, "baudrate": finding.baudrate})
-
-
-def _settle(over: asyncio.Future[None]) -> None:
-    if not over.done():
-        over.set_result(None)

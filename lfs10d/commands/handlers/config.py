@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from lfs10d.command import Command, RefusedError, Result, ok, rejected
+from lfs10d.command import Command, Result, ok, rejected
 from lfs10d.commands.admission import CommandSpec
 from lfs10d.commands.context import Context, Handler
 from lfs10d.commands.handlers.config_edit import altered, apply_edit, known_device, refuse
@@ -66,11 +66,8 @@ async def reload(_: NoParameters, context: Context, __: Command) -> Result:
 
 async def reset(parameters: WhichChange, context: Context, command: Command) -> Result:
     """Undo changes made by request."""
-    try:
-        device, key = parameters.place
-        before, now = await apply_edit(lambda now: _without(device, key, now), context)
-    except RefusedError as error:
-        return error.result
+    device, key = parameters.place
+    before, now = await apply_edit(lambda now: _without(device, key, now), context)
     left = set(changes.keys(now.changes))
     data = {
         "dropped": [name for name in changes.keys(before.changes) if name not in left],

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from lfs10d.command import Command, ErrorCode, RefusedError, Result, failed, ok
+from lfs10d.command import Command, ErrorCode, Result, failed, ok
 from lfs10d.commands.admission import CommandSpec
 from lfs10d.commands.context import Context, Handler
 from lfs10d.commands.handlers.config_edit import apply_edit, as_json, known_device, refuse, unknown_device
@@ -77,21 +77,18 @@ class Options(Parameters):
 
 async def add(parameters: NewDevice, context: Context, command: Command) -> Result:
     """Poll one more slave; with `probe` only if it answers."""
-    try:
-        profile = await profile_of(parameters.profile, context.config.now)
-        _check_new(parameters, profile, context.config.now, context.reconfiguration.reserved())
-        if parameters.probe:
-            await _ping(parameters.slave, profile, context)
+    profile = await profile_of(parameters.profile, context.config.now)
+    _check_new(parameters, profile, context.config.now, context.reconfiguration.reserved())
+    if parameters.probe:
+        await _ping(parameters.slave, profile, context)
 
-        def edit(now: Effective) -> Changes:
-            _check_new(parameters, profile, now, context.reconfiguration.reserved())
-            place = Place(parameters.slave) if parameters.probe else None
-            return now.changes.adding(parameters.device, parameters.entry, place)
+    def edit(now: Effective) -> Changes:
+        _check_new(parameters, profile, now, context.reconfiguration.reserved())
+        place = Place(parameters.slave) if parameters.probe else None
+        return now.changes.adding(parameters.device, parameters.entry, place)
 
-        _, now = await apply_edit(edit, context)
-        slave = known_device(parameters.device, now)
-    except RefusedError as error:
-        return error.result
+    _, now = await apply_edit(edit, context)
+    slave = known_device(parameters.device, now)
     data = {"slave": slave.id, **as_json(slave, SHOWN)}
     context.publisher.applied("device/add", command, device=slave.name, **{"from": None, "to": data})
     return ok({"device": slave.name, **data})
@@ -159,10 +156,7 @@ async def remove(parameters: OneDevice, context: Context, command: Command) -> R
             known_device(device, now)
         return now.changes.removing(device, now.file_values)
 
-    try:
-        before, _ = await apply_edit(edit, context)
-    except RefusedError as error:
-        return error.result
+    before, _ = await apply_edit(edit, context)
     gone = before.slave(device)
     data = None if gone is None else {"slave": gone.id, **as_json(gone, SHOWN)}
     context.publisher.applied("device/remove", command, device=device, **{"from": data, "to": None})
@@ -182,15 +176,11 @@ async def options(parameters: Options, context: Context, command: Command) -> Re
             raise refuse("invalid_param", why, param=param if param in wanted else None)
         return changes
 
-    try:
-        if not wanted:
-            message = f"nothing to change: give {', '.join(OPTIONS[:-1])} or {OPTIONS[-1]}"
-            raise refuse("invalid_param", message)
-        before, now = await apply_edit(edit, context)
-        keys = tuple(wanted)
-        old, new = as_json(known_device(device, before), keys), as_json(known_device(device, now), keys)
-    except RefusedError as error:
-        return error.result
+    if not wanted:
+        raise refuse("invalid_param", f"nothing to change: give {', '.join(OPTIONS[:-1])} or {OPTIONS[-1]}")
+    before, now = await apply_edit(edit, context)
+    keys = tuple(wanted)
+    old, new = as_json(known_device(device, before), keys), as_json(known_device(device, now), keys)
     if old != new:
         context.publisher.applied("device/options", command, device=device, **{"from": old, "to": new})
     return ok({"from": old, "to": new})

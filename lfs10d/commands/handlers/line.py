@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from lfs10d.command import Command, RefusedError, Result, ok
+from lfs10d.command import Command, Result, ok
 from lfs10d.commands.admission import CommandSpec
 from lfs10d.commands.context import Context, Handler
 from lfs10d.commands.message import NoParameters, Parameters
@@ -33,10 +33,7 @@ async def trace(parameters: HowLong, context: Context, _: Command) -> Result:
 
 async def pause(parameters: HowLong, context: Context, _: Command) -> Result:
     """Free the port for another program for a while."""
-    try:
-        await context.line.pause(parameters.duration)
-    except RefusedError as error:
-        return error.result
+    await context.line.pause(parameters.duration)
     return ok({"for": parameters.duration})
 
 

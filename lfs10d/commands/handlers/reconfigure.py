@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from lfs10d.command import Command, RefusedError, Result
+from lfs10d.command import Command, Result
 from lfs10d.commands.admission import CommandSpec
 from lfs10d.commands.context import Context, Handler
 from lfs10d.commands.handlers import device
@@ -67,10 +67,7 @@ class AdoptParameters(Parameters):
 async def adopt(parameters: AdoptParameters, context: Context, command: Command) -> Result:
     """Take in a factory-new sensor."""
     wanted = parameters
-    try:
-        await device.profile_of(wanted.profile, context.config.now)
-    except RefusedError as error:
-        return error.result
+    await device.profile_of(wanted.profile, context.config.now)
     request = AdoptRequest(wanted.name, wanted.label, wanted.factory, wanted.to, wanted.profile)
     return await context.reconfiguration.adopt(request, command)
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
-from lfs10d.command import Command, ErrorCode, RefusedError, Result, failed, ok, rejected
+from lfs10d.command import Command, ErrorCode, Result, failed, ok, rejected
 from lfs10d.commands.admission import CommandSpec
 from lfs10d.commands.context import Context, Handler
 from lfs10d.commands.handlers.config_edit import known_device, refuse
@@ -64,16 +64,14 @@ async def read(parameters: SomeRegisters, context: Context, _: Command) -> Resul
     """Read registers as they are, with function 03."""
     now = context.config.now
     address, count = parameters.address, parameters.count
-    try:
-        device, slave = _target(parameters, now)
-        if address + count > REGISTERS:
-            raise refuse("invalid_param", f"count: there are {REGISTERS - address} registers from there", param="count")
-        most = READ_COUNT_MAX if device is None else now.loaded.profiles[device.profile].most_words
-        if count > most:
-            message = f"count: one read of a {_kind(device, now)} brings at most {most} registers"
-            raise refuse("invalid_param", message, param="count")
-    except RefusedError as error:
-        return error.result
+    device, slave = _target(parameters, now)
+    if address + count > REGISTERS:
+        raise refuse("invalid_param", f"count: there are {REGISTERS - address} registers from there", param="count")
+    profile = None if device is None else now.loaded.profiles[device.profile]
+    most = READ_COUNT_MAX if profile is None else profile.most_words
+    if count > most:
+        kind = "slave" if profile is None else profile.title
+        raise refuse("invalid_param", f"count: one read of a {kind} brings at most {most} registers", param="count")
     access = await context.line.access(ReadRegisters(slave, address, count), device)
     place = {"device": device and device.name, "slave": slave, "address": address}
     if access.end is End.DONE:
@@ -85,17 +83,14 @@ async def write(parameters: OneRegister, context: Context, command: Command) -> 
     """Write one register with the profile's write function and read it back; only settings that the profile marks."""
     now = context.config.now
     address, value = parameters.address, parameters.value
-    try:
-        device, slave = _target(parameters, now)
-        if device is None:
-            _check_unknown(address, now)
-        else:
-            _check_setting(address, value, now.loaded.profiles[device.profile])
-        reserved = context.reconfiguration.reserved().get(slave)
-        if reserved is not None:
-            raise refuse("busy", f"slave id {slave} {reserved}; write when that is over")
-    except RefusedError as error:
-        return error.result
+    device, slave = _target(parameters, now)
+    if device is None:
+        _check_unknown(address, now)
+    else:
+        _check_setting(address, value, now.loaded.profiles[device.profile])
+    reserved = context.reconfiguration.reserved().get(slave)
+    if reserved is not None:
+        raise refuse("busy", f"slave id {slave} {reserved}; write when that is over")
     function = 6 if device is None else now.loaded.profiles[device.profile].write_function
     access = await context.line.access(WriteRegister(slave, address, value, function), device)
     place = {"device": device and device.name, "slave": slave, "address": address}
@@ -123,10 +118,6 @@ def _target(parameters: OnePlace, now: Effective) -> tuple[SlaveConfig | None, i
             raise refuse("invalid_param", "device: is missing; or give slave, a slave id", param="device")
         case _:
             raise refuse("invalid_param", "device: give either device or slave", param="device")
-
-
-def _kind(device: SlaveConfig | None, now: Effective) -> str:
-    return "slave" if device is None else now.loaded.profiles[device.profile].title
 
 
 def _check_unknown(address: int, now: Effective) -> None:

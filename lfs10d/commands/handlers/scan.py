@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
-from lfs10d.command import Command, RefusedError, Result, failed, ok
+from lfs10d.command import Command, Result, failed, ok
 from lfs10d.commands.admission import CommandSpec
 from lfs10d.commands.context import Context, Handler
 from lfs10d.commands.handlers import device
@@ -82,10 +82,7 @@ class WhomToFind(Parameters):
 
 async def scan(parameters: WhomToFind, context: Context, command: Command) -> Result:
     """Find out who is on the line."""
-    try:
-        done = await context.line.scan(parameters.ids, parameters.baudrates or (), parameters.share / 100)
-    except RefusedError as error:
-        return error.result
+    done = await context.line.scan(parameters.ids, parameters.baudrates or (), parameters.share / 100)
     data: dict[str, Any] = {"found": [_told(finding, context) for finding in done.found]}
     asked = f"after {done.progress.asked} of {done.progress.total} ids"
     if done.lost:
@@ -133,7 +130,8 @@ async def _add(done: Scan, context: Context, command: Command) -> dict[str, list
             continue
         own = now.loaded.profiles
         word = next((word for word, known in own.items() if known.name == profile.name), profile.name)
-        answer = await device.add(device.NewDevice(slave=finding.slave, profile=word), context, command)
+        wanted = device.NewDevice(slave=finding.slave, profile=word)
+        answer = await device.HANDLERS["device/add"].perform(wanted, context, command)
         entry = {"id": finding.slave, "error": answer.error()} if answer.code else answer.data
         (refused if answer.code else added).append(entry)  # type: ignore[arg-type]  # device/add answers with an object
     return {"added": added, "not_added": refused}
