@@ -69,7 +69,7 @@ class CommandClient:
     @property
     def connected(self) -> bool:
         """Whether there is a connection."""
-        return self._link.standing is not None
+        return self._link.connection is not None
 
     @property
     def request_sent(self) -> bool:
@@ -78,7 +78,7 @@ class CommandClient:
 
     @property
     def daemon_online(self) -> bool:
-        """Whether the daemon is online, as far as a standing connection shows."""
+        """Whether the daemon is online, as far as the present connection shows."""
         return self.connected and self.availability == ONLINE
 
     @property
@@ -130,7 +130,7 @@ class CommandClient:
         usual = [self.topics.full(self.topics.response(each)) for each in (name, "unknown")]
         self._pending, self._response = (token, frozenset(usual)), None
         await self._subscribe([Filter(topic) for topic in usual])
-        connection = self._link.standing
+        connection = self._link.connection
         mid = None
         if connection is not None:
             topic, payload = self.topics.full(f"request/{name}"), json.dumps(content).encode()
@@ -149,7 +149,7 @@ class CommandClient:
 
     def send(self, name: str, content: dict[str, Any]) -> None:
         """Send a request without waiting for its response; the request before may still be answered."""
-        connection = self._link.standing
+        connection = self._link.connection
         if connection is not None:
             connection.publish(self.topics.full(f"request/{name}"), json.dumps(content).encode())
 
@@ -169,7 +169,7 @@ class CommandClient:
             raise FailedError(f"{self.place} refuses the request {name}: {reason_in_words(reason)}")
 
     async def _subscribe(self, filters: list[Filter]) -> None:
-        connection = self._link.standing
+        connection = self._link.connection
         mid = None if connection is None else connection.subscribe(filters)
         if mid is None:
             raise BrokerError(self.ended_by or f"{self.place}: the connection is lost")
@@ -197,8 +197,8 @@ class CommandClient:
         """Note the connection, and subscribe again after a loss."""
         del accepted
         again, self.ended_by = self.ended_by is not None, None
-        if again and self._link.standing is not None:
-            self._link.standing.subscribe(self._filters)
+        if again and self._link.connection is not None:
+            self._link.connection.subscribe(self._filters)
         self._changed.set()
 
     def ended(self, ended: Disconnect) -> None:

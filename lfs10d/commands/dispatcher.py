@@ -48,21 +48,21 @@ class Dispatcher:
         # What is too large is not returned either: a slow broker would have us keep it.
         correlation = request.correlation if size <= LARGEST_CORRELATION else None
         reply_to = ReplyTo(request.response_topic or own, correlation, name[:LONGEST_NAME])
-        verdict = self._responder.admission.admit(
+        decision = self._responder.admission.admit(
             name, request.payload, retained=request.retained, reply_to=reply_to, now=now, correlation=size
         )
-        match verdict:
+        match decision:
             case Ignored():
                 return
             case Answered(command=command, result=result, took=took):
-                if verdict.clear:
+                if decision.clear:
                     self._responder.clear(request.topic)
-                self._log_answered(reply_to.name, verdict, now)
+                self._log_answered(reply_to.name, decision, now)
                 self._responder.respond(reply_to, command, result, took)
             case Waiting():
                 log.debug("request %s repeats one that still runs", escape(reply_to.name))
             case Admitted():
-                self._begin(verdict, reply_to)
+                self._begin(decision, reply_to)
 
     def _begin(self, admitted: Admitted[ReplyTo], reply_to: ReplyTo) -> None:
         if self._ending:
@@ -86,10 +86,10 @@ class Dispatcher:
             result = task.result()
         self._responder.finish(admitted, reply_to, result)
 
-    def _log_answered(self, name: str, verdict: Answered, now: float) -> None:
+    def _log_answered(self, name: str, decision: Answered, now: float) -> None:
         """Log a request that was answered at once; of a flood only that there is one."""
-        if not verdict.flood:
-            result = verdict.result
+        if not decision.flood:
+            result = decision.result
             status = f"{result.status} ({result.code})" if result.code else result.status
             log.info("request %s: %s", escape(name), status)
         elif now >= self._flood_logged_until:

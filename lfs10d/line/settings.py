@@ -38,7 +38,7 @@ def port_settings(line: LineConfig) -> PortSettings:
 
 def line_rules(line: LineConfig) -> LineRules:
     """Return how the line is spoken on."""
-    return LineRules(extra_gap=line.extra_gap, turnaround_delay=line.turnaround_delay, echo=line.echo)
+    return LineRules(extra_gap=line.extra_gap, broadcast_delay=line.turnaround_delay, echo=line.echo)
 
 
 def poll_rules(poll: PollConfig) -> PollRules:

@@ -32,7 +32,7 @@ class Ask:
 class LineContext:
     """The state of the line that every exchange needs. Durations are seconds.
 
-    `adapter_latency` is the longest pause that the adapter may put into one answer. `turnaround_delay` is the silence
+    `adapter_latency` is the longest pause that the adapter may put into one answer. `broadcast_delay` is the silence
     after a broadcast. `gap` is the required silence where it is longer than the timing's (a change of rate).
     `echo_proved`: that the adapter has no echo was observed, not only configured. `paced`: the port is a real wire, on
     which nothing arrives sooner than the rate allows (not so on a pseudo terminal or behind a network bridge).
@@ -41,7 +41,7 @@ class LineContext:
     timing: LineTiming
     echo: Echo
     adapter_latency: float
-    turnaround_delay: float = 0.1
+    broadcast_delay: float = 0.1
     gap: float | None = None
     paced: bool = False
     echo_proved: bool = False

@@ -59,10 +59,10 @@ class Wait(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class LineRules:
-    """Settings for every exchange on this line. Durations in s; `turnaround_delay` is the silence after a broadcast."""
+    """Settings for every exchange on this line. Durations in s; `broadcast_delay` is the silence after a broadcast."""
 
     extra_gap: float = 0.0
-    turnaround_delay: float = 0.1
+    broadcast_delay: float = 0.1
     echo: Literal["auto", "on", "off"] = "auto"
 
 
@@ -251,7 +251,7 @@ class Bus:
             timing=self.timing,
             echo=self._echo.state,
             adapter_latency=self.port.adapter_latency,
-            turnaround_delay=self.rules.turnaround_delay,
+            broadcast_delay=self.rules.broadcast_delay,
             gap=self._gap,
             paced=self.port.paced,
             echo_proved=self._echo.proved,

@@ -159,8 +159,8 @@ _CLOSENESS = {FaultCode.COLLISION: 4, FaultCode.MALFORMED: 3, FaultCode.WRONG_FU
 """Which of several frames tells most: the asked slave's own, nearest to what was asked."""
 
 
-def _closeness(verdict: Diagnosis) -> int:
-    return _CLOSENESS[verdict.code]
+def _closeness(diagnosis: Diagnosis) -> int:
+    return _CLOSENESS[diagnosis.code]
 
 
 def _judge(request: Request, body: bytes) -> Diagnosis:

@@ -34,7 +34,7 @@ Rules
    count, function, slave), only a late answer, too few bytes, a wrong check; nothing but echo is `timeout`.
 9. A right frame is no answer to us if another master was heard asking the same slave after our request, or right
    before it and not answered yet: `collision`; our request counts as not answered. No frame says whom it answers.
-10. A broadcast is answered by nobody and is over after `turnaround_delay`.
+10. A broadcast is answered by nobody and is over after `broadcast_delay`.
 """
 
 from __future__ import annotations
@@ -253,7 +253,7 @@ class Exchange:
         """
         ask, line = self._ask, self._line
         if ask.request.slave == BROADCAST:
-            over = self._sent_end + line.turnaround_delay
+            over = self._sent_end + line.broadcast_delay
             return over, over
         first = max(self._sent_end + ask.timeout, self._reception.late_at + self._patience)
         size = self._answer_size

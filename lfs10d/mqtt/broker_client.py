@@ -66,8 +66,8 @@ class BrokerClient:
         return self._nodes[self._reconnect.node]
 
     @property
-    def standing(self) -> Connection | None:
-        """The connection while it stands."""
+    def connection(self) -> Connection | None:
+        """The connection that the broker has accepted; None where there is none."""
         return self._connection if self._accepted is not None else None
 
     @property
@@ -79,7 +79,7 @@ class BrokerClient:
     def summary(self) -> str:
         """Whether the broker is connected, in words, with the node where there are several."""
         broker = self.settings.place if len(self._nodes) > 1 else "broker"
-        return f"{broker} {'away' if self.standing is None else 'connected'}"
+        return f"{broker} {'away' if self.connection is None else 'connected'}"
 
     @property
     def duplicate(self) -> bool:
@@ -113,12 +113,12 @@ class BrokerClient:
         self._wanted = False
         if self._timer is not None:
             self._timer.cancel()
-        standing = self.standing
+        connection = self.connection
         if will:
             self.drop("left without DISCONNECT")
-        elif standing is not None:
+        elif connection is not None:
             self._over.clear()
-            standing.leave()
+            connection.leave()
             try:
                 await asyncio.wait_for(self._over.wait(), within)
             except TimeoutError:

@@ -50,7 +50,7 @@ class CleanExit:
 
     @property
     def _connected(self) -> bool:
-        return self._client.standing is not None
+        return self._client.connection is not None
 
     async def _until(self, reached: Callable[[], bool], deadline: float) -> bool:
         """Wait until this is so; return False if it is not by the deadline, or the connection is lost."""

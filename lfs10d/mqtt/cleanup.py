@@ -48,7 +48,7 @@ class Cleanup:
         self._owned = owned
         self._clear = clear
         self._connect = connect
-        self._standing: Connection | None = None
+        self._first: Connection | None = None
         self._second: _SecondConnection | None = None
         self._search: OrphanSearch | None = None
         self._subscription: int | None = None
@@ -56,21 +56,21 @@ class Cleanup:
     @property
     def under_way(self) -> bool:
         """The broker is asked what it retains, or is sending it."""
-        return self._standing is not None
+        return self._first is not None
 
     @property
     def has_second(self) -> bool:
         """The second connection is begun, and not over."""
         return self._second is not None
 
-    def begin(self, standing: Connection | None) -> None:
+    def begin(self, first: Connection | None) -> None:
         """Have the broker send what it retains, unless that is under way or it is away."""
         self.wanted = False
-        if standing is None or self.under_way:
+        if first is None or self.under_way:
             return
-        self._standing = standing
+        self._first = first
         if self.single:
-            self._search_over(standing)
+            self._search_over(first)
         else:
             self._second = _SecondConnection(
                 lambda events: self._connect(events, SECOND_CLIENT),
@@ -98,7 +98,7 @@ class Cleanup:
             if self.single:
                 log.info("the broker may permit one connection only: no second one is made from now on")
             self._second.abandon()
-        self._standing = self._second = self._search = None
+        self._first = self._second = self._search = None
 
     def subscribed(self, mid: int) -> None:
         """Take the broker's answer to a subscription: from now on it is silent when it has sent everything."""
@@ -114,21 +114,21 @@ class Cleanup:
 
     def _on_second_end(self, ended: Disconnect) -> None:
         self._second = None
-        if self._standing is not None:
+        if self._first is not None:
             log.info("%s, for a second connection; retained topics are read over the first", ended.message)
-            self._search_over(self._standing)
+            self._search_over(self._first)
 
     def _end(self, search: OrphanSearch) -> None:
-        standing, second = self._standing, self._second
-        if standing is None or search is not self._search:
+        first, second = self._first, self._second
+        if first is None or search is not self._search:
             return
         loop = asyncio.get_running_loop()
         if loop.time() < search.due:
             loop.call_at(search.due, self._end, search)
             return
-        self._standing = self._second = self._search = None
+        self._first = self._second = self._search = None
         if second is None:
-            standing.unsubscribe(self._topics.retained_of_devices)
+            first.unsubscribe(self._topics.retained_of_devices)
         else:
             second.leave()
         self._clear_some(search.orphans(self._owned), 0)

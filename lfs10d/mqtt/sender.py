@@ -199,7 +199,7 @@ class Sender:
             self._turn = asyncio.get_running_loop().call_soon(self._send_some)
 
     def _send_a_few(self) -> bool:
-        """Send up to `LETTERS_AT_ONCE`; return whether nothing more may go now."""
+        """Send up to `ITEMS_AT_ONCE`; return whether nothing more may go now."""
         now = self._now()
         for _ in range(ITEMS_AT_ONCE):
             item = self._outbox.next(now, batch=self._assembly is None)

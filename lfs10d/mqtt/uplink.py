@@ -89,7 +89,7 @@ class Uplink:
     @property
     def connected(self) -> bool:
         """The broker has accepted us."""
-        return self._client.standing is not None
+        return self._client.connection is not None
 
     @property
     def version(self) -> Version | None:
@@ -224,18 +224,18 @@ class Uplink:
 
     def accepted(self, accepted: Accepted) -> None:
         """Read our retained topics back, if that is wanted; then subscribe, and send the burst."""
-        standing, reader = self._client.standing, self._retained_reader
-        if standing is not None and reader is not None and not reader.over:
-            reader.begin(standing, partial(self._begin, accepted))
+        connection, reader = self._client.connection, self._retained_reader
+        if connection is not None and reader is not None and not reader.over:
+            reader.begin(connection, partial(self._begin, accepted))
         else:
             self._begin(accepted)
 
     def _begin(self, accepted: Accepted) -> None:
-        standing = self._client.standing
-        if standing is None:
+        connection = self._client.connection
+        if connection is None:
             return
-        self._sender.connected(standing, accepted)
-        self._subscription = standing.subscribe([Filter(self._topics.requests), Filter(self._topics.availability)])
+        self._sender.connected(connection, accepted)
+        self._subscription = connection.subscribe([Filter(self._topics.requests), Filter(self._topics.availability)])
         self.requests_denied = False
         self._outbox.burst(self._events.burst(), _ONLINE)
         self._announcing = self._cleanup.wanted = True
@@ -266,7 +266,7 @@ class Uplink:
             if self._announcing:
                 self._announcing = False
                 self._events.on_announced()
-                self.discovery.begin(self._client.standing)
+                self.discovery.begin(self._client.connection)
             self._clear_if_out()
         self._clean_exit.on_progress()
 
@@ -299,8 +299,8 @@ class Uplink:
             self._on_request(request)
 
     def _ask_for_retained_requests(self) -> None:
-        if (standing := self._client.standing) is not None:
-            standing.subscribe([Filter(self._topics.requests)])
+        if (connection := self._client.connection) is not None:
+            connection.subscribe([Filter(self._topics.requests)])
 
     def _on_offline(self) -> None:
         """Contradict the will of our earlier connection, or another client; the burst will do so by itself."""
@@ -314,7 +314,7 @@ class Uplink:
 
     def _clear_if_out(self) -> None:
         if self._cleanup.wanted and self._outbox.retained_out:
-            self._cleanup.begin(self._client.standing)
+            self._cleanup.begin(self._client.connection)
 
     def _clear_orphans(self, topics: Iterable[str]) -> None:
         self.publish(telemetry.retained(topic, None) for topic in topics)

@@ -80,14 +80,14 @@ def _inactive(last_code: FaultCode | None, cleared: int | None) -> dict[str, obj
 class DeviceAlarm:
     """The error of one device; `rise_after` may be changed at any time and holds from the next failure on."""
 
-    __slots__ = ("_cleared", "_last_code", "_run", "_standing", "active", "rise_after")
+    __slots__ = ("_cleared", "_last_code", "_lasting", "_run", "active", "rise_after")
 
     def __init__(self, rise_after: int) -> None:
         self.rise_after = rise_after
         self.active = False
         """An error of the polls is active."""
         self._run: _Run | None = None
-        self._standing: _Run | None = None
+        self._lasting: _Run | None = None
         self._last_code: FaultCode | None = None
         self._cleared: int | None = None
 
@@ -115,26 +115,26 @@ class DeviceAlarm:
         self._cleared = ts
         return True
 
-    def stands(self, fault: Fault | None, ts: int) -> bool:
+    def set_lasting(self, fault: Fault | None, ts: int) -> bool:
         """Take an error that no poll raises or clears, None where it is over; return whether that is a change."""
-        before = self._standing
+        before = self._lasting
         if fault is None:
-            self._standing = None
+            self._lasting = None
             if before is not None and not self.active:
                 self._last_code = before.fault.code
                 self._cleared = ts
         elif before is None:
-            self._standing = _Run(fault, ts, ts)
-        return (before is None) is not (self._standing is None)
+            self._lasting = _Run(fault, ts, ts)
+        return (before is None) is not (self._lasting is None)
 
     def payload(self) -> dict[str, object]:
         """Return the error object."""
-        run, standing = self._run if self.active else None, self._standing
+        run, lasting = self._run if self.active else None, self._lasting
         if run is not None:
             codes = [code.value for code in run.codes if code != run.fault.code]
-            return run.payload(codes if standing is None else [*codes, standing.fault.code.value])
-        if standing is not None:
-            return standing.payload([])
+            return run.payload(codes if lasting is None else [*codes, lasting.fault.code.value])
+        if lasting is not None:
+            return lasting.payload([])
         return _inactive(self._last_code, self._cleared)
 
 

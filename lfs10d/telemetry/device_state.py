@@ -134,13 +134,13 @@ class DeviceState:
     def mask(self, now: Instant) -> list[Publication]:
         """Take the device's own error back: what ails it is not the device."""
         ended = self._alarm.ended(now.ts())
-        return [self._error()] if self._alarm.stands(None, now.ts()) or ended else []
+        return [self._error()] if self._alarm.set_lasting(None, now.ts()) or ended else []
 
     def on_answered_twice(self, heard: AnsweredTwice, now: Instant) -> list[Publication]:
         """Take that a second answer comes to each request, or no longer does."""
         ts = now.ts(heard.at)
         published = []
-        if self._alarm.stands(heard.fault, ts):
+        if self._alarm.set_lasting(heard.fault, ts):
             published.append(self._error())
             if heard.fault is not None:
                 facts = {"device": self.info.name, "slave": heard.slave, "message": heard.fault.message}

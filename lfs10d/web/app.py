@@ -24,7 +24,17 @@ from lfs10d.schema.fields import Name
 from lfs10d.web import metrics
 from lfs10d.web.actions import DEEPEST_DATA, Answer
 from lfs10d.web.connection import LARGEST_HEAD
-from lfs10d.web.guard import HEADER, HEADERS, HostList, Token, Verdict, cookies_of, same_origin, set_cookie, viewer_of
+from lfs10d.web.guard import (
+    HEADER,
+    HEADERS,
+    HostList,
+    Token,
+    TokenCheck,
+    cookies_of,
+    same_origin,
+    set_cookie,
+    viewer_of,
+)
 from lfs10d.web.pruned import pruned
 from lfs10d.web.viewers import Viewers
 
@@ -136,10 +146,10 @@ class _Pages:
 
     async def session(self, request: Request) -> Response:
         """Tell whether this viewer may change anything; a cookie of an older token is taken back."""
-        verdict = self._judge(request)
-        body = {"controls": self._token.known, "open": verdict is Verdict.RIGHT}
-        response = _refused(verdict) if verdict is Verdict.LIMITED else JSONResponse(body)
-        if verdict is Verdict.WRONG:
+        checked = self._judge(request)
+        body = {"controls": self._token.known, "open": checked is TokenCheck.RIGHT}
+        response = _refused(checked) if checked is TokenCheck.LIMITED else JSONResponse(body)
+        if checked is TokenCheck.WRONG:
             response.headers["set-cookie"] = set_cookie("", secure=_over_tls(request))
         return response
 
@@ -153,9 +163,9 @@ class _Pages:
         given = content.get("token")
         if not self._token.known:
             return _problem(403, "not_allowed", "this page has no token, so it is for reading alone")
-        verdict = self._token.check(given if isinstance(given, str) else "", _client(request), time.monotonic())
-        if verdict is not Verdict.RIGHT:
-            return _refused(verdict)
+        checked = self._token.check(given if isinstance(given, str) else "", _client(request), time.monotonic())
+        if checked is not TokenCheck.RIGHT:
+            return _refused(checked)
         response = JSONResponse({"status": "ok"})
         response.headers["set-cookie"] = set_cookie(self._token.cookie.reveal(), secure=_over_tls(request))
         return response
@@ -211,7 +221,7 @@ class _Pages:
         """Return the page; which line or device it shows is decided in the browser."""
         return _file(self._files["index.html"], request)
 
-    def _judge(self, request: Request) -> Verdict:
+    def _judge(self, request: Request) -> TokenCheck:
         cookies = cookies_of(request.headers.get("cookie", ""))
         return self._token.judge(request.headers, cookies, _client(request), time.monotonic())
 
@@ -221,8 +231,8 @@ class _Pages:
             return foreign
         if not self._token.known:
             return _problem(403, "not_allowed", "this page has no token, so it is for reading alone")
-        verdict = self._judge(request)
-        return await _content(request) if verdict is Verdict.RIGHT else _refused(verdict)
+        checked = self._judge(request)
+        return await _content(request) if checked is TokenCheck.RIGHT else _refused(checked)
 
 
 def _static_files() -> dict[str, tuple[str, bytes, str]]:
@@ -284,12 +294,12 @@ def _answered(answer: Answer) -> Response:
     return Response(json.dumps(body), answer.code, media_type="application/json")
 
 
-def _refused(verdict: Verdict) -> Response:
-    if verdict is Verdict.LIMITED:
+def _refused(checked: TokenCheck) -> Response:
+    if checked is TokenCheck.LIMITED:
         response = _problem(429, "rate_limited", "too many wrong tokens: wait a minute, then try again")
         response.headers["retry-after"] = "60"
         return response
-    if verdict is Verdict.WRONG:
+    if checked is TokenCheck.WRONG:
         return _problem(401, "wrong_token", "the token is wrong")
     return _problem(401, "no_token", "this needs the token")
 

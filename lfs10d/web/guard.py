@@ -54,8 +54,8 @@ HEADERS: Final = (
 _HOST: Final = re.compile(r"(?P<name>\[[0-9A-Fa-f:.]{2,45}\]|[A-Za-z0-9._-]{1,253}?)\.?(?::(?P<port>\d{1,5}))?")
 
 
-class Verdict(StrEnum):
-    """What becomes of a token."""
+class TokenCheck(StrEnum):
+    """The result of comparing a token."""
 
     RIGHT = "right"
     WRONG = "wrong"
@@ -137,29 +137,29 @@ class Token:
         digest = hmac.new(key, b"lfs10d web session", hashlib.sha256).digest()
         return Secret(base64.urlsafe_b64encode(digest).decode().rstrip("="))
 
-    def judge(self, headers: Mapping[str, str], cookies: Mapping[str, str], client: str, now: float) -> Verdict:
+    def judge(self, headers: Mapping[str, str], cookies: Mapping[str, str], client: str, now: float) -> TokenCheck:
         """Return what the token of a request is worth: `Authorization: Bearer`, or else the cookie."""
         scheme, _, given = headers.get("authorization", "").partition(" ")
         if scheme.lower() == "bearer":
             return self.check(given.strip(), client, now)
         if COOKIE in cookies:
             return self._compared(cookies[COOKIE], self.cookie, client, now)
-        return Verdict.ABSENT
+        return TokenCheck.ABSENT
 
-    def check(self, given: str, client: str, now: float) -> Verdict:
+    def check(self, given: str, client: str, now: float) -> TokenCheck:
         """Compare a token that was given."""
         return self._compared(given, self._token or Secret(""), client, now)
 
-    def _compared(self, given: str, right: Secret, client: str, now: float) -> Verdict:
+    def _compared(self, given: str, right: Secret, client: str, now: float) -> TokenCheck:
         if self.limited(client, now):
-            return Verdict.LIMITED
+            return TokenCheck.LIMITED
         if self._token is not None and len(given) <= LONGEST_TOKEN and given.isprintable() and Secret(given) == right:
-            return Verdict.RIGHT
+            return TokenCheck.RIGHT
         if client not in self._wrong and len(self._wrong) >= MOST_ADDRESSES:
             self._wrong = {each: times for each, times in self._wrong.items() if now - times[-1] < MINUTE}
         self._wrong.setdefault(client, deque(maxlen=WRONG_PER_MINUTE)).append(now)
         self._all.append(now)
-        return Verdict.WRONG
+        return TokenCheck.WRONG
 
     def limited(self, client: str, now: float) -> bool:
         """Return whether there were too many wrong tokens within the last minute, from there or in all."""

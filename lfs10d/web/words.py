@@ -83,9 +83,9 @@ def answer(response: Mapping[str, Any]) -> str:
     error = response.get("error")
     error = error if isinstance(error, Mapping) else {}
     code, message = error.get("code"), error.get("message")
-    verdict = "Nothing was changed" if response.get("status") == "rejected" else "It failed"
+    outcome = "Nothing was changed" if response.get("status") == "rejected" else "It failed"
     parts = [
-        f"{verdict}: {meaning(code)}.",
+        f"{outcome}: {meaning(code)}.",
         f"{message[0].upper()}{message[1:]}." if isinstance(message, str) and message else "",
         remedy(code),
     ]

@@ -46,7 +46,7 @@ def test_what_comes_to_its_end_is_returned_and_raised() -> None:
 
 @pytest.mark.parametrize("number", ENDING)
 def test_a_signal_cancels_it_once_and_it_ends_as_it_wants(number: signal.Signals) -> None:
-    course = []
+    ends = []
 
     async def waiting() -> None:
         try:
@@ -55,9 +55,9 @@ def test_a_signal_cancels_it_once_and_it_ends_as_it_wants(number: signal.Signals
         finally:
             os.kill(os.getpid(), signal.SIGTERM)
             await asyncio.sleep(0.02)
-            course.append("left")
+            ends.append("left")
 
     with pytest.raises(KeyboardInterrupt):
         event_loop.run(waiting())
-    assert course == ["left"]
+    assert ends == ["left"]
     assert {signal.getsignal(each) for each in ENDING} == {signal.SIG_IGN}

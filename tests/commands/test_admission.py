@@ -16,9 +16,14 @@ from lfs10d.commands.message import LARGEST
 from tests.support.admissions import FORMS, NOW, Door, To
 
 
-def test_a_request_of_an_allowed_class_gets_a_ticket_with_its_parameters() -> None:
-    ticket = Door().ticket("device/read", {"id": "a", "to": 9})
-    assert (ticket.name, ticket.command.id, ticket.parameters, ticket.since) == ("device/read", "a", To(to=9), NOW)
+def test_a_request_of_an_allowed_class_is_admitted_with_its_parameters() -> None:
+    admitted = Door().admitted("device/read", {"id": "a", "to": 9})
+    assert (admitted.name, admitted.command.id, admitted.parameters, admitted.since) == (
+        "device/read",
+        "a",
+        To(to=9),
+        NOW,
+    )
 
 
 # Each check before the next: a request that is wrong in every way from here on is told the first.
@@ -41,11 +46,11 @@ def test_the_checks_come_in_the_order_of_the_contract(
     code: str, payload: bytes, name: str, retained: bool, flooded: bool  # noqa: FBT001 - columns of a table
 ) -> None:  # fmt: skip
     door = Door()
-    door.ticket("device/read", {"id": "used", "to": 1})
+    door.admitted("device/read", {"id": "used", "to": 1})
     if flooded:
         door.flood()
-    verdict = door.answered(name, payload, retained=retained)
-    assert (verdict.result.code, verdict.clear) == (code, code == "retained")
+    decision = door.answered(name, payload, retained=retained)
+    assert (decision.result.code, decision.clear) == (code, code == "retained")
 
 
 @pytest.mark.parametrize("retained", [True, False])

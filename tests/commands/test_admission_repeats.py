@@ -26,10 +26,10 @@ from tests.support.admissions import DAY, NOW, Door
 
 def test_a_repeat_gets_the_first_answer_and_its_time_again() -> None:
     door = Door()
-    ticket = door.ticket("device/read", {"id": "a", "to": 1})
+    admitted = door.admitted("device/read", {"id": "a", "to": 1})
     door.now += 0.25
     answer = ok({"from": 1})
-    assert door.done(ticket, answer) == []
+    assert door.done(admitted, answer) == []
     door.now += 10
     again = door.answered("device/read", {"to": 1, "id": "a"})
     assert (again.result, again.took, again.command.id, again.clear) == (answer, 0.25, "a", False)
@@ -37,22 +37,22 @@ def test_a_repeat_gets_the_first_answer_and_its_time_again() -> None:
 
 def test_repeats_wait_while_the_first_runs_and_are_all_given_back_once() -> None:
     door = Door()
-    ticket = door.ticket("device/read", {"id": "a", "to": 1})
+    admitted = door.admitted("device/read", {"id": "a", "to": 1})
     assert door.tell("device/read", {"id": "a", "to": 1}, reply_to="one") == Waiting()
     assert door.tell("device/read", {"transaction": "a", "to": 1}, reply_to="two") == Waiting()
-    assert door.done(ticket) == [("a", "one"), (None, "two")]
+    assert door.done(admitted) == [("a", "one"), (None, "two")]
     assert isinstance(door.tell("device/read", {"id": "a", "to": 1}), Answered)
 
 
 def test_of_the_repeats_of_one_request_16_wait_and_more_are_busy() -> None:
     door = Door()
-    ticket = door.ticket("device/read", {"id": "a", "to": 1})
+    admitted = door.admitted("device/read", {"id": "a", "to": 1})
     for number in range(WAITING):
         assert door.tell("device/read", {"id": "a", "to": 1}, reply_to=str(number)) == Waiting()
     assert door.code("device/read", {"id": "a", "to": 1}) == "busy"
-    other = door.ticket("device/read", {"id": "b", "to": 1})
+    other = door.admitted("device/read", {"id": "b", "to": 1})
     assert door.tell("device/read", {"id": "b", "to": 1}) == Waiting(), "those of another request are its own"
-    assert [reply_to for _, reply_to in door.done(ticket)] == [str(number) for number in range(WAITING)]
+    assert [reply_to for _, reply_to in door.done(admitted)] == [str(number) for number in range(WAITING)]
     assert len(door.done(other)) == 1
     assert door.answered("device/read", {"id": "a", "to": 1}).result == ok()
 
@@ -60,7 +60,7 @@ def test_of_the_repeats_of_one_request_16_wait_and_more_are_busy() -> None:
 def test_correlation_data_may_have_1024_bytes_and_no_more_whatever_the_payload() -> None:
     door = Door()
     for name in ("device/read", "no/request"):
-        verdict = door.admission.admit(
+        decision = door.admission.admit(
             name,
             b'{"id": "a", "to": 1}',
             retained=False,
@@ -68,8 +68,8 @@ def test_correlation_data_may_have_1024_bytes_and_no_more_whatever_the_payload()
             now=NOW,
             correlation=LARGEST_CORRELATION + 1,
         )
-        assert isinstance(verdict, Answered)
-        assert (verdict.command.id, verdict.result.status, verdict.result.code) == ("a", "rejected", "too_large")
+        assert isinstance(decision, Answered)
+        assert (decision.command.id, decision.result.status, decision.result.code) == ("a", "rejected", "too_large")
     allowed = door.admission.admit(
         "device/read",
         b'{"id": "a", "to": 1}',
@@ -83,9 +83,9 @@ def test_correlation_data_may_have_1024_bytes_and_no_more_whatever_the_payload()
 
 def test_a_repeat_with_other_parameters_is_a_conflict_while_the_first_runs_and_afterwards() -> None:
     door = Door()
-    ticket = door.ticket("device/read", {"id": "a", "to": 1})
+    admitted = door.admitted("device/read", {"id": "a", "to": 1})
     assert door.code("device/read", {"id": "a", "to": 2}) == "duplicate_conflict"
-    door.done(ticket)
+    door.done(admitted)
     assert door.code("device/read", {"id": "a", "to": 2}) == "duplicate_conflict"
     assert door.code("device/read", {"id": "a"}) == "duplicate_conflict"
     assert isinstance(door.tell("device/read", {"id": "a", "to": 1}), Answered)
@@ -93,7 +93,7 @@ def test_a_repeat_with_other_parameters_is_a_conflict_while_the_first_runs_and_a
 
 def test_an_id_is_one_per_request_and_text_is_no_number() -> None:
     door = Door()
-    door.done(door.ticket("device/read", {"id": 1, "to": 1}))
+    door.done(door.admitted("device/read", {"id": 1, "to": 1}))
     assert isinstance(door.tell("device/read", {"id": "1", "to": 2}), Admitted)
     assert isinstance(door.tell("device/readdress", {"id": 1, "to": 2}), Admitted)
     assert isinstance(door.tell("health", {"id": 1}), Admitted)
@@ -102,7 +102,7 @@ def test_an_id_is_one_per_request_and_text_is_no_number() -> None:
 def test_requests_without_an_id_are_never_repeats() -> None:
     door = Door()
     for _ in range(5):
-        door.done(door.ticket("device/read", {"to": 1}))
+        door.done(door.admitted("device/read", {"to": 1}))
 
 
 def test_a_rejected_parameter_is_remembered_with_its_id() -> None:
@@ -116,9 +116,9 @@ def test_a_rejected_parameter_is_remembered_with_its_id() -> None:
 @pytest.mark.parametrize(("name", "kept"), [("device/read", REMEMBERED_FOR), ("device/readdress", DAY)])
 def test_an_answer_is_remembered_from_the_response_on_for_as_long_as_its_form_says(name: str, kept: float) -> None:
     door = Door()
-    ticket = door.ticket(name, {"id": "a", "to": 1})
+    admitted = door.admitted(name, {"id": "a", "to": 1})
     door.now += 1e6  # however long it takes
-    door.done(ticket)
+    door.done(admitted)
     door.now += kept - 0.001
     assert isinstance(door.tell(name, {"id": "a", "to": 1}), Answered)
     door.now += 0.001
@@ -129,7 +129,7 @@ def fill(door: Door, count: int, first: int = 0) -> None:
     """Let `count` requests with ids of their own come and go, as fast as the rate allows."""
     for number in range(first, first + count):
         door.now += 1 / RATE + 1e-9
-        door.done(door.ticket("health", {"id": number}))
+        door.done(door.admitted("health", {"id": number}))
 
 
 def test_256_ids_are_remembered_and_the_oldest_goes_first() -> None:
@@ -143,8 +143,8 @@ def test_256_ids_are_remembered_and_the_oldest_goes_first() -> None:
 
 def test_a_flood_of_ids_pushes_out_neither_a_physical_change_nor_what_still_runs() -> None:
     door = Door()
-    door.done(door.ticket("device/readdress", {"id": "moved", "to": 9}))
-    running = door.ticket("device/read", {"id": "running", "to": 1})
+    door.done(door.admitted("device/readdress", {"id": "moved", "to": 9}))
+    running = door.admitted("device/read", {"id": "running", "to": 1})
     fill(door, 3 * REMEMBERED)
     assert isinstance(door.tell("device/readdress", {"id": "moved", "to": 9}), Answered)
     assert isinstance(door.tell("device/read", {"id": "running", "to": 1}), Waiting)
@@ -153,12 +153,12 @@ def test_a_flood_of_ids_pushes_out_neither_a_physical_change_nor_what_still_runs
 
 def test_many_that_ran_at_once_are_forgotten_down_to_256() -> None:
     door = Door()
-    tickets = []
+    all_admitted = []
     for number in range(REMEMBERED + 50):
         door.now += 1 / RATE + 1e-9
-        tickets.append(door.ticket("health", {"id": number}))
-    for ticket in tickets:
-        door.done(ticket)
+        all_admitted.append(door.admitted("health", {"id": number}))
+    for admitted in all_admitted:
+        door.done(admitted)
     fill(door, 1, 1000)
     known = [isinstance(door.tell("health", {"id": number}), Answered) for number in (53, 52, 51, 50)]
     assert known == [True, True, True, False]
@@ -173,7 +173,7 @@ STEPS = st.lists(
 def test_every_request_is_given_back_exactly_once_and_no_id_is_performed_twice_within_a_minute(
     steps: list[tuple[int, int, bool, float]],
 ) -> None:
-    """The law of the door: each request comes back by a verdict or by `done`, never by both."""
+    """The law of the door: each request comes back by a decision or by `done`, never by both."""
     door = Door()
     running: list[Admitted[str]] = []
     owed = 0
@@ -182,19 +182,19 @@ def test_every_request_is_given_back_exactly_once_and_no_id_is_performed_twice_w
     for key, to, finish, pause in steps:
         door.now += pause
         owed += 1
-        verdict = door.tell("device/read", {"id": key, "to": to})
-        if isinstance(verdict, Answered):
+        decision = door.tell("device/read", {"id": key, "to": to})
+        if isinstance(decision, Answered):
             given += 1
-        elif isinstance(verdict, Admitted):
+        elif isinstance(decision, Admitted):
             assert key not in performed or door.now >= performed[key] + REMEMBERED_FOR
-            assert all(ticket.command.id != key for ticket in running)
-            running.append(verdict)
+            assert all(admitted.command.id != key for admitted in running)
+            running.append(decision)
         if finish and running:
-            ticket = running.pop(0)
-            given += 1 + len(door.done(ticket))
-            assert isinstance(ticket.command.id, int)
-            performed[ticket.command.id] = door.now
-    given += sum(1 + len(door.done(ticket)) for ticket in running)
+            admitted = running.pop(0)
+            given += 1 + len(door.done(admitted))
+            assert isinstance(admitted.command.id, int)
+            performed[admitted.command.id] = door.now
+    given += sum(1 + len(door.done(admitted)) for admitted in running)
     assert given == owed
 
 

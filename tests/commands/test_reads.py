@@ -26,10 +26,10 @@ class Line:
 
     def __init__(self) -> None:
         self.submitted: list[tuple[str, int]] = []
-        self.inquiries = PendingReads(lambda device, number: self.submitted.append((device, number)))
+        self.reads = PendingReads(lambda device, number: self.submitted.append((device, number)))
 
     async def begin(self, *devices: str) -> list[asyncio.Task[ReadResult | None]]:
-        tasks = [asyncio.create_task(self.inquiries.read(device)) for device in devices]
+        tasks = [asyncio.create_task(self.reads.read(device)) for device in devices]
         await asyncio.sleep(0)
         return tasks
 
@@ -44,8 +44,8 @@ def test_a_reading_tells_the_request_whose_number_it_has_and_no_other() -> None:
         one, two = await line.begin("a", "a")
         (_, first), (_, second) = line.submitted
         assert first != second
-        line.inquiries.on_reading(reading(), PUBLISHED)
-        line.inquiries.on_reading(reading(second), PUBLISHED)
+        line.reads.on_reading(reading(), PUBLISHED)
+        line.reads.on_reading(reading(second), PUBLISHED)
         assert await two == ReadResult(SAMPLE, None)
         assert not one.done()
         one.cancel()
@@ -58,7 +58,7 @@ def test_one_reading_may_answer_several_and_carries_its_fault() -> None:
         line = Line()
         tasks = await line.begin("a", "a")
         fault = Fault(FaultCode.PORT_LOST, "absent")
-        line.inquiries.on_reading(reading(*(number for _, number in line.submitted), fault=fault), PUBLISHED)
+        line.reads.on_reading(reading(*(number for _, number in line.submitted), fault=fault), PUBLISHED)
         assert await asyncio.gather(*tasks) == [ReadResult(SAMPLE, fault)] * 2
 
     run(scene())
@@ -70,7 +70,7 @@ def test_a_reading_nobody_waits_for_any_more_is_passed_over() -> None:
         (task,) = await line.begin("a")
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
-        line.inquiries.on_reading(reading(line.submitted[0][1], 99), PUBLISHED)
+        line.reads.on_reading(reading(line.submitted[0][1], 99), PUBLISHED)
         assert task.cancelled()
 
     run(scene())
@@ -80,8 +80,8 @@ def test_what_is_told_twice_counts_once() -> None:
     async def scene() -> None:
         line = Line()
         (task,) = await line.begin("a")
-        line.inquiries.on_reading(reading(line.submitted[0][1]), PUBLISHED)
-        line.inquiries.abandon({"a"})
+        line.reads.on_reading(reading(line.submitted[0][1]), PUBLISHED)
+        line.reads.abandon({"a"})
         assert await task == ReadResult(SAMPLE, None)
 
     run(scene())
@@ -91,10 +91,10 @@ def test_those_who_wait_for_a_device_that_is_gone_are_told_and_the_others_wait_o
     async def scene() -> None:
         line = Line()
         gone, stays = await line.begin("a", "b")
-        line.inquiries.abandon({"a", "nobody"})
+        line.reads.abandon({"a", "nobody"})
         assert await gone is None
         assert not stays.done()
-        line.inquiries.on_reading(reading(line.submitted[1][1], device="b"), [])
+        line.reads.on_reading(reading(line.submitted[1][1], device="b"), [])
         assert await stays == ReadResult(None, None)
 
     run(scene())

@@ -37,14 +37,14 @@ class Broker:
     def admit(self, name: str, reply_to: ReplyTo) -> Admitted[ReplyTo] | Waiting | Answered:
         now = asyncio.get_running_loop().time()
         payload = json.dumps({"id": 7}).encode()
-        verdict = self.responder.admission.admit(name, payload, retained=False, reply_to=reply_to, now=now)
-        assert isinstance(verdict, Admitted | Waiting | Answered)
-        return verdict
+        decision = self.responder.admission.admit(name, payload, retained=False, reply_to=reply_to, now=now)
+        assert isinstance(decision, Admitted | Waiting | Answered)
+        return decision
 
     def admitted(self, name: str, reply_to: ReplyTo) -> Admitted[ReplyTo]:
-        verdict = self.admit(name, reply_to)
-        assert isinstance(verdict, Admitted)
-        return verdict
+        decision = self.admit(name, reply_to)
+        assert isinstance(decision, Admitted)
+        return decision
 
     @property
     def answers(self) -> list[tuple[str, object, object, bytes | None]]:

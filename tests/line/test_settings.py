@@ -53,7 +53,7 @@ def test_the_line_is_spoken_on_as_configured(loaded: LoadedConfig) -> None:
     rules = line_rules(loaded.config.line)
     timing = timing_of(loaded.config.line)
 
-    assert (rules.extra_gap, rules.turnaround_delay, rules.echo) == (0.005, 0.05, "on")
+    assert (rules.extra_gap, rules.broadcast_delay, rules.echo) == (0.005, 0.05, "on")
     assert timing.bits == 12
     assert timing.gap == pytest.approx(3.5 * 12 / 19200 + 0.005)
 

@@ -35,7 +35,7 @@ def test_messages_go_and_come_with_all_that_belongs_to_them(mosquitto: Mosquitto
             accepted = await client.opened(PATIENCE)
             assert accepted is await client.opened(PATIENCE)
             assert accepted.version is Version.V5
-            connection = client.standing
+            connection = client.connection
             assert connection is not None
             subscription = connection.subscribe([Filter("in/#"), Filter("in/too", qos=0)])
             await witness.until(lambda: subscription in witness.subscriptions)
@@ -79,7 +79,7 @@ def test_what_is_published_under_the_cork_goes_by_one_segment_when_it_is_taken_o
     async def scenario() -> None:
         async with serving(answer) as port, connecting(settings_of(port)) as (client, _):
             await client.opened(PATIENCE)
-            connection = client.standing
+            connection = client.connection
             assert connection is not None
             connection.cork(on=True)
             for number in range(3):
@@ -175,7 +175,7 @@ def test_a_broker_that_refuses_5_is_spoken_to_in_3_1_1_with_one_warning(
         old_broker.refusal = refused_by
         async with old_broker.running() as port, connecting(settings_of(port)) as (client, witness):
             assert (await client.opened(PATIENCE)).version is Version.V311
-            connection = client.standing
+            connection = client.connection
             assert connection is not None
             mid = connection.publish("t", b"x", correlation=b"ignored")
             subscription = connection.subscribe([Filter("in")])

@@ -84,7 +84,7 @@ def test_tls_with_the_right_authority_connects(mosquitto: Mosquitto, authority: 
         settings = settings_of(mosquitto.port, host="localhost", tls=Tls(ca=authority.ca))
         async with connecting(settings) as (client, witness):
             await client.opened(PATIENCE)
-            connection = client.standing
+            connection = client.connection
             assert connection is not None
             mid = connection.publish("t", b"x" * 100_000)
             await witness.until(lambda: mid in witness.acknowledgements)

@@ -23,7 +23,7 @@ def test_a_lost_connection_comes_back(mosquitto: Mosquitto, caplog: pytest.LogCa
             await client.opened(PATIENCE)
             mosquitto.kill()
             await witness.until(lambda: "ended" in witness.told)
-            assert client.standing is None
+            assert client.connection is None
             assert client.version is None
             mosquitto.start()
             await witness.until(lambda: witness.told == ["accepted", "ended", "accepted"])

@@ -56,9 +56,9 @@ class Taker:
         self.come = asyncio.Event()
 
     def accepted(self, _: Accepted) -> None:
-        standing = self.client.standing
-        assert standing is not None
-        standing.subscribe([Filter("t")])
+        connection = self.client.connection
+        assert connection is not None
+        connection.subscribe([Filter("t")])
 
     def ended(self, ended: Disconnect) -> None:
         self.endings.append(ended)

@@ -68,7 +68,7 @@ def test_what_is_cleared_just_before_a_reload_is_cleared_once(mosquitto: Mosquit
     asyncio.run(scenario())
 
 
-def test_a_reload_during_a_sweep_does_not_begin_another(mosquitto: Mosquitto) -> None:
+def test_a_reload_during_a_cleanup_does_not_begin_another(mosquitto: Mosquitto) -> None:
     mosquitto.publish(f"{B}/device/gone/state", "x", retain=True)
 
     async def scenario() -> None:

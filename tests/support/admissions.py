@@ -49,23 +49,23 @@ class Door:
         payload = content if isinstance(content, bytes) else json.dumps({} if content is None else content).encode()
         return self.admission.admit(name, payload, retained=retained, reply_to=reply_to, now=self.now)
 
-    def ticket(self, name: str, content: object = None) -> Admitted[str]:
-        verdict = self.tell(name, content)
-        assert isinstance(verdict, Admitted)
-        return verdict
+    def admitted(self, name: str, content: object = None) -> Admitted[str]:
+        decision = self.tell(name, content)
+        assert isinstance(decision, Admitted)
+        return decision
 
     def answered(self, name: str, content: object = None, *, retained: bool = False) -> Answered:
-        verdict = self.tell(name, content, retained=retained)
-        assert isinstance(verdict, Answered)
-        return verdict
+        decision = self.tell(name, content, retained=retained)
+        assert isinstance(decision, Answered)
+        return decision
 
     def code(self, name: str, content: object = None, *, retained: bool = False) -> str | None:
-        verdict = self.answered(name, content, retained=retained)
-        assert verdict.result.status == "rejected"
-        return verdict.result.code
+        decision = self.answered(name, content, retained=retained)
+        assert decision.result.status == "rejected"
+        return decision.result.code
 
-    def done(self, ticket: Admitted[str], answer: Result | None = None) -> list[tuple[object, str]]:
-        return [(call.id, reply_to) for call, reply_to in self.admission.done(ticket, answer or ok(), self.now)]
+    def done(self, admitted: Admitted[str], answer: Result | None = None) -> list[tuple[object, str]]:
+        return [(call.id, reply_to) for call, reply_to in self.admission.done(admitted, answer or ok(), self.now)]
 
     def flood(self) -> None:
         """Use up the burst."""

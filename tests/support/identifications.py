@@ -56,7 +56,7 @@ def outcome(
     )
 
 
-def interview(
+def identify(
     device: Callable[[ReadRegisters], Outcome],
     *,
     slave: int = 3,
@@ -93,10 +93,10 @@ def lfs10(slave: int = 3, wind: tuple[int, int] = WIND) -> Callable[[ReadRegiste
 
 def garbled(times: Sequence[bool]) -> Callable[[ReadRegisters], Outcome]:
     """Return an LFS10 whose value is garbled in these of the reads."""
-    course = iter(times)
+    garbles = iter(times)
 
     def device(request: ReadRegisters) -> Outcome:
-        if request.address == 1 and next(course):
+        if request.address == 1 and next(garbles):
             return outcome(request, code=FaultCode.CRC, heard=b"\x03\x03\x04garbled", unsolicited=0)
         return lfs10()(request)
 

@@ -72,7 +72,7 @@ class Mimic:
 
 @dataclass
 class Pretence:
-    """The line. `asked` is every question, `aside` everything to be done off the line, with what is answered to it."""
+    """The line. `asked` is every request, `awaited` everything to be done off the line."""
 
     sensors: list[Mimic] = field(default_factory=list)
     clock: ProcedureClock = field(default_factory=ProcedureClock)
@@ -81,9 +81,9 @@ class Pretence:
     asked: list[Ask] = field(default_factory=list)
     awaited: list[object] = field(default_factory=list)
     answer: object = None
-    """What is said to what goes aside: None, or why it failed."""
+    """The result of what is awaited: None, or why it failed."""
     later: list[tuple[float, Callable[[], object]]] = field(default_factory=list)
-    """What happens at its time, or as soon as the course looks up after that."""
+    """What happens at its time, or at the first request after that."""
     noise: set[tuple[int, int]] = field(default_factory=set)
     """Slave id and rate of the places where bytes come that make no frame."""
     turnaround: float = 0.005
@@ -110,7 +110,7 @@ class Pretence:
         return [request for request in self.requests if isinstance(request, WriteRegister)]
 
     def carry_out(self, steps: Generator[Step, Any, T], *, within: float = 600.0) -> T:
-        """Carry out a course to its end and return what it returned."""
+        """Carry out a procedure to its end and return its result."""
         value: object = None
         until = self.clock.now + within
         try:

@@ -1,4 +1,4 @@
-"""Blocking calls aside the loop."""
+"""Blocking calls beside the loop."""
 
 from __future__ import annotations
 

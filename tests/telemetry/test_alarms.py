@@ -218,8 +218,8 @@ def test_every_error_of_the_line_is_shown_when_it_rises_and_gone_when_it_ends(co
 def test_an_id_answered_twice_stands_whatever_the_polls_say() -> None:
     twice = Fault(FaultCode.DUPLICATE_ID, "slave 1 is answered for twice")
     alarm = DeviceAlarm(2)
-    assert alarm.stands(twice, 1000)
-    assert not alarm.stands(twice, 1500)
+    assert alarm.set_lasting(twice, 1000)
+    assert not alarm.set_lasting(twice, 1500)
     assert (alarm.payload()["code"], alarm.payload()["also"], alarm.payload()["since"]) == ("duplicate_id", [], 1000)
     assert not alarm.ended(2000)
     assert alarm.payload()["active"] is True
@@ -228,14 +228,14 @@ def test_an_id_answered_twice_stands_whatever_the_polls_say() -> None:
     assert (alarm.payload()["code"], alarm.payload()["also"]) == ("timeout", ["duplicate_id"])
     assert alarm.ended(5000)
     assert alarm.payload()["code"] == "duplicate_id"
-    assert alarm.stands(None, 6000)
-    assert not alarm.stands(None, 7000)
+    assert alarm.set_lasting(None, 6000)
+    assert not alarm.set_lasting(None, 7000)
     assert (alarm.payload()["last_code"], alarm.payload()["cleared"]) == ("duplicate_id", 6000)
 
 
 def test_what_stands_may_end_while_the_polls_fail() -> None:
     alarm = DeviceAlarm(1)
-    alarm.stands(Fault(FaultCode.DUPLICATE_ID, "twice"), 1000)
+    alarm.set_lasting(Fault(FaultCode.DUPLICATE_ID, "twice"), 1000)
     alarm.failed(Fault(FaultCode.TIMEOUT, "no answer"), 2000)
-    assert alarm.stands(None, 3000)
+    assert alarm.set_lasting(None, 3000)
     assert (alarm.payload()["code"], alarm.payload()["also"]) == ("timeout", [])

@@ -14,7 +14,7 @@ from lfs10d.web.guard import (
     Authority,
     HostList,
     Token,
-    Verdict,
+    TokenCheck,
     cookies_of,
     loopback,
     same_origin,
@@ -26,7 +26,7 @@ TOKEN = "correct-horse-battery"  # noqa: S105 - of a test
 HERE = "192.0.2.1"
 
 
-def verdict(token: Token, given: str, now: float = 0.0, client: str = HERE) -> Verdict:
+def verdict(token: Token, given: str, now: float = 0.0, client: str = HERE) -> TokenCheck:
     return token.judge({"authorization": f"Bearer {given}"}, {}, client, now)
 
 
@@ -107,58 +107,58 @@ def test_which_addresses_others_reach(host: str, own: bool) -> None:  # noqa: FB
 
 def test_the_right_token_and_its_cookie_open_the_controls() -> None:
     token = Token(Secret(TOKEN))
-    assert verdict(token, TOKEN) is Verdict.RIGHT
-    assert token.judge({"authorization": f"bearer  {TOKEN} "}, {}, HERE, 0.0) is Verdict.RIGHT
-    assert token.judge({}, {COOKIE: token.cookie.reveal()}, HERE, 0.0) is Verdict.RIGHT
+    assert verdict(token, TOKEN) is TokenCheck.RIGHT
+    assert token.judge({"authorization": f"bearer  {TOKEN} "}, {}, HERE, 0.0) is TokenCheck.RIGHT
+    assert token.judge({}, {COOKIE: token.cookie.reveal()}, HERE, 0.0) is TokenCheck.RIGHT
     assert token.known
 
 
 def test_the_cookie_does_not_give_the_token_away_and_ends_with_it() -> None:
     cookie = Token(Secret(TOKEN)).cookie.reveal()
     assert TOKEN not in cookie
-    assert Token(Secret("another-token-of-mine")).judge({}, {COOKIE: cookie}, HERE, 0.0) is Verdict.WRONG
+    assert Token(Secret("another-token-of-mine")).judge({}, {COOKIE: cookie}, HERE, 0.0) is TokenCheck.WRONG
 
 
 @pytest.mark.parametrize("given", ["", "x", TOKEN[:-1], TOKEN + "x", TOKEN.upper(), "x" * (LONGEST_TOKEN + 1), "é"])
 def test_a_wrong_token_opens_nothing(given: str) -> None:
-    assert verdict(Token(Secret(TOKEN)), given) is Verdict.WRONG
+    assert verdict(Token(Secret(TOKEN)), given) is TokenCheck.WRONG
 
 
 def test_nothing_given_is_no_attempt() -> None:
     token = Token(Secret(TOKEN))
     for _ in range(100):
-        assert token.judge({"authorization": "Basic eDp5"}, {}, HERE, 0.0) is Verdict.ABSENT
-    assert verdict(token, TOKEN) is Verdict.RIGHT
+        assert token.judge({"authorization": "Basic eDp5"}, {}, HERE, 0.0) is TokenCheck.ABSENT
+    assert verdict(token, TOKEN) is TokenCheck.RIGHT
 
 
 def test_without_a_token_nothing_is_right() -> None:
     token = Token(None)
     assert not token.known
-    assert verdict(token, "") is Verdict.WRONG
-    assert token.judge({}, {COOKIE: token.cookie.reveal()}, HERE, 0.0) is Verdict.WRONG
+    assert verdict(token, "") is TokenCheck.WRONG
+    assert token.judge({}, {COOKIE: token.cookie.reveal()}, HERE, 0.0) is TokenCheck.WRONG
 
 
 def test_after_five_wrong_tokens_in_a_minute_the_right_one_is_refused_too() -> None:
     token = Token(Secret(TOKEN))
-    assert [verdict(token, "wrong", now) for now in range(5)] == [Verdict.WRONG] * 5
-    assert verdict(token, TOKEN, 5.0) is Verdict.LIMITED
-    assert token.judge({}, {COOKIE: token.cookie.reveal()}, HERE, 59.9) is Verdict.LIMITED
-    assert verdict(token, TOKEN, 6.0, "192.0.2.2") is Verdict.RIGHT, "another address goes on"
-    assert verdict(token, TOKEN, 60.1) is Verdict.RIGHT, "a minute after the first of them"
+    assert [verdict(token, "wrong", now) for now in range(5)] == [TokenCheck.WRONG] * 5
+    assert verdict(token, TOKEN, 5.0) is TokenCheck.LIMITED
+    assert token.judge({}, {COOKIE: token.cookie.reveal()}, HERE, 59.9) is TokenCheck.LIMITED
+    assert verdict(token, TOKEN, 6.0, "192.0.2.2") is TokenCheck.RIGHT, "another address goes on"
+    assert verdict(token, TOKEN, 60.1) is TokenCheck.RIGHT, "a minute after the first of them"
 
 
 def test_cookies_are_guessed_no_faster_than_tokens() -> None:
     token = Token(Secret(TOKEN))
     verdicts = [token.judge({}, {COOKIE: f"guess-{number}"}, HERE, 0.0) for number in range(6)]
-    assert verdicts == [Verdict.WRONG] * 5 + [Verdict.LIMITED]
+    assert verdicts == [TokenCheck.WRONG] * 5 + [TokenCheck.LIMITED]
 
 
 def test_many_addresses_together_are_limited_too() -> None:
     token = Token(Secret(TOKEN))
     for number in range(WRONG_IN_ALL):
-        assert verdict(token, "wrong", 0.0, f"2001:db8::{number}") is Verdict.WRONG
-    assert verdict(token, TOKEN, 1.0) is Verdict.LIMITED
-    assert verdict(token, TOKEN, 61.0) is Verdict.RIGHT
+        assert verdict(token, "wrong", 0.0, f"2001:db8::{number}") is TokenCheck.WRONG
+    assert verdict(token, TOKEN, 1.0) is TokenCheck.LIMITED
+    assert verdict(token, TOKEN, 61.0) is TokenCheck.RIGHT
 
 
 def test_addresses_are_forgotten_after_a_minute() -> None:

@@ -195,7 +195,7 @@ async def _log_in(login: Login, needed: float) -> list[Finding]:
 async def _try_out(
     client: BrokerClient, trial: _Trial, login: Login, accepted: Accepted, needed: float
 ) -> AsyncIterator[Finding]:
-    connection = client.standing
+    connection = client.connection
     base = login.topics.base
     topic = login.topics.full(login.topics.response(f"doctor-{secrets.token_hex(6)}"))
     if connection is None:

@@ -29,11 +29,11 @@ def ask(fake: FakeContext) -> Ask:
     def ask(name: str, payload: str = "{}") -> Result:
         forms = {name: request.spec for name, request in HANDLERS.items()}
         door = Admission[None](forms, frozenset({"polling", "sensors", "registers"}))
-        verdict = door.admit(name, payload.encode(), retained=False, reply_to=None, now=0.0)
-        if isinstance(verdict, Answered):
-            return verdict.result
-        assert isinstance(verdict, Admitted)
-        return asyncio.run(HANDLERS[name].perform(verdict.parameters, fake.context, verdict.command))
+        decision = door.admit(name, payload.encode(), retained=False, reply_to=None, now=0.0)
+        if isinstance(decision, Answered):
+            return decision.result
+        assert isinstance(decision, Admitted)
+        return asyncio.run(HANDLERS[name].perform(decision.parameters, fake.context, decision.command))
 
     return ask
 

@@ -71,7 +71,7 @@ def test_by_3_1_1_a_request_is_answered_by_its_id(site: Site, mosquitto: Mosquit
     assert "unknown_request" in typed(site, "request", "no/such").stderr
 
 
-def test_a_visitor_by_5_understands_a_daemon_that_speaks_3_1_1(site: Site, mosquitto: Mosquitto) -> None:
+def test_a_verb_by_5_understands_a_daemon_that_speaks_3_1_1(site: Site, mosquitto: Mosquitto) -> None:
     del mosquitto
     running(site, mqtt={"version": "3.1.1"})
     site.write(slaves=[1, 2])

@@ -19,7 +19,7 @@ from tests.support.identifications import (
     PROFILES,
     WIND,
     garbled,
-    interview,
+    identify,
     lfs10,
     outcome,
     registers,
@@ -29,7 +29,7 @@ NOT_A_NUMBER = (0x7FC0, 0x0000)
 
 
 def test_an_lfs10_is_recognised_by_its_id_its_value_and_its_rate() -> None:
-    finding, asked = interview(lfs10())
+    finding, asked = identify(lfs10())
     assert asked == [ReadRegisters(3, 5, 1), ReadRegisters(3, 1, 2), ReadRegisters(3, 4, 1)]
     assert finding == FoundDevice(
         3, 9600, answers=True, rtt=0.02, profile=LFS10, values={"wind_speed": 12.99}, id_register=3
@@ -38,7 +38,7 @@ def test_an_lfs10_is_recognised_by_its_id_its_value_and_its_rate() -> None:
 
 def test_what_is_known_already_is_not_asked_again() -> None:
     first = outcome(ReadRegisters(3, 5, 1), (3,))
-    finding, asked = interview(lfs10(), first=first)
+    finding, asked = identify(lfs10(), first=first)
     assert asked == [ReadRegisters(3, 1, 2), ReadRegisters(3, 4, 1)]
     assert finding is not None
     assert finding.profile is LFS10
@@ -57,7 +57,7 @@ def test_what_is_known_already_is_not_asked_again() -> None:
 )
 def test_where_id_value_and_rate_do_not_all_agree_it_is_an_unknown_device(content: dict[int, int]) -> None:
     # The right id alone was enough before: a device of integers that holds its id at 0x0005 was named an LFS10.
-    finding, _ = interview(registers(content))
+    finding, _ = identify(registers(content))
     assert finding is not None
     assert (finding.answers, finding.profile, dict(finding.values)) == (True, None, {})
 
@@ -70,7 +70,7 @@ def test_at_a_rate_without_a_code_the_content_of_its_register_says_nothing() -> 
 
 
 def test_two_lfs10_whose_values_collide_are_named_as_such() -> None:
-    finding, _ = interview(garbled([True] * 5))
+    finding, _ = identify(garbled([True] * 5))
     assert finding is not None
     assert (finding.profile, finding.id_register, finding.duplicate) == (LFS10, 3, True)
 
@@ -79,22 +79,22 @@ def test_two_devices_whose_values_collide_and_whose_id_is_not_the_right_one_are_
     def device(request: ReadRegisters) -> Outcome:
         return lfs10(slave=2)(request) if request.address != 1 else garbled([True])(request)
 
-    finding, _ = interview(device)
+    finding, _ = identify(device)
     assert finding is not None
     assert (finding.profile, finding.duplicate) == (None, True)
 
 
 def test_another_possible_id_needs_a_believable_value() -> None:
-    finding, _ = interview(lfs10(slave=2), slave=255)
+    finding, _ = identify(lfs10(slave=2), slave=255)
     assert finding is not None
     assert (finding.profile, finding.id_register) == (LFS10, 2)
-    finding, _ = interview(lfs10(slave=2, wind=NOT_A_NUMBER), slave=255)
+    finding, _ = identify(lfs10(slave=2, wind=NOT_A_NUMBER), slave=255)
     assert finding is not None
     assert finding.profile is None
 
 
 def test_an_id_register_with_no_id_in_it_is_no_lfs10() -> None:
-    finding, _ = interview(registers({1: WIND[0], 2: WIND[1], 5: 0}))
+    finding, _ = identify(registers({1: WIND[0], 2: WIND[1], 5: 0}))
     assert finding is not None
     assert (finding.profile, finding.id_register) == (None, None)
 
@@ -108,14 +108,14 @@ def test_an_id_register_with_no_id_in_it_is_no_lfs10() -> None:
     ],
 )
 def test_other_devices_are_recognised_by_their_values(profile: Profile, content: dict[int, int]) -> None:
-    finding, _ = interview(registers(content))
+    finding, _ = identify(registers(content))
     assert finding is not None
     assert finding.profile is profile
     assert set(finding.values) <= set(profile.value_names)
 
 
 def test_a_device_that_refuses_everything_is_there_but_unknown() -> None:
-    finding, asked = interview(registers({}))
+    finding, asked = identify(registers({}))
     assert finding == FoundDevice(3, 9600, answers=True, rtt=0.02, exception=2)
     assert {(read.address, read.count) for read in asked} == {
         (profile.slave_id.register, 1) if profile.slave_id else (profile.reads()[0].address, profile.reads()[0].count)
@@ -125,15 +125,15 @@ def test_a_device_that_refuses_everything_is_there_but_unknown() -> None:
 
 
 def test_profiles_whose_ids_it_cannot_have_are_not_tried() -> None:
-    _, asked = interview(registers({}), slave=250)
+    _, asked = identify(registers({}), slave=250)
     assert asked == [ReadRegisters(250, register, 1) for register in (5, 0x07D0, 0x1000)]
-    finding, asked = interview(registers({0: 7}), slave=250, profiles=[LD_E])
+    finding, asked = identify(registers({0: 7}), slave=250, profiles=[LD_E])
     assert asked == [ReadRegisters(250, 0, 1)]
     assert finding == FoundDevice(250, 9600, answers=True, rtt=0.02)
 
 
 def test_silence_is_asked_three_times_and_then_nobody_is_there() -> None:
-    finding, asked = interview(outcome, profiles=[LFS10])
+    finding, asked = identify(outcome, profiles=[LFS10])
     assert finding is None
     assert asked == 3 * [ReadRegisters(3, 5, 1)]
 
@@ -146,6 +146,6 @@ def test_one_silence_hides_nobody() -> None:
         count += 1
         return outcome(request) if count == 1 else lfs10()(request)
 
-    finding, _ = interview(device)
+    finding, _ = identify(device)
     assert finding is not None
     assert (finding.profile, finding.spoilt) == (LFS10, 0)

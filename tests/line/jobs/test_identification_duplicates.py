@@ -22,7 +22,7 @@ from tests.support.identifications import (
     LFS10,
     PROFILES,
     garbled,
-    interview,
+    identify,
     lfs10,
     outcome,
 )
@@ -40,7 +40,7 @@ from tests.support.identifications import (
 def test_answers_garbled_three_times_of_five_are_two_devices(
     times: list[bool], spoilt_count: int, *, duplicate: bool
 ) -> None:
-    finding, _ = interview(garbled(times))
+    finding, _ = identify(garbled(times))
     assert finding is not None
     assert (finding.profile, finding.spoilt, finding.duplicate) == (LFS10, spoilt_count, duplicate)
     assert finding.tries == (5 if spoilt_count else 0)
@@ -51,7 +51,7 @@ def test_a_second_frame_behind_the_right_one_is_another_device() -> None:
         answer = lfs10()(request).answer
         return outcome(request, answer, unsolicited=9 if request.address == 1 else 0)
 
-    finding, _ = interview(device)
+    finding, _ = identify(device)
     assert finding is not None
     assert (finding.duplicate, dict(finding.values)) == (True, {"wind_speed": 12.99})
 
@@ -69,8 +69,8 @@ def noise(count: int) -> Callable[[ReadRegisters], Outcome]:
 
 
 def test_noise_alone_is_a_device_only_if_it_hardly_ever_fails_to_come() -> None:
-    assert interview(noise(3), profiles=[LFS10])[0] is None
-    finding, _ = interview(noise(4), profiles=[LFS10])
+    assert identify(noise(3), profiles=[LFS10])[0] is None
+    finding, _ = identify(noise(4), profiles=[LFS10])
     assert finding == FoundDevice(3, 9600, spoilt=4, tries=5, duplicate=True)
 
 
@@ -78,14 +78,14 @@ def test_an_answer_that_may_be_an_older_ones_is_not_believed() -> None:
     def device(request: ReadRegisters) -> Outcome:
         return outcome(request, lfs10()(request).answer, ambiguous=True) if request.address == 5 else outcome(request)
 
-    finding, _ = interview(device, profiles=[LFS10])
+    finding, _ = identify(device, profiles=[LFS10])
     assert finding is not None
     assert (finding.answers, finding.profile, finding.id_register) == (True, None, None)
 
 
 def test_rtt_is_the_middle_one() -> None:
     times = iter([0.5, 0.02, 0.03])
-    finding, _ = interview(lambda asked: outcome(asked, exception=2, rtt=next(times)), profiles=PROFILES[:3])
+    finding, _ = identify(lambda asked: outcome(asked, exception=2, rtt=next(times)), profiles=PROFILES[:3])
     assert finding is not None
     assert finding.rtt == 0.03
 
@@ -96,7 +96,7 @@ def test_a_wrong_frame_of_the_slave_is_an_answer_and_no_noise() -> None:
     wrong = outcome(request, code=FaultCode.MALFORMED, heard=longer, unsolicited=11)
     assert speaks(wrong, CODEC)
     assert not spoilt(wrong, CODEC)
-    finding, _ = interview(lambda asked: outcome(asked, code=FaultCode.MALFORMED, heard=longer), profiles=[LD_E])
+    finding, _ = identify(lambda asked: outcome(asked, code=FaultCode.MALFORMED, heard=longer), profiles=[LD_E])
     assert finding == FoundDevice(3, 9600, answers=True)
 
 

@@ -11,7 +11,7 @@ from lfs10d.line.jobs.identification import by_evidence
 from lfs10d.modbus.outcome import Outcome
 from lfs10d.modbus.request import ReadRegisters
 from lfs10d.profiles.profile import Profile
-from tests.support.identifications import BUILTIN, LFS10, PROFILES, interview, outcome, registers
+from tests.support.identifications import BUILTIN, LFS10, PROFILES, identify, outcome, registers
 
 WN90LP, PR_3000 = BUILTIN["ecowitt-wn90lp"], BUILTIN["pr-3000-fsjt"]
 
@@ -27,7 +27,7 @@ def dfrobot(*values: int, slave: int = 3) -> Callable[[ReadRegisters], Outcome]:
 
 def named(device: Callable[[ReadRegisters], Outcome], **more: Any) -> list[str]:  # noqa: ANN401 - passed on
     """Return the profile of a device and its alternatives by name; [] where it is unknown."""
-    finding, _ = interview(device, **more)
+    finding, _ = identify(device, **more)
     assert finding is not None
     return [profile.name for profile in (finding.profile, *finding.alternatives) if profile is not None]
 
@@ -62,7 +62,7 @@ def test_a_device_that_identifies_itself_is_no_other() -> None:
     device = registers(STATION | {0x0160: 0x0090})
     assert named(device, profiles=[PLAIN, WN90LP]) == ["plain", "ecowitt-wn90lp"], "a person's own goes first"
     assert named(device, profiles=[WN90LP, PLAIN]) == ["ecowitt-wn90lp"]
-    _, asked = interview(device, profiles=[WN90LP, PLAIN, *PROFILES])
+    _, asked = identify(device, profiles=[WN90LP, PLAIN, *PROFILES])
     assert [(read.address, read.count) for read in asked] == [(0x0162, 1), (0x0160, 1), (0x0165, 10), (0x0161, 1)]
 
 
@@ -97,7 +97,7 @@ def test_every_identifying_register_must_hold_one_of_its_contents(second: int | 
 def test_a_device_without_an_optional_register_is_recognised_by_the_others() -> None:
     """A WN90LP from before July 2023 has no rain counter."""
     device = registers({address: word for address, word in STATION.items() if address != 0x016E} | {0x0160: 0x0090})
-    finding, _ = interview(device)
+    finding, _ = identify(device)
     assert finding is not None
     assert finding.profile is WN90LP
     assert set(finding.values) == set(WN90LP.value_names) - {"rain_counter"}
@@ -127,7 +127,7 @@ def test_a_device_is_recognised_by_its_first_value_wherever_that_is_read() -> No
     heater = {"name": "heater", "register": 3, "function": 1}
     speed = {"name": "wind_speed", "register": 500, "type": "uint16", "unit": "m/s"}
     profile = Profile.model_validate({"name": "p", "title": "P", "values": [speed, heater]})
-    finding, asked = interview(registers({500: 7}), profiles=[profile])
+    finding, asked = identify(registers({500: 7}), profiles=[profile])
     assert finding is not None
     assert (finding.profile, dict(finding.values)) == (profile, {"wind_speed": 7})
     assert asked == [ReadRegisters(3, 500, 1)]
@@ -152,7 +152,7 @@ SPARE = [
 )
 def test_of_values_that_are_all_optional_one_is_enough(content: dict[int, int], values: dict[str, int] | None) -> None:
     profile = Profile.model_validate({"name": "spare", "title": "S", "values": SPARE, "slave_id": {"register": 5}})
-    found, _ = interview(registers({5: 3} | content), profiles=(profile,))
+    found, _ = identify(registers({5: 3} | content), profiles=(profile,))
     assert found is not None
     assert (found.profile, found.values) == ((profile, values) if values else (None, {}))
 
@@ -160,7 +160,7 @@ def test_of_values_that_are_all_optional_one_is_enough(content: dict[int, int], 
 def test_values_alone_speak_for_a_profile_by_the_first_read_only() -> None:
     """Anything may be in the others."""
     profile = Profile.model_validate({"name": "spare", "title": "S", "values": SPARE})
-    found, asked = interview(registers({9: 12}), profiles=(profile,))
+    found, asked = identify(registers({9: 12}), profiles=(profile,))
     assert found is not None
     assert (found.profile, [each.address for each in asked]) == (None, [1, 1, 2])
 
@@ -169,6 +169,6 @@ def test_a_first_value_that_is_unavailable_leaves_it_to_the_others() -> None:
     values = [SPARE[0] | {"unavailable": [0xFFFF], "optional": False}, SPARE[2]]
     profile = Profile.model_validate({"name": "spare", "title": "S", "values": values, "slave_id": {"register": 5}})
     for content, wanted in (({1: 0xFFFF, 9: 12}, profile), ({1: 0xFFFF}, None)):
-        found, _ = interview(registers({5: 3} | content), profiles=(profile,))
+        found, _ = identify(registers({5: 3} | content), profiles=(profile,))
         assert found is not None
         assert found.profile is wanted

@@ -1,4 +1,4 @@
-"""A generator as a job: what it yields is asked, waited for or done aside, and its end is told before it is over."""
+"""A generator as a job: each step is a request, a wait or work off the line; its end is reported before it is over."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ HERE = Ask(WHO, RTU, 0.2)
 THERE = Ask(WHO, RTU, 0.1, None, 19200)
 
 
-def course(steps: Generator[Step, Any, Any], clock: ProcedureClock | None = None) -> tuple[Procedure, list[object]]:
-    """Return a course of these steps on a line at 9600, and what it tells."""
+def procedure(steps: Generator[Step, Any, Any], clock: ProcedureClock | None = None) -> tuple[Procedure, list[object]]:
+    """Return a procedure of these steps on a line at 9600 baud, and what it awaits off the line."""
     told: list[object] = []
     return Procedure(steps, clock or ProcedureClock(), lambda _, what: told.append(what), line_rate=9600), told
 
@@ -40,7 +40,7 @@ def answer(heard: Callable[..., Outcome]) -> Outcome:
 
 
 def test_unless_told_otherwise_it_is_a_change_that_takes_a_third_of_the_line_and_no_slave_id_for_itself() -> None:
-    made, _ = course(steps_of(HERE))
+    made, _ = procedure(steps_of(HERE))
     assert (made.purpose, made.share, made.excludes) == (Purpose.CHANGE, 0.3, frozenset())
 
 
@@ -57,7 +57,7 @@ def test_it_is_what_it_is_told_to_be() -> None:
     assert (made.purpose, made.share, made.excludes) == (Purpose.PROBE, 0.1, frozenset({3}))
 
 
-def test_a_question_is_asked_again_until_its_outcome_came_and_the_outcome_reaches_the_course(answer: Outcome) -> None:
+def test_a_request_is_sent_again_until_its_outcome_came_and_the_outcome_reaches_the_procedure(answer: Outcome) -> None:
     sent: list[object] = []
     times: list[float] = []
     clock = ProcedureClock()
@@ -68,7 +68,7 @@ def test_a_question_is_asked_again_until_its_outcome_came_and_the_outcome_reache
         yield Hold(9.0)
         times.append(clock.now)
 
-    made, _ = course(steps(), clock)
+    made, _ = procedure(steps(), clock)
     assert made.ask(1.0) == made.ask(2.0) == HERE
     assert made.on_outcome(answer, 3.0) == Requeue(3.0)
     assert sent == [answer]
@@ -78,18 +78,18 @@ def test_a_question_is_asked_again_until_its_outcome_came_and_the_outcome_reache
 
 
 def test_a_hold_ends_at_its_time_and_not_before() -> None:
-    made, _ = course(steps_of(Hold(5.0), HERE))
+    made, _ = procedure(steps_of(Hold(5.0), HERE))
     assert made.ask(1.0) == Hold(5.0)
     assert made.ask(4.9) == Hold(5.0)
     assert made.ask(5.0) == HERE
 
 
 def test_a_hold_without_end_is_passed_on() -> None:
-    made, _ = course(steps_of(Hold(), HERE))
+    made, _ = procedure(steps_of(Hold(), HERE))
     assert made.ask(1.0) == Hold()
 
 
-def test_what_goes_aside_is_told_once_and_the_course_goes_on_with_what_came_of_it() -> None:
+def test_work_off_the_line_is_reported_once_and_the_procedure_goes_on_with_its_result() -> None:
     sent: list[object] = []
 
     def steps() -> Generator[Step, Any, None]:
@@ -97,7 +97,7 @@ def test_what_goes_aside_is_told_once_and_the_course_goes_on_with_what_came_of_i
         sent.append((yield Await("second")))
         yield HERE
 
-    made, told = course(steps())
+    made, told = procedure(steps())
     assert made.ask(1.0) == made.ask(2.0) == Hold()
     assert told == ["intent"]
     made.resume("on the disk")
@@ -121,7 +121,7 @@ def test_what_is_answered_at_once_is_not_waited_for() -> None:
 
 
 def test_it_is_over_only_when_its_end_was_taken_care_of(answer: Outcome) -> None:
-    made, told = course(steps_of(HERE, result="moved"))
+    made, told = procedure(steps_of(HERE, result="moved"))
     made.ask(1.0)
     assert made.on_outcome(answer, 1.1) == Requeue(1.1)
     assert made.ask(1.2) == made.ask(1.3) == Hold()
@@ -133,7 +133,7 @@ def test_it_is_over_only_when_its_end_was_taken_care_of(answer: Outcome) -> None
 
 
 def test_at_another_rate_it_goes_on_at_once_for_a_quarter_of_a_second(answer: Outcome) -> None:
-    made, _ = course(steps_of(*[THERE] * 9))
+    made, _ = procedure(steps_of(*[THERE] * 9))
     made.ask(1.0)
     assert made.on_outcome(answer, 1.05) == Continue()
     made.ask(1.05)
@@ -146,7 +146,7 @@ def test_at_another_rate_it_goes_on_at_once_for_a_quarter_of_a_second(answer: Ou
 
 @pytest.mark.parametrize("following", [HERE, Ask(WHO, RTU, 0.1, None, 4800), Hold(2.0)])
 def test_a_stay_at_another_rate_ends_where_what_follows_does_not_belong_there(answer: Outcome, following: Step) -> None:
-    made, _ = course(steps_of(THERE, following))
+    made, _ = procedure(steps_of(THERE, following))
     made.ask(1.0)
     assert made.on_outcome(answer, 1.01) == Requeue(1.01)
 
@@ -156,13 +156,13 @@ def test_at_the_lines_own_rate_others_may_have_the_line_between_two_questions(
     answer: Outcome, rate: int | None
 ) -> None:
     own = Ask(WHO, RTU, 0.1, None, rate)
-    made, _ = course(steps_of(own, own))
+    made, _ = procedure(steps_of(own, own))
     made.ask(1.0)
     assert made.on_outcome(answer, 1.01) == Requeue(1.01)
 
 
 def test_halted_it_sends_nothing_and_tells_nothing(answer: Outcome) -> None:
-    made, told = course(steps_of(HERE, HERE))
+    made, told = procedure(steps_of(HERE, HERE))
     made.ask(1.0)
     made.halt()
     assert made.on_outcome(answer, 1.1) == Done()
@@ -172,13 +172,13 @@ def test_halted_it_sends_nothing_and_tells_nothing(answer: Outcome) -> None:
 
 
 def test_an_outcome_it_did_not_ask_for_ends_it_without_harm(answer: Outcome) -> None:
-    made, _ = course(steps_of(Hold(5.0), HERE))
+    made, _ = procedure(steps_of(Hold(5.0), HERE))
     made.ask(1.0)
     assert made.on_outcome(answer, 1.1) == Done()
 
 
 @pytest.mark.parametrize("begun", [False, True])
-def test_where_the_port_is_lost_the_course_says_what_that_means(begun: bool) -> None:  # noqa: FBT001  # a case
+def test_where_the_port_is_lost_the_procedure_says_what_that_means(begun: bool) -> None:  # noqa: FBT001  # a case
     clock = ProcedureClock()
 
     def steps() -> Generator[Step, Any, object]:
@@ -188,7 +188,7 @@ def test_where_the_port_is_lost_the_course_says_what_that_means(begun: bool) -> 
             return f"lost at {clock.now}"
         return "never"
 
-    made, told = course(steps(), clock)
+    made, told = procedure(steps(), clock)
     if begun:
         made.ask(1.0)
     made.cut_off(2.0)
@@ -197,15 +197,15 @@ def test_where_the_port_is_lost_the_course_says_what_that_means(begun: bool) -> 
     assert made.ask(4.0) == Done()
 
 
-def test_a_course_that_does_not_care_is_over_without_a_result() -> None:
-    made, told = course(steps_of(HERE))
+def test_a_procedure_that_ignores_the_loss_of_the_port_is_over_without_a_result() -> None:
+    made, told = procedure(steps_of(HERE))
     made.ask(1.0)
     made.cut_off(2.0)
     assert told == [Finished(None)]
 
 
 def test_a_port_lost_after_the_end_changes_nothing_about_it(answer: Outcome) -> None:
-    made, told = course(steps_of(HERE, result="moved"))
+    made, told = procedure(steps_of(HERE, result="moved"))
     made.ask(1.0)
     made.on_outcome(answer, 1.1)
     made.cut_off(1.2)
@@ -214,7 +214,7 @@ def test_a_port_lost_after_the_end_changes_nothing_about_it(answer: Outcome) -> 
 
 
 def test_a_question_that_belongs_behind_the_one_before_it_is_asked_at_once(answer: Outcome) -> None:
-    made, _ = course(steps_of(HERE, replace(HERE, at_once=True), HERE))
+    made, _ = procedure(steps_of(HERE, replace(HERE, at_once=True), HERE))
     assert made.ask(1.0) == HERE
     assert made.on_outcome(answer, 1.1) == Continue()
     assert made.ask(1.1) == replace(HERE, at_once=True)

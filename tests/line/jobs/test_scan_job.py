@@ -105,8 +105,8 @@ def test_beside_polls_it_takes_its_share_of_the_line_and_no_more(rate: int) -> N
 
 
 def test_at_the_lines_own_rate_polls_come_between_any_two_questions() -> None:
-    errands = [event.purpose for event in beside_polls(0.3, (9600,)).exchanges]
-    assert (Purpose.SCAN, Purpose.SCAN) not in set(pairwise(errands))
+    purposes = [event.purpose for event in beside_polls(0.3, (9600,)).exchanges]
+    assert (Purpose.SCAN, Purpose.SCAN) not in set(pairwise(purposes))
 
 
 def test_another_rate_is_spoken_in_slices_and_never_for_one_exchange() -> None:
