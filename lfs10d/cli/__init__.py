@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -120,3 +120,9 @@ def state_option(function: Callable[..., Any]) -> Callable[..., Any]:
 def json_option(function: Callable[..., Any]) -> Callable[..., Any]:
     """Add `--json`, passed on as `as_json: bool`."""
     return click.option("--json", "as_json", is_flag=True, help="Print JSON for programs.")(function)
+
+
+def print_lines(lines: Iterable[str], *, err: bool = False) -> None:
+    """Print each line as it comes, on standard error if `err`."""
+    for line in lines:
+        click.echo(line, err=err)

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import click
 
-from lfs10d.cli import EXIT_FAILED
+from lfs10d.cli import EXIT_FAILED, print_lines
 from lfs10d.cli.adopt_loop import FIRST, NEXT, AdoptedSensor, AdoptLoop
 from lfs10d.cli.client import CommandClient
 from lfs10d.cli.login import Login
@@ -38,8 +38,7 @@ async def repeat(login: Login, loop: AdoptLoop, *, as_json: bool) -> int:
     finally:
         await client.disconnect()
         if loop.adopted and not as_json:
-            for text in summary(loop.adopted):
-                click.echo(text)
+            print_lines(summary(loop.adopted))
     if not loop.adopted:
         click.echo("No sensor was adopted.", err=True)
     return 0 if ended_well and loop.adopted and not loop.unfinished else EXIT_FAILED

@@ -38,29 +38,23 @@ def _load(loaded: LoadedConfig, budget: Budget) -> Iterator[tuple[KeyPath, str]]
         if share.rest and share.load_with_turnaround is not None and share.load_with_turnaround > 1:
             index = [slave.name for slave in loaded.config.slaves].index(share.device)
             needed = duration_text(round(share.load_with_turnaround * share.interval, 3))
-            yield (
-                ("slaves", index),
-                (
-                    f"one poll takes {needed} with the rest before each request (request_gap): it will be polled less "
-                    f"often than every {duration_text(share.interval)}"
-                ),
+            message = (
+                f"one poll takes {needed} with the rest before each request (request_gap): it will be polled less "
+                f"often than every {duration_text(share.interval)}"
             )
+            yield ("slaves", index), message
     if budget.wire_load > 1:
-        yield (
-            path,
-            (
-                f"the intervals ask for {budget.wire_load:.1%} of what the line carries: every device will be polled "
-                "less often; use longer intervals, a higher baud rate or a second line"
-            ),
+        message = (
+            f"the intervals ask for {budget.wire_load:.1%} of what the line carries: every device will be polled "
+            "less often; use longer intervals, a higher baud rate or a second line"
         )
+        yield path, message
     elif budget.wire_load_with_turnaround > 1:
-        yield (
-            path,
-            (
-                f"the intervals ask for {budget.wire_load_with_turnaround:.1%} of what the line carries if the devices "
-                f"take {duration_text(ASSUMED_TURNAROUND)} to answer (and {budget.wire_load:.1%} if they took none)"
-            ),
+        message = (
+            f"the intervals ask for {budget.wire_load_with_turnaround:.1%} of what the line carries if the devices "
+            f"take {duration_text(ASSUMED_TURNAROUND)} to answer (and {budget.wire_load:.1%} if they took none)"
         )
+        yield path, message
     if not loaded.config.slaves:
         yield ("slaves",), "there are no slaves: nothing will be polled until one is added"
     elif not budget.shares:
@@ -83,13 +77,11 @@ def _login(loaded: LoadedConfig) -> Iterator[tuple[KeyPath, str]]:
         return
     certificate = mqtt.tls is not None and mqtt.tls.cert is not None
     if mqtt.username is None and not certificate:
-        yield (
-            ("mqtt", "host"),
-            (
-                "the broker is remote and needs no login: anyone who reaches it can publish readings and requests; "
-                "set mqtt.username and mqtt.password_file, or mqtt.tls.cert"
-            ),
+        message = (
+            "the broker is remote and needs no login: anyone who reaches it can publish readings and requests; "
+            "set mqtt.username and mqtt.password_file, or mqtt.tls.cert"
         )
+        yield ("mqtt", "host"), message
     if mqtt.username is not None and mqtt.tls is None:
         yield ("mqtt", "username"), "the password crosses the network unencrypted; set mqtt.tls"
 
@@ -105,14 +97,12 @@ def _files(loaded: LoadedConfig) -> Iterator[tuple[KeyPath, str]]:
         path: KeyPath = ("mqtt", "password_file") if mqtt.password_file is not None else ("mqtt",)
         yield path, "the password ends with a space, which is part of it: remove it unless it is meant"
     if mqtt.tls is not None and mqtt.tls.ca is not None and (missing := missing_in_authorities(mqtt.tls.ca)):
-        yield (
-            ("mqtt", "tls", "ca"),
-            (
-                f"an authority without {' and '.join(missing)} (RFC 5280, section 4.2.1), which strict clients refuse, "
-                "any Python from 3.13 on among them; lfs10d takes it: make the next one with "
-                "-addext keyUsage=critical,keyCertSign,cRLSign"
-            ),
+        message = (
+            f"an authority without {' and '.join(missing)} (RFC 5280, section 4.2.1), which strict clients refuse, "
+            "any Python from 3.13 on among them; lfs10d takes it: make the next one with "
+            "-addext keyUsage=critical,keyCertSign,cRLSign"
         )
+        yield ("mqtt", "tls", "ca"), message
 
 
 def _names(loaded: LoadedConfig, host: str) -> Iterator[tuple[KeyPath, str]]:
@@ -128,24 +118,20 @@ def _names(loaded: LoadedConfig, host: str) -> Iterator[tuple[KeyPath, str]]:
     if all(loopback(host) for host, _ in config.mqtt.nodes):
         return
     if not any(document.holds(path) for path in (("line", "name"), ("mqtt", "base_topic"))):
-        yield (
-            ("mqtt",),
-            (
-                "line.name and mqtt.base_topic are both defaults: a second gateway at this broker would publish under "
-                f"{config.mqtt.base_topic}/{config.line.name} too; set one of them"
-            ),
+        message = (
+            "line.name and mqtt.base_topic are both defaults: a second gateway at this broker would publish under "
+            f"{config.mqtt.base_topic}/{config.line.name} too; set one of them"
         )
+        yield ("mqtt",), message
     if config.mqtt.client_id is not None and host.lower() in COMMON_HOST_NAMES:
         given = loaded.document.data
         written = given["mqtt"].get("client_id") if isinstance(given, dict) and "mqtt" in given else None
         if written is None or "%H" in written:
-            yield (
-                ("mqtt", "client_id"),
-                (
-                    f"the client id {config.mqtt.client_id} comes from the host name {host}, which many hosts have; "
-                    "two clients of one id throw each other out: set mqtt.client_id or the host's name"
-                ),
+            message = (
+                f"the client id {config.mqtt.client_id} comes from the host name {host}, which many hosts have; "
+                "two clients of one id throw each other out: set mqtt.client_id or the host's name"
             )
+            yield ("mqtt", "client_id"), message
 
 
 def _calibration(loaded: LoadedConfig) -> Iterator[tuple[KeyPath, str]]:
@@ -156,13 +142,11 @@ def _calibration(loaded: LoadedConfig) -> Iterator[tuple[KeyPath, str]]:
             value = values[name]
             if entry.offset < 0 and value.range is not None and value.range[0] == 0:
                 least = f"{-entry.offset / entry.scale:.3g}"
-                yield (
-                    ("slaves", index, "calibration", name, "offset"),
-                    (
-                        f"{name} below {spell(float(least), value.unit)} becomes negative by it, which is out_of_range "
-                        f"for profile {slave.profile}"
-                    ),
+                message = (
+                    f"{name} below {spell(float(least), value.unit)} becomes negative by it, which is out_of_range "
+                    f"for profile {slave.profile}"
                 )
+                yield ("slaves", index, "calibration", name, "offset"), message
 
 
 def _addresses(loaded: LoadedConfig) -> Iterator[tuple[KeyPath, str]]:

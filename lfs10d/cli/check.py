@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from lfs10d.cli import EXIT_CONFIG, EXIT_UNAVAILABLE, config_option, event_loop, json_option
+from lfs10d.cli import EXIT_CONFIG, EXIT_UNAVAILABLE, config_option, event_loop, json_option, print_lines
 from lfs10d.cli.advice import advice
 from lfs10d.cli.doctor.finding import Finding, lines
 from lfs10d.cli.render.table import columns
@@ -45,9 +45,7 @@ def command(config: Path, *, online: bool, as_json: bool) -> int:
     except ConfigError as error:
         if not as_json:
             raise
-        click.echo(
-            json.dumps({"valid": False, "problems": [_problem_json(problem) for problem in error.problems]}, indent=2)
-        )
+        click.echo(json.dumps({"valid": False, "problems": [asdict(problem) for problem in error.problems]}, indent=2))
         click.echo(str(error), err=True)
         return EXIT_CONFIG
     found = budget(loaded.config, loaded.profiles)
@@ -57,12 +55,9 @@ def command(config: Path, *, online: bool, as_json: bool) -> int:
         report = _report(loaded, found, warnings) | ({"online": [asdict(each) for each in seen]} if online else {})
         click.echo(json.dumps(report, indent=2, allow_nan=False))
     else:
-        for text in _lines(loaded, found):
-            click.echo(escape(text))
-        for text in lines(seen):
-            click.echo(text)
-    for warning in warnings:
-        click.echo(escape(str(warning)), err=True)
+        print_lines(map(escape, _lines(loaded, found)))
+        print_lines(lines(seen))
+    print_lines((escape(str(warning)) for warning in warnings), err=True)
     return EXIT_UNAVAILABLE if any(each.level == "fail" for each in seen) else 0
 
 
@@ -73,16 +68,6 @@ def _look(config: Path, loaded: LoadedConfig) -> list[Finding]:
     return event_loop.run(rounds.port_and_broker(config, loaded))
 
 
-def _problem_json(problem: Problem) -> dict[str, Any]:
-    return {
-        "file": problem.file,
-        "line": problem.line,
-        "column": problem.column,
-        "path": problem.path,
-        "message": problem.message,
-    }
-
-
 def _report(loaded: LoadedConfig, found: Budget, warnings: tuple[Problem, ...]) -> dict[str, Any]:
     certificates = {
         slave.name: {name: entry.model_dump() for name, entry in slave.calibration.items()}
@@ -90,7 +75,7 @@ def _report(loaded: LoadedConfig, found: Budget, warnings: tuple[Problem, ...]) 
     }
     return {
         "valid": True,
-        "warnings": [_problem_json(warning) for warning in warnings],
+        "warnings": [asdict(warning) for warning in warnings],
         "budget": {
             "gap_us": round(found.gap * 1e6, 1),
             "load_pct": round(found.load * 100, 2),

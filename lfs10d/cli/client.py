@@ -29,7 +29,46 @@ NO_SUBSCRIBERS: Final = 0x10
 """PUBACK of a message without a subscriber (MQTT 5.0, section 3.4.2.1)."""
 
 
-class CommandClient:
+class Acknowledgements:
+    """What a connection reports: reason codes by message id, and its end; wait for them with `wait_until`."""
+
+    def __init__(self) -> None:
+        self.ended_by: str | None = None
+        """Why the connection was lost, in words; None while there is one."""
+        self.settled: dict[int, tuple[int, ...]] = {}
+        """Reason codes of acknowledged subscriptions and publications, by message id."""
+        self.changed = asyncio.Event()
+
+    async def wait_until(self, condition: Callable[[], bool], within: float | None) -> bool:
+        """Wait until the condition holds; return whether it does `within` s. Raises BrokerError when disconnected."""
+        try:
+            async with asyncio.timeout(within):
+                while not condition():
+                    if self.ended_by is not None:
+                        raise BrokerError(self.ended_by)
+                    self.changed.clear()
+                    await self.changed.wait()
+        except TimeoutError:
+            return False
+        return True
+
+    def ended(self, ended: Disconnect) -> None:
+        """Note that the connection is lost."""
+        self.ended_by = ended.message
+        self.changed.set()
+
+    def acknowledged(self, mid: int, reason: int) -> None:
+        """Note that a publication was acknowledged."""
+        self.settled[mid] = (reason,)
+        self.changed.set()
+
+    def subscribed(self, mid: int, reasons: tuple[int, ...]) -> None:
+        """Note that a subscription was acknowledged."""
+        self.settled[mid] = reasons
+        self.changed.set()
+
+
+class CommandClient(Acknowledgements):
     """One connection. `arrived` gets what comes on `filters`; responses and the availability are kept here."""
 
     def __init__(
@@ -38,12 +77,11 @@ class CommandClient:
         filters: Iterable[Filter] = (),
         arrived: Callable[[Incoming], None] = lambda _: None,
     ) -> None:
+        super().__init__()
         self.topics = login.topics
         self._missing_password = login.missing_password
         self.availability: str | None = None
         """The last availability of the daemon, published or its will; None: none yet."""
-        self.ended_by: str | None = None
-        """Why the connection was lost, in words; None while there is one."""
         self._arrived = arrived
         self._own = self.topics.full(self.topics.response(f"cli-{secrets.token_hex(6)}"))
         self._filters = [
@@ -52,9 +90,6 @@ class CommandClient:
             *filters,
         ]
         self._link = BrokerClient(login.settings, self)
-        self._changed = asyncio.Event()
-        self._settled: dict[int, tuple[int, ...]] = {}
-        """Reason codes of acknowledged subscriptions and publications, by message id."""
         self._pending: tuple[str, frozenset[str]] | None = None
         """The id of the pending request, and the topics of its response from a daemon that knows no Response Topic."""
         self._response: dict[str, Any] | None = None
@@ -117,8 +152,8 @@ class CommandClient:
     async def wait_for_daemon(self) -> None:
         """Wait until the broker is connected and the daemon online again."""
         while not self.daemon_online:
-            self._changed.clear()
-            await self._changed.wait()
+            self.changed.clear()
+            await self.changed.wait()
 
     async def request(self, name: str, content: dict[str, Any], within: float | None) -> dict[str, Any] | None:
         """Send a request and return its response, None if none came `within` s.
@@ -138,8 +173,8 @@ class CommandClient:
         if mid is None:
             raise BrokerError(f"{self.place}: the connection is lost; nothing was sent")
         try:
-            await self.wait_until(lambda: mid in self._settled or self._answered, within)
-            self._check_acknowledgement(self._settled.get(mid, (0,))[0], name)
+            await self.wait_until(lambda: mid in self.settled or self._answered, within)
+            self._check_acknowledgement(self.settled.get(mid, (0,))[0], name)
             await self.wait_until(lambda: self._answered or self.daemon_gone, within)
         except BrokerError as error:
             raise BrokerError(f"{error}; {name} may or may not have been carried out") from None
@@ -173,23 +208,10 @@ class CommandClient:
         mid = None if connection is None else connection.subscribe(filters)
         if mid is None:
             raise BrokerError(self.ended_by or f"{self.place}: the connection is lost")
-        await self.wait_until(lambda: mid in self._settled, CONNECTS_WITHIN)
-        for each, reason in zip(filters, self._settled.get(mid, ()), strict=False):
+        await self.wait_until(lambda: mid in self.settled, CONNECTS_WITHIN)
+        for each, reason in zip(filters, self.settled.get(mid, ()), strict=False):
             if reason >= REFUSED_FROM:
                 raise FailedError(f"{self.place} refuses the subscription to {each.topic}: {reason_in_words(reason)}")
-
-    async def wait_until(self, condition: Callable[[], bool], within: float | None) -> bool:
-        """Wait until the condition holds; return whether it does `within` s. Raises BrokerError when disconnected."""
-        try:
-            async with asyncio.timeout(within):
-                while not condition():
-                    if self.ended_by is not None:
-                        raise BrokerError(self.ended_by)
-                    self._changed.clear()
-                    await self._changed.wait()
-        except TimeoutError:
-            return False
-        return True
 
     # Events of the link
 
@@ -199,23 +221,12 @@ class CommandClient:
         again, self.ended_by = self.ended_by is not None, None
         if again and self._link.connection is not None:
             self._link.connection.subscribe(self._filters)
-        self._changed.set()
+        self.changed.set()
 
     def ended(self, ended: Disconnect) -> None:
-        """Note that the connection is lost."""
-        self.ended_by = ended.message
+        """Note that the connection is lost, and with it what was known of the daemon."""
         self.availability = None
-        self._changed.set()
-
-    def acknowledged(self, mid: int, reason: int) -> None:
-        """Note that a request was acknowledged."""
-        self._settled[mid] = (reason,)
-        self._changed.set()
-
-    def subscribed(self, mid: int, reasons: tuple[int, ...]) -> None:
-        """Note that a subscription was acknowledged."""
-        self._settled[mid] = reasons
-        self._changed.set()
+        super().ended(ended)
 
     def arrived(self, message: Incoming) -> None:
         """Keep a response or the daemon's availability; pass on the rest."""
@@ -225,7 +236,7 @@ class CommandClient:
             self._take(message, self._pending[0])
         else:
             self._arrived(message)
-        self._changed.set()
+        self.changed.set()
 
     def _take(self, message: Incoming, token: str) -> None:
         response = parsed(message.payload)

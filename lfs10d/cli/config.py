@@ -10,11 +10,12 @@ from typing import Any
 
 import click
 
-from lfs10d.cli import EXIT_FAILED, config_option, json_option, state_option
+from lfs10d.cli import EXIT_FAILED, config_option, json_option, print_lines, state_option
 from lfs10d.cli.effective_file import with_changes
 from lfs10d.cli.json_text import json_text
 from lfs10d.cli.render.table import columns
 from lfs10d.config.changes import Changes
+from lfs10d.config.credentials import DENIED
 from lfs10d.config.effective import Effective, effective, merged_data
 from lfs10d.config.json_schema import json_schema
 from lfs10d.config.loader import LoadedConfig, leaves, load
@@ -27,9 +28,6 @@ from lfs10d.schema.fields import Duration, Size
 from lfs10d.schema.quantities import duration_text, size_text
 from lfs10d.schema.yaml12 import render
 from lfs10d.system.logs import escape
-
-DENIED = "permission denied"
-"""What the system says of a directory that is not for us, in the words of `lfs10d.config.credentials.reason`."""
 
 EXAMPLES = """\b
 Examples:
@@ -88,10 +86,8 @@ def command(config: Path, state_dir: Path | None, *, merged: bool, as_json: bool
             (path_text(path), _written(loaded.config, path, value), str(loaded.origins[path_text(path)]))
             for path, value in leaves(loaded.config)
         ]
-        for text in columns(("key", "value", "origin"), rows):
-            click.echo(text)
-    for warning in _warnings(now):
-        click.echo(f"lfs10d: {warning}", err=True)
+        print_lines(columns(("key", "value", "origin"), rows))
+    print_lines((f"lfs10d: {warning}" for warning in _warnings(now)), err=True)
     if missing is not None:
         click.echo(f"lfs10d: {missing}; what requests changed is missing here: call it as root", err=True)
         return EXIT_FAILED

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import click
 
-from lfs10d.config.credentials import UnreadableError, password_in, service_password
+from lfs10d.config.credentials import DENIED, UnreadableError, password_in, service_password
 from lfs10d.config.loader import LoadedConfig, load
 from lfs10d.config.models import Config
 from lfs10d.daemon.state_directory import service_unit
@@ -20,8 +20,6 @@ from lfs10d.mqtt.topics import Topics
 from lfs10d.system.dataclass import dataclass
 from lfs10d.system.secret import Secret, leave_no_core
 
-DENIED: Final = "permission denied"
-"""The system's reason for a file we may not read, in the words of `lfs10d.config.credentials.reason`."""
 REMEDY: Final = "call it as root or as a member of the service's group, or give --username and --password-file"
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import click
 
-from lfs10d.cli import EXIT_FAILED, EXIT_UNAVAILABLE, json_option
+from lfs10d.cli import EXIT_FAILED, EXIT_UNAVAILABLE, json_option, print_lines
 from lfs10d.cli.calibrated import NONE, Calibrations, calibration_option, calibrations_of
 from lfs10d.cli.direct_line import DirectLine
 from lfs10d.cli.local_time import clock_text, stamp
@@ -103,8 +103,7 @@ def command(**values: Any) -> int:  # noqa: ANN401  # twelve options; `_ReadOpti
         return _read(options)
     except PortBusyError as error:
         click.echo(f"lfs10d: {error}", err=True)
-        for text in instead(line.port, slave=options.slave):
-            click.echo(text, err=True)
+        print_lines(instead(line.port, slave=options.slave), err=True)
         return EXIT_UNAVAILABLE
 
 
@@ -184,12 +183,10 @@ def _on_reading(options: _ReadOptions, attempts: _Attempts, reading: Reading, li
         click.echo(_watched(options, reading))
         sys.stdout.flush()
     elif fault is None:
-        for text in _shown(options, reading):
-            click.echo(text)
+        print_lines(_shown(options, reading))
     if fault is not None and final and not attempts.explained and not options.as_json:
         attempts.explained = True
-        for text in _explanation(options, attempts, fault, line.uart):
-            click.echo(text, err=True)
+        print_lines(_explanation(options, attempts, fault, line.uart), err=True)
     if options.watch or not final:
         return None
     return EXIT_FAILED if fault is not None else 0
@@ -266,7 +263,8 @@ def _explanation(options: _ReadOptions, attempts: _Attempts, fault: Fault, uart:
     hexes = [frame.hex(" ").upper() or "nothing" for _, frame in frames]
     width = min(max(map(len, hexes)), WIDE_HEX)
     for (what, frame), text in zip(frames, hexes, strict=True):
-        yield f"  {what}  {text.ljust(width)}  {_meaning(frame, options)}".rstrip()
+        meaning = describe(frame, options.codec) if frame else ""
+        yield f"  {what}  {text.ljust(width)}  {meaning}".rstrip()
     yield ""
     echoed = any(each.sent and each.heard.startswith(each.sent) for each in attempts.exchanges)
     framing = None if uart is None else uart.framing
@@ -274,10 +272,6 @@ def _explanation(options: _ReadOptions, attempts: _Attempts, fault: Fault, uart:
     yield from troubleshooting.lines(
         troubleshooting.meaning(seen), (*_rate_advice(options, fault), *troubleshooting.checks(seen))
     )
-
-
-def _meaning(frame: bytes, options: _ReadOptions) -> str:
-    return describe(frame, options.codec) if frame else ""
 
 
 def _rate_advice(options: _ReadOptions, fault: Fault) -> Iterator[str]:

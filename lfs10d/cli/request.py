@@ -13,7 +13,7 @@ from typing import Any
 import click
 from pydantic import ValidationError
 
-from lfs10d.cli import EXIT_FAILED, config_option, event_loop, json_option, request_words
+from lfs10d.cli import EXIT_FAILED, config_option, event_loop, json_option, print_lines, request_words
 from lfs10d.cli.adopt_loop import AdoptLoop
 from lfs10d.cli.adopt_repeat import ADOPT, repeat
 from lfs10d.cli.client import RETAINED_WITHIN, CommandClient, parsed
@@ -106,8 +106,7 @@ class _Command(click.Command):
 def _list(context: click.Context, parameter: click.Parameter, wanted: bool) -> None:  # noqa: FBT001  # as click calls it
     del parameter
     if wanted and not context.resilient_parsing:
-        for text in request_words.listing():
-            click.echo(text)
+        print_lines(request_words.listing())
         context.exit()
 
 
@@ -161,8 +160,8 @@ def command(**values: Any) -> int:  # noqa: ANN401  # nine options; `_RequestOpt
     else:
         click.echo(status_line(response), err=not done)
         data = response.get("data")
-        for text in health(data) if options.name == "health" and isinstance(data, dict) else content_lines(response):
-            click.echo(text)
+        is_health = options.name == "health" and isinstance(data, dict)
+        print_lines(health(data or {}) if is_health else content_lines(response))
     return 0 if done else EXIT_FAILED
 
 

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import secrets
-import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import Any, Final
 
 import click
 
-from lfs10d.cli import EXIT_FAILED
+from lfs10d.cli import EXIT_FAILED, print_lines
 from lfs10d.cli.client import CommandClient, parsed
 from lfs10d.cli.json_text import json_text
 from lfs10d.cli.login import Login
 from lfs10d.cli.render import scan_findings
 from lfs10d.cli.render.response import content_lines, status_line
-from lfs10d.cli.render.scan_progress import REPORT_EVERY, progress_bar, span
+from lfs10d.cli.render.scan_progress import progress_view
 from lfs10d.errors import FailedError
 from lfs10d.mqtt.messages import Filter, Incoming
 from lfs10d.profiles.library import builtin_names, load_profile
@@ -26,9 +24,6 @@ from lfs10d.profiles.profile import Profile
 from lfs10d.schema.quantities import duration_text
 from lfs10d.system.logs import escape
 from lfs10d.telemetry.publication import EVENT
-
-if TYPE_CHECKING:  # rich is imported where something is drawn, and nowhere else
-    from rich.progress import Progress as Bar
 
 SCAN: Final = "line/scan"
 CANCEL: Final = "line/cancel"
@@ -38,12 +33,14 @@ ENDS_WITHIN: Final = 1.4
 
 async def scan(login: Login, content: dict[str, Any], patience: float | None, *, as_json: bool) -> int:
     """Have the daemon scan and show its progress; return the exit code. Cancelling ends the scan, too."""
-    with _view(quiet=as_json) as shown:
+    with progress_view(quiet=as_json, title=SCAN, remaining="?") as shown:
 
         def arrived(message: Incoming) -> None:
             event = parsed(message.payload)
             if isinstance(event, dict) and event.get("type") == "scan_progress":
-                shown.on_progress(event)
+                percent, remaining = _figures(event)
+                where = f"{event.get('baudrate')} baud, id {event.get('slave')!s:>3}"
+                shown.progress(percent, remaining, escape(where))
 
         client = CommandClient(login, [Filter(login.topics.full(EVENT))], arrived)
         cancelled = False
@@ -83,8 +80,7 @@ def show(response: Mapping[str, Any], *, as_json: bool) -> int:
         else:
             click.echo("No device was found.")
         rest = {key: value for key, value in data.items() if key != "found"}
-        for text in content_lines({"data": rest}) if rest else ():
-            click.echo(text)
+        print_lines(content_lines({"data": rest}) if rest else ())
     return 0 if done else EXIT_FAILED
 
 
@@ -125,24 +121,6 @@ def _remarks(entry: Mapping[str, Any]) -> Iterator[str]:
         yield scan_findings.may_also_be([_title(str(name)) for name in others])
 
 
-# Progress
-
-
-class _ProgressView(Protocol):
-    def on_progress(self, progress: Mapping[str, Any]) -> None:
-        """Take an event `scan_progress`."""
-
-
-@contextmanager
-def _view(*, quiet: bool) -> Iterator[_ProgressView]:
-    """Give what shows the progress on standard error; `quiet`: only on a terminal, where it leaves nothing behind."""
-    if not sys.stderr.isatty():
-        yield _Lines(quiet=quiet)
-        return
-    with progress_bar() as bar:
-        yield _Bar(bar)
-
-
 def _figures(progress: Mapping[str, Any]) -> tuple[float, float]:
     """Return percent and s to go; what comes from the broker may be anything."""
     percent, remaining = (
@@ -150,31 +128,3 @@ def _figures(progress: Mapping[str, Any]) -> tuple[float, float]:
         for value, most in ((progress.get("percent"), 100.0), (progress.get("remaining_s"), 1e6))
     )
     return percent, remaining
-
-
-class _Lines:
-    def __init__(self, *, quiet: bool) -> None:
-        self._quiet = quiet
-        self._next = REPORT_EVERY
-
-    def on_progress(self, progress: Mapping[str, Any]) -> None:
-        """Print a line now and then."""
-        percent, remaining = _figures(progress)
-        if not self._quiet and self._next <= percent < 100.0:  # noqa: PLR2004  # of a hundred percent
-            self._next = percent + REPORT_EVERY
-            click.echo(f"{percent:.0f} %, about {span(remaining)} to go", err=True)
-
-
-class _Bar:
-    def __init__(self, bar: Bar) -> None:
-        self._bar = bar
-        self._task = bar.add_task("line/scan", total=100.0, remaining="?")
-        bar.refresh()
-
-    def on_progress(self, progress: Mapping[str, Any]) -> None:
-        """Move the bar."""
-        percent, remaining = _figures(progress)
-        where = f"{progress.get('baudrate')} baud, id {progress.get('slave')!s:>3}"
-        self._bar.update(
-            self._task, completed=percent, description=escape(where), remaining=span(remaining), refresh=True
-        )

@@ -12,13 +12,13 @@ from typing import Any
 
 import click
 
-from lfs10d.cli import EXIT_FAILED, EXIT_UNAVAILABLE, json_option
+from lfs10d.cli import EXIT_FAILED, EXIT_UNAVAILABLE, json_option, print_lines
 from lfs10d.cli.calibrated import NONE, Calibrations, calibration_option, calibrations_of
 from lfs10d.cli.direct_line import DirectLine
 from lfs10d.cli.options import PORT, LineOptions, baudrate_of, line_options, take
 from lfs10d.cli.port_holder import instead
 from lfs10d.cli.render import scan_findings, troubleshooting
-from lfs10d.cli.render.scan_progress import view
+from lfs10d.cli.render.scan_progress import scan_view
 from lfs10d.errors import FailedError, PortBusyError, PortError
 from lfs10d.line.jobs.identification import FoundDevice, by_evidence
 from lfs10d.line.jobs.scan import Scan
@@ -195,14 +195,12 @@ class _Result:
         if found and not written:
             click.echo()
             click.echo("# To poll them, save this as lfs10d.yaml, then: lfs10d run -c lfs10d.yaml")
-            for text in scan_findings.snippet(found, self.line, asked=self.asked, known=self.calibrations):
-                click.echo(text)
+            print_lines(scan_findings.snippet(found, self.line, asked=self.asked, known=self.calibrations))
         if found and not self.scan.noise.ids:
             return
         if found:
             click.echo()
-        for text in self._explanation():
-            click.echo(text, err=True)
+        print_lines(self._explanation(), err=True)
 
     def _explanation(self) -> Iterator[str]:
         noise, asked = self.scan.noise, self.scan.progress.asked
@@ -226,7 +224,7 @@ def _scan(result: _Result, *, as_json: bool) -> int:
             while not line.events(LOOK_EVERY):
                 pass  # until the port is open
             result.opened = True
-            with view(scan, scan_findings.lasting_name(port), quiet=as_json) as drawn:
+            with scan_view(scan, scan_findings.lasting_name(port), quiet=as_json) as drawn:
                 line.submit(scan)
                 while not scan.over:
                     line.events(LOOK_EVERY)
@@ -241,7 +239,6 @@ def _scan(result: _Result, *, as_json: bool) -> int:
     except PortError as error:
         click.echo(f"lfs10d: {error}", err=True)
         if isinstance(error, PortBusyError):
-            for text in instead(port, slave=None):
-                click.echo(text, err=True)
+            print_lines(instead(port, slave=None), err=True)
         return EXIT_UNAVAILABLE
     return 0 if scan.found else EXIT_FAILED

@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from lfs10d import __version__
-from lfs10d.cli import EXIT_FAILED, SERVICE_FILE
+from lfs10d.cli import EXIT_FAILED, SERVICE_FILE, print_lines
 from lfs10d.cli.service_files import (
     Installation,
     ServicePlaces,
@@ -72,8 +72,7 @@ def install(*, user: bool, instance: str | None) -> int:
                 f"{obstacle}; install into /opt/lfs10d (python3 -m venv /opt/lfs10d), or by sudo pipx with "
                 "PIPX_HOME=/opt/pipx PIPX_BIN_DIR=/usr/local/bin, or use --user"
             )
-    for sentence in install_units(installation, places):
-        click.echo(sentence)
+    print_lines(install_units(installation, places))
     file = _file(places, instance)
     if install_sample(file):
         click.echo(f"{file} written: a sample")
@@ -116,8 +115,7 @@ def remove(*, user: bool, instance: str | None) -> int:
             places.call("disable", "--now", unit)
             click.echo(f"{unit} stopped and disabled")
     places.call("stop", "lfs10d@*.service")
-    for sentence in remove_units(places) or ["no units of lfs10d service install were found"]:
-        click.echo(sentence)
+    print_lines(remove_units(places) or ["no units of lfs10d service install were found"])
     places.call("daemon-reload")
     click.echo(f"Configuration and state stay: {places.configurations}, {_state(user=user)}")
     return 0

@@ -159,9 +159,6 @@ def command(**values: Any) -> None:  # noqa: ANN401  # seventeen options; `Simul
     _report_figures(options, port, "end")
 
 
-simulate = command
-
-
 def _power_cycle(line: SimulatedLine) -> None:
     line.power_cut(line.now / SECOND)
     line.power_up()

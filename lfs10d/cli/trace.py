@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import click
 
-from lfs10d.cli import EXIT_FAILED, config_option, event_loop, json_option
+from lfs10d.cli import EXIT_FAILED, config_option, event_loop, json_option, print_lines
 from lfs10d.cli.client import CommandClient, parsed
 from lfs10d.cli.json_text import json_text
 from lfs10d.cli.local_time import NO_CLOCK, clock_text
@@ -102,8 +102,7 @@ async def _show(client: CommandClient, frames: deque[Any], duration: float, *, a
             frame = frames.popleft()
             if not isinstance(frame, dict):
                 continue
-            for text in [json_text(frame)] if as_json else lines(frame, width):
-                click.echo(text)
+            print_lines([json_text(frame)] if as_json else lines(frame, width))
         if client.daemon_gone:
             raise BrokerError(f"{client.place}: the daemon went offline")
     return 0

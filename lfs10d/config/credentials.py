@@ -26,6 +26,10 @@ LONGEST_PATH = 4096
 """Characters of a path that are shown: whole, for only whole it helps (PATH_MAX of Linux)."""
 
 
+DENIED = "permission denied"
+"""The system's reason for what we may not read, as `reason` says it."""
+
+
 class UnreadableError(Exception):
     """A file beside the configuration cannot be used; the message says why."""
 

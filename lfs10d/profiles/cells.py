@@ -17,7 +17,6 @@ _EXPONENT = 0x7F80_0000
 _SIGN = 0x8000_0000
 _SMALLEST = float_bits(SMALLEST_FLOAT, "float32")
 """Bits of the float32 nearest to it; magnitudes order as their bits do."""
-_TEN = 10
 
 
 class Part(NamedTuple):

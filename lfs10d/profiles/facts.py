@@ -15,25 +15,11 @@ from lfs10d.system.dataclass import dataclass
 Place: TypeAlias = tuple[str | int, ...]
 
 RESERVED_NAMES = frozenset(
-    {
-        "v",
-        "line",
-        "device",
-        "boot",
-        "seq",
-        "ts",
-        "time",
-        "clock",
-        "unit",
-        "units",
-        "quality",
-        "error",
-        "rtt_ms",
-        "errors",
-        "ages",
-    }
-    | {"historical"}
-)
+    (
+        "v", "line", "device", "boot", "seq", "ts", "time", "clock", "unit", "units", "quality", "error", "rtt_ms",
+        "errors", "ages", "historical",
+    )
+)  # fmt: skip
 """Keys of a sample; value names stand flat beside them."""
 
 LAST_REGISTER = 0xFFFF
@@ -48,14 +34,7 @@ def refuse(problems: list[tuple[Place, str]]) -> None:
     if problems:
         raise ValidationError.from_exception_data(
             "profile",
-            [
-                InitErrorDetails(
-                    type=plain_error(message),
-                    loc=place,
-                    input=None,
-                )
-                for place, message in problems
-            ],
+            [InitErrorDetails(type=plain_error(message), loc=place, input=None) for place, message in problems],
         )
 
 

@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from lfs10d.cli import login as logins
-from lfs10d.cli.login import DENIED, REMEDY, Login, log_in
+from lfs10d.cli.login import REMEDY, Login, log_in
 from lfs10d.config import credentials
+from lfs10d.config.credentials import DENIED
 from lfs10d.errors import ConfigError
 from lfs10d.system.secret import Secret
 

@@ -58,7 +58,8 @@ async def start_broker(children: Children, wanted: str = "auto") -> Broker:
             await children.discard(child)
     reasons = "".join(f" ({words})" for words in last_words[-1:])
     raise FailedError(
-        f"no broker could be started{reasons}: apt install mosquitto, or pip install amqtt into {_environment()}"
+        f"no broker could be started{reasons}: apt install mosquitto, or pip install amqtt into "
+        + os.environ.get("VIRTUAL_ENV", "this environment")
     )
 
 
@@ -73,10 +74,6 @@ def _command(name: str, port: int, children: Children) -> tuple[str, ...]:
     return (str(shutil.which(name, path=_PLACES)), "-c", str(file))
 
 
-def _environment() -> str:
-    return os.environ.get("VIRTUAL_ENV", "this environment")
-
-
 def _ports() -> Iterator[int]:
     """Yield the usual port if it is free, then others that are."""
     if is_free(USUAL_PORT):
@@ -89,7 +86,7 @@ def _ports() -> Iterator[int]:
 
 
 def is_free(port: int) -> bool:
-    """Say whether a broker could listen on this port of the loopback now."""
+    """Say whether a program of ours could listen on this port of the loopback now."""
     with socket.socket() as probe:
         # As brokers do: a connection of before that is still fading away is no hindrance.
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -5,11 +5,10 @@ from __future__ import annotations
 import importlib.util
 import re
 import secrets
-import socket
 from pathlib import Path
 from typing import Final
 
-from lfs10d.cli.demo.broker import LOOPBACK
+from lfs10d.cli.demo.broker import LOOPBACK, is_free
 from lfs10d.cli.demo.processes import PYTHON, Child, Children
 from lfs10d.system.dataclass import dataclass
 
@@ -42,7 +41,7 @@ def begin_page(children: Children, configuration: Path) -> StartingPage | None:
     token, token_file = secrets.token_hex(8), children.folder / _KEY_FILE
     token_file.touch(mode=0o600)
     token_file.write_text(token)
-    child = _start(children, configuration, USUAL_PORT if _is_free(USUAL_PORT) else 0)
+    child = _start(children, configuration, USUAL_PORT if is_free(USUAL_PORT) else 0)
     return StartingPage(child, configuration, token)
 
 
@@ -76,13 +75,3 @@ async def _address(children: Children, child: Child) -> str | None:
     if address is None:
         await children.discard(child)
     return address
-
-
-def _is_free(port: int) -> bool:
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((LOOPBACK, port))
-        except OSError:
-            return False
-    return True

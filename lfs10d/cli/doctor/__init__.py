@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from lfs10d.cli import EXIT_FAILED, config_option, event_loop, json_option, state_option
+from lfs10d.cli import EXIT_FAILED, config_option, event_loop, json_option, print_lines, state_option
 from lfs10d.cli.login import login_options
 
 EXAMPLES = """\b
@@ -39,7 +39,6 @@ def command(
     if as_json:
         click.echo(json.dumps([asdict(each) for each in findings], indent=2))
     else:
-        for line in lines(findings):
-            click.echo(line)
+        print_lines(lines(findings))
         click.echo(summary(findings))
     return EXIT_FAILED if any(each.level == "fail" for each in findings) else 0

@@ -10,19 +10,18 @@ import ssl
 import statistics
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
-from dataclasses import field
 from typing import Final
 
+from lfs10d.cli.client import Acknowledgements
 from lfs10d.cli.doctor.finding import Finding, fail, ok, warn
 from lfs10d.cli.login import Login
 from lfs10d.errors import BrokerError
 from lfs10d.mqtt.broker_client import BrokerClient
 from lfs10d.mqtt.connection import Connection
 from lfs10d.mqtt.messages import Accepted, Filter, Incoming
-from lfs10d.mqtt.reasons import REFUSED_FROM, Disconnect, reason_in_words
+from lfs10d.mqtt.reasons import REFUSED_FROM, reason_in_words
 from lfs10d.mqtt.settings import BrokerSettings
 from lfs10d.mqtt.tls import tls_context
-from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.homeassistant.gateway import config_topic, object_id
 
 REACHED_WITHIN: Final = 5.0
@@ -38,36 +37,16 @@ SMALLEST_PACKET: Final = 8192 + 512
 """Bytes; an array of history has up to 8 KB (contract of the topics), and its topic."""
 
 
-@dataclass(slots=True)
-class _Trial:
+class _Trial(Acknowledgements):
     """What one connection of ours has shown."""
 
-    accepted_as: Accepted | None = None
-    answers: dict[int, tuple[int, ...]] = field(default_factory=dict)
-    heard: set[bytes] = field(default_factory=set)
-    topics: set[str] = field(default_factory=set)
-    ended_by: str = ""
-    changed: asyncio.Event = field(default_factory=asyncio.Event)
+    def __init__(self) -> None:
+        super().__init__()
+        self.heard: set[bytes] = set()
+        self.topics: set[str] = set()
 
     def accepted(self, accepted: Accepted) -> None:
-        """Note the connection."""
-        self.accepted_as = accepted
-        self.changed.set()
-
-    def ended(self, ended: Disconnect) -> None:
-        """Note why it is over."""
-        self.ended_by = ended.message
-        self.changed.set()
-
-    def acknowledged(self, mid: int, reason: int) -> None:
-        """Note that the broker has a message, or refused it."""
-        self.answers[mid] = (reason,)
-        self.changed.set()
-
-    def subscribed(self, mid: int, reasons: tuple[int, ...]) -> None:
-        """Note the answer to a subscription."""
-        self.answers[mid] = reasons
-        self.changed.set()
+        """Do nothing: `BrokerClient.opened` returns it."""
 
     def arrived(self, message: Incoming) -> None:
         """Note what came back."""
@@ -77,22 +56,16 @@ class _Trial:
 
     async def answer(self, mid: int | None) -> int | None:
         """Return the reason of an acknowledgement; None where none comes, or the connection ends."""
-        if mid is None or not await self.until(lambda: mid in self.answers):
+        if mid is None or not await self.until(lambda: mid in self.settled):
             return None
-        return self.answers[mid][0]
+        return self.settled[mid][0]
 
     async def until(self, condition: Callable[[], bool]) -> bool:
         """Wait until the condition holds; False where it does not in time, or the connection ends."""
         try:
-            async with asyncio.timeout(ANSWERED_WITHIN):
-                while not condition():
-                    if self.ended_by:
-                        return False
-                    self.changed.clear()
-                    await self.changed.wait()
-        except TimeoutError:
+            return await self.wait_until(condition, ANSWERED_WITHIN)
+        except BrokerError:
             return False
-        return True
 
 
 async def look(login: Login, messages_a_second: float) -> list[Finding]:

@@ -8,7 +8,7 @@ from typing import Any
 
 from lfs10d.cli.local_time import stamp, zone_name
 from lfs10d.cli.render.live_state import LiveState, ShownDevice
-from lfs10d.cli.render.live_table import DataSource, Line, TableRow, header, rows, table
+from lfs10d.cli.render.live_table import DataSource, TableRow, header, rows, table
 from lfs10d.telemetry.publication import iso_time
 
 WIDE = 10_000
@@ -27,7 +27,8 @@ class LiveLines:
         self, live: LiveState, source: DataSource, *, now: float, wall: float
     ) -> Iterator[tuple[str, dict[str, Any] | None]]:
         """Yield each new line as text and as data for JSON; a heading, which begins with #, has no data."""
-        heading = tuple("".join(text for text, _ in line) for line in self._header(live, source, wall))
+        lines = header(live, source, WIDE, pace=False, wall=wall, zone=self._zone)
+        heading = tuple("".join(text for text, _ in line) for line in lines)
         if heading != self._heading:
             self._heading = heading
             yield from ((f"# {text}", None) for text in heading)
@@ -40,9 +41,6 @@ class LiveLines:
                 ts = round(wall * 1000)
                 data = _data(device, row, iso_time(ts), age=live.age(device, wall), alive=source.alive)
                 yield _text(row, stamp(ts, self._zone)), data
-
-    def _header(self, live: LiveState, source: DataSource, wall: float) -> list[Line]:
-        return header(live, source, WIDE, pace=False, wall=wall, zone=self._zone)
 
 
 def health(status: Mapping[str, Any], zone: tzinfo | None = None) -> Iterator[str]:

@@ -12,7 +12,7 @@ from dataclasses import field
 from math import isfinite
 from typing import Any, Final, TypeGuard
 
-from lfs10d.cli.render.response import BESIDES
+from lfs10d.profiles.facts import RESERVED_NAMES
 from lfs10d.reading import FaultCode, Value
 from lfs10d.system.dataclass import dataclass
 
@@ -152,7 +152,7 @@ class LiveState:
             return  # the state repeats a sample of telemetry, or is no sample
         if not device.enabled and sample.get("error") != "disabled":
             return  # polled for a request alone
-        values = {name: value for name, value in sample.items() if name not in BESIDES}
+        values = {name: value for name, value in sample.items() if name not in RESERVED_NAMES}
         units = sample.get("units")
         if not isinstance(units, dict):
             units = dict.fromkeys(values, sample.get("unit") or "")
@@ -218,7 +218,7 @@ class LiveState:
         """Return the first value of a sample or of a device in the status file; None where it has none."""
         given = sample.get("values")
         values = given.items() if isinstance(given, dict) else sample.items()
-        numbers = (_number(value) for name, value in values if name not in BESIDES)
+        numbers = (_number(value) for name, value in values if name not in RESERVED_NAMES)
         return next((number for number in numbers if number is not None), None)
 
     def mark(self, name: str) -> tuple[str, int]:

@@ -9,6 +9,7 @@ from typing import Protocol
 
 import click
 
+from lfs10d.cli import print_lines
 from lfs10d.cli.json_text import json_text
 from lfs10d.cli.render.live_lines import LiveLines
 from lfs10d.cli.render.live_state import LiveState
@@ -48,8 +49,7 @@ class LivePrinter:
     def __enter__(self) -> None:
         """Print the remarks; JSON has none."""
         if not self._as_json:
-            for remark in self._remarks:
-                click.echo(f"# {remark}")
+            print_lines(f"# {remark}" for remark in self._remarks)
 
     def __exit__(self, *error: object) -> None:
         """Do nothing: each line was complete."""

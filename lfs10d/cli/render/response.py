@@ -8,26 +8,12 @@ from datetime import tzinfo
 from typing import Any
 
 from lfs10d.cli.local_time import stamp
+from lfs10d.profiles.facts import RESERVED_NAMES
 from lfs10d.system.logs import escape
 
 INDENT = "  "
 SAMPLE = frozenset({"device", "seq", "quality", "error"})
 """Keys by which a sample is recognized."""
-BESIDES = SAMPLE | {
-    "v",
-    "line",
-    "boot",
-    "ts",
-    "time",
-    "clock",
-    "unit",
-    "units",
-    "rtt_ms",
-    "errors",
-    "ages",
-    "historical",
-}
-"""Keys of a sample besides its values."""
 DEEPEST = 20
 """Levels that are indented; what lies deeper is shown as JSON."""
 
@@ -56,7 +42,7 @@ def _sample(sample: Mapping[str, Any], zone: tzinfo | None) -> str:
     errors = found if isinstance(found, dict) else {}
     values = []
     for name, value in sample.items():
-        if name in BESIDES:
+        if name in RESERVED_NAMES:
             continue
         unit = units.get(name) if isinstance(units, dict) else sample.get("unit")
         why = errors.get(name)

@@ -10,8 +10,7 @@ from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
+from lfs10d.cli import print_lines
 from lfs10d.cli.calibrated import NONE, Calibrations
 from lfs10d.cli.options import LineOptions
 from lfs10d.cli.render.table import columns
@@ -45,8 +44,7 @@ def row(finding: FoundDevice, calibrated: Mapping[str, Value | None] = NOTHING) 
 def show(rows: list[tuple[str, ...]]) -> None:
     """Print what was found."""
     if not sys.stdout.isatty():
-        for text in columns(HEAD, rows, right=RIGHT):
-            click.echo(text)
+        print_lines(columns(HEAD, rows, right=RIGHT))
         return
     # Only a terminal needs rich; importing it takes longer than the rest of the verb.
     from rich import box  # noqa: PLC0415 - for a terminal only

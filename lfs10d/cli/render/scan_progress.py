@@ -14,40 +14,33 @@ from lfs10d.cli.render import scan_findings
 if TYPE_CHECKING:  # rich is imported where something is drawn, and nowhere else
     from rich.progress import Progress as Bar
 
-    from lfs10d.line.jobs.identification import FoundDevice
     from lfs10d.line.jobs.scan import Scan
 
 REPORT_EVERY = 10.0
 """Percent between two lines where no bar can be drawn."""
 
 
-class ScanView(Protocol):
+class ProgressView(Protocol):
     """Shows how far a scan is."""
 
-    def update(self) -> None:
-        """Show what is new."""
+    def found(self, sentence: str) -> None:
+        """Show what was found."""
+
+    def progress(self, percent: float, remaining: float, where: str) -> None:
+        """Show how far it is: percent, s to go, and where it asks now."""
 
 
 @contextmanager
-def view(scan: Scan, port: str, *, quiet: bool) -> Iterator[ScanView]:
-    """Give what shows the scan; `quiet`: only on a terminal, where it leaves nothing behind."""
-    terminal = sys.stderr.isatty()
-    if not (quiet and not terminal):
-        click.echo(announcement(scan, port), err=True)
-    if not terminal:
-        yield _ProgressLines(scan, quiet=quiet)
+def progress_view(*, quiet: bool, title: str, remaining: str) -> Iterator[ProgressView]:
+    """Give what shows the progress; `quiet`: only on a terminal, where it leaves nothing behind.
+
+    `title` and `remaining` stand there until there is progress.
+    """
+    if not sys.stderr.isatty():
+        yield _ProgressLines(quiet=quiet)
         return
-    bar = progress_bar()
-    with bar:
-        yield _ProgressBar(scan, bar)
-
-
-def announcement(scan: Scan, port: str) -> str:
-    """Return what is about to happen and how long it takes."""
-    search = scan.plan
-    rates = " and ".join(str(timing.baudrate) for timing in search.timings)
-    ids = f"id {search.ids[0]}" if len(search.ids) == 1 else f"{len(search.ids)} ids"
-    return f"Scanning {port}: {ids} at {rates} baud, about {span(search.expected)}. Nothing is written. Ctrl-C ends it."
+    with _progress_bar() as bar:
+        yield _ProgressBar(bar, title, remaining)
 
 
 def span(seconds: float) -> str:
@@ -59,69 +52,40 @@ def span(seconds: float) -> str:
     return f"{minutes} min {rest} s" if rest else f"{minutes} min"
 
 
-class _NewFindings:
-    """Yields each finding once."""
-
-    def __init__(self, scan: Scan) -> None:
-        self._scan = scan
-        self._reported: set[tuple[int, int]] = set()
-
-    def fresh(self) -> Iterator[FoundDevice]:
-        """Yield what was found since the last call."""
-        for finding in self._scan.found:
-            key = finding.slave, finding.baudrate
-            if key not in self._reported:
-                self._reported.add(key)
-                yield finding
-
-
-def _sentence(finding: FoundDevice) -> str:
-    return f"found {finding.slave} at {finding.baudrate} baud: {scan_findings.what(finding)}"
-
-
 class _ProgressLines:
-    def __init__(self, scan: Scan, *, quiet: bool) -> None:
-        self._scan = scan
+    def __init__(self, *, quiet: bool) -> None:
         self._quiet = quiet
-        self._new = _NewFindings(scan)
         self._next = REPORT_EVERY
 
-    def update(self) -> None:
-        """Print a line for each finding, and one now and then."""
-        if self._quiet:
-            return
-        for finding in self._new.fresh():
-            click.echo(_sentence(finding), err=True)
-        progress = self._scan.progress
-        if self._next <= progress.percent < 100.0:  # noqa: PLR2004  # of a hundred percent
-            self._next = progress.percent + REPORT_EVERY
-            click.echo(f"{progress.percent:.0f} %, about {span(progress.remaining)} to go", err=True)
+    def found(self, sentence: str) -> None:
+        """Print a line."""
+        if not self._quiet:
+            click.echo(sentence, err=True)
+
+    def progress(self, percent: float, remaining: float, where: str) -> None:
+        """Print a line now and then."""
+        del where
+        if not self._quiet and self._next <= percent < 100.0:  # noqa: PLR2004  # of a hundred percent
+            self._next = percent + REPORT_EVERY
+            click.echo(f"{percent:.0f} %, about {span(remaining)} to go", err=True)
 
 
 class _ProgressBar:
-    def __init__(self, scan: Scan, bar: Bar) -> None:
-        self._scan = scan
+    def __init__(self, bar: Bar, title: str, remaining: str) -> None:
         self._bar = bar
-        self._new = _NewFindings(scan)
-        self._task = bar.add_task("", total=100.0, remaining=span(scan.plan.expected))
+        self._task = bar.add_task(title, total=100.0, remaining=remaining)
+        bar.refresh()
 
-    def update(self) -> None:
-        """Move the bar; put each finding above it."""
-        for finding in self._new.fresh():
-            self._bar.console.print(_sentence(finding), markup=False, highlight=False)
-        progress = self._scan.progress
-        where = f"{progress.baudrate} baud, id {progress.slave:>3}"
-        self._bar.update(
-            self._task,
-            completed=progress.percent,
-            description=where,
-            remaining=span(progress.remaining),
-            refresh=True,
-        )
+    def found(self, sentence: str) -> None:
+        """Put a line above the bar."""
+        self._bar.console.print(sentence, markup=False, highlight=False)
+
+    def progress(self, percent: float, remaining: float, where: str) -> None:
+        """Move the bar."""
+        self._bar.update(self._task, completed=percent, description=where, remaining=span(remaining), refresh=True)
 
 
-def progress_bar() -> Bar:
-    """Return a bar for standard error; what adds a task gives it `remaining`, in words."""
+def _progress_bar() -> Bar:
     # Only a terminal needs rich; importing it takes longer than the rest of the verb.
     from rich.console import Console  # noqa: PLC0415 - for a terminal only
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn  # noqa: PLC0415 - for a terminal only
@@ -136,3 +100,40 @@ def progress_bar() -> Bar:
         transient=True,
         expand=True,
     )
+
+
+# A scan of our own
+
+
+class ScanView:
+    """Shows how far a scan is, and what it finds."""
+
+    def __init__(self, scan: Scan, shown: ProgressView) -> None:
+        self._scan = scan
+        self._shown = shown
+        self._reported: set[tuple[int, int]] = set()
+
+    def update(self) -> None:
+        """Show what is new."""
+        for finding in self._scan.found:
+            place = finding.slave, finding.baudrate
+            if place not in self._reported:
+                self._reported.add(place)
+                what = scan_findings.what(finding)
+                self._shown.found(f"found {finding.slave} at {finding.baudrate} baud: {what}")
+        progress = self._scan.progress
+        where = f"{progress.baudrate} baud, id {progress.slave:>3}"
+        self._shown.progress(progress.percent, progress.remaining, where)
+
+
+@contextmanager
+def scan_view(scan: Scan, port: str, *, quiet: bool) -> Iterator[ScanView]:
+    """Say what is about to happen and how long it takes, then give what shows the scan; `quiet` as above."""
+    plan = scan.plan
+    if not quiet or sys.stderr.isatty():
+        rates = " and ".join(str(timing.baudrate) for timing in plan.timings)
+        ids = f"id {plan.ids[0]}" if len(plan.ids) == 1 else f"{len(plan.ids)} ids"
+        what = f"{ids} at {rates} baud, about {span(plan.expected)}"
+        click.echo(f"Scanning {port}: {what}. Nothing is written. Ctrl-C ends it.", err=True)
+    with progress_view(quiet=quiet, title="", remaining=span(plan.expected)) as shown:
+        yield ScanView(scan, shown)

@@ -47,7 +47,7 @@ def test_the_page_is_on_the_loopback_and_its_token_is_for_us_alone(tmp_path: Pat
 def test_where_another_took_the_usual_port_at_the_last_moment_it_is_on_another(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(page, "_is_free", lambda _: True)
+    monkeypatch.setattr(page, "is_free", lambda _: True)
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))
         other.listen()
