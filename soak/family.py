@@ -21,11 +21,11 @@ from lfs10d.profiles.library import load_profile
 from lfs10d.simulator.burst import MASTER
 from lfs10d.simulator.judge import JudgeReport
 from lfs10d.simulator.line import SimulatedLine
-from lfs10d.simulator.queued_sensor import QueuedSensor
 from lfs10d.simulator.wire import SECOND, Format
 from soak.attestation import Oracle, Samples, codes, parsed
 from soak.troubles import FAMILY, Fault, mix
 from soak.virtual import EPOCH, DaemonInMemory
+from tests.support.queued_sensor import QueuedSensor
 
 DEVICES = (1, 2, 3, 4)
 ILL = 2

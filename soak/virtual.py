@@ -24,7 +24,6 @@ from lfs10d.mqtt.uplink import Uplink
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Event, Reading
 from lfs10d.simulator.line import SimulatedLine
-from lfs10d.simulator.port import STANDSTILL, SimulatedPort, VirtualClock
 from lfs10d.simulator.wire import nanoseconds
 from lfs10d.system.clock import Instant
 from lfs10d.telemetry.first_burst import FirstBurst
@@ -32,6 +31,7 @@ from lfs10d.telemetry.info import DaemonInfo
 from lfs10d.telemetry.publication import Publication
 from lfs10d.telemetry.station import Station
 from soak.brokerinmemory import BrokerInMemory
+from tests.support.virtual_port import STANDSTILL, SimulatedPort, VirtualClock
 
 EPOCH = 1_700_000_000
 """Wall clock at the virtual time 0, in s."""

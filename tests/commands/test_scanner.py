@@ -20,8 +20,8 @@ from lfs10d.modbus.bus import Bus, LineRules
 from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.reading import Event
 from lfs10d.simulator.line import SimulatedLine
-from lfs10d.simulator.port import SimulatedPort, VirtualClock, run
 from lfs10d.simulator.sensor import Sensor
+from tests.support.virtual_port import SimulatedPort, VirtualClock, run
 
 IDS = tuple(range(1, 41))
 

@@ -14,10 +14,10 @@ import pytest
 from lfs10d.simulator.burst import MASTER
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
-from lfs10d.simulator.queued_sensor import QueuedSensor
 from lfs10d.simulator.wire import SECOND, Format
 from soak.attestation import Oracle, epoch_of, parsed
 from soak.troubles import KINDS
+from tests.support.queued_sensor import QueuedSensor
 from tests.support.sites import Site, View, eventually, tell
 
 pytestmark = [pytest.mark.needs("mosquitto"), pytest.mark.long(55)]

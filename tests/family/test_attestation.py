@@ -9,10 +9,10 @@ import pytest
 
 from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.simulator.line import SimulatedLine
-from lfs10d.simulator.port import SimulatedPort, VirtualClock
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import seal
 from soak.attestation import LOOKS, Attested, Oracle, codes, epoch_of, parsed
+from tests.support.virtual_port import SimulatedPort, VirtualClock
 
 EPOCH = 1_700_000_000
 READ = bytes((3, 0, 1, 0, 2))

@@ -18,11 +18,11 @@ from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Event, Reading
 from lfs10d.simulator.blueprint import blueprint_of
 from lfs10d.simulator.line import SimulatedLine
-from lfs10d.simulator.port import SimulatedPort, VirtualClock, run
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.telemetry.info import DeviceInfo
 from tests.support.any_profiles import a_profile, certificates
 from tests.support.stations import instant, station
+from tests.support.virtual_port import SimulatedPort, VirtualClock, run
 
 SLAVE = 9
 

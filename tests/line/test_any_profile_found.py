@@ -21,10 +21,10 @@ from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Event, Reading
 from lfs10d.simulator.blueprint import blueprint_of
 from lfs10d.simulator.line import SimulatedLine
-from lfs10d.simulator.port import SimulatedPort, VirtualClock, run
 from lfs10d.simulator.sensor import Sensor
 from tests.support.any_profiles import SETTINGS, a_profile
 from tests.support.scans import BUILTIN, RTU, Scanned
+from tests.support.virtual_port import SimulatedPort, VirtualClock, run
 
 SLAVE = 9
 

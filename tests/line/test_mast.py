@@ -21,10 +21,10 @@ from lfs10d.reading import Event, FaultCode, Reading
 from lfs10d.simulator.blueprint import blueprint_of
 from lfs10d.simulator.burst import MASTER
 from lfs10d.simulator.line import SimulatedLine
-from lfs10d.simulator.port import SimulatedPort, VirtualClock
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.signals import Published
 from tests.support.lines import Rig
+from tests.support.virtual_port import SimulatedPort, VirtualClock
 
 HOUR = 3600.0
 INTERVAL = 10.0

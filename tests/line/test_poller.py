@@ -18,9 +18,9 @@ from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.library import load_profile
 from lfs10d.reading import Event, Exchanged, FaultCode, PortChanged, Purpose, Reading, UartCounted, UartCounters
 from lfs10d.simulator.line import SimulatedLine
-from lfs10d.simulator.port import SimulatedPort, VirtualClock, run
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
+from tests.support.virtual_port import SimulatedPort, VirtualClock, run
 
 SETTINGS = PortSettings("/dev/simulated")
 

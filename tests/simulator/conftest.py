@@ -8,10 +8,10 @@ import pytest
 
 from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.simulator.line import SimulatedLine
-from lfs10d.simulator.port import SimulatedPort, VirtualClock
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Framing
 from tests.support.simulated import Bench
+from tests.support.virtual_port import SimulatedPort, VirtualClock
 
 
 @pytest.fixture

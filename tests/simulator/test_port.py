@@ -12,10 +12,10 @@ from lfs10d.modbus.port import Port
 from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.reading import UartCounters
 from lfs10d.simulator.line import SimulatedLine
-from lfs10d.simulator.port import SimulatedPort, VirtualClock, format_of, run
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format, seal, unseal
 from tests.support.simulated import Bench
+from tests.support.virtual_port import SimulatedPort, VirtualClock, format_of, run
 
 Maker = Callable[..., Bench]
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from lfs10d.simulator.queued_sensor import QueuedSensor
 from lfs10d.simulator.wire import Format
+from tests.support.queued_sensor import QueuedSensor
 
 READ = bytes((1, 3, 0, 1, 0, 2))
 LASTS = Format().span(9)

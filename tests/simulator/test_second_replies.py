@@ -7,9 +7,9 @@ from collections.abc import Callable
 import pytest
 
 from lfs10d.simulator.line import SensorAnswer
-from lfs10d.simulator.queued_sensor import QueuedSensor
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format, nanoseconds
+from tests.support.queued_sensor import QueuedSensor
 from tests.support.simulated import Bench
 
 Maker = Callable[..., Bench]

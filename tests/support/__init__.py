@@ -14,6 +14,8 @@ The wire (`modbus`)
 
 The simulator
     `simulated`          a simulated line, asked byte by byte
+    `virtual_port`       the master's port on it in virtual time, and what drives a master through that
+    `queued_sensor`      a simulated sensor that answers one request after the other, however late
     `sensor_values`      wind speeds in the replies of a simulated sensor
 
 One line, without broker and daemon (`line`)

@@ -19,10 +19,10 @@ from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Event, Exchanged, FaultCode, PortChanged, Reading
 from lfs10d.simulator.burst import MASTER
 from lfs10d.simulator.line import HeardRequest, SensorAnswer, SimulatedLine
-from lfs10d.simulator.port import SimulatedPort, VirtualClock, run
-from lfs10d.simulator.queued_sensor import QueuedSensor
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
+from tests.support.queued_sensor import QueuedSensor
+from tests.support.virtual_port import SimulatedPort, VirtualClock, run
 
 LFS10 = load_profile("lfs10", relative_to=Path())
 

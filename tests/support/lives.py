@@ -36,12 +36,12 @@ from lfs10d.reading import Event, PortChanged, Reading
 from lfs10d.reconfiguration.journal import Journal
 from lfs10d.reconfiguration.reconfiguration import Reconfiguration
 from lfs10d.simulator.line import SimulatedLine
-from lfs10d.simulator.port import SimulatedPort, VirtualClock, run
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from lfs10d.system.clock import Instant
 from lfs10d.system.disk import Disk
 from tests.support.virtual_loop import Loop
+from tests.support.virtual_port import SimulatedPort, VirtualClock, run
 from tests.support.volatile_disk import ForgetfulFiles, PowerCutError
 
 T = TypeVar("T")

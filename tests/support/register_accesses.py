@@ -20,8 +20,8 @@ from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Event, Exchanged, Purpose
 from lfs10d.simulator.blueprint import blueprint_of
 from lfs10d.simulator.line import SimulatedLine
-from lfs10d.simulator.port import SimulatedPort, VirtualClock, run
 from lfs10d.simulator.sensor import Sensor
+from tests.support.virtual_port import SimulatedPort, VirtualClock, run
 
 ROOT = Path(__file__).parents[2]
 VANE = load_profile("config/profiles/wind-vane.yaml", relative_to=ROOT)

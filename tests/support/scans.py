@@ -18,8 +18,8 @@ from lfs10d.modbus.timing import LineTiming
 from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.reading import Event, Exchanged
 from lfs10d.simulator.line import SimulatedLine
-from lfs10d.simulator.port import SimulatedPort, VirtualClock, run
 from lfs10d.simulator.sensor import Sensor
+from tests.support.virtual_port import SimulatedPort, VirtualClock, run
 
 BUILTIN = {name: load_profile(name, relative_to=Path()) for name in builtin_names()}
 PROFILES = by_evidence(BUILTIN.values())

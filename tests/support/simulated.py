@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from lfs10d.simulator.line import SensorAnswer, SimulatedLine
-from lfs10d.simulator.port import SimulatedPort, VirtualClock
 from lfs10d.simulator.wire import Framing, seal, unseal
+from tests.support.virtual_port import SimulatedPort, VirtualClock
 
 READ, WRITE = 3, 6
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from contextvars import Context
 from typing import TypeVarTuple
 
-from lfs10d.simulator.port import VirtualClock
+from tests.support.virtual_port import VirtualClock
 
 Ts = TypeVarTuple("Ts")
 ENDLESS = 10_000
