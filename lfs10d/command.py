@@ -1,4 +1,4 @@
-"""The way down: a command, its result, and the errors a command can end with."""
+"""The way down: a command, its result, and its error codes."""
 
 from __future__ import annotations
 
@@ -61,23 +61,23 @@ class Result:
 
 
 def ok(data: object = None) -> Result:
-    """Return the answer to a request that was carried out."""
+    """Return the result of a request that was carried out."""
     return Result("ok", data)
 
 
 def rejected(code: ErrorCode, message: str, *, param: str | None = None, **facts: object) -> Result:
-    """Return the answer to a request that changed nothing."""
+    """Return the result of a request that changed nothing."""
     return Result("rejected", code=code, message=message, facts={"param": param, **facts})
 
 
 def failed(code: ErrorCode, message: str, *, data: object = None, **facts: object) -> Result:
-    """Return the answer to a request that may have sent a write, or asked for a reading that failed."""
+    """Return the result of a request that may have sent a write, or whose reading failed."""
     return Result("failed", data, code, message, {"param": None, **facts})
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """What could be read of a request: its ids, what it asks in its own words, and the same as one text.
+    """A request as far as it could be read: its ids, its parameters, and these as one text.
 
     `topic` (under B) and `correlation` are where its answer goes, once it is being performed.
 
@@ -93,12 +93,12 @@ class Command:
 
     @property
     def key(self) -> Identifier | None:
-        """What tells a repeat; None: it cannot be told."""
+        """What identifies a repeat: the id; None: it cannot be identified."""
         return self.transaction if self.id is None else self.id
 
 
 class RefusedError(Exception):
-    """A request is refused where it is being carried out; `result` says why."""
+    """A request is refused while it is carried out; `result` is the rejection."""
 
     def __init__(self, result: Result) -> None:
         super().__init__(result.message)

@@ -74,7 +74,7 @@ WALK: Final = (
     ),
     Step(
         "config/reset",
-        "Takes back what requests changed of a device, or of one key of it: the file is valid again.",
+        "Undoes what requests changed of a device, or of one of its keys: the value in the file holds again.",
         {"device": "slave-3"},
     ),
     Step("device/remove", "Its retained topics are cleared.", {"device": "crane"}),
@@ -84,8 +84,12 @@ WALK: Final = (
         "An LFS10 has no register that may be written this way:",
         {"device": "mast-top", "address": 5, "value": 9},
     ),
-    Step("line/trace", "Publishes every frame on `B/trace` for this time; `lfs10d trace` shows them.", {"for": "10s"}),
-    Step("line/pause", "Frees the port for another program for this time.", {"for": "30s"}),
+    Step(
+        "line/trace",
+        "Publishes every frame on `B/trace` for the time given; `lfs10d trace` shows them.",
+        {"for": "10s"},
+    ),
+    Step("line/pause", "Frees the port for another program for the time given.", {"for": "30s"}),
     Step("line/cancel", "Ends the trace and the pause early.", {}),
     Step(
         "line/scan",

@@ -17,6 +17,7 @@ from docs.generate.markdown import example, plain, table
 from docs.generate.meanings import ERROR_CODES, FAULT_CODES
 from docs.generate.uplink import bytes_table
 from docs.generate.wind import wind_examples
+from lfs10d.cli.request_words import KEEPING, PRESENT
 from lfs10d.command import ErrorCode
 from lfs10d.commands.context import Handler
 from lfs10d.commands.handlers.registry import HANDLERS
@@ -202,7 +203,8 @@ def _requests() -> Iterator[str]:
         fields = request.spec.parameters.model_fields
         if fields:
             rows = (
-                (f"`{field.alias or key}`", _parameter(field), field.description or "") for key, field in fields.items()
+                (f"`{field.alias or key}`", _parameter(field, keeping=name in KEEPING), field.description or "")
+                for key, field in fields.items()
             )
             yield table(("parameter", "value", "meaning"), rows)
         else:
@@ -217,7 +219,7 @@ def _does(request: Handler) -> str:
     return " ".join(words.partition("\n\n")[0].split())
 
 
-def _parameter(field: FieldInfo) -> str:
+def _parameter(field: FieldInfo, *, keeping: bool) -> str:
     kind = kind_of(field)
     beside_null = next(kinds_within(field.annotation), None)  # `Annotated[int, Whole(1, 255)] | None`
     if kind is not None:
@@ -226,4 +228,6 @@ def _parameter(field: FieldInfo) -> str:
         words = f"{beside_null.words}, or null"
     else:
         words = type_words(TypeAdapter[object](field.annotation or object).json_schema(), {})
-    return f"{plain(words)}; required" if field.is_required() else f"{plain(words)}; default `{written(field)}`"
+    if field.is_required():
+        return f"{plain(words)}; required"
+    return f"{plain(words)}; default: {PRESENT}" if keeping else f"{plain(words)}; default `{written(field)}`"

@@ -1,4 +1,4 @@
-"""Adopting sensors one after the other: which request comes next, and what is reported to the person. Pure.
+"""Adopts sensors one after the other: decides the next request, and what is reported to the person. Pure.
 
 Rules
 -----
@@ -28,9 +28,9 @@ RECHECK_AFTER: Final = 3.0
 TEMPORARY: Final = frozenset(
     {"timeout", "duplicate_id", "not_recognised", "busy", "line_error", "rate_limited", "cancelled"}
 )
-"""Rejections that end by themselves, or by what the person does on the line."""
+"""Rejections that end by themselves, or once the person has changed something on the line."""
 PERMANENT: Final = frozenset({"storage_full", "internal"})
-"""Failures that would come again."""
+"""Failures that would occur again."""
 FIRST: Final = "Plug in a sensor. Ctrl-C when all are adopted."
 NEXT: Final = "Plug in the next one."
 
@@ -51,7 +51,7 @@ class AdoptedSensor:
 
     @property
     def data(self) -> dict[str, Any]:
-        """The same for programs."""
+        """The sensor as JSON data."""
         return {"device": self.device, "slave": self.slave, "baudrate": self.baudrate}
 
 

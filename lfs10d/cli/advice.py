@@ -16,7 +16,7 @@ from lfs10d.schema.messages import KeyPath
 from lfs10d.schema.quantities import duration_text
 
 COMMON_HOST_NAMES = frozenset({"localhost", "raspberrypi", "debian", "raspbian", "ubuntu", "linux", "openwrt"})
-"""Default host names of systems, which two gateways may share."""
+"""Default host names of systems: two gateways may share one."""
 
 
 def advice(loaded: LoadedConfig, budget: Budget, host: str) -> tuple[Problem, ...]:
@@ -129,7 +129,7 @@ def _names(loaded: LoadedConfig, host: str) -> Iterator[tuple[KeyPath, str]]:
         if written is None or "%H" in written:
             message = (
                 f"the client id {config.mqtt.client_id} comes from the host name {host}, which many hosts have; "
-                "two clients of one id throw each other out: set mqtt.client_id or the host's name"
+                "two clients with one id disconnect each other: set mqtt.client_id or change the host name"
             )
             yield ("mqtt", "client_id"), message
 

@@ -24,12 +24,12 @@ from lfs10d.system.dataclass import dataclass
 
 def calibration_option(function: Callable[..., Any]) -> Callable[..., Any]:
     """Add `-c FILE` and `--state-dir`, passed on as `config: Path` and `state_dir`; `calibrations_of` takes them."""
-    return config_option(state_option(function), "Whose `calibration` is shown beside raw values.")
+    return config_option(state_option(function), "The configuration whose `calibration` is shown beside raw values.")
 
 
 @dataclass(frozen=True, slots=True)
 class Calibrations:
-    """What the configuration knows of a line's slaves, by the slave id that each has now, at the line's rate.
+    """The configured slaves of a line, by the slave id that each has now, at the line's rate.
 
     `profiles` are the calibrated ones, `raw` the same that show values without calibration. `slaves` are all of them
     whose place is known.
@@ -41,7 +41,7 @@ class Calibrations:
     slaves: Mapping[int, SlaveConfig] = field(default_factory=dict)
 
     def read_as(self, slave: int, baudrate: int, profile: Profile) -> Profile:
-        """Return the profile by which a device is read so that its raw values are judged as the daemon judges them.
+        """Return the profile with which raw values are judged as the daemon judges them.
 
         That is the contract's order: the calibration first, then the range.
         """
@@ -72,7 +72,7 @@ class Calibrations:
 
 NONE = Calibrations({}, 0)
 UNFINISHED = "line.port"
-"""What is wrong with a file that does not name its port yet, as the sample: it cannot be about this port."""
+"""The problems of a file without a port yet, such as the sample: it cannot be about this port."""
 
 
 def calibrations_of(port: str, file: Path, state_dir: Path | None) -> Calibrations:
@@ -107,11 +107,11 @@ def _found(port: str, file: Path, state_dir: Path | None, *, named: bool) -> tup
     except StateError as error:
         if not any(slave.calibration for slave in loaded.config.slaves):
             return NONE, None
-        return NONE, f"{error}; so it is not known which sensor has which slave id now (call it as root)"
+        return NONE, f"{error}; so it is not known which slave id each sensor has now (call it as root)"
 
 
 def _by_place(now: Effective) -> tuple[Calibrations, str | None]:
-    """Return the calibrations by where their devices are; a device that is to be looked for has no place."""
+    """Return the calibrations by slave id; a device that must be searched for first has none."""
     sure = {slave.id: slave for slave in now.polled.slaves if len(now.places[slave.name]) == 1}
     unsure = [slave.name for slave in now.polled.slaves if slave.calibration and slave.id not in sure]
     plain = {slave.id: (now.loaded.profiles[slave.profile], slave.certificates) for slave in sure.values()}

@@ -62,7 +62,7 @@ def command(config: Path, *, online: bool, as_json: bool) -> int:
 
 
 def _look(config: Path, loaded: LoadedConfig) -> list[Finding]:
-    """Return what is to be said of the port and the broker now."""
+    """Return the findings about the port and the broker now."""
     from lfs10d.cli.doctor import rounds  # noqa: PLC0415  # the broker's client takes a third of a second
 
     return event_loop.run(rounds.port_and_broker(config, loaded))

@@ -1,4 +1,4 @@
-"""A verb's connection to the broker, and the requests it sends to the daemon behind it.
+"""A verb's connection to the broker, and its requests to the daemon.
 
 The connection has a client id of its own, no will and no queue, and leaves nothing retained.
 """
@@ -34,7 +34,7 @@ class Acknowledgements:
 
     def __init__(self) -> None:
         self.ended_by: str | None = None
-        """Why the connection was lost, in words; None while there is one."""
+        """The reason why the connection was lost; None while it is there."""
         self.settled: dict[int, tuple[int, ...]] = {}
         """Reason codes of acknowledged subscriptions and publications, by message id."""
         self.changed = asyncio.Event()
@@ -69,7 +69,7 @@ class Acknowledgements:
 
 
 class CommandClient(Acknowledgements):
-    """One connection. `arrived` gets what comes on `filters`; responses and the availability are kept here."""
+    """One connection. `arrived` receives the messages on `filters`; responses and availability are kept here."""
 
     def __init__(
         self,
@@ -81,7 +81,7 @@ class CommandClient(Acknowledgements):
         self.topics = login.topics
         self._missing_password = login.missing_password
         self.availability: str | None = None
-        """The last availability of the daemon, published or its will; None: none yet."""
+        """The daemon's last availability, its will included; None before the first."""
         self._arrived = arrived
         self._own = self.topics.full(self.topics.response(f"cli-{secrets.token_hex(6)}"))
         self._filters = [
@@ -108,12 +108,12 @@ class CommandClient(Acknowledgements):
 
     @property
     def request_sent(self) -> bool:
-        """Whether a request was sent, whatever became of it."""
+        """Whether a request was sent, acknowledged or not."""
         return self._pending is not None
 
     @property
     def daemon_online(self) -> bool:
-        """Whether the daemon is online, as far as the present connection shows."""
+        """Whether the daemon is online, by the last availability of this connection."""
         return self.connected and self.availability == ONLINE
 
     @property
@@ -229,7 +229,7 @@ class CommandClient(Acknowledgements):
         super().ended(ended)
 
     def arrived(self, message: Incoming) -> None:
-        """Keep a response or the daemon's availability; pass on the rest."""
+        """Keep a response or the daemon's availability; pass other messages on."""
         if message.topic == self.topics.availability:
             self.availability = message.payload.decode("utf-8", "replace")
         elif self._pending is not None and message.topic in {self._own, *self._pending[1]}:
@@ -249,7 +249,7 @@ class CommandClient(Acknowledgements):
 
 
 def parsed(payload: bytes) -> Any:  # noqa: ANN401  # any JSON
-    """Return a payload's JSON, None if it is none; it may come from any client."""
+    """Return a payload's JSON, None if it is not JSON: any client may have published it."""
     try:
         return json.loads(payload)
     except (ValueError, RecursionError):

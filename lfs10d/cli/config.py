@@ -60,8 +60,8 @@ def _print_schema(context: click.Context, _: click.Parameter, wanted: bool) -> N
 def command(config: Path, state_dir: Path | None, *, merged: bool, as_json: bool) -> int:
     """Print the effective configuration, each value with its origin.
 
-    That is the file and what requests changed, which the daemon keeps in its state directory. Who may not read that is
-    shown the file's part, without --merged, and told what is missing; exit code 1. Passwords are never shown: the file
+    That is the file with the changes that requests made, which the daemon keeps in its state directory. If you may not
+    read that, only the file's values are printed, with the reason; exit code 1. Passwords are never shown: the file
     names a file that holds one.
     """
     if merged and as_json:
@@ -89,27 +89,27 @@ def command(config: Path, state_dir: Path | None, *, merged: bool, as_json: bool
         print_lines(columns(("key", "value", "origin"), rows))
     print_lines((f"lfs10d: {warning}" for warning in _warnings(now)), err=True)
     if missing is not None:
-        click.echo(f"lfs10d: {missing}; what requests changed is missing here: call it as root", err=True)
+        click.echo(f"lfs10d: {missing}; the changes made by request are missing here: call it as root", err=True)
         return EXIT_FAILED
     return 0
 
 
 def _refuse_conflicts(now: Effective, file: Path) -> None:
-    """Raise FailedError where no file can say what holds: it would give one slave id to two devices."""
+    """Raise FailedError where no file can express the configuration: two devices would have one slave id."""
     for name, why in now.conflicts.items():
         raise FailedError(f"{file}: no file can express the effective configuration: {name} is not polled, for {why}")
 
 
 def _warnings(now: Effective) -> Iterator[str]:
-    """Yield what the daemon will do to changes that do not fit the file any more."""
+    """Yield a warning for each change that no longer fits the file: the daemon will drop it."""
     for lost in now.dropped:
-        yield f"{lost.key}: {lost.message}: what a request changed there is dropped at the next start or reload"
+        yield f"{lost.key}: {lost.message}: the change made by request is dropped at the next start or reload"
     for name, why in {**now.suspended, **now.conflicts}.items():
         yield f"{name}: {why}"
 
 
 def _report(loaded: LoadedConfig, missing: str | None) -> dict[str, Any]:
-    """Return it as JSON has it; `missing`: why what requests changed is not in it."""
+    """Return the configuration for JSON; `missing` is why the changes by request are not in it."""
     report = {} if missing is None else {"missing": missing}
     return {
         **report,
@@ -119,7 +119,7 @@ def _report(loaded: LoadedConfig, missing: str | None) -> dict[str, Any]:
 
 
 def _written(config: Config, path: tuple[str | int, ...], value: object) -> str:
-    """Return a value as one would write it into the file."""
+    """Return a value as it is written in the file."""
     kind = _kind(config, path)
     if value is None:
         return "auto" if isinstance(kind, Duration) else "null"

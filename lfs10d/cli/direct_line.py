@@ -30,7 +30,7 @@ _Message: TypeAlias = "list[Event] | BaseException"
 
 
 class DirectLine:
-    """Opens the port on entering, frees it on leaving. `uart` is what the driver counted meanwhile, if it counts."""
+    """Opens the port on entering, frees it on leaving. `uart` has the driver's counts of that time, if it counts."""
 
     def __init__(self, settings: PortSettings) -> None:
         self.path = settings.path
@@ -43,13 +43,13 @@ class DirectLine:
         self._thread = LineThread(self._poller, prepare=_prepare, failed=self._queue.put)
 
     def __enter__(self) -> Self:
-        """Start the thread; it opens the port, or reports why it cannot."""
+        """Start the thread, which opens the port or reports why it cannot."""
         sys.setswitchinterval(SWITCH_INTERVAL)
         self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Free the port after the exchange under way, so that who opens it next does not hear its answer."""
+        """Free the port after the exchange under way, so that the next program does not receive its answer."""
         freed = threading.Event()
         self._poller.pause(freed.set)
         self._thread.wake()
@@ -69,7 +69,7 @@ class DirectLine:
         self._thread.wake()
 
     def events(self, within: float) -> list[Event]:
-        """Return what happened next, [] if nothing did within so many s; PortError if the port cannot be used."""
+        """Return the next events, [] if none came within the time; raises PortError if the port cannot be used."""
         try:
             message = self._queue.get(timeout=within)
         except Empty:

@@ -1,4 +1,4 @@
-"""A configuration file together with what requests changed, for the verbs that show or use both."""
+"""A configuration file together with the changes made by request, for the verbs that show or use both."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from lfs10d.system.disk import Disk
 
 
 def with_changes(file: LoadedConfig, directory: Path, *, chosen: bool) -> Effective:
-    """Return what holds by a file and the state directory; raises StateError rather than tell half of it.
+    """Return the effective configuration of a file and the state directory; raises StateError if only half is known.
 
     Where nobody named the directory (`chosen` is False) and there is none, no daemon ever ran by this file, and nothing
     was changed.
@@ -31,5 +31,5 @@ def with_changes(file: LoadedConfig, directory: Path, *, chosen: bool) -> Effect
         raise StateError(f"the state directory {directory} cannot be read: {why}")
     found = ChangesFile(directory, Disk()).read()
     if found.trouble is not None:
-        raise StateError(f"what requests changed cannot be understood: {found.trouble}")
+        raise StateError(f"the changes made by request cannot be read: {found.trouble}")
     return effective(file, found.changes)

@@ -36,12 +36,12 @@ class Login:
 
 def login_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """Add `--username` and `--password-file`, which `log_in` takes."""
-    name = click.option("--username", metavar="NAME", help="Log in with this name, not the file's.")
+    name = click.option("--username", metavar="NAME", help="Log in with this name, not the configuration's.")
     password = click.option(
         "--password-file",
         metavar="FILE",
         type=click.Path(path_type=Path, readable=False),  # whether it can be read is told in our words
-        help="Its first line is the password, not the file's.",
+        help="File whose first line is the password.",
     )
     return name(password(function))
 
@@ -77,7 +77,7 @@ def log_in(file: Path, verb: str, *, username: str | None, password_file: Path |
 
 
 def _loaded(file: Path, *, own: bool, needed: bool) -> tuple[LoadedConfig, str]:
-    """Return the configuration, and why its password file is done without; ConfigError where it cannot be."""
+    """Return the configuration, and why its password file cannot be read; ConfigError if the password is needed."""
     try:
         return load(file, files=not own), ""
     except ConfigError as error:

@@ -1,4 +1,4 @@
-"""What several verbs share of their options: kinds of arguments, the line's parameters, completion of profiles."""
+"""Options that several verbs share: kinds of arguments, the line's parameters, completion of profiles."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ _NUMBER = re.compile(r"[0-9]{1,15}(\.[0-9]{1,20})?")
 # What an argument may be
 
 PORT = click.Path(readable=False)
-"""Any path, completed as one; whether it can be opened is reported by the verb."""
+"""A path, completed as one; the verb reports whether it can be opened."""
 
 
 class SlaveId(click.IntRange):
-    """A slave id, and called one when it is wrong."""
+    """A slave id; its errors say so."""
 
     name = "slave id"
 
@@ -77,7 +77,7 @@ class LineOptions:
     timeout: float | None
 
     def settings(self, baudrate: int) -> PortSettings:
-        """Return how the port is to be opened."""
+        """Return the settings of the port."""
         return PortSettings(self.port, baudrate, self.parity, self.databits, self.stopbits)
 
     def timing(self, baudrate: int) -> LineTiming:

@@ -32,15 +32,15 @@ from lfs10d.system.logs import escape
 ATTEMPTS = 3
 """Polls that are tried, with time-outs of 200, 400 and 1000 ms (`lfs10d.line.device.FIRST_TIMEOUTS`)."""
 ONE_READING_INTERVAL = 0.5
-"""s: where one reading is wanted, no second poll begins while it is held back (`lfs10d.line.held_readings`)."""
+"""Interval in s for a single reading: no second poll begins while the first is held back (`held_readings`)."""
 SHORTEST_INTERVAL = 0.05
 """Seconds between two polls, at least."""
 LOOK_EVERY = 0.1
 WIDE_HEX = 40
-"""Columns of hex that are aligned; longer ones stand out."""
+"""Columns for bytes in hex; longer ones are not aligned."""
 BAR_UNIT = 1.0
 BAR_MOST = 40
-"""A column of the wind bar is one unit of the value; it has at most so many."""
+"""Longest wind bar in columns; one column is one unit of the value."""
 
 EXAMPLES = """\b
 Examples:
@@ -66,19 +66,21 @@ def _rate(context: click.Context, parameter: click.Parameter, value: str) -> int
     show_default=True,
     metavar="NAME|FILE",
     shell_complete=profile_names,
-    help="Which device.",
+    help="Kind of device.",
 )
 @click.option(
     "--baudrate", callback=_rate, default="9600", show_default=True, metavar="RATE", help="The sensor's rate."
 )
-@click.option("--checksum", type=click.Choice(["crc", "sum"]), default=None, help="If not the profile's.")
+@click.option(
+    "--checksum", type=click.Choice(["crc", "sum"]), default=None, help="Check of the rtu frames, if not the profile's."
+)
 @click.option("--watch", is_flag=True, help="Read again and again, until Ctrl-C.")
 @click.option(
     "--interval",
     type=DurationType("250ms or 1s", least=SHORTEST_INTERVAL),
     default="1s",
     show_default=True,
-    help="How often.",
+    help="Time between two readings with --watch.",
 )
 @line_options
 @calibration_option
@@ -172,7 +174,7 @@ def _read(options: _ReadOptions) -> int:
 
 
 def _on_reading(options: _ReadOptions, attempts: _Attempts, reading: Reading, line: DirectLine) -> int | None:
-    """Show one reading if it is to be shown; return the exit code when all is done."""
+    """Show one reading unless it is a failure before the last try; return the exit code at the end, else None."""
     fault = reading.fault
     attempts.failures = 0 if fault is None else attempts.failures + 1
     final = fault is None or (fault.code in ALIVE_CODES and not fault.busy) or attempts.failures >= ATTEMPTS
@@ -217,7 +219,7 @@ def _with_unit(value: Value, unit: str) -> str:
 
 
 def _wall(reading: Reading) -> float:
-    """Return when it was read, in seconds since the epoch."""
+    """Return the time of the reading in seconds since the epoch."""
     return time.time() - (time.monotonic() - reading.at)
 
 
@@ -282,7 +284,7 @@ def _rate_advice(options: _ReadOptions, fault: Fault) -> Iterator[str]:
 
 
 def _json(options: _ReadOptions, reading: Reading) -> dict[str, Any]:
-    """Return a reading for JSON: a sample of the contract, as far as there is one without a daemon."""
+    """Return a reading for JSON: a sample as the daemon publishes it, without what only a daemon knows."""
     fault = reading.fault
     names, units = options.profile.value_names, options.profile.units
     values = reading.values or {}

@@ -36,12 +36,12 @@ from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.publication import DEVICES
 
 USUAL_TIMEOUT = 10.0
-"""Seconds to wait for the response where nothing else is given."""
+"""Seconds to wait for the response without --timeout."""
 UNLIMITED = frozenset({"line/scan", "line/baudrate", "line/adopt", "device/readdress"})
 """Requests without a time limit: scans and changes of sensors."""
 
 IDS = ("id", "transaction")
-"""Parameters that are text whatever is typed."""
+"""Parameters that are text even if they look like a number."""
 _HEXADECIMAL = re.compile(r"0x[0-9A-Fa-f]{1,8}")
 _LEADING_ZEROS = re.compile(r"0[0-9]{1,19}")
 
@@ -87,7 +87,7 @@ def configured_devices(file: object) -> tuple[str, ...]:
 
 
 class _Command(click.Command):
-    """Knows which request its help is asked for, which click sees only after `--help`."""
+    """Shows the help of a request that is named beside `--help`, which click handles first."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Parse what was typed."""
@@ -125,20 +125,20 @@ def _list(context: click.Context, parameter: click.Parameter, wanted: bool) -> N
 @click.option(
     "--timeout",
     type=DurationType("500ms or 10s"),
-    help=f"How long to wait for the response. Default: {duration_text(USUAL_TIMEOUT)}, no end for what takes longer.",
+    help=f"Longest wait for the response: {duration_text(USUAL_TIMEOUT)}; none for scans and changes of sensors.",
 )
 @click.option(
     "--repeat",
     is_flag=True,
-    help="With line/adopt: one sensor after the other, until Ctrl-C; name=NAME,NAME,... in turn.",
+    help="With line/adopt: one sensor after the other, until Ctrl-C; name=NAME,NAME,... gives each its name.",
 )
 @login_options
 @json_option
 def command(**values: Any) -> int:  # noqa: ANN401  # nine options; `_RequestOptions` names and types them
     """Send the request NAME to the running daemon; print its response.
 
-    NAME is one such as device/read; --list prints them all, NAME --help what one takes. Each VALUE is read as the
-    request wants it: text, a number, true, a duration, or JSON; a device may be given by its slave id. Exit code 0 if
+    NAME is for example device/read: --list prints all requests, NAME --help the parameters of one. A VALUE is text, a
+    number, true, a duration or JSON, as the parameter requires; a device may be given by its slave id. Exit code 0 if
     it was carried out, 1 if not or if no response came in time, 69 if the broker or the daemon is away.
     """
     options = _RequestOptions(**values)
@@ -180,7 +180,7 @@ class _RequestOptions:
 
     @property
     def adopt_loop(self) -> AdoptLoop:
-        """What is adopted with `--repeat`."""
+        """The loop for `--repeat`."""
         if self.name != ADOPT:
             raise click.UsageError(f"--repeat goes with {ADOPT} alone")
         if self.timeout is not None:
@@ -257,7 +257,7 @@ class KeyValueError(ValueError):
 
 
 def content_of(arguments: Iterable[str], form: type[Parameters] | None) -> dict[str, Any]:
-    """Return the parameters that the arguments mean; `form` is None for a request that is not known.
+    """Return the parameters given by the arguments; `form` is None for an unknown request.
 
     What no reading of a value makes right is passed on as it is: the daemon says what is wrong with it.
     """
@@ -280,12 +280,12 @@ def _value(key: str, text: str, form: type[Parameters] | None) -> Any:  # noqa: 
 
 
 def _items(text: str) -> list[Any]:
-    """Return what a text with commas means as a list."""
+    """Return text with commas as a list."""
     return [list(_readings(item.strip()))[-1] for item in text.split(",")]
 
 
 def _readings(text: str) -> Iterator[Any]:
-    """Yield what the text may mean: null, the text itself, a number as in YAML, JSON; where nothing fits, the last."""
+    """Yield the possible values of a text: null, the text itself, a number as in YAML, JSON; the last if none fits."""
     if text == "null":
         yield None
     yield text

@@ -16,24 +16,26 @@ from lfs10d.schema.quantities import duration_text
 from lfs10d.system.dataclass import dataclass
 
 WIDTH: Final = 79
-"""Columns of a line, so that none is broken on a terminal of 80."""
+"""Longest line in columns, for a terminal of 80."""
 CLASSES: Final = ("always", "polling", "sensors", "registers")
 """Classes of requests, as they are listed."""
 _SLAVE_IDS: Final = frozenset(map(str, range(1, 256)))
 KEEPING: Final = frozenset({"device/options"})
-"""Requests that leave as it is what is not given."""
+"""Requests that leave unchanged what is not given."""
+PRESENT: Final = "the present value"
+"""The default of their parameters, in words."""
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One parameter: what may be written for it, and what holds without (None: it must be given)."""
+    """One parameter: its possible values, and its default in words (None: it must be given)."""
 
     key: str
     words: str
     usual: str | None
     meaning: str
     values: tuple[str, ...]
-    """What it may be, where that is a few words."""
+    """Its possible values, if they are a few words."""
 
 
 def parameters(name: str) -> tuple[Parameter, ...]:
@@ -56,12 +58,12 @@ def _parameter(key: str, field: FieldInfo, *, keeping: bool) -> Parameter:
             values = tuple(map(str, choice.values))
         case [Flag(), *_]:
             values = ("true", "false")
-    usual = None if field.is_required() else "as it is" if keeping else _usual(field.default, kinds)
+    usual = None if field.is_required() else PRESENT if keeping else _usual(field.default, kinds)
     return Parameter(key, words, usual, field.description or "", values)
 
 
 def _kinds_within(annotation: Any) -> Iterator[FieldKind]:  # noqa: ANN401  # any annotation
-    """Yield what single values within an annotation may be: `Annotated[int, Whole(1, 255)] | None`."""
+    """Yield the kinds of values within an annotation such as `Annotated[int, Whole(1, 255)] | None`."""
     if get_origin(annotation) is Annotated:
         yield from (each for each in get_args(annotation)[1:] if isinstance(each, FieldKind))
     for inner in get_args(annotation):
@@ -75,7 +77,7 @@ def _usual(value: object, kinds: Sequence[FieldKind]) -> str:
 
 
 def does(name: str) -> str:
-    """Return in a sentence what a request does."""
+    """Return a sentence that says what a request does."""
     return " ".join((inspect.getdoc(HANDLERS[name].work) or "").partition("\n\n")[0].split()).replace("`", "")
 
 
@@ -116,7 +118,7 @@ def _block(text: str, indent: str = "      ") -> list[str]:
 
 
 def named_device(text: str, devices: object) -> str:
-    """Return the name of the device that is meant by its name or by its slave id.
+    """Return the name of a device that is given by its name or by its slave id.
 
     `devices` is the payload of topic `devices`. A name comes before an id; what no device has is returned as it is,
     and the daemon rejects it.
@@ -128,12 +130,12 @@ def named_device(text: str, devices: object) -> str:
 
 
 def is_slave_id(text: object) -> bool:
-    """Whether a person who writes this for a device may mean its slave id."""
+    """Whether text given for a device may be its slave id."""
     return isinstance(text, str) and text in _SLAVE_IDS
 
 
 def completions(name: str, given: Sequence[str], begun: str, known: Mapping[str, Collection[str]]) -> list[str]:
-    """Return what may stand in place of `begun`, the word that is being typed after the words `given`.
+    """Return the completions of `begun`, the word that is being typed after the words `given`.
 
     `known` are the values of some keys, of `device` for example. Shells give `device=mast` as one word, or (bash) as
     the words `device`, `=` and `mast`.

@@ -34,10 +34,10 @@ LOOK_EVERY = 0.1
 
 EXAMPLES = """\b
 Examples:
-  lfs10d scan /dev/ttyUSB0                  all ids at both rates, a minute
-  lfs10d scan /dev/ttyUSB0 --ids 1-20       twenty ids, a few seconds
-  lfs10d scan /dev/ttyUSB0 --baudrate 9600  one rate
-  lfs10d scan /dev/ttyUSB0 --write site.yaml    keep what was found
+  lfs10d scan /dev/ttyUSB0                    all ids at both rates, a minute
+  lfs10d scan /dev/ttyUSB0 --ids 1-20         twenty ids, a few seconds
+  lfs10d scan /dev/ttyUSB0 --baudrate 9600    one rate
+  lfs10d scan /dev/ttyUSB0 --write site.yaml  keep what was found
 """
 
 
@@ -60,14 +60,21 @@ def _new_file(context: click.Context, parameter: click.Parameter, value: Path | 
 
 
 def given(name: str) -> bool:
-    """Whether a person gave this option."""
+    """Whether this option was given on the command line."""
     source = click.get_current_context().get_parameter_source(name)
     return source is not None and source is not click.core.ParameterSource.DEFAULT
 
 
 @click.command("scan", epilog=EXAMPLES)
 @click.argument("port", type=PORT)
-@click.option("--ids", callback=_ids, default="1-255", show_default=True, metavar="IDS", help="Such as 1-20,255.")
+@click.option(
+    "--ids",
+    callback=_ids,
+    default="1-255",
+    show_default=True,
+    metavar="IDS",
+    help="Slave ids to ask, such as 1-20,255.",
+)
 @click.option(
     "--baudrate",
     "rates",
@@ -82,10 +89,10 @@ def given(name: str) -> bool:
     "profiles",
     multiple=True,
     metavar="NAME|FILE",
-    help="A profile to recognise, and whose rates are tried too.",
+    help="Also recognise devices of this profile, and try its rates.",
 )
 @click.option(
-    "--checksum", type=click.Choice(["crc", "sum"]), default="crc", show_default=True, help="Of the rtu frames sent."
+    "--checksum", type=click.Choice(["crc", "sum"]), default="crc", show_default=True, help="Check of the rtu frames."
 )
 @click.option(
     "--write",
@@ -106,9 +113,9 @@ def command(
 ) -> int:
     """Find the devices on the line at PORT.
 
-    Polls every id at every rate; nothing is ever written to a device. A device set to the other checksum does not
-    answer: scan once with each. The port must be free. Exit code 1 if no device answers. A slave that is configured
-    with `calibration` is shown raw and calibrated.
+    Asks every id at every rate; nothing is ever written to a device. A device set to the other checksum does not
+    answer: scan once with each. The port must be free. Exit code 1 if no device answers. Values of a slave that is
+    configured with `calibration` are shown raw and calibrated.
     """
     as_json, checksum = options.pop("as_json"), options.pop("checksum")
     line = take(options)
@@ -188,7 +195,7 @@ class _Result:
         }
 
     def show(self, *, written: bool = False) -> None:
-        """Print what was found, or what it means that nothing was; the configuration unless it is `written`."""
+        """Print what was found and its configuration (unless that is `written`), or what to check if nothing was."""
         found = self.scan.found
         if found:
             scan_findings.show([scan_findings.row(finding, self.calibrated(finding)) for finding in found])

@@ -24,10 +24,10 @@ from lfs10d.errors import ConfigError, FailedError
 
 EXAMPLES = """\b
 Examples:
-  sudo lfs10d service install    write the units, start what is configured
+  sudo lfs10d service install                  install and start it
   sudo lfs10d service install --instance roof  for /etc/lfs10d/roof.yaml
-  lfs10d service print           the unit as it would be written
-  sudo lfs10d service remove     stop it, remove the units
+  lfs10d service print                         print the unit only
+  sudo lfs10d service remove                   stop it, remove the units
 """
 INSTANCE = re.compile(r"[a-z0-9_-]{1,32}")
 SYSTEM_UNITS = Path("/etc/systemd/system")

@@ -35,13 +35,14 @@ Examples:
   lfs10d simulate --link /tmp/line0 --wind wind.csv       recorded values
   lfs10d read /tmp/line0 3                                in another terminal
 
-  \b
-  A fault file:
+\b
+A faults file:
   slaves:
-  3: silent
-  4: [{fault: noisy, rate: 0.1}]
-  5: [{fault: silent, after: 10s, for: 5s}]
-  SIGUSR1 takes the power from all sensors for a moment.
+    3: silent
+    4: [{fault: noisy, rate: 0.1}]
+    5: [{fault: silent, after: 10s, for: 5s}]
+
+SIGUSR1 switches the power of all sensors off and on.
 """
 
 
@@ -93,11 +94,23 @@ class SimulateOptions:
 
 @click.command("simulate", epilog=EXAMPLES)
 @click.option("--link", type=click.Path(path_type=Path), metavar="PATH", help="A lasting name for the terminal.")
-@click.option("--slaves", callback=_ids, default="1-8", show_default=True, metavar="IDS", help="Which ids.")
-@click.option("--baudrate", type=click.Choice([str(rate) for rate in BAUDRATES]), default="9600", show_default=True)
-@click.option("--parity", type=click.Choice(["none", "even", "odd"]), default="none", show_default=True)
-@click.option("--stopbits", type=click.Choice(["1", "2"]), default="1", show_default=True)
-@click.option("--framing", type=click.Choice(["rtu", "ascii"]), default="rtu", show_default=True)
+@click.option("--slaves", callback=_ids, default="1-8", show_default=True, metavar="IDS", help="Slave ids.")
+@click.option(
+    "--baudrate",
+    type=click.Choice([str(rate) for rate in BAUDRATES]),
+    default="9600",
+    show_default=True,
+    help="Bits per second.",
+)
+@click.option(
+    "--parity", type=click.Choice(["none", "even", "odd"]), default="none", show_default=True, help="Parity bit."
+)
+@click.option(
+    "--stopbits", type=click.Choice(["1", "2"]), default="1", show_default=True, help="Stop bits per character."
+)
+@click.option(
+    "--framing", type=click.Choice(["rtu", "ascii"]), default="rtu", show_default=True, help="How bytes become frames."
+)
 @click.option("--faults", type=click.Path(path_type=Path), metavar="FILE", help="A faults file (YAML).")
 @click.option(
     "--profile",
@@ -110,27 +123,33 @@ class SimulateOptions:
     type=DURATION,
     default="5ms",
     show_default=True,
-    help="Time before an answer begins.",
+    help="Time from a request to its answer.",
 )
 @click.option(
     "--jitter",
     type=DURATION,
     default="0ms",
     show_default=True,
-    help="Random additional time, up to this.",
+    help="Longest random time added to that.",
 )
 @click.option("--latency", type=DURATION, default=None, help="Interval at which the adapter delivers bytes.")
 @click.option("--echo", is_flag=True, help="The adapter returns the master's own bytes.")
-@click.option("--values", type=click.Choice(["wind", "unique"]), default="wind", show_default=True)
+@click.option(
+    "--values",
+    type=click.Choice(["wind", "unique"]),
+    default="wind",
+    show_default=True,
+    help="Wind that changes slowly, or each value once.",
+)
 @click.option("--wind", type=click.Path(path_type=Path), metavar="FILE", help="A recording (CSV) to play.")
 @click.option("--seed", type=int, default=1, show_default=True, help="Seed of wind and faults.")
 @click.option("--interval", type=DURATION, default=None, help="Print the counts at this interval.")
 @json_option
 def command(**values: Any) -> None:  # noqa: ANN401  # seventeen options; `SimulateOptions` names and types them
-    """Run a line full of simulated sensors on a pseudo terminal, and judge who polls it.
+    """Run a line of simulated sensors on a pseudo terminal, and judge the master that polls it.
 
-    A request that begins before 3.5 characters of silence, or pauses for more than 1.5 inside, is ignored and
-    counted. Ctrl-C ends it.
+    A request that begins before 3.5 characters of silence, or has a pause of more than 1.5 characters inside, is
+    ignored and counted. Ctrl-C ends it.
     """
     options = SimulateOptions(**values)
     plan = options.plan

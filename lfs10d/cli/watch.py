@@ -28,7 +28,7 @@ from lfs10d.telemetry import publication
 EVERY: Final = 0.5
 """s between two updates: fast enough to follow a cup that is turned by hand."""
 SETTLES_WITHIN: Final = 0.2
-"""s for the rest of what is retained, so that no device is shown as unknown whose messages are still on their way."""
+"""s to wait for the remaining retained messages, so that no device is shown as unknown meanwhile."""
 CONNECTS_WITHIN: Final = 6.0
 """s to connect before the daemon's status file is shown; connecting goes on meanwhile."""
 FRESH: Final = 3.0
@@ -52,8 +52,8 @@ Examples:
 def command(config: Path, username: str | None, password_file: Path | None, *, as_json: bool) -> int:
     """Show every slave of the running daemon, live, until Ctrl-C.
 
-    From MQTT, or from the daemon's own status file where the broker or the daemon's connection to it is away; the
-    table says which, and what is old is shown as old. The sensor whose value just moved is marked. In a pipe each new
+    From MQTT, or from the daemon's own status file while the broker, or the daemon's connection to it, is away; the
+    table says which. Old values are shown as old. The sensor whose value just moved is marked. In a pipe each new
     value is one line. Exit code 69 if there is neither a broker with this daemon nor a status file.
     """
     with contextlib.suppress(KeyboardInterrupt):
@@ -92,7 +92,7 @@ class Watch:
         self._why = ""
         """What was wrong with the broker, or the daemon there, at the beginning."""
         self._heard_at = 0.0
-        """When anything came by MQTT last, epoch s."""
+        """When the last message came by MQTT, epoch s."""
         self._status: _Status | None = None
         topics = login.topics
         once = [publication.DEVICES, publication.LINE_STATE, publication.LINE_ERROR, publication.LINE_STATS]
@@ -179,7 +179,7 @@ class Watch:
         self._live.on_message(relative, payload, old=message.retained, now=time.monotonic(), wall=self._heard_at)
 
     def _read(self) -> None:
-        """Read the status file of our line, if there is one; what was read before stays and grows old."""
+        """Read the status file of our line, if there is one; otherwise the last content stays and grows old."""
         for path in self._files:
             try:
                 status = parsed(read_regular(path, LARGEST_STATUS))

@@ -28,7 +28,7 @@ RATE = 20.0
 BURST = 64
 """Requests at once."""
 REMEMBERED = 256
-"""Ids that are remembered, those of requests that still run besides."""
+"""Ids that are remembered, besides those of requests under way."""
 REMEMBERED_FOR = 60.0
 """Seconds for which a result is kept for its repeats."""
 
@@ -40,7 +40,7 @@ W = TypeVar("W")
 
 @dataclass(frozen=True, slots=True)
 class CommandSpec:
-    """A request before it is carried out: its class, its parameters, seconds for which its result is remembered."""
+    """A kind of request: its class, its parameters, seconds for which its result is remembered."""
 
     klass: RequestClass
     parameters: type[Parameters] = NoParameters
@@ -49,7 +49,7 @@ class CommandSpec:
 
 @dataclass(frozen=True, slots=True)
 class Ignored:
-    """Nothing is done and no response sent."""
+    """The request is ignored: no response is sent."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ class _Memory(Generic[W]):
 
 @dataclass(frozen=True, slots=True)
 class Admitted(Generic[W]):
-    """A request admitted at monotonic `since`: carry it out, then call `Admission.done`, once."""
+    """A request admitted at monotonic `since`; carry it out, then call `Admission.done` once."""
 
     name: str
     command: Command
@@ -90,7 +90,7 @@ class Admitted(Generic[W]):
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """A repeat of a request that still runs: `Admission.done` will give it back."""
+    """A repeat of a request under way; `Admission.done` of that returns it."""
 
 
 class Admission(Generic[W]):
@@ -129,14 +129,14 @@ class Admission(Generic[W]):
         return self._repeated(name, command, reply_to, now) or self._new(name, command, problem, now)
 
     def _refusal(self, name: str, problem: Result | None) -> Result | None:
-        """Return the rejection that holds whatever the parameters are, None if there is none."""
+        """Return the rejection that does not depend on the parameters, None if there is none."""
         if problem is not None and problem.code == "invalid_json":
             return problem
         spec = self.specs.get(name)
         if spec is None:
             return rejected("unknown_request", f"no such request; known are: {', '.join(sorted(self.specs))}")
         if spec.klass != "always" and spec.klass not in self.allowed:
-            message = f"requests of class {spec.klass} are not obeyed; add it to `commands` in the configuration"
+            message = f"requests of class {spec.klass} are not accepted; add it to `commands` in the configuration"
             return rejected("not_allowed", message)
         return None
 
@@ -158,7 +158,7 @@ class Admission(Generic[W]):
             message = "this id was used for another request; give every request an id of its own"
             return Answered(command, rejected("duplicate_conflict", message))
         if first.result is None and len(first.repeats) >= WAITING:
-            message = f"{WAITING} repeats of this request wait for its end already; its response comes once it is over"
+            message = f"{WAITING} repeats of this request are waiting for its end already; its response comes then"
             return Answered(command, rejected("busy", message))
         if first.result is None:
             first.repeats.append((command, reply_to))
@@ -176,7 +176,7 @@ class Admission(Generic[W]):
         return Admitted(name, command, parameters, now, memory)
 
     def _remember(self, name: str, command: Command, memory: _Memory[W]) -> None:
-        """Remember an id; of those over, the ones to be forgotten last are kept, and all whose request still runs."""
+        """Remember an id; all with a request under way are kept, of the others the newest."""
         if command.key is None:
             return
         self._seen.pop((name, command.key), None)
@@ -187,7 +187,7 @@ class Admission(Generic[W]):
         self._seen[name, command.key] = memory
 
     def recall(self, name: str, command: Command, result: Result | None, forget_at: float) -> list[tuple[Command, W]]:
-        """Remember a request of an earlier life of the daemon, None while its result is still to come.
+        """Remember a request of an earlier run of the daemon; its result is None while it is still to come.
 
         Returns the repeats that waited for the result, with their `reply_to`.
         """
@@ -202,7 +202,7 @@ class Admission(Generic[W]):
         return repeats
 
     def done(self, admitted: Admitted[W], result: Result, now: float) -> list[tuple[Command, W]]:
-        """Note how it ended; return the repeats that wait for it, with their `reply_to`."""
+        """Note the result; return the repeats that wait for it, with their `reply_to`."""
         memory = admitted.memory
         memory.result, memory.took = result, now - admitted.since
         memory.forget_at = now + self.specs[admitted.name].remembered_for
@@ -211,7 +211,7 @@ class Admission(Generic[W]):
 
 
 def _too_large(payload: int, correlation: int) -> str | None:
-    """Return the words for what is too large in a request; None if nothing is."""
+    """Return in words what is too large in a request; None if nothing is."""
     if payload > LARGEST:
         return f"the payload has more than the {LARGEST} bytes that are allowed"
     if correlation > LARGEST_CORRELATION:

@@ -1,4 +1,4 @@
-"""What a handler may use of the daemon, and what a handler is."""
+"""The interfaces that a handler may use of the daemon, and the type of a handler."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:  # `lfs10d request` reads from the handlers what there is to a
 
 
 class LineCommands(Protocol):
-    """What handlers do with the line; see `lfs10d.commands.line_access.LineAccess`."""
+    """The line, for handlers; see `lfs10d.commands.line_access.LineAccess`."""
 
     @property
     def paused(self) -> bool:
@@ -31,7 +31,7 @@ class LineCommands(Protocol):
         ...
 
     async def read(self, device: str) -> ReadResult | None:
-        """Poll a configured device now; None if it was removed or became another one before the poll."""
+        """Poll a configured device now; None if it was removed or replaced before the poll."""
         ...
 
     def trace(self, duration: float) -> None:
@@ -66,14 +66,14 @@ class LineCommands(Protocol):
 
 
 class SensorChanges(Protocol):
-    """What changes sensors; see `lfs10d.reconfiguration.reconfiguration.Reconfiguration`."""
+    """Changes of sensors, for handlers; see `lfs10d.reconfiguration.reconfiguration.Reconfiguration`."""
 
     def reserved(self) -> Mapping[int, str]:
         """Return the slave ids that no device may be given now, with the reason: `is reserved by ...`."""
         ...
 
     async def readdress(self, device: str, to: int, *, dry_run: bool, call: Command) -> Result:
-        """Give a sensor another slave id, verified on the line; with `dry_run` only find out whether it could be."""
+        """Give a sensor another slave id, verified on the line; with `dry_run` only check whether that is possible."""
         ...
 
     async def baudrate(self, to: int, *, power_cycle: bool, dry_run: bool, call: Command) -> Result:
@@ -86,14 +86,14 @@ class SensorChanges(Protocol):
 
 
 class Announcements(Protocol):
-    """What handlers publish, and what is known of the daemon; see `lfs10d.mqtt.publisher.Publisher`."""
+    """Publishing, for handlers; see `lfs10d.mqtt.publisher.Publisher`."""
 
     def health(self) -> dict[str, object]:
-        """Return how the daemon, the line and the devices are, as in `status.json`."""
+        """Return the state of the daemon, the line and the devices, as in `status.json`."""
         ...
 
     def republish(self) -> int:
-        """Publish every retained topic once more; return how many."""
+        """Publish every retained topic again; return their number."""
         ...
 
     def applied(self, request: str, command: Command, **facts: object) -> None:
@@ -103,7 +103,7 @@ class Announcements(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """What a handler may use. Called in the thread of the asyncio loop."""
+    """Everything a handler may use. Used in the thread of the asyncio loop."""
 
     config: LiveConfig
     line: LineCommands

@@ -19,7 +19,7 @@ from lfs10d.system.logs import escape
 log = logging.getLogger(__name__)
 
 LONGEST_NAME = 64
-"""Characters of a request's name that are returned."""
+"""Longest name of a request that is returned, in characters."""
 FLOOD_LOGGED_EVERY = 60.0
 """Seconds between two log lines about too many requests."""
 
@@ -40,7 +40,7 @@ class Dispatcher:
         self._responder.admission.allowed = classes
 
     def on_request(self, request: InboundRequest) -> None:
-        """Take a request; it is answered now or later, once."""
+        """Take a request; it is answered exactly once, now or later."""
         now = asyncio.get_running_loop().time()
         name = "/".join(request.levels)
         own = f"response/{name}" if name in self._handlers else "response/unknown"
@@ -60,7 +60,7 @@ class Dispatcher:
                 self._log_answered(reply_to.name, decision, now)
                 self._responder.respond(reply_to, command, result, took)
             case Waiting():
-                log.debug("request %s repeats one that still runs", escape(reply_to.name))
+                log.debug("request %s repeats one under way", escape(reply_to.name))
             case Admitted():
                 self._begin(decision, reply_to)
 
@@ -75,7 +75,7 @@ class Dispatcher:
         task.add_done_callback(partial(self._on_end, admitted, reply_to))
 
     def _on_end(self, admitted: Admitted[ReplyTo], reply_to: ReplyTo, task: asyncio.Task[Result]) -> None:
-        """Answer a request whose task is over, however it ended, begun or not."""
+        """Answer a request whose task is over, also if it failed or never began."""
         self._running.discard(task)
         if task.cancelled():
             result = failed("cancelled", "the daemon is ending")
@@ -87,7 +87,7 @@ class Dispatcher:
         self._responder.finish(admitted, reply_to, result)
 
     def _log_answered(self, name: str, decision: Answered, now: float) -> None:
-        """Log a request that was answered at once; of a flood only that there is one."""
+        """Log a request that was answered at once; of a flood only one line."""
         if not decision.flood:
             result = decision.result
             status = f"{result.status} ({result.code})" if result.code else result.status
@@ -97,7 +97,7 @@ class Dispatcher:
             log.warning("too many requests: those beyond the allowed rate are rejected")
 
     async def stop(self) -> None:
-        """Answer what still runs as cancelled, and what comes from now on."""
+        """Answer requests under way, and all further ones, with `cancelled`."""
         self._ending = True
         for task in self._running:
             task.cancel()

@@ -53,7 +53,7 @@ class LineAccess:
         return self._pause.paused
 
     async def read(self, device: str) -> ReadResult | None:
-        """Poll a device now; None if it was removed or became another one before the poll."""
+        """Poll a device now; None if it was removed or replaced before the poll."""
         return await self._reads.read(device)
 
     def trace(self, duration: float) -> None:
@@ -104,7 +104,7 @@ class LineAccess:
         return Access(target, request, pending=line.pending, echo_known=line.echo_known, over=over)
 
     async def _run(self, job: Callable[[Callable[[J], None]], J]) -> J:
-        """Submit the job that is built with its callback; return it when it is over."""
+        """Submit the job that `build` makes with its callback; return it when it is over."""
         over: ThreadFuture[J] = ThreadFuture()
         self._line.submit(job(over.set_result))
         return await over
@@ -112,7 +112,7 @@ class LineAccess:
     # -- what happens on the line
 
     def on_event(self, event: Event, published: Iterable[Publication], now: Instant) -> list[Publication]:
-        """Take an event of the line with what the station made of it; return what a trace publishes besides."""
+        """Take an event of the line with its publications; return those of a trace."""
         if isinstance(event, Reading):
             self._reads.on_reading(event, published)
         elif isinstance(event, Exchanged) and self._trace is not None:
@@ -122,13 +122,13 @@ class LineAccess:
         return []
 
     def on_config(self, before: Config, after: Config) -> None:
-        """Take another configuration: polls of devices that are no longer the same get no reading."""
+        """Take another configuration: reads of devices that were removed or replaced end without a reading."""
         self._reads.abandon(altered(_identities(before), _identities(after)))
         if before.line != after.line:
             self._scanner.cancel()  # it uses the settings of the line before
 
 
 def _identities(config: Config) -> dict[str, object]:
-    """Return what makes each device this one and no other on the line."""
+    """Return slave id, profile and the like of each device: if they differ it is another device."""
     framing = config.line.framing
     return {slave.name: (slave.id, slave.profile, slave.checksum, slave.enabled, framing) for slave in config.slaves}

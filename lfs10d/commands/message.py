@@ -1,4 +1,4 @@
-"""What comes in: the envelope of a request, its parameters, and the answer to it. Plain values, no I/O.
+"""The format of requests and responses: envelope, parameters, response. Plain values, no I/O.
 
 A request is a JSON object of at most 4 KiB with an optional `id` (or `transaction`, which is the same); the rest of
 its keys are parameters.
@@ -25,7 +25,7 @@ LONGEST_ID = 64
 
 
 class Parameters(BaseModel):
-    """The parameters of one request; strict, for guessing turns `{"to": true}` into slave 1."""
+    """The parameters of one request; strict, since lax validation turns `{"to": true}` into slave 1."""
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -35,7 +35,7 @@ class NoParameters(Parameters):
 
 
 def read(payload: bytes) -> tuple[Command, Result | None]:
-    """Read a payload of at most `LARGEST` bytes; the answer is the rejection of one that is wrong as a whole.
+    """Read a payload of at most `LARGEST` bytes; returns a rejection if it is wrong as a whole.
 
     It is `invalid_json`, or `invalid_param` for an id that is none.
     """
@@ -47,7 +47,7 @@ def read(payload: bytes) -> tuple[Command, Result | None]:
         # The parser above takes the last of two; this one is asked second, for it minds neither depth nor NaN.
         json.loads(payload, object_pairs_hook=_once)
     except _TwiceError as error:
-        return Command(), rejected("invalid_json", f"{quoted(str(error))} is given twice; which is meant?")
+        return Command(), rejected("invalid_json", f"{quoted(str(error))} is given twice; keep one")
     if not isinstance(content, dict):
         return Command(), rejected("invalid_json", 'the payload must be a JSON object, {"id": "a1"} for example')
     ids: dict[str, Identifier | None] = {}

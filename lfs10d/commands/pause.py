@@ -1,4 +1,4 @@
-"""The port freed for another program for a while, on request. Used in the thread of the asyncio loop."""
+"""Frees the port for another program on request, for a limited time. Used in the asyncio loop."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class PausableLine(Protocol):
     """A line whose port can be freed; see `lfs10d.line.line.Line`."""
 
     async def pause(self) -> None:
-        """Give the port back; return when it is free."""
+        """Close the port; return when it is free."""
         ...
 
     def resume(self) -> None:
@@ -31,7 +31,7 @@ class SetPaused(Protocol):
 
 
 class LinePause:
-    """Frees the port and opens it again when the time is over."""
+    """Frees the port, and opens it again when the time is over."""
 
     def __init__(self, line: PausableLine, set_paused: SetPaused) -> None:
         self._line = line

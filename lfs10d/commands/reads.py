@@ -1,4 +1,4 @@
-"""Polls on request: a number goes to the line thread and comes back with the reading."""
+"""Polls on request: each has a number that comes back with the reading."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from lfs10d.telemetry.publication import Payload, Publication, PublicationKind
 
 @dataclass(frozen=True, slots=True)
 class ReadResult:
-    """The sample of one poll as it was published, and why there is no value."""
+    """The published sample of one poll, and its fault if there is no value."""
 
     sample: Payload
     fault: Fault | None
@@ -39,7 +39,7 @@ class PendingReads:
             del self._waiting[number]
 
     def on_reading(self, reading: Reading, published: Iterable[Publication]) -> None:
-        """Resolve the reads that wait for this reading; `published` is what the station made of it."""
+        """Resolve the reads that wait for this reading, which led to the publications `published`."""
         if not reading.requests:
             return
         sample = next((each.payload for each in published if each.kind is PublicationKind.SAMPLE), None)
@@ -47,7 +47,7 @@ class PendingReads:
             self._resolve(number, ReadResult(sample, reading.fault))
 
     def abandon(self, devices: Collection[str]) -> None:
-        """Resolve the reads of these devices: no reading will come."""
+        """End the reads of these devices without a reading."""
         for number, (device, _) in self._waiting.items():
             if device in devices:
                 self._resolve(number, None)
@@ -60,5 +60,5 @@ class PendingReads:
 
 
 def altered(before: Mapping[str, object], after: Mapping[str, object]) -> frozenset[str]:
-    """Return the names that are gone or stand for something else than before."""
+    """Return the names that are gone or belong to another device than before."""
     return frozenset(name for name, what in before.items() if after.get(name) != what)

@@ -1,4 +1,4 @@
-"""Responses: each command is answered once where it asked to be, its repeats too. Used in the asyncio loop."""
+"""Responses: one for each command and each of its repeats, on the topic it asked for. Used in the asyncio loop."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class ReplyTo:
-    """Where the response to one request goes: a topic under B, with the request's Correlation Data."""
+    """The address of the response to one request: a topic under B, with its Correlation Data."""
 
     topic: str
     correlation: bytes | None
@@ -25,7 +25,7 @@ class ReplyTo:
 
 
 class Responses(Protocol):
-    """Where responses are published; see `lfs10d.mqtt.uplink.Uplink`."""
+    """Publishes responses; see `lfs10d.mqtt.uplink.Uplink`."""
 
     def respond(self, topic: str, payload: dict[str, object], correlation: bytes | None = None) -> None:
         """Publish a response on a topic under B."""
@@ -37,14 +37,14 @@ class Responses(Protocol):
 
 
 class Responder:
-    """Publishes the results of commands, and has them remembered for their repeats."""
+    """Publishes the results of commands, and lets the admission remember them for repeats."""
 
     def __init__(self, admission: Admission[ReplyTo], uplink: Responses) -> None:
         self.admission = admission
         self._uplink = uplink
 
     def respond(self, reply_to: ReplyTo, command: Command, result: Result, took: float = 0.0) -> None:
-        """Publish the response to a command that took so many seconds."""
+        """Publish the response to a command, which took `took` seconds."""
         payload = response(command, reply_to.name, result, took * 1000)
         self._uplink.respond(reply_to.topic, payload, reply_to.correlation)
 
@@ -64,7 +64,7 @@ class Responder:
     def recall(
         self, name: str, command: Command, result: Result | None, *, forget_in: float, respond: bool = False
     ) -> None:
-        """Remember a command of an earlier life of the daemon for its repeats, for `forget_in` s.
+        """Remember a command of an earlier run of the daemon for its repeats, for `forget_in` s.
 
         Without a result they wait for it. With `respond` the command itself is answered too, where it asked to be.
         """

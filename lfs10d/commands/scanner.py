@@ -16,13 +16,13 @@ from lfs10d.line.jobs.scan_plan import ScanPlan
 from lfs10d.telemetry.publication import EventType
 
 SCANNING: Final = "scanning"
-"""The activity of the line meanwhile."""
+"""The line's activity during a scan."""
 LOOK_EVERY = 0.5
 """Seconds between two checks of its progress."""
 STEP = 10.0
-"""Progress is published at each step of so many percent, and at the beginning and end."""
+"""Progress is published at the beginning, at the end, and at each step of this many percent."""
 LAST_STEP = 99.0
-"""Percent published at most before the end: at the end of each round some ids are asked again."""
+"""Highest percentage published before the end: after each round some ids are asked again."""
 
 
 class Scanner:
@@ -47,7 +47,7 @@ class Scanner:
         """Set once the scan is over, or cancelled."""
 
     async def scan(self, plan: ScanPlan) -> Scan:
-        """Scan, one at a time; return the scan when it is over, however it ended. Cancelling it ends it early."""
+        """Scan, one at a time; return the scan when it is over. Cancelling the task ends it early."""
         loop, over = asyncio.get_running_loop(), asyncio.Event()
 
         def ended(_: Scan) -> None:
@@ -68,7 +68,7 @@ class Scanner:
         return scan
 
     def cancel(self) -> bool:
-        """End the scan; whether there was one. Its last exchange may still be on the line."""
+        """End the scan and return whether there was one; its last exchange may still be on the line."""
         if self._scan is None:
             return False
         self._scan.cancel()
@@ -76,7 +76,7 @@ class Scanner:
         return True
 
     async def _follow(self, scan: Scan, over: asyncio.Event) -> None:
-        """Publish its progress until it is over, and each id that seems to have two devices."""
+        """Publish the progress of a scan until its end, and each id that seems to have two devices."""
         duplicates: set[tuple[int, int]] = set()
         self._publish_progress(scan, last := 0.0)
         while not over.is_set():

@@ -14,7 +14,7 @@ from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.publication import TRACE, VERSION, Publication, PublicationKind
 
 LONGEST = 600
-"""Bytes of a frame that are published; the longest frame, in ASCII, has 513 (Modbus over Serial Line V1.02, 2.5.2)."""
+"""Most bytes published of a frame; the longest frame, in ASCII, has 513 (Modbus over Serial Line V1.02, 2.5.2)."""
 
 
 _READ_BODY = 6
@@ -60,7 +60,7 @@ class FrameTrace:
 
 
 def _meaning(exchange: Exchanged, device: TracedDevice) -> str | None:
-    """Return the values of a good reply, or what is wrong with them; None for a reply that has no value.
+    """Return the values of a good reply in words, or their fault; None for a reply without values.
 
     Where several frames could be the reply none is chosen: a trace shows no value that may be another device's.
     """

@@ -80,7 +80,7 @@ class ChangesFile:
             found = self.read()
         except StateError as error:
             self._unread = str(error)
-            return FoundChanges(Changes(), trouble=f"{error}; what requests changed is not known")
+            return FoundChanges(Changes(), trouble=f"{error}; the changes made by request are not known")
         if found.trouble is None:
             return found
         aside = self.path.with_name(ASIDE)

@@ -156,7 +156,7 @@ class LineActions:
 
 
 def _own(login: Login) -> Login:
-    """Return the login with a client id of its own: two clients of one id throw each other out."""
+    """Return the login with a client id of its own: two clients with one id would disconnect each other."""
     return replace(login, settings=replace(login.settings, client_id=f"lfs10d-web-{secrets.token_hex(4)}"))
 
 

@@ -67,20 +67,20 @@ class ListenAddress(click.ParamType):  # type: ignore[type-arg]  # generic in ne
     type=ListenAddress(),
     default="127.0.0.1:8073",
     show_default=True,
-    help="Address and port; one that others reach only with a token.",
+    help="Address and port to listen on; an address that others can reach needs a token.",
 )
 @click.option(
     "--token-file",
     metavar="FILE",
     type=click.Path(path_type=Path, readable=False),
-    help="Its first line is the token for requests. Default: the systemd credential web-token; without, reading only.",
+    help="File with the token for requests. Default: the systemd credential web-token; without, reading only.",
 )
 @click.option(
     "--allow-host",
     "names",
     multiple=True,
     metavar="NAME",
-    help="A name under which the page is asked for, beside this machine's own.",
+    help="Host name that viewers may use for the page, besides this machine's own.",
 )
 @login_options
 def command(  # one for each option

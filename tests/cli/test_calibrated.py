@@ -169,8 +169,8 @@ def test_without_the_changes_nothing_is_calibrated(file: Path, capsys: pytest.Ca
     (file.parent / "state/changes.yaml").write_text("no: changes\n")
     assert called(file) == NONE
     told = capsys.readouterr().err
-    assert told.startswith("lfs10d: what requests changed cannot be understood: ")
-    assert told.endswith("which sensor has which slave id now (call it as root); raw values alone are shown\n")
+    assert told.startswith("lfs10d: the changes made by request cannot be read: ")
+    assert told.endswith("which slave id each sensor has now (call it as root); raw values alone are shown\n")
     file.write_text(TEXT.replace(", calibration: {wind_speed: {scale: 1.01, offset: 0.06}}", ""))
     assert called(file) == NONE
     assert capsys.readouterr().err == ""

@@ -42,11 +42,12 @@ def test_the_help_of_a_request_says_what_each_parameter_may_be(name: str) -> Non
 
 
 def test_what_may_be_left_out_says_what_holds_then() -> None:
-    assert parameters("device/read") == (Parameter("device", parameters("device/read")[0].words, None, "", ()),)
+    (device,) = parameters("device/read")
+    assert device == Parameter("device", device.words, None, "Name of the device.", ())
     usual = {each.key: each.usual for each in parameters("device/add")}
     assert (usual["slave"], usual["interval"], usual["probe"], usual["profile"]) == (None, "null", "true", "lfs10")
     assert [each.usual for each in parameters("line/trace")] == ["30s"]
-    assert {each.usual for each in parameters("device/options")} == {None, "as it is"}
+    assert {each.usual for each in parameters("device/options")} == {None, "the present value"}
     (first, *_) = parameters("line/adopt")
     assert first.words.endswith(", or null")
     assert parameters("no/such") == ()

@@ -53,7 +53,7 @@ def test_who_may_not_read_the_state_directory_is_shown_the_file_s_part_and_told_
     assert done.returncode == 1
     assert "mqtt.host" in done.stdout
     why = f"{tmp_path}/state/changes.yaml cannot be read: permission denied"
-    assert done.stderr == f"lfs10d: {why}; what requests changed is missing here: call it as root\n"
+    assert done.stderr == f"lfs10d: {why}; the changes made by request are missing here: call it as root\n"
     (again := tmp_path / "again").mkdir()
     done = config_of_another(again, "--json")
     assert (done.returncode, json.loads(done.stdout)["config"]["mqtt"]["host"]) == (1, "localhost")

@@ -82,7 +82,7 @@ def test_anything_but_a_json_object_is_invalid_json_and_has_no_id(payload: bytes
 def test_a_key_that_is_given_twice_is_invalid_json_that_names_it(payload: bytes, key: str) -> None:
     call, problem = read(payload)
     assert call == Command()
-    assert problem == rejected("invalid_json", f"{key} is given twice; which is meant?")
+    assert problem == rejected("invalid_json", f"{key} is given twice; keep one")
 
 
 def test_two_objects_may_have_the_same_key() -> None:

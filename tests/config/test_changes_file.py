@@ -265,7 +265,7 @@ def test_what_cannot_be_read_is_reported_and_not_overwritten(tmp_path: Path) -> 
         file.read()
     found = file.take()
     assert found.trouble is not None
-    assert found.trouble.endswith("is a directory; what requests changed is not known")
+    assert found.trouble.endswith("is a directory; the changes made by request are not known")
     with pytest.raises(StateError, match="cannot be read"):
         file.save(ONE)
 

@@ -21,7 +21,7 @@ USUAL_PORT: Final = 1883
 _LISTEN: Final = "0A"
 """TCP_LISTEN in hexadecimal, as /proc/net/tcp writes it."""
 TRIES: Final = 3
-"""Times a broker is started anew because somebody took its port between our look and its own."""
+"""Starts of a broker whose port was taken by another program just before."""
 
 _PLACES: Final = os.pathsep.join((os.environ.get("PATH", os.defpath), "/usr/local/sbin", "/usr/sbin", "/sbin"))
 """Debian keeps daemons in /usr/sbin, which is not on a user's PATH."""
@@ -47,7 +47,7 @@ def known(wanted: str = "auto") -> tuple[str, ...]:
 
 
 async def start_broker(children: Children, wanted: str = "auto") -> Broker:
-    """Start the best broker that runs; FailedError if none does."""
+    """Start the first broker that runs; raises FailedError if none does."""
     last_words = []
     for name in known(wanted):
         for port in _ports():
@@ -99,7 +99,7 @@ def is_free(port: int) -> bool:
 
 
 def listens(process: int, port: int) -> bool:
-    """Say whether this process listens on this TCP port: another may have been faster, and is no broker of ours."""
+    """Return whether this process listens on this TCP port: another program may have taken it."""
     # proc(5): local address, state and inode are columns 1, 3 and 9.
     rows = [line.split() for line in Path("/proc/net/tcp").read_text("ascii").splitlines()[1:]]
     listening = {f"socket:[{row[9]}]" for row in rows if row[1].endswith(f":{port:04X}") and row[3] == _LISTEN}

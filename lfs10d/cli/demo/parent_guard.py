@@ -19,7 +19,7 @@ ITSELF = Path(__file__)
 
 
 def main(parent: int, program: str, *arguments: str) -> None:
-    """Become the program, tied to `parent`; return without a word if that is gone already."""
+    """Become the program, tied to `parent`; return if that has already ended."""
     with contextlib.suppress(AttributeError):  # not Linux
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
     if os.getppid() == parent:

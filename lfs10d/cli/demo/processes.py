@@ -45,10 +45,10 @@ _OF_A_SERVICE: Final = frozenset(
         "XDG_RUNTIME_DIR",
     }
 )
-"""Variables that would lead a child to the files of a real daemon on this machine."""
+"""Environment variables through which a child would use files of a real daemon on this machine."""
 
 PYTHON: Final = (sys.executable, "-P")
-"""Starts a module of ours; -P: a file of the folder we were called in is never taken for one."""
+"""Starts one of our modules; -P: never a file of the same name in the current folder."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,18 +100,18 @@ class Children:
         return await _comes_true(lambda: claim() or not child.alive, START_WITHIN) and child.alive
 
     def check(self) -> None:
-        """Raise FailedError if one that was ready has ended."""
+        """Raise FailedError if a child that was ready has ended."""
         for child in self._started:
             if not child.alive:
                 raise FailedError(f"the demo's {child.name} has ended: {child.last_words()}")
 
     async def discard(self, child: Child) -> None:
-        """End one that is of no use."""
+        """End a child that is not needed."""
         self._started.remove(child)
         await _end([child], OTHERS_END_WITHIN)
 
     async def end(self) -> None:
-        """End all: first the daemon, that it can still say goodbye to the others."""
+        """End all, the daemon first, so that it can publish `offline`."""
         await _end([child for child in self._started if child.name == DAEMON], DAEMON_ENDS_WITHIN)
         await _end([child for child in self._started if child.name != DAEMON], OTHERS_END_WITHIN)
 
@@ -126,7 +126,7 @@ async def _end(children: list[Child], within: float) -> None:
 
 
 async def _comes_true(claim: Callable[[], bool], within: float) -> bool:
-    """Wait until `claim()` holds, for so many seconds; return whether it does."""
+    """Wait until `claim()` holds, at most `seconds`; return whether it does."""
     deadline = time.monotonic() + within
     while not claim():
         if time.monotonic() > deadline:

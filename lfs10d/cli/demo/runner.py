@@ -80,7 +80,7 @@ async def show(*, duration: float | None, wanted: str) -> None:
 
 
 async def _until(over: asyncio.Event, play: Coroutine[None, None, None]) -> None:
-    """Play to the end, or until `over`."""
+    """Show the demo to its end, or until `over`."""
     playing, ending = asyncio.ensure_future(play), asyncio.ensure_future(over.wait())
     await asyncio.wait({playing, ending}, return_when=asyncio.FIRST_COMPLETED)
     if not ending.done():
@@ -102,7 +102,7 @@ async def _show(watch: Watch, view: LiveView, duration: float | None) -> None:
 
 
 async def _start(children: Children, wanted: str) -> tuple[Watch, Broker, Page | None]:
-    """Start line, broker, page and daemon; return what watches the daemon, connected, the broker and the page."""
+    """Start line, broker, page and daemon; return the connected view of the daemon, the broker and the page."""
     link, faults_file, configuration_file = (children.folder / name for name in ("line", "faults.yaml", "lfs10d.yaml"))
     ours = (*PYTHON, "-m", "lfs10d")
     faults_file.write_text(faults())

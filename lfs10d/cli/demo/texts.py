@@ -15,7 +15,7 @@ NEWEST: Final = "5"
 
 
 def remarks(broker: Broker, page: Page | None) -> tuple[str, ...]:
-    """Return what stands below the table: what is shown, which sensors are faulty, the page, how to subscribe."""
+    """Return the lines below the table: what is shown, which sensors are faulty, the page, how to subscribe."""
     seen = ("The page in a browser needs the extra: pip install 'lfs10d[web]'",)
     if page is not None:
         seen = (f"In a browser: {page.address} (token for its controls: {page.token})",)
@@ -35,7 +35,7 @@ def remarks(broker: Broker, page: Page | None) -> tuple[str, ...]:
 
 
 def summary(live: LiveState, seconds: float) -> str:
-    """Return one line for the end; samples are numbered from 1 for each sensor."""
+    """Return the last line; samples are numbered from 1 for each sensor."""
     devices = live.devices.values()
     samples = sum(max(0, device.seq) for device in devices)
     online = sum(device.online for device in devices)

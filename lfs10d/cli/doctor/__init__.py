@@ -29,8 +29,8 @@ def command(
 ) -> int:
     """Look at program, configuration, port, broker, clock, disk, service and sensors, and say what to do.
 
-    Where the daemon runs it is asked; where it does not, the sensors are. Nothing is changed. Exit code 1 if
-    something is to be mended, 0 also with warnings.
+    A running daemon is asked how its sensors are; without one the sensors are read directly. Nothing is changed. Exit
+    code 1 if something failed, 0 with warnings alone.
     """
     from lfs10d.cli.doctor import rounds  # noqa: PLC0415  # so that --help is quick
     from lfs10d.cli.doctor.finding import lines, summary  # noqa: PLC0415

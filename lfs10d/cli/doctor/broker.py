@@ -1,4 +1,4 @@
-"""The broker: its name, its port, TLS, the login, what may be published, its limits and how far away it is."""
+"""Examines the broker: name, port, TLS, login, permissions, limits and round-trip time."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ LEFT_WITHIN: Final = 0.3
 ROUND_TRIPS: Final = 5
 RETAINED_WITHIN: Final = 1.0
 SOON: Final = 30 * 86400
-"""s before the end of a certificate from which it is worth a warning."""
+"""s before the end of a certificate from which on there is a warning."""
 SMALLEST_PACKET: Final = 8192 + 512
 """Bytes; an array of history has up to 8 KB (contract of the topics), and its topic."""
 
 
 class _Trial(Acknowledgements):
-    """What one connection of ours has shown."""
+    """The findings of one connection of ours."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -49,7 +49,7 @@ class _Trial(Acknowledgements):
         """Do nothing: `BrokerClient.opened` returns it."""
 
     def arrived(self, message: Incoming) -> None:
-        """Note what came back."""
+        """Note a message that came back."""
         self.heard.add(message.payload)
         self.topics.add(message.topic)
         self.changed.set()
@@ -69,7 +69,7 @@ class _Trial(Acknowledgements):
 
 
 async def look(login: Login, messages_a_second: float) -> list[Finding]:
-    """Return what is to be said of the broker; `messages_a_second` is what the polls of this line need."""
+    """Return the findings about the broker; the polls of this line need `messages_a_second`."""
     findings = []
     reached = False
     for node in login.settings.nodes:
@@ -86,7 +86,7 @@ def _reached(node: BrokerSettings) -> list[Finding]:
 
 
 def reach(node: BrokerSettings, now: float | None = None) -> Iterator[Finding]:
-    """Yield how far one node is reached: name, TCP, TLS with the dates of its certificate. Blocks."""
+    """Yield the findings about reaching one node: name, TCP, TLS with the dates of its certificate. Blocks."""
     area = "broker"
     try:
         socket.getaddrinfo(node.host, node.port, type=socket.SOCK_STREAM)
@@ -193,7 +193,7 @@ async def _try_out(
 
 
 async def _round_trip(connection: Connection, trial: _Trial, topic: str) -> float | str:
-    """Publish once; return the s until the acknowledgement, or why it is not heard again, in words."""
+    """Publish once; return the s until the acknowledgement, or in words why it did not come back."""
     payload, began = secrets.token_hex(8).encode(), time.monotonic()
     reason = await trial.answer(connection.publish(topic, payload))
     if reason is None or reason >= REFUSED_FROM:
@@ -205,7 +205,7 @@ async def _round_trip(connection: Connection, trial: _Trial, topic: str) -> floa
 
 
 async def _discovery(connection: Connection, trial: _Trial, prefix: str, base: str) -> Finding:
-    """Return whether the line has been announced to Home Assistant, and whether that is there."""
+    """Return whether the line was announced to Home Assistant, and whether that runs."""
     own, birth = config_topic(prefix, object_id(base)), f"{prefix}/status"
     reason = await trial.answer(connection.subscribe([Filter(own), Filter(birth)]))
     advice = f"the broker's ACL must let this login publish below {prefix}: docs/mqtt-security.md"
@@ -221,7 +221,7 @@ async def _discovery(connection: Connection, trial: _Trial, prefix: str, base: s
 
 
 def limits(accepted: Accepted, round_trip: float, needed: float) -> Iterator[Finding]:
-    """Yield what is to be said of the broker's limits; `round_trip` in s, `needed` in messages a second."""
+    """Yield the findings about the broker's limits; `round_trip` in s, `needed` in messages a second."""
     carried = accepted.receive_maximum / max(round_trip, 1e-4)
     text = (
         f"publishing below the base topic works; round trip {round_trip * 1e3:.0f} ms, window "

@@ -1,4 +1,4 @@
-"""One thing that the doctor looked at: how it is, and what to do."""
+"""A finding of the doctor: the state of one thing, and what to do about it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ AREA_WIDTH: Final = 13
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """How one thing is; `advice` says what to do, and is empty where all is well."""
+    """The state of one thing; `advice` says what to do, and is empty where all is well."""
 
     area: str
     level: Level
@@ -27,12 +27,12 @@ class Finding:
 
 
 def ok(area: str, text: str) -> Finding:
-    """Return that a thing is as it should be."""
+    """Return the finding that a thing is as it should be."""
     return Finding(area, "ok", text)
 
 
 def warn(area: str, text: str, advice: str) -> Finding:
-    """Return what may become a fault, or is one that lfs10d lives with."""
+    """Return a finding that may become a fault, or does not stop lfs10d."""
     return Finding(area, "warn", text, advice)
 
 
@@ -53,4 +53,4 @@ def lines(findings: Iterable[Finding]) -> Iterator[str]:
 def summary(findings: Iterable[Finding]) -> str:
     """Return how many of each level there are, in words."""
     levels = [each.level for each in findings]
-    return f"{levels.count('fail')} to mend, {levels.count('warn')} to look at, {levels.count('ok')} well"
+    return f"{levels.count('fail')} failed, {levels.count('warn')} with a warning, {levels.count('ok')} ok"

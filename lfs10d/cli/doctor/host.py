@@ -1,4 +1,4 @@
-"""The machine: its clock, the disk of the state directory, the service and other daemons."""
+"""Examines the machine: clock, disk of the state directory, service, other daemons."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ SLOW_SYNC: Final = 0.2
 STUCK_SYNC: Final = 2.0
 WRITES: Final = 5
 MUCH_WRITTEN: Final = 20e9
-"""Bytes a day from which a usual SD card of 32 GB does not live for many years."""
+"""Bytes written a day that wear out a usual SD card of 32 GB within years."""
 SECTOR: Final = 512
 LONG_ENOUGH: Final = 3600.0
-"""s since the boot, before which a rate of writing says little."""
+"""s since the boot; before that the rate of writing means little."""
 CLOCK_SLACK: Final = 86400.0
 REFUSED: Final[Mapping[int, str]] = {
     errno.ENOSPC: "make room: df -h; large folders: sudo du -xh --max-depth=2 /var | sort -h | tail",
     errno.EDQUOT: "make room, or raise the quota",
     errno.EROFS: "a failing SD card is made read-only: dmesg; else sudo mount -o remount,rw, and see /etc/fstab",
 }
-"""What to do where a write is refused, by errno. Until then samples are published, and there is no backlog."""
+"""What to do if a write is refused, by errno. Samples are published all the same, without a backlog."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,11 +48,11 @@ class DiskState:
     sync: float | None = None
     written: float | None = None
     refused: int = 0
-    """The errno with which a write was refused, 0 where none was tried or it went well."""
+    """The errno of a refused write; 0 if it succeeded or none was tried."""
 
 
 def clock(state: ClockState, now: float, installed: float) -> Iterator[Finding]:
-    """Yield what is to be said of the wall clock; `now` and `installed` in s since the epoch."""
+    """Yield the findings about the wall clock; `now` and `installed` in s since the epoch."""
     if now < installed - CLOCK_SLACK:
         yield fail(
             "clock",
@@ -70,7 +70,7 @@ def clock(state: ClockState, now: float, installed: float) -> Iterator[Finding]:
 
 
 def look_at_disk(folder: Path, wanted: int, root: Root | None = None) -> DiskState:
-    """Return how the state directory's disk is; writes and removes a small file there if it may."""
+    """Return the state of the state directory's disk; a small file is written there and removed, if permitted."""
     root = root or Root()
     existing = next(each for each in (folder, *folder.parents) if there(each))
     writable = existing == folder and folder.is_dir() and os.access(folder, os.W_OK)
@@ -94,7 +94,7 @@ def look_at_disk(folder: Path, wanted: int, root: Root | None = None) -> DiskSta
 
 
 def _device(path: Path) -> str:
-    """Return the name of the block device that holds a path, such as mmcblk0p2; "" where it is none."""
+    """Return the name of the block device that holds a path, such as mmcblk0p2; "" if there is none."""
     number = path.stat().st_dev
     link = Path(f"/sys/dev/block/{os.major(number)}:{os.minor(number)}")
     return link.resolve().name if there(link) else ""
@@ -130,7 +130,7 @@ def _written_a_day(device: str, root: Root) -> float | None:
 
 
 def disk(state: DiskState) -> Iterator[Finding]:
-    """Yield what is to be said of the disk."""
+    """Yield the findings about the disk."""
     where = str(state.folder)
     if state.refused:
         yield fail(
@@ -141,14 +141,16 @@ def disk(state: DiskState) -> Iterator[Finding]:
     elif state.sync is not None and state.sync >= STUCK_SYNC:
         yield fail("disk", f"{where}: a write takes {state.sync:.1f} s", "the disk or SD card is failing: replace it")
     elif state.sync is not None and state.sync >= SLOW_SYNC:
-        yield warn("disk", f"{where}: a write takes {state.sync:.1f} s", "is the SD card worn, or the disk busy?")
+        yield warn("disk", f"{where}: a write takes {state.sync:.1f} s", "is the SD card worn out, or the disk busy?")
     elif state.writable:
         speed = "" if state.sync is None else f", a write takes {state.sync * 1e3:.0f} ms"
         yield ok("disk", f"{where} can be written{speed}")
     elif not state.exists:
-        yield ok("disk", f"{where} is not there yet: the daemon makes it")
+        yield ok("disk", f"{where} does not exist yet: the daemon creates it")
     else:
-        yield warn("disk", f"{where} cannot be written by you", "the service can: to look closer call it as root")
+        yield warn(
+            "disk", f"{where} cannot be written by this user", "the service can write there; as root more is examined"
+        )
     if state.free < state.wanted:
         yield warn(
             "disk",
@@ -167,7 +169,7 @@ def disk(state: DiskState) -> Iterator[Finding]:
 
 
 def unit_state(unit: str) -> dict[str, str] | None:
-    """Return what systemd says of a unit; None where there is no systemd."""
+    """Return systemd's properties of a unit; None without systemd."""
     keys = "LoadState,UnitFileState,ActiveState,SubState,NRestarts,Result,ExecMainStatus,WatchdogUSec,MainPID"
     try:
         done = subprocess.run(  # noqa: S603  # the unit's name is ours
@@ -180,9 +182,11 @@ def unit_state(unit: str) -> dict[str, str] | None:
 
 
 def service(unit: str, state: Mapping[str, str] | None) -> Iterator[Finding]:
-    """Yield what is to be said of a unit."""
+    """Yield the findings about a unit."""
     if state is None:
-        yield warn("service", "there is no systemd here", "see docs/installation.md, or start lfs10d run yourself")
+        yield warn(
+            "service", "there is no systemd on this machine", "see docs/installation.md, or start lfs10d run yourself"
+        )
         return
     if state.get("LoadState") != "loaded":
         yield warn("service", f"{unit} is not installed", "sudo lfs10d service install, or the Debian package")
@@ -206,11 +210,11 @@ def service(unit: str, state: Mapping[str, str] | None) -> Iterator[Finding]:
 
 
 def daemons(same: tuple[int, ...]) -> Iterator[Finding]:
-    """Yield what is to be said where several daemons run for one configuration or one port; `same` are processes."""
+    """Yield a finding where several daemons run for one configuration or one port; `same` are processes."""
     if len(same) > 1:
         processes = ", ".join(map(str, same))
         yield fail(
             "service",
             f"{len(same)} daemons run for this line (processes {processes})",
-            "end all but one: each takes the other's client id at the broker, and only one can have the port",
+            "end all but one: they disconnect each other at the broker, and only one can have the port",
         )

@@ -1,4 +1,4 @@
-"""The serial port: whether it is there, who else wants it, and how the adapter is set."""
+"""Examines the serial port: whether it exists, which other programs use it, and the adapter's settings."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from lfs10d.modbus.port_lock import holder
 from lfs10d.system.dataclass import dataclass
 
 CH340: Final = "1a86:7523"
-"""brltty takes this adapter for a Braille display, up to Debian 12 and Ubuntu 22.04."""
+"""USB id that brltty takes for a Braille display, up to Debian 12 and Ubuntu 22.04."""
 SLOW_LATENCY: Final = 2
-"""ms; more than that costs more of each exchange than the silence before it."""
+"""Longest latency in ms that costs an exchange less than the silence before it."""
 READ_WRITE: Final = stat.S_IRGRP | stat.S_IWGRP
 SERVICE_GROUP: Final = "dialout"
 """The unit's SupplementaryGroups=."""
@@ -29,7 +29,7 @@ CONTAINER_MARKS: Final = (".dockerenv", "run/.containerenv", "run/systemd/contai
 
 @dataclass(frozen=True, slots=True)
 class PortState:
-    """What is known of a port. `""` and None: there is none, or it cannot be seen."""
+    """The state of a port. `""` and None: there is none, or it cannot be seen."""
 
     path: str
     device: str = ""
@@ -45,7 +45,7 @@ class PortState:
     holder: str = ""
     held_by_daemon: bool = False
     console: str = ""
-    """Why the port is a console, in words."""
+    """Why the port is a console; empty if it is none."""
     mini_uart: bool = False
     running: frozenset[str] = frozenset()
     """Which of `RUNNING` run."""
@@ -59,7 +59,7 @@ class Root:
     path: Path = Path("/")
 
     def read(self, name: str) -> str:
-        """Return a small file's text, "" where it cannot be read."""
+        """Return a small file's text, "" if it cannot be read."""
         try:
             return (self.path / name).read_text("utf-8", "replace").strip("\0\n ")
         except OSError:
@@ -67,7 +67,7 @@ class Root:
 
 
 def there(path: Path) -> bool:
-    """Tell whether a path is there; False where one may not look, as below the state of a DynamicUser service."""
+    """Return whether a path exists; False where that cannot be seen, as in the state of a DynamicUser service."""
     try:
         return path.exists()
     except OSError:
@@ -75,7 +75,7 @@ def there(path: Path) -> bool:
 
 
 def look(port: str, root: Root | None = None) -> PortState:
-    """Return what the system says of a port; nothing is opened."""
+    """Return the state of a port without opening it."""
     root = root or Root()
     programs = set(_programs(root))
     container = any(there(root.path / mark) for mark in CONTAINER_MARKS)
@@ -144,7 +144,7 @@ def _programs(root: Root) -> Iterator[str]:
 
 
 def _console(name: str, root: Root) -> str:
-    """Return why the port is a console: the kernel's, or a login's."""
+    """Return why the port is a console, of the kernel or of a login; empty if it is none."""
     names = {name}
     alias = root.path / "dev/serial0"
     if there(alias) and alias.resolve().name == name:
@@ -161,7 +161,7 @@ def _console(name: str, root: Root) -> str:
 
 
 def judge(state: PortState, *, service: bool) -> Iterator[Finding]:
-    """Yield what is to be said of a port; `service`: a service of the system opens it."""
+    """Yield the findings about a port; `service`: a service of the system opens it."""
     if not state.device:
         if state.container:
             yield fail(
@@ -174,7 +174,7 @@ def judge(state: PortState, *, service: bool) -> Iterator[Finding]:
         yield from _programs_that_grab(state)
         return
     if not state.is_device:
-        yield fail("port", f"{state.path} is no device", "name a serial port: ls -l /dev/serial/by-id")
+        yield fail("port", f"{state.path} is not a device", "name a serial port: ls -l /dev/serial/by-id")
         return
     kind = " ".join(part for part in (state.driver, state.usb_id) if part)
     yield ok("port", f"{state.path} is {state.device}" + (f" ({kind})" if kind else ""))
@@ -197,13 +197,13 @@ def judge(state: PortState, *, service: bool) -> Iterator[Finding]:
     if state.mini_uart:
         yield warn(
             "port",
-            f"{state.device} is the Pi's mini UART: its rate follows the core's clock, and it has no parity",
+            f"{state.device} is the Pi's mini UART: its rate changes with the processor's clock, and it has no parity",
             "use the PL011 (dtoverlay=disable-bt, port /dev/ttyAMA0) or a USB adapter",
         )
     if state.latency_ms is not None and state.latency_ms > SLOW_LATENCY:
         yield warn(
             "port",
-            f"the adapter keeps bytes for {state.latency_ms} ms before it passes them on",
+            f"the adapter holds bytes back for {state.latency_ms} ms",
             "line.low_latency: true, or the udev rule of docs/installation.md (latency_timer)",
         )
     yield from _programs_that_grab(state)

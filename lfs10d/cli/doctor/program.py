@@ -1,4 +1,4 @@
-"""The program: Python, the libraries, the configuration."""
+"""Examines the program: Python, the libraries, the configuration."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ OLDEST_PYTHON: Final = (3, 11)
 
 
 def versions() -> Iterator[Finding]:
-    """Yield what runs."""
+    """Yield the versions of Python, lfs10d and the libraries."""
     libraries = ", ".join(f"{name} {_version(name)}" for name in LIBRARIES)
     text = f"lfs10d {__version__}, Python {platform.python_version()}, {libraries}, in {sys.prefix}"
     if sys.version_info[:2] < OLDEST_PYTHON:
@@ -37,13 +37,13 @@ def _version(library: str) -> str:
 
 
 def broken(error: ConfigError) -> Iterator[Finding]:
-    """Yield each thing that is wrong with a configuration."""
+    """Yield each error of a configuration."""
     for problem in error.problems:
         yield fail("configuration", str(problem), "correct it, then: lfs10d check")
 
 
 def configuration(loaded: LoadedConfig, host: str) -> Iterator[Finding]:
-    """Yield that a configuration is valid, and what in it is probably a mistake."""
+    """Yield that a configuration is valid, and its warnings."""
     found = budget(loaded.config, loaded.profiles)
     slaves = len(loaded.config.slaves)
     yield ok("configuration", f"{loaded.path}: valid, {slaves} slaves, load of the line {found.wire_load:.0%}")

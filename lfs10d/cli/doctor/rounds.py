@@ -1,4 +1,4 @@
-"""The order in which the doctor looks: what needs nothing first, then the port, the broker, the sensors."""
+"""The examination in order: program and machine, then port, broker and sensors."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ PROC: Final = Path("/proc")
 async def examine(
     file: Path, state_dir: Path | None, username: str | None, password_file: Path | None
 ) -> list[Finding]:
-    """Return all findings for the line of a configuration file; `state_dir` is where somebody says its state is."""
+    """Return all findings for the line of a configuration file; `state_dir` as given on the command line."""
     findings = [*program.versions()]
     try:
         loaded = load(file, files=False)
@@ -52,7 +52,7 @@ async def examine(
 
 
 async def port_and_broker(file: Path, loaded: LoadedConfig) -> list[Finding]:
-    """Return what is to be said of the port and the broker of a configuration."""
+    """Return the findings about the port and the broker of a configuration."""
     seen = await asyncio.to_thread(port.look, loaded.config.line.port)
     login = log_in(file, "check", username=None, password_file=None, needed=False)
     findings = [*port.judge(seen, service=service_unit(file) is not None)]
@@ -60,7 +60,7 @@ async def port_and_broker(file: Path, loaded: LoadedConfig) -> list[Finding]:
 
 
 def needed(config: Config) -> float:
-    """Return how many messages a second the polls of a configuration make, states included."""
+    """Return the messages per second that the polls of a configuration make, states included."""
     intervals = [slave.interval or 0.05 for slave in config.slaves if slave.enabled]
     samples = sum(1 / interval for interval in intervals) if config.mqtt.telemetry else 0.0
     return samples + sum(1 / max(interval, config.mqtt.state_every) for interval in intervals)
@@ -97,7 +97,7 @@ def running(file: Path, proc: Path = PROC) -> Iterator[int]:
 
 
 def _in_a_container(status: str) -> bool:
-    """Tell from a process' status whether it is in a container of ours: the paths it was given are not ours.
+    """Return whether a process runs in a container on this machine, by its status: its paths are not ours.
 
     It has a number in each namespace from this one down to its own (proc(5), NSpid).
     """
@@ -105,7 +105,7 @@ def _in_a_container(status: str) -> bool:
 
 
 def _is_python(program: str) -> bool:
-    """Tell a daemon from `sudo lfs10d run` and others that have started one and wait for it."""
+    """Return whether a process is a daemon, not `sudo lfs10d run` or another that waits for one."""
     return Path(program).name.startswith("python")
 
 
@@ -127,7 +127,7 @@ async def _sensors(file: Path, loaded: LoadedConfig, login: Login, seen: port.Po
 
 
 async def _asked(loaded: LoadedConfig, seen: port.PortState, silence: str) -> list[Finding]:
-    """Return what is to be said of the sensors where no daemon does; `silence` is why, in words."""
+    """Return the findings about the sensors where no daemon answers; `silence` is the reason."""
     if seen.held_by_daemon:
         return [warn("sensors", f"a daemon holds the port and does not reply: {silence}", "see broker, above")]
     if not seen.is_device or seen.holder:

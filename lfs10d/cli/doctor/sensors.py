@@ -1,4 +1,4 @@
-"""The sensors: as the running daemon sees them, or asked one after the other where none runs."""
+"""Examines the sensors: as the running daemon shows them, or read one after the other where none runs."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Reading
 
 ATTEMPTS: Final = 3
-"""How often a sensor that does not answer is asked."""
+"""Tries to read a sensor that does not answer."""
 PATIENCE: Final = 8.0
-"""s for each sensor at most, where the line is asked directly; a silent one takes 2 of them."""
+"""Most s for each sensor where the line is read directly; a silent one takes 2."""
 ADVICE: Final[Mapping[str, str]] = {
     "timeout": "is it powered and wired (A, B)? does it have this id and rate? lfs10d scan",
     "crc": "noise or two sensors of one id: termination, shield, ground; unplug one and look again",
@@ -44,13 +44,15 @@ OTHERWISE: Final = "docs/when-it-goes-wrong.md has every code"
 
 
 def by_daemon(live: LiveState, wall: float) -> Iterator[Finding]:
-    """Yield what the daemon's line and devices show at `wall` (s since the epoch)."""
+    """Yield the findings that the daemon publishes of line and devices; `wall` is now, in s since the epoch."""
     if live.line_error is not None:
         code = live.line_error_code or ""
         yield fail("line", f"{code}: {live.line_error}{_since(live.line_error_since)}", ADVICE.get(code, OTHERWISE))
     activity = live.line.get("activity")
     if activity not in {None, "polling"}:
-        yield warn("line", f"it is {activity} now, so nothing is polled as usual", "lfs10d request line/cancel ends it")
+        yield warn(
+            "line", f"it is {activity} now: sensors are not polled as usual", "lfs10d request line/cancel ends it"
+        )
     silent = [device for device in live.devices.values() if device.enabled and not device.online]
     for device in live.devices.values():
         if device.enabled and (device.error is not None or device in silent):
@@ -79,7 +81,7 @@ def _since(ts: float | None) -> str:
 
 
 def by_asking(loaded: LoadedConfig) -> list[Finding]:
-    """Ask each enabled slave of a line that nobody else holds, and return who answers."""
+    """Read each enabled slave of a line that is free; return which answer."""
     config = loaded.config
     slaves = [slave for slave in config.slaves if slave.enabled]
     if not slaves:
@@ -100,7 +102,7 @@ def _settings(line: LineConfig, baudrate: int) -> PortSettings:
 
 
 def _at_another_rate(line: LineConfig, specs: Sequence[DeviceSpec]) -> Iterator[Finding]:
-    """Ask at the other rates that the profiles know; yield where somebody answers."""
+    """Read at the other rates of the profiles; yield the rates at which devices answer."""
     rates = {rate for spec in specs if spec.profile.baudrate is not None for rate in spec.profile.baudrate.codes}
     for rate in sorted(rates - {line.baudrate}):
         readings = _polled(_settings(line, rate), specs)
@@ -128,7 +130,7 @@ def _spec(loaded: LoadedConfig, slave: SlaveConfig, profile: Profile) -> DeviceS
 
 
 def _polled(settings: PortSettings, specs: Sequence[DeviceSpec]) -> dict[str, Reading]:
-    """Ask each until it answers, `ATTEMPTS` times at most: a reply may be lost, or slower than the first time limit."""
+    """Read each until it answers, at most `ATTEMPTS` times: a reply may be lost, or slower than the first time-out."""
     readings: dict[str, Reading] = {}
     attempts = {spec.name: ATTEMPTS for spec in specs}
     rules = PollRules(retries=0, offline_after=ATTEMPTS, probe_interval_max=1.0)
@@ -144,7 +146,7 @@ def _polled(settings: PortSettings, specs: Sequence[DeviceSpec]) -> dict[str, Re
 
 
 def answers(specs: Sequence[DeviceSpec], readings: Mapping[str, Reading], port: str) -> Iterator[Finding]:
-    """Yield which sensors answer, and where none does what that may mean."""
+    """Yield which sensors answer, and the likely causes if none does."""
     good = [spec for spec in specs if (found := readings.get(spec.name)) is not None and found.fault is None]
     for spec in specs:
         reading = readings.get(spec.name)

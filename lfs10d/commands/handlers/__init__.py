@@ -1,1 +1,1 @@
-"""What each request does: one file per noun. Whether it is obeyed is decided in `lfs10d.commands.admission`."""
+"""What each request does: one file per noun. `lfs10d.commands.admission` decides whether it is accepted."""

@@ -33,13 +33,13 @@ class WhichChange(Parameters):
 
     @property
     def place(self) -> tuple[str, str | None]:
-        """The device, and the key of it, None for all of them; raises RefusedError where neither can be meant."""
+        """The device and its key, None for all keys; raises RefusedError for a change that no request made."""
         if not self.key:
             if not self.device:
                 raise refuse("invalid_param", "device: is missing; give device or key", param="device")
             return self.device, None
         if self.key == "line.baudrate":
-            raise refuse("invalid_param", "key: a baud rate is a fact; line/baudrate changes it", param="key")
+            raise refuse("invalid_param", "key: a baud rate cannot be reset; line/baudrate changes it", param="key")
         parts = self.key.split(".")
         if self.device and len(parts) == 1:
             return self.device, parts[0]
@@ -49,14 +49,14 @@ class WhichChange(Parameters):
 
 
 async def get(_: NoParameters, context: Context, __: Command) -> Result:
-    """Return the effective configuration, secrets left out, and where its values come from but for defaults."""
+    """Return the effective configuration without secrets, and the origin of each value that is no default."""
     loaded = context.config.loaded
     origins = {key: str(origin) for key, origin in loaded.origins.items() if origin.kind != "default"}
     return ok({"config": loaded.config.model_dump(mode="json"), "origins": origins})
 
 
 async def reload(_: NoParameters, context: Context, __: Command) -> Result:
-    """Read the files again; a broken one changes nothing."""
+    """Read the files again and apply what changed; files with errors change nothing."""
     try:
         plan = await context.config.reload()
     except ConfigError as error:
@@ -78,7 +78,7 @@ async def reset(parameters: WhichChange, context: Context, command: Command) -> 
 
 
 def _without(device: str, key: str | None, now: Effective) -> Changes:
-    """Return the changes without one; raises RefusedError if it is none, or cannot be taken back."""
+    """Return the changes without one; raises RefusedError if there is none, or it cannot be undone."""
     param = "device" if key is None else "key"
     change = now.changes.of(device)
     if not change:

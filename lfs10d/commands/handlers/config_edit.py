@@ -1,4 +1,4 @@
-"""What requests that change the configuration have in common: refused or kept, and told to everybody."""
+"""Edits of the configuration by request: saved and applied, or refused."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from lfs10d.errors import StateError
 
 
 async def apply_edit(edit: Edit, context: Context) -> tuple[Effective, Effective]:
-    """Change what holds; raises RefusedError, also where the change cannot be kept."""
+    """Change the configuration; raises RefusedError, also if the change cannot be saved."""
     try:
         return await context.config.change(edit)
     except StateError as error:
@@ -21,7 +21,7 @@ async def apply_edit(edit: Edit, context: Context) -> tuple[Effective, Effective
 
 
 def refuse(code: ErrorCode, message: str, *, param: str | None = None, **facts: object) -> RefusedError:
-    """Return the error that refuses a request before anything was changed."""
+    """Return the error that refuses a request; nothing was changed."""
     return RefusedError(rejected(code, message, param=param, **facts))
 
 
@@ -40,7 +40,7 @@ def known_device(device: str, now: Effective) -> SlaveConfig:
 
 
 def as_json(slave: SlaveConfig, keys: tuple[str, ...]) -> dict[str, Any]:
-    """Return what holds of a device as JSON has it: durations in s, a learned time-out is auto."""
+    """Return the settings of a device for JSON: durations in s, a learned time-out is `auto`."""
     values = {key: getattr(slave, key) for key in keys}
     if "response_timeout" in values and values["response_timeout"] is None:
         values["response_timeout"] = "auto"
@@ -48,7 +48,7 @@ def as_json(slave: SlaveConfig, keys: tuple[str, ...]) -> dict[str, Any]:
 
 
 def altered(before: Effective, now: Effective) -> list[dict[str, Any]]:
-    """Return what another configuration changes: key, from, to; devices that come or go as a whole."""
+    """Return the differences between two configurations: key, from, to; an added or removed device is one."""
     found = difference(before.config, now.config)
     changed = [{"key": change.key, "from": change.old, "to": change.new} for change in found.changed]
     for names, old, new in ((found.added, None, "polled"), (found.removed, "polled", None)):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeAlias
 
 from pydantic import Field
 
@@ -27,47 +27,50 @@ from lfs10d.schema.fields import FilePath, Flag, Name, quoted
 from lfs10d.system.threads import run_in_thread
 
 SHOWN = ("label", "profile", "interval", "enabled", "response_timeout")
-"""What the answer tells of a device that was added."""
+"""Keys of the response about a device that was added."""
 STATED = ("label", "profile", "interval")
-"""What a request may state of a device it adds; the rest is as for any other."""
+"""Keys of a device that `device/add` may give; the others have their defaults."""
+
+
+DeviceName: TypeAlias = Annotated[str, Name(), Field(description="Name of the device.")]
 
 
 class OneDevice(Parameters):
-    """Which device."""
+    """The parameters of a request about one device."""
 
-    device: Annotated[str, Name()]
+    device: DeviceName
 
 
 class NewDevice(Parameters):
-    """A device to be polled."""
+    """The parameters of `device/add`."""
 
-    slave: SlaveId
+    slave: SlaveId = Field(description="Its slave id, 1 to 255.")
     name: Annotated[str, Name()] | None = Field(None, description="Without: `slave-5` for slave id 5.")
-    label: Label = None
-    profile: Annotated[str, FilePath()] = "lfs10"
+    label: Label = Field(None, description="Text for people.")
+    profile: Annotated[str, FilePath()] = Field("lfs10", description="Name or file of its profile.")
     interval: Interval | None = Field(None, description="Without: `poll.interval` of the configuration.")
-    probe: Annotated[bool, Flag()] = True
+    probe: Annotated[bool, Flag()] = Field(default=True, description="Add it only if it answers now.")
 
     @property
     def device(self) -> str:
-        """Its name, or the default one."""
+        """Its name, or the default name."""
         return self.name or default_device_name(self.slave)
 
     @property
     def entry(self) -> dict[str, Any]:
-        """What is said of it."""
+        """Its entry in the configuration."""
         stated = {key: getattr(self, key) for key in STATED if key in self.model_fields_set}
         return {"id": self.slave, **{key: value for key, value in stated.items() if value is not None}}
 
 
 class Options(Parameters):
-    """What is to be changed of a device."""
+    """The parameters of `device/options`; those that are absent stay as they are."""
 
-    device: Annotated[str, Name()]
-    interval: Interval = 1.0
-    enabled: Annotated[bool, Flag()] = True
-    label: Label = None
-    response_timeout: ResponseTimeout = None
+    device: DeviceName
+    interval: Interval = Field(1.0, description="Time between two polls.")
+    enabled: Annotated[bool, Flag()] = Field(default=True, description="Whether it is polled.")
+    label: Label = Field(None, description="Text for people.")
+    response_timeout: ResponseTimeout = Field(None, description="How long an answer may take to begin.")
 
     @property
     def wanted(self) -> dict[str, Any]:
@@ -76,7 +79,7 @@ class Options(Parameters):
 
 
 async def add(parameters: NewDevice, context: Context, command: Command) -> Result:
-    """Poll one more slave; with `probe` only if it answers."""
+    """Add a device and poll it; with `probe` only if it answers."""
     profile = await profile_of(parameters.profile, context.config.now)
     _check_new(parameters, profile, context.config.now, context.reconfiguration.reserved())
     if parameters.probe:
@@ -95,7 +98,7 @@ async def add(parameters: NewDevice, context: Context, command: Command) -> Resu
 
 
 async def profile_of(word: str, now: Effective) -> Profile:
-    """Return a profile by its name or file. A file is one that is used already, or lies beside the configuration.
+    """Return a profile by its name or file; the file must be in use already, or lie beside the configuration.
 
     Raises RefusedError for anything else.
     """
@@ -117,7 +120,7 @@ async def profile_of(word: str, now: Effective) -> Profile:
 
 
 def _check_new(wanted: NewDevice, profile: Profile, now: Effective, reserved: Mapping[int, str]) -> None:
-    """Raise RefusedError if there cannot be such a device."""
+    """Raise RefusedError if the device cannot be added: its id or name is taken."""
     config = now.config
     slave = inherited(SlaveConfig.model_construct(name=wanted.device, **wanted.entry), config.poll)
     alone = config.model_copy(update={"slaves": (slave,)})
@@ -136,7 +139,7 @@ def _check_new(wanted: NewDevice, profile: Profile, now: Effective, reserved: Ma
 
 
 async def _ping(slave: int, profile: Profile, context: Context) -> None:
-    """Raise RefusedError unless there is an answer."""
+    """Raise RefusedError unless the slave answers."""
     ping = await context.line.ping(slave, profile)
     if ping.answered:
         return
@@ -148,7 +151,7 @@ async def _ping(slave: int, profile: Profile, context: Context) -> None:
 
 
 async def remove(parameters: OneDevice, context: Context, command: Command) -> Result:
-    """Poll a device no more."""
+    """Remove a device: it is no longer polled."""
     device = parameters.device
 
     def edit(now: Effective) -> Changes:
@@ -164,7 +167,7 @@ async def remove(parameters: OneDevice, context: Context, command: Command) -> R
 
 
 async def options(parameters: Options, context: Context, command: Command) -> Result:
-    """Change how a device is polled and called."""
+    """Change the interval, label or time-out of a device, or whether it is polled."""
     device, wanted = parameters.device, parameters.wanted
 
     def edit(now: Effective) -> Changes:
@@ -187,7 +190,7 @@ async def options(parameters: Options, context: Context, command: Command) -> Re
 
 
 async def read(parameters: OneDevice, context: Context, _: Command) -> Result:
-    """Poll a device now, in turn with everybody else."""
+    """Poll a device now, in turn with the others."""
     device = parameters.device
     if device not in context.devices:
         return unknown_device(device, context.devices)

@@ -11,12 +11,12 @@ from lfs10d.commands.message import NoParameters
 
 
 async def health(_: NoParameters, context: Context, __: Command) -> Result:
-    """Tell how everything is."""
+    """Return the state of the daemon, the line and every device."""
     return ok(context.publisher.health())
 
 
 async def republish(_: NoParameters, context: Context, __: Command) -> Result:
-    """Send every retained topic once more."""
+    """Publish every retained topic again."""
     return ok({"topics": context.publisher.republish()})
 
 

@@ -17,34 +17,41 @@ from lfs10d.reconfiguration.adopt_request import AdoptRequest
 from lfs10d.schema.fields import Choice, FilePath, Flag, Name, Text, Whole
 
 REMEMBERED_FOR = 86_400.0
-"""How long the answer to a physical change is kept for its repeats, in s."""
+"""Seconds for which the response to a physical change is kept for repeats of the request."""
+
+
+DRY_RUN = "Only check whether it can be done; nothing is written."
 
 
 class ReaddressParameters(Parameters):
-    """Which device gets which slave id; with `dry_run` nothing is written."""
+    """The parameters of `device/readdress`."""
 
-    device: Annotated[str, Name()]
-    to: Annotated[int, Whole(1, 255)]
-    dry_run: Annotated[bool, Flag()] = False
+    device: device.DeviceName
+    to: Annotated[int, Whole(1, 255)] = Field(description="Its new slave id.")
+    dry_run: Annotated[bool, Flag()] = Field(default=False, description=DRY_RUN)
 
 
 async def readdress(parameters: ReaddressParameters, context: Context, command: Command) -> Result:
-    """Give a sensor another slave id."""
+    """Give a sensor another slave id, and verify it."""
     return await context.reconfiguration.readdress(
         parameters.device, parameters.to, dry_run=parameters.dry_run, call=command
     )
 
 
 class BaudrateParameters(Parameters):
-    """Which rate; with `power_cycle` the sensors obey when their power is switched off and on."""
+    """The parameters of `line/baudrate`."""
 
-    to: Annotated[int, Choice((9600, 19200, 1200, 2400, 4800, 38400, 57600, 115200))]
-    power_cycle: Annotated[bool, Flag()] = False
-    dry_run: Annotated[bool, Flag()] = False
+    to: Annotated[int, Choice((9600, 19200, 1200, 2400, 4800, 38400, 57600, 115200))] = Field(
+        description="The new rate."
+    )
+    power_cycle: Annotated[bool, Flag()] = Field(
+        default=False, description="The sensors use the new rate after their power is switched off and on."
+    )
+    dry_run: Annotated[bool, Flag()] = Field(default=False, description=DRY_RUN)
 
 
 async def baudrate(parameters: BaudrateParameters, context: Context, command: Command) -> Result:
-    """Move every sensor and the port to another rate."""
+    """Move every sensor and the port to another rate, verified, or back."""
     if context.line.paused:
         return FREED
     return await context.reconfiguration.baudrate(
@@ -53,11 +60,11 @@ async def baudrate(parameters: BaudrateParameters, context: Context, command: Co
 
 
 class AdoptParameters(Parameters):
-    """What the new sensor is to be called, what it is, where it is and which slave id it is to get."""
+    """The parameters of `line/adopt`."""
 
-    name: Annotated[str, Name()] | None = None
-    label: Annotated[str | None, Text(200, null=True)] = None
-    profile: Annotated[str, FilePath()] = "lfs10"
+    name: Annotated[str, Name()] | None = Field(None, description="Without: `slave-5` for slave id 5.")
+    label: Annotated[str | None, Text(200, null=True)] = Field(None, description="Text for people.")
+    profile: Annotated[str, FilePath()] = Field("lfs10", description="Name or file of its profile.")
     factory: Annotated[int, Whole(1, 255)] | None = Field(
         default=None, alias="from", description="Without: the factory id of the profile."
     )
@@ -65,7 +72,7 @@ class AdoptParameters(Parameters):
 
 
 async def adopt(parameters: AdoptParameters, context: Context, command: Command) -> Result:
-    """Take in a factory-new sensor."""
+    """Adopt a factory-new sensor: it gets a free slave id and the line's rate, and is polled."""
     wanted = parameters
     await device.profile_of(wanted.profile, context.config.now)
     request = AdoptRequest(wanted.name, wanted.label, wanted.factory, wanted.to, wanted.profile)

@@ -39,7 +39,7 @@ REGISTERS = 0x1_0000
 
 
 class OnePlace(Parameters):
-    """Whose register; either by `device` or by `slave`."""
+    """A register of a device, given by `device` or by `slave`."""
 
     device: Annotated[str, Name()] | None = Field(None, description="The device, by its name.")
     slave: Annotated[int, Whole(0, 255)] | None = Field(
@@ -49,19 +49,19 @@ class OnePlace(Parameters):
 
 
 class SomeRegisters(OnePlace):
-    """What to read."""
+    """The parameters of `register/read`."""
 
     count: Annotated[int, Whole(1, READ_COUNT_MAX)] = Field(1, description="How many registers.")
 
 
 class OneRegister(OnePlace):
-    """What to write."""
+    """The parameters of `register/write`."""
 
     value: Annotated[int, Whole(0, REGISTERS - 1)] = Field(description="What the register is to hold, unscaled.")
 
 
 async def read(parameters: SomeRegisters, context: Context, _: Command) -> Result:
-    """Read registers as they are, with function 03."""
+    """Read registers with function 03, unscaled."""
     now = context.config.now
     address, count = parameters.address, parameters.count
     device, slave = _target(parameters, now)
@@ -155,7 +155,7 @@ def _writable(settings: Iterable[Setting]) -> str:
 
 
 def _ended(access: Access, who: str, *, data: object = None, writes: bool = False) -> Result:
-    """Return the answer to an access that did not do what was asked: rejected where a write was not even sent."""
+    """Return the result of an access that failed; `rejected` if no write was sent."""
     code, words = _why(access)
     fault = access.fault
     facts: dict[str, Any] = {}
@@ -167,7 +167,7 @@ def _ended(access: Access, who: str, *, data: object = None, writes: bool = Fals
 
 
 def _why(access: Access) -> tuple[ErrorCode, str]:
-    """Return the error code and the words for it."""
+    """Return the error code and the message."""
     fault = access.fault
     said = "the port is lost" if fault is None else fault.message
     match access.end:

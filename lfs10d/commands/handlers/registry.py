@@ -1,4 +1,4 @@
-"""Every request by its name: `config/reload` is `B/request/config/reload`."""
+"""The handlers of all requests by name: `config/reload` is `B/request/config/reload`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`line/scan`: who is on the line, found while polling goes on."""
+"""`line/scan`: finds the devices on the line while polling goes on."""
 
 from __future__ import annotations
 
@@ -65,14 +65,16 @@ class ScanRates(FieldKind):
 
 
 class WhomToFind(Parameters):
-    """Where to look, with how much of the line's time in percent, and whether to add who is found."""
+    """The parameters of `line/scan`."""
 
-    ids: Annotated[tuple[int, ...], SlaveIds()] = Field(default=f"1-{LAST_ID}", validate_default=True)
+    ids: Annotated[tuple[int, ...], SlaveIds()] = Field(
+        default=f"1-{LAST_ID}", validate_default=True, description="Slave ids to ask."
+    )
     baudrates: Annotated[tuple[int, ...] | None, ScanRates()] = Field(
         default=None, description="Without: the line's own, and both of an LFS10."
     )
     share: Annotated[int, Whole(1, 100)] = Field(
-        default=30, description="Percent of the line's time that it takes at most; polling keeps 5 in any case."
+        default=30, description="Most of the line's time that it takes, in percent; polling keeps 5 in any case."
     )
     add: Annotated[bool, Flag()] = Field(
         default=False,
@@ -81,7 +83,7 @@ class WhomToFind(Parameters):
 
 
 async def scan(parameters: WhomToFind, context: Context, command: Command) -> Result:
-    """Find out who is on the line."""
+    """Find the devices on the line, while polling goes on."""
     done = await context.line.scan(parameters.ids, parameters.baudrates or (), parameters.share / 100)
     data: dict[str, Any] = {"found": [_told(finding, context) for finding in done.found]}
     asked = f"after {done.progress.asked} of {done.progress.total} ids"
@@ -95,7 +97,7 @@ async def scan(parameters: WhomToFind, context: Context, command: Command) -> Re
 
 
 def _known(finding: FoundDevice, context: Context) -> str | None:
-    """Return the name of the device that is configured where this was found."""
+    """Return the name of the device that is configured at this slave id and rate."""
     config = context.config.now.config
     if finding.baudrate != config.line.baudrate:
         return None
@@ -118,7 +120,7 @@ def _told(finding: FoundDevice, context: Context) -> dict[str, Any]:
 
 
 async def _add(done: Scan, context: Context, command: Command) -> dict[str, list[dict[str, Any]]]:
-    """Have polled who is new and beyond doubt, each as `device/add` does; return who was added and who was not."""
+    """Add the new devices that are recognised beyond doubt, as `device/add` does; return those added and not added."""
     added: list[dict[str, Any]] = []
     refused: list[dict[str, Any]] = []
     for finding in done.found:

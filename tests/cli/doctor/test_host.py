@@ -52,7 +52,7 @@ def test_a_synchronised_clock_is_well() -> None:
         (replace(GOOD_DISK, sync=0.5), "warn", "a write takes 0.5 s"),
         (replace(GOOD_DISK, sync=3.0), "fail", "a write takes 3.0 s"),
         (replace(GOOD_DISK, free=10**6), "warn", "1 MB are free"),
-        (replace(GOOD_DISK, writable=False), "warn", "cannot be written by you"),
+        (replace(GOOD_DISK, writable=False), "warn", "cannot be written by this user"),
         (replace(GOOD_DISK, written=50e9), "warn", "50 GB a day"),
         (replace(GOOD_DISK, refused=errno.ENOSPC), "fail", "cannot be written: no space left on device"),
         (replace(GOOD_DISK, writable=False, refused=errno.EROFS), "fail", "cannot be written: read-only file system"),
@@ -95,7 +95,7 @@ def test_a_folder_that_one_may_not_look_into_is_no_trouble(tmp_path: Path, monke
     monkeypatch.setattr(Path, "stat", closed)
     seen = look_at_disk(link, 1000, Root(tmp_path / "none"))
     assert (seen.exists, seen.writable, seen.sync, seen.refused) == (True, False, None, 0)
-    assert "cannot be written by you" in only(list(disk(seen))).text
+    assert "cannot be written by this user" in only(list(disk(seen))).text
 
 
 def test_a_disk_that_refuses_a_write_is_not_told_to_be_well(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

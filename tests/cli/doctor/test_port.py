@@ -33,7 +33,7 @@ def test_a_port_that_is_well_has_no_advice() -> None:
     [
         (PortState("/dev/x"), "fail", "is absent", "ls -l /dev/serial/by-id"),
         (PortState("/dev/x", container=True), "fail", "not in this container", "--device"),
-        (replace(WELL, is_device=False), "fail", "is no device", "ls -l /dev/serial/by-id"),
+        (replace(WELL, is_device=False), "fail", "is not a device", "ls -l /dev/serial/by-id"),
         (
             replace(WELL, path="/dev/ttyUSB0"),
             "warn",
