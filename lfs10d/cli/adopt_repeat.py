@@ -51,6 +51,23 @@ def summary(adopted: Sequence[AdoptedSensor]) -> list[str]:
     return [count, *columns(("name", "id", "baud"), rows, right={1, 2})]
 
 
+async def adopt(client: CommandClient, loop: AdoptLoop) -> dict[str, Any]:
+    """Send the loop's next request; return its response, with an id only where nothing else identifies that.
+
+    The daemon keeps the response to each id on its disk for a day: too much for a request every few seconds.
+    """
+    content = loop.content if client.by_response_topic else {**loop.content, "id": secrets.token_hex(6)}
+    return await client.request(ADOPT, content, None) or {}
+
+
+async def health(client: CommandClient) -> object:
+    """Request the daemon's health and return it; raises FailedError where it does not respond."""
+    response = await client.request("health", {"id": secrets.token_hex(6)}, HEALTH_WITHIN)
+    if response is None:
+        raise FailedError(f"no response to health within {HEALTH_WITHIN:g} s")
+    return response.get("data")
+
+
 class _AdoptRepeat:
     """The requests and reports, until it is cancelled."""
 
@@ -84,8 +101,7 @@ class _AdoptRepeat:
         async with spinning(WAITING):
             if loop.uncertain and await self._check_health():
                 return True
-            response = await self._client.request(ADOPT, self._with_id(loop.content), None)
-            turn = loop.on_response(response or {})
+            turn = loop.on_response(await adopt(self._client, loop))
         if turn.adopted is not None:
             self._report(turn.adopted)
         if turn.problem is not None:
@@ -98,22 +114,10 @@ class _AdoptRepeat:
 
     async def _check_health(self) -> bool:
         """Request the daemon's health; return whether it shows a sensor that was adopted meanwhile."""
-        response = await self._client.request("health", self._with_id({}, always=True), HEALTH_WITHIN)
-        if response is None:
-            raise FailedError(f"no response to health within {HEALTH_WITHIN:g} s")
-        found = list(self._loop.on_health(response.get("data")))
+        found = list(self._loop.on_health(await health(self._client)))
         for each in found:
             self._report(each)
         return bool(found)
-
-    def _with_id(self, content: dict[str, Any], *, always: bool = False) -> dict[str, Any]:
-        """Return a request's content, with an id only where nothing else identifies its response.
-
-        The daemon keeps the response to each id on its disk for a day: too much for a request every few seconds.
-        """
-        if self._client.by_response_topic and not always:
-            return content
-        return {**content, "id": secrets.token_hex(6)}
 
     def _report(self, adopted: AdoptedSensor) -> None:
         if self._as_json:

@@ -10,20 +10,17 @@ import contextlib
 from collections.abc import Callable, Mapping
 from dataclasses import field, replace
 from functools import partial
-from typing import Protocol, TypeAlias
+from typing import Protocol
 
 from lfs10d.config.changes import Changes
 from lfs10d.config.changes_file import FILE_NAME, ChangesFile
-from lfs10d.config.effective import Effective, effective
+from lfs10d.config.effective import Edit, Effective, effective
 from lfs10d.config.loader import LoadedConfig
 from lfs10d.config.merge import DroppedChange
 from lfs10d.config.reload import ConfigFiles, ReloadPlan, imprint, plan, read
 from lfs10d.errors import StateError
 from lfs10d.system.dataclass import dataclass
 from lfs10d.system.threads import run_in_thread
-
-Edit: TypeAlias = "Callable[[Effective], Changes]"
-"""Returns the changes for a configuration in force; raises what refuses the request. Called in any thread."""
 
 
 @dataclass(slots=True)

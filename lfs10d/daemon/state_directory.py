@@ -26,7 +26,7 @@ def state_directory(file: Path, line: str, *, chosen: Path | None, environment: 
         return Path(given)
     if in_system_folder(file):
         return Path("/var/lib", _service(file))
-    return _home(environment) / ".local/state/lfs10d" / line
+    return Path(environment.get("HOME") or "/") / ".local/state/lfs10d" / line
 
 
 def in_system_folder(file: Path) -> bool:
@@ -43,10 +43,6 @@ def service_unit(file: Path) -> str | None:
 
 def _service(file: Path) -> str:
     return "lfs10d" if file.stem == DEFAULT_STEM else f"lfs10d-{file.stem}"
-
-
-def _home(environment: Mapping[str, str]) -> Path:
-    return Path(environment.get("HOME") or "/")
 
 
 def status_file(file: Path, line: str, environment: Mapping[str, str], *, root: bool = False) -> Path | None:

@@ -46,16 +46,9 @@ class StatusFile:
 
 def _json(status: Mapping[str, object]) -> str:
     """Return the status as JSON, each device by itself: the encoder holds the interpreter, and the line must wake."""
+    encode = _JSON.encode
     members = (
-        f"{_encoded(key)}:{f'[{_joined(value)}]' if isinstance(value, list) else _encoded(value)}"
+        f"{encode(key)}:" + (f"[{','.join(map(encode, value))}]" if isinstance(value, list) else encode(value))
         for key, value in status.items()
     )
     return f"{{{','.join(members)}}}"
-
-
-def _joined(items: list[object]) -> str:
-    return ",".join(_encoded(item) for item in items)
-
-
-def _encoded(value: object) -> str:
-    return _JSON.encode(value)

@@ -7,7 +7,7 @@ import secrets
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import field, replace
+from dataclasses import asdict, field, replace
 from typing import Any, Final
 
 from lfs10d.cli.client import CommandClient
@@ -43,16 +43,7 @@ class RequestRecord:
 
     def shown(self) -> dict[str, Any]:
         """Return it as JSON has it."""
-        return {
-            "number": self.number,
-            "name": self.name,
-            "parameters": self.parameters,
-            "began": self.began,
-            "status": self.status,
-            "words": self.words,
-            "data": self.data,
-            "ended": self.ended,
-        }
+        return asdict(self)
 
 
 @dataclass(frozen=True, slots=True)

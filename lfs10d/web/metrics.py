@@ -36,6 +36,10 @@ _OWN: Final = frozenset(
 """Names that our own metrics of a device have or may have (OpenMetrics 1.0, section 4.3)."""
 _NO_EXCHANGE: Final = frozenset({"overrun", "port_lost", "port_busy"})
 """Codes that are counted without a request on the line."""
+_GAP: Final = "lfs10d_line_gap_seconds"
+_RESPONSE: Final = f"{_DEVICE}_response_seconds"
+_PER_SECOND: Final = {_GAP: 1e6, _RESPONSE: 1e3}
+"""In how many of its unit a second is published."""
 _OLD_AFTER: Final = 1.5
 """s beyond three intervals after which a value is not published: the way from the sensor to here takes some."""
 
@@ -73,9 +77,7 @@ def openmetrics_wanted(accept: str) -> bool:
 def text(lines: Iterable[LineModel], wall: float, *, openmetrics: bool) -> str:
     """Return the figures of these lines; `wall` is now, epoch seconds of this machine."""
     families = _Families()
-    families.of("lfs10d_build_info", "gauge", "The version of lfs10d that serves these metrics.").add(
-        1, version=__version__
-    )
+    families.gauge("lfs10d_build_info", "The version of lfs10d that serves these metrics.", 1, version=__version__)
     for line in lines:
         _add_line(families, line, wall)
     written = [row for family in families for row in _written(family, openmetrics=openmetrics)]
@@ -89,39 +91,43 @@ class _Families:
     def of(self, name: str, kind: str, words: str, unit: str = "") -> Family:
         return self._families.setdefault(name, Family(name, kind, words, unit))
 
+    def gauge(self, name: str, words: str, value: object, unit: str = "", **labels: str) -> None:
+        self.of(name, "gauge", words, unit).add(value, **labels)
+
+    def counter(self, name: str, words: str, value: object, **labels: str) -> None:
+        self.of(name, "counter", words).add(value, "_total", **labels)
+
+    def quantiles(self, name: str, words: str, figures: object, keys: Mapping[str, str], **labels: str) -> None:
+        """Add those of these figures that are there, in seconds by quantile."""
+        for quantile, key in keys.items():
+            figure = _number(_mapping(figures).get(key))
+            if figure is not None:
+                per_second = _PER_SECOND[name]
+                self.of(name, "summary", words, "seconds").add(figure / per_second, **labels, quantile=quantile)
+
     def __iter__(self) -> Iterator[Family]:
         return iter(self._families.values())
 
 
 def _add_line(families: _Families, line: LineModel, wall: float) -> None:
-    source = line.source(wall)
-    key = line.key
-    connected = line.broker(source)["connected"]
-    families.of("lfs10d_mqtt_connected", "gauge", "Whether the daemon is connected to its broker.").add(
-        1 if connected else 0, line=key
-    )
+    source, key = line.source(wall), line.key
+    broker = line.broker(source)
+    connected = 1 if broker["connected"] else 0
+    families.gauge("lfs10d_mqtt_connected", "Whether the daemon is connected to its broker.", connected, line=key)
     if not source.alive:
         return
     side = line.side(source)
     state = side.live.line
     load = _number(state.get("load_pct"))
     if load is not None:
-        families.of("lfs10d_line_load_ratio", "gauge", "Share of time in which the line is in use.", "ratio").add(
-            load / 100, line=key
-        )
+        words = "Share of time in which the line is in use."
+        families.gauge("lfs10d_line_load_ratio", words, load / 100, "ratio", line=key)
     _add_exchanges(families, key, state)
-    gaps = _mapping(state.get("gap_us"))
-    for quantile, name in (("0", "min"), ("0.5", "p50"), ("0.99", "p99")):
-        gap = _number(gaps.get(name))
-        if gap is not None:
-            families.of(
-                "lfs10d_line_gap_seconds", "summary", "Silence measured before requests; 0 is the least.", "seconds"
-            ).add(gap / 1e6, line=key, quantile=quantile)
-    broker, store = line.broker(source), _mapping(state.get("store"))
-    families.of("lfs10d_store_samples", "gauge", "Samples waiting for the broker.").add(broker["waiting"], line=key)
-    families.of("lfs10d_store_dropped", "counter", "Samples dropped since the daemon's start.").add(
-        store.get("dropped"), "_total", line=key
-    )
+    words = "Silence measured before requests; 0 is the least."
+    families.quantiles(_GAP, words, state.get("gap_us"), {"0": "min", "0.5": "p50", "0.99": "p99"}, line=key)
+    families.gauge("lfs10d_store_samples", "Samples waiting for the broker.", broker["waiting"], line=key)
+    dropped = _mapping(state.get("store")).get("dropped")
+    families.counter("lfs10d_store_dropped", "Samples dropped since the daemon's start.", dropped, line=key)
     for device in side.live.devices.values():
         _add_device(families, line, side, device, wall)
 
@@ -131,49 +137,32 @@ def _add_exchanges(families: _Families, key: str, state: Mapping[str, Any]) -> N
     errors = {code: count for code, count in _counts(state.get("errors")).items() if code not in _NO_EXCHANGE}
     if exchanges is None:
         return
-    family = families.of("lfs10d_line_exchanges", "counter", "Requests on the line since the daemon's start.")
-    family.add(max(0, exchanges - sum(errors.values())), "_total", line=key, result="ok")
-    for code, count in errors.items():
-        family.add(count, "_total", line=key, result=code)
+    for result, count in (("ok", max(0, exchanges - sum(errors.values()))), *errors.items()):
+        words = "Requests on the line since the daemon's start."
+        families.counter("lfs10d_line_exchanges", words, count, line=key, result=result)
 
 
 def _add_device(families: _Families, line: LineModel, side: Side, device: ShownDevice, wall: float) -> None:
     labels = {"line": line.key, "device": device.name}
-    families.of(f"{_DEVICE}_online", "gauge", "Whether the device answers.").add(int(device.online), **labels)
+    families.gauge(f"{_DEVICE}_online", "Whether the device answers.", int(device.online), **labels)
     age = side.live.age(device, wall)
     sample = side.samples.get(device.name, {})
     fresh = age is not None and age <= 3 * device.interval + _OLD_AFTER
     if sample.get("quality") in ("good", "partial") and device.enabled and fresh:
         for name, value in device.values.items():
             unit = unit_words(device.units.get(name, ""))
-            families.of(
-                _gauge(name, unit), "gauge", f"{name.replace('_', ' ')} as the device measured it last.", unit
-            ).add(value, **labels)
+            words = f"{name.replace('_', ' ')} as the device measured it last."
+            families.gauge(_gauge(name, unit), words, value, unit, **labels)
     stats = _mapping(side.extras.get((device.name, "stats")))
-    families.of(f"{_DEVICE}_polls", "counter", "Polls since the daemon's start.").add(
-        stats.get("polls"), "_total", **labels
-    )
+    families.counter(f"{_DEVICE}_polls", "Polls since the daemon's start.", stats.get("polls"), **labels)
     for code, count in _counts(stats.get("errors")).items():
-        families.of(f"{_DEVICE}_poll_errors", "counter", "Failed polls since the daemon's start, by code.").add(
-            count, "_total", **labels, code=code
-        )
-    rtt = _mapping(stats.get("rtt_ms"))
-    for quantile, name in (("0.5", "p50"), ("0.95", "p95")):
-        time = _number(rtt.get(name))
-        if time is not None:
-            families.of(
-                f"{_DEVICE}_response_seconds",
-                "summary",
-                "First bit of the request to last bit of the reply.",
-                "seconds",
-            ).add(time / 1e3, **labels, quantile=quantile)
+        words = "Failed polls since the daemon's start, by code."
+        families.counter(f"{_DEVICE}_poll_errors", words, count, **labels, code=code)
+    words = "First bit of the request to last bit of the reply."
+    families.quantiles(_RESPONSE, words, stats.get("rtt_ms"), {"0.5": "p50", "0.95": "p95"}, **labels)
     if device.good_ts is not None:
-        families.of(
-            f"{_DEVICE}_last_good_timestamp_seconds",
-            "gauge",
-            "When the device gave its last good value, by the daemon's clock.",
-            "seconds",
-        ).add(device.good_ts / 1e3, **labels)
+        words = "When the device gave its last good value, by the daemon's clock."
+        families.gauge(f"{_DEVICE}_last_good_timestamp_seconds", words, device.good_ts / 1e3, "seconds", **labels)
 
 
 def _gauge(name: str, unit: str) -> str:

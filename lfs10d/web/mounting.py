@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import secrets
 import time
 from collections.abc import Callable
 from typing import Any, Final
 
 from lfs10d.cli.adopt_loop import AdoptLoop
-from lfs10d.cli.adopt_repeat import ADOPT, HEALTH_WITHIN
+from lfs10d.cli.adopt_repeat import adopt, health
 from lfs10d.cli.client import CommandClient
 from lfs10d.cli.login import Login
 from lfs10d.errors import BrokerError, FailedError
@@ -122,10 +121,9 @@ class Mounting:
         if loop.uncertain and await self._check_health(client):
             self._words, self._problem = NEXT, ""
             return
-        content = dict(loop.content) if client.by_response_topic else {**loop.content, "id": secrets.token_hex(6)}
         self._asked_at = self._now()
         try:
-            response = await client.request(ADOPT, content, None) or {}
+            response = await adopt(client, loop)
         finally:
             took, self._asked_at = self._now() - self._asked_at, None
         turn = loop.on_response(response)
@@ -151,7 +149,4 @@ class Mounting:
 
     async def _check_health(self, client: CommandClient) -> bool:
         """Request the daemon's health; return whether it shows a sensor that was adopted meanwhile."""
-        response = await client.request("health", {"id": secrets.token_hex(6)}, HEALTH_WITHIN)
-        if response is None:
-            raise FailedError(f"no response to health within {HEALTH_WITHIN:g} s")
-        return bool(list(self._loop.on_health(response.get("data"))))
+        return bool(list(self._loop.on_health(await health(client))))

@@ -16,8 +16,8 @@ from lfs10d.commands.dispatcher import Dispatcher
 from lfs10d.commands.handlers.registry import HANDLERS
 from lfs10d.commands.responder import Responder
 from lfs10d.config.changes_file import ChangesFile
-from lfs10d.config.effective import Effective
-from lfs10d.config.live_config import Edit, LiveConfig, News
+from lfs10d.config.effective import Edit, Effective
+from lfs10d.config.live_config import LiveConfig, News
 from lfs10d.config.loader import load
 from lfs10d.config.models import Config
 from lfs10d.config.reload import ReloadPlan
