@@ -17,10 +17,14 @@ JOB_CREDIT = 0.1
 
 
 class JobQueue:
-    """The jobs of one line. `excluded` are the slave ids that belong to one of them for the moment."""
+    """The jobs of one line. `excluded` are the slave ids that belong to one of them for the moment.
+
+    `release_at` is when the first rest of a job is over, inf where none rests until a time.
+    """
 
     def __init__(self) -> None:
         self.excluded: frozenset[int] = frozenset()
+        self.release_at = inf
         self._waiting: list[Job] = []
         self._held: list[tuple[float, Job]] = []
         self._shares: dict[Job, Account] = {}
@@ -50,26 +54,30 @@ class JobQueue:
         self._waiting.insert(0, job)
         self._slice = job
 
-    @property
-    def idle(self) -> bool:
-        """No job waits or rests."""
-        return not (self._waiting or self._held)
+    def idle(self, now: float) -> bool:
+        """Whether no job waits for the line; one that rests does when its rest is over."""
+        return not self._waiting and now < self.release_at
 
     def hold(self, job: Job, hold: Hold) -> None:
         """Let a job rest."""
-        self._held.append((inf if hold.until is None else hold.until, job))
+        self._rest([*self._held, (inf if hold.until is None else hold.until, job)])
+
+    def _rest(self, held: list[tuple[float, Job]]) -> None:
+        self._held = held
+        self.release_at = min((until for until, _ in held), default=inf)
 
     def released(self, now: float) -> list[Job]:
         """Take the jobs whose rest is over."""
+        if now < self.release_at:
+            return []
         over = [job for until, job in self._held if until <= now]
-        if over:
-            self._held = [entry for entry in self._held if entry[0] > now]
+        self._rest([entry for entry in self._held if entry[0] > now])
         return over
 
     def wake(self, job: Job) -> bool:
         """Take `job` if it rests; whether it did."""
         before = len(self._held)
-        self._held = [entry for entry in self._held if entry[1] is not job]
+        self._rest([entry for entry in self._held if entry[1] is not job])
         return len(self._held) < before
 
     def choose(self, now: float) -> Job | None:
@@ -88,9 +96,8 @@ class JobQueue:
 
     def next_at(self, now: float) -> float:
         """When a job may speak, if nothing else happens; inf where none can."""
-        wishes = [until for until, _ in self._held]
-        wishes += [self._shares[job].ready_at(now) for job in self._waiting if job in self._shares]
-        return min(wishes, default=inf)
+        wishes = [self._shares[job].ready_at(now) for job in self._waiting if job in self._shares]
+        return min([self.release_at, *wishes])
 
     def spend(self, job: Job, taken: float, now: float) -> None:
         """Note that `job` used the line for `taken` s."""
@@ -108,7 +115,7 @@ class JobQueue:
         """Forget the unwanted jobs; return them."""
         dropped = [job for job in (*self._waiting, *(held for _, held in self._held)) if unwanted(job)]
         self._waiting = [job for job in self._waiting if job not in dropped]
-        self._held = [entry for entry in self._held if entry[1] not in dropped]
+        self._rest([entry for entry in self._held if entry[1] not in dropped])
         for job in dropped:
             self.over(job)
         return dropped

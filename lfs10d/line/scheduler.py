@@ -190,10 +190,10 @@ class Scheduler:
         return Rest(min(self._probing.next_at, self._polls.next_due(), self._jobs.next_at(now)))
 
     def patient(self, now: float) -> bool:
-        """Whether the line need not hurry; with a device of interval 0 or a job on it, it must."""
+        """Whether the line need not hurry; with a device of interval 0 or a job that waits for it, it must."""
         job = self._current[0] if self._current else None
         flat_out = isinstance(job, Poll) and job.device.spec.interval == 0
-        return self._jobs.idle and not flat_out and now < self._probing.next_at and self._polls.patient(now)
+        return self._jobs.idle(now) and not flat_out and now < self._probing.next_at and self._polls.patient(now)
 
     def _begin(self, job: Job, ask: Ask, now: float) -> None:
         self._current = job, ask

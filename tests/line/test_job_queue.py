@@ -133,16 +133,17 @@ def test_a_job_rests_until_its_time_or_until_it_is_woken(queue: JobQueue) -> Non
     assert queue.next_at(0.0) == inf
 
 
-def test_it_is_idle_where_no_job_waits_or_rests(queue: JobQueue) -> None:
-    resting, waiting = Task(), Task()
-    seen = [queue.idle]
-    queue.hold(resting, Hold())
-    seen.append(queue.idle)
+def test_it_is_idle_where_no_job_waits_and_no_rest_is_over(queue: JobQueue) -> None:
+    asleep, resting, waiting = Task(), Task(), Task()
+    seen = [queue.idle(0.0)]
+    queue.hold(asleep, Hold())
+    queue.hold(resting, Hold(3.0))
+    seen += [queue.idle(2.9), queue.idle(3.0)]
     queue.wake(resting)
-    seen.append(queue.idle)
+    seen.append(queue.idle(3.0))
     queue.submit(waiting, 0.0)
-    seen.append(queue.idle)
-    assert seen == [True, False, True, False]
+    seen.append(queue.idle(3.0))
+    assert seen == [True, True, False, True, False]
 
 
 def test_what_is_dropped_is_forgotten_wherever_it_waits(queue: JobQueue) -> None:

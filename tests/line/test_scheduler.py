@@ -44,6 +44,14 @@ def test_the_line_hurries_flat_out_and_where_a_job_or_a_probe_waits() -> None:
     assert not flat_out.scheduler.patient(0.0)
 
 
+def test_a_job_that_rests_does_not_hurry_the_line_before_its_rest_is_over() -> None:
+    rig = Rig(spec(1), spec(2))
+    rig.scheduler.submit(Task(Hold(0.7), asking(7)), 0.0)
+    rig.run(0.5)
+    assert rig.scheduler.patient(0.5)
+    assert not rig.scheduler.patient(0.7)
+
+
 def test_an_outcome_without_a_question_is_a_mistake() -> None:
     rig = Rig(spec(1))
     with pytest.raises(RuntimeError, match=r"^an outcome without an Ask$"):

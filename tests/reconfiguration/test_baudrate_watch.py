@@ -55,6 +55,13 @@ def test_nobody_is_asked_elsewhere_while_one_answers(bench: Bench) -> None:
     assert told == []
 
 
+def test_the_watch_does_not_hurry_the_line_between_its_looks(bench: Bench) -> None:
+    life = bench.sensors(3, 4)
+    looking_out(bench, life)
+    bench.go(life, 5.5)
+    assert life.poller.scheduler.patient(bench.clock.now)
+
+
 def test_sensors_that_are_dead_are_found_nowhere(bench: Bench) -> None:
     life = bench.sensors(3, 4)
     told = looking_out(bench, life)
