@@ -113,6 +113,8 @@ class ResponseTimes:
         self._last: deque[float] = deque(maxlen=LEARNED_FROM)
         self._ordered: list[float] = []
         self.p99: float | None = None
+        self.timeout: float | None = None
+        """The time-out that is learned from them in s (rule 4); None while there are none."""
 
     def __len__(self) -> int:
         return len(self._last)
@@ -120,11 +122,16 @@ class ResponseTimes:
     def learn(self, turnaround: float) -> None:
         """Take one more answer's turnaround in s."""
         ordered = self._ordered
-        if len(self._last) == LEARNED_FROM:
+        if len(ordered) == LEARNED_FROM:
             del ordered[bisect_left(ordered, self._last[0])]
         self._last.append(turnaround)
         insort(ordered, turnaround)
-        self.p99 = ordered[ceil(0.99 * len(ordered)) - 1]
+        count = len(ordered)
+        p99 = ordered[ceil(0.99 * count) - 1]
+        if p99 != self.p99 or count == CONFIDENT_FROM:
+            self.p99 = p99
+            least = LEARNED_LEAST if count >= CONFIDENT_FROM else FIRST_TIMEOUTS[0]
+            self.timeout = min(max(2 * p99 + LEARNED_MARGIN, least), LEARNED_MOST)
 
     def count_near(self, turnaround: float, margin: float) -> int:
         """Return how many of the last answers took as long as `turnaround` s, give or take `margin` s."""
@@ -134,7 +141,7 @@ class ResponseTimes:
         """Begin anew, as after a change of rate."""
         self._last.clear()
         self._ordered = []
-        self.p99 = None
+        self.p99 = self.timeout = None
 
 
 @dataclass(slots=True)
@@ -199,13 +206,11 @@ class Device:
         """How long its next poll waits for the first byte of an answer, in s (rules 4 and 5)."""
         if self.spec.response_timeout is not None:
             return self.spec.response_timeout
-        p99 = self.response_times.p99
-        if p99 is None:
-            if self.hurried or (self.failures and not self.silent):
-                return FIRST_TIMEOUTS[0]
-            return FIRST_TIMEOUTS[min(self.failures, len(FIRST_TIMEOUTS) - 1)]
-        least = LEARNED_LEAST if len(self.response_times) >= CONFIDENT_FROM else FIRST_TIMEOUTS[0]
-        return min(max(2 * p99 + LEARNED_MARGIN, least), LEARNED_MOST)
+        if self.response_times.timeout is not None:
+            return self.response_times.timeout
+        if self.hurried or (self.failures and not self.silent):
+            return FIRST_TIMEOUTS[0]
+        return FIRST_TIMEOUTS[min(self.failures, len(FIRST_TIMEOUTS) - 1)]
 
     @property
     def patience(self) -> float | None:

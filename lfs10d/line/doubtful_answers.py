@@ -116,30 +116,26 @@ class DoubtfulAnswers:
         `tardy`: some answer of the slave has come after its time. `explained`: noise is another master's doing.
         """
         slave, began = outcome.request.slave, outcome.began
-        self._late(outcome)
+        if outcome.late:
+            self._late(outcome)
         if began is None:
             return False
-        state = self._state(slave)
-        spoke = max(state.spoke, state.answered.get(_wanted(outcome.request), -inf))
-        apart = began - spoke >= self._duplicates.watched(slave)
-        clean = apart and state.unproved.own_by <= began
+        state, wanted = self._state(slave), _wanted(outcome.request)
+        unproved = state.unproved
+        spoke = max(state.spoke, state.answered.get(wanted, -inf))
+        clean = unproved.own_by <= began and began - spoke >= self._duplicates.watched(slave)
         if not outcome.heard:
-            state.proved = not state.unproved
+            state.proved = not unproved.answers
             state.held_until = max(state.held_until, outcome.ended + WATCHED)
             return False
         self._settle(slave, state, outcome.ended)
         if clean:
-            state.unproved.forget()
-        beside = _beside(outcome)
-        look = _look(outcome)
-        if look is None or outcome.late or _broken_answer(outcome, beside, explained=False):
-            state.spoke = outcome.ended
-        else:
-            state.answered[look] = outcome.ended
-        if look is not None and not beside:
-            state.unproved.answered(began, look)
-        state.proved = not state.unproved
-        state.held_until = max(outcome.ended + WATCHED, state.unproved.own_by)
+            unproved.forget()
+        beside = _beside(outcome) if outcome.strays else b""
+        look = _look(outcome, wanted)
+        _note_look(state, outcome, look, beside)
+        state.proved = not unproved.answers
+        state.held_until = max(outcome.ended + WATCHED, unproved.own_by)
         if outcome.answer is None:
             if not explained and spoilt(outcome):
                 self._broken(slave, state, outcome)
@@ -151,7 +147,7 @@ class DoubtfulAnswers:
             return True
         if not clean:
             may_be_late = tardy and self._duplicates.extras(slave) > 0
-            self._prove(state, outcome, outcome.ended + TARDY if may_be_late else _own_by(outcome, state.took))
+            self._prove(state, outcome, look, outcome.ended + TARDY if may_be_late else _own_by(outcome, state.took))
         state.took.append(outcome.turnaround or 0.0)
         return False
 
@@ -164,9 +160,10 @@ class DoubtfulAnswers:
         self, state: _SlaveTrust, outcome: Outcome, beside: bytes, usual: ResponseTimes | None, *, explained: bool
     ) -> bool:
         """Whether an answer is doubtful (rule 3); a clean one has no `usual`."""
-        known = self._trusted(state, outcome.ended)
-        noise = bool(beside) and (bool(state.unproved) or not known)
-        doubted = state.in_a_row < VAIN and _broken_answer(outcome, beside, explained=explained)
+        doubted = noise = False
+        if beside:
+            noise = bool(state.unproved.answers) or not self._trusted(state, outcome.ended)
+            doubted = state.in_a_row < VAIN and _broken_answer(outcome, beside, explained=explained)
         if usual is not None and not doubted:
             second = outcome.began is not None and state.second_at >= outcome.began
             doubted = (noise and not explained) or second or _unusual(outcome, usual)
@@ -174,12 +171,12 @@ class DoubtfulAnswers:
         state.in_a_row = state.in_a_row + 1 if doubted else 0
         return doubted
 
-    def _prove(self, state: _SlaveTrust, outcome: Outcome, own_by: float) -> None:
+    def _prove(self, state: _SlaveTrust, outcome: Outcome, look: object, own_by: float) -> None:
         """Count an answer as unproved where the slave's own may still come."""
-        if state.unproved:  # if one of those is a second one, this may be the own of the one before
+        if state.unproved.answers:  # if one of those is a second one, this may be the own of the one before
             own_by = max(own_by, state.unproved.own_by + _length(outcome))
         if own_by > outcome.ended:
-            state.unproved.add(_look(outcome), outcome.ended, own_by)
+            state.unproved.add(look, outcome.ended, own_by)
             state.held_until = max(state.held_until, own_by)
 
     def proved(self, slave: int) -> bool:
@@ -188,7 +185,8 @@ class DoubtfulAnswers:
 
     def unproved(self, slave: int) -> bool:
         """Whether the answer of the slave's last exchange, or one before, is unproved."""
-        return bool(self._state(slave).unproved)
+        state = self._slaves.get(slave)
+        return state is not None and bool(state.unproved.answers)
 
     def overdue(self, slave: int, now: float) -> bool:
         """Whether answers of the slave have been unproved for too long."""
@@ -244,12 +242,21 @@ class DoubtfulAnswers:
             state.trust = min(2 * state.trust, TRUST_MOST)
 
 
-def _look(outcome: Outcome) -> object:
-    """Return what tells the answer of an exchange from those to other requests; None without one."""
-    request = outcome.request
+def _note_look(state: _SlaveTrust, outcome: Outcome, look: object, beside: bytes) -> None:
+    """Note when an answer of this look came, and what it proves; what is no plain answer is any sign of the slave."""
+    if look is None or outcome.late or (beside and _broken_answer(outcome, beside, explained=False)):
+        state.spoke = outcome.ended
+    else:
+        state.answered[look] = outcome.ended
+    if state.unproved.answers and look is not None and not beside:
+        state.unproved.answered(outcome.began or 0.0, look)
+
+
+def _look(outcome: Outcome, wanted: object) -> object:
+    """Return what tells the answer from those to other requests, `wanted` where it is a right one; None without one."""
     if outcome.fault is not None and outcome.fault.code is FaultCode.EXCEPTION and not outcome.may_follow:
-        return request.function, EXCEPTION_LOOK
-    return None if outcome.answer is None else _wanted(request)
+        return outcome.request.function, EXCEPTION_LOOK
+    return None if outcome.answer is None else wanted
 
 
 def _wanted(request: Request) -> object:
@@ -259,7 +266,7 @@ def _wanted(request: Request) -> object:
 
 def _beside(outcome: Outcome) -> bytes:
     """Return what came with an answer and belongs to nothing, our own request left out: the adapter may return it."""
-    return b"".join(data for data, _ in outcome.strays).replace(outcome.sent, b"") if outcome.strays else b""
+    return b"".join(data for data, _ in outcome.strays).replace(outcome.sent, b"")
 
 
 def _broken_answer(outcome: Outcome, beside: bytes, *, explained: bool) -> bool:

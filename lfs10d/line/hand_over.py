@@ -27,8 +27,9 @@ class HandOver:
         """Until then nothing is held: somebody watches the frames (`line/trace`)."""
         self._took: deque[float] = deque(maxlen=REMEMBERED)
         self._since = inf
+        """When the first of the events that wait was left."""
         self._seen = 0
-        self._urgent = False
+        """So many of them have been looked at, and can wait."""
 
     def on_exchange(self, took: float) -> None:
         """Note how long an exchange took with the silence before it, in s."""
@@ -42,16 +43,17 @@ class HandOver:
         """
         if self.hold == 0 or now < self.at_once_until:
             return now
-        self._since = min(self._since, now)
-        self._urgent = self._urgent or not all(map(_can_wait, events[self._seen :]))
-        self._seen = len(events)
+        if not self._seen:
+            self._since = now
         latest = self._since + self.hold
-        soonest = asked + min(self._took, default=inf)
-        return now if self._urgent or soonest > latest else latest
+        if asked + min(self._took, default=inf) > latest or not all(map(_can_wait, events[self._seen :])):
+            return now
+        self._seen = len(events)
+        return latest
 
     def handed_over(self) -> None:
         """Note that nothing waits any more."""
-        self._since, self._seen, self._urgent = inf, 0, False
+        self._seen = 0
 
 
 def _can_wait(event: Event) -> bool:

@@ -16,42 +16,44 @@ from lfs10d.reading import Fault, Reading
 
 
 class HeldReadings:
-    """The readings of one line that are held back, in order; None of them is waited for by the line."""
+    """The readings of one line that are held back, in order; None of them is waited for by the line.
+
+    `entries` has with each reading until when it is held, and when its slave's own answer would have come.
+    """
 
     def __init__(self) -> None:
-        self._held: deque[tuple[float, float, Reading]] = deque()
-        """Until when it is held, and when its slave's own answer would have come, with each."""
+        self.entries: deque[tuple[float, float, Reading]] = deque()
 
     @property
     def next_at(self) -> float:
         """When the first of them is over, inf where there is none."""
-        return min((until for until, _, _ in self._held), default=inf)
+        return min((until for until, _, _ in self.entries), default=inf)
 
     def hold(self, readings: Iterable[Reading], until: float, own_by: float) -> None:
         """Hold these back until then; their slave's own answer would have come by `own_by`."""
-        self._held.extend((until, own_by, reading) for reading in readings)
+        self.entries.extend((until, own_by, reading) for reading in readings)
 
     def extend(self, device: str, until: float, own_by: float) -> None:
         """Hold the readings of a device that are held back for longer: until then, or until proved."""
-        for place, (over, _, reading) in enumerate(self._held):
+        for place, (over, _, reading) in enumerate(self.entries):
             if reading.device == device and over > -inf:
-                self._held[place] = max(over, until), own_by, reading
+                self.entries[place] = max(over, until), own_by, reading
 
     def holds(self, device: str, at: float) -> bool:
         """Whether the own answer to a reading of a device, which is held back, may have come at `at` or later."""
-        return any(reading.device == device and at <= own_by for _, own_by, reading in self._held)
+        return any(reading.device == device and at <= own_by for _, own_by, reading in self.entries)
 
     def spoil(self, device: str, fault: Fault, *, at: float | None = None) -> None:
         """Let the readings of a device fail that are held back, or only those that were so at `at`."""
-        for place, (until, _, reading) in enumerate(self._held):
+        for place, (until, _, reading) in enumerate(self.entries):
             if reading.device == device and (at is None or reading.at < at <= until):
                 failed = reading if reading.values is None else replace(reading, values=None, rtt=None, fault=fault)
-                self._held[place] = -inf, -inf, failed
+                self.entries[place] = -inf, -inf, failed
 
     def released(self, now: float = inf, device: str | None = None) -> Iterator[Reading]:
         """Yield, and take, those whose time is over by `now` (inf: all), those of one device only if it is given."""
-        for held in tuple(self._held):
+        for held in tuple(self.entries):
             until, _, reading = held
             if until <= now and device in (None, reading.device):
-                self._held.remove(held)
+                self.entries.remove(held)
                 yield reading

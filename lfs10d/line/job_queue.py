@@ -24,7 +24,7 @@ class JobQueue:
 
     def __init__(self) -> None:
         self.excluded: frozenset[int] = frozenset()
-        self.release_at = inf
+        self.release_at = self._wanted_from = inf
         self._waiting: list[Job] = []
         self._held: list[tuple[float, Job]] = []
         self._shares: dict[Job, Account] = {}
@@ -55,8 +55,8 @@ class JobQueue:
         self._slice = job
 
     def idle(self, now: float) -> bool:
-        """Whether no job waits for the line; one that rests does when its rest is over."""
-        return not self._waiting and now < self.release_at
+        """Whether no job waits for the line: one that rests does when its rest is over, a poll that rests is late."""
+        return not self._waiting and now < self._wanted_from
 
     def hold(self, job: Job, hold: Hold) -> None:
         """Let a job rest."""
@@ -65,6 +65,7 @@ class JobQueue:
     def _rest(self, held: list[tuple[float, Job]]) -> None:
         self._held = held
         self.release_at = min((until for until, _ in held), default=inf)
+        self._wanted_from = -inf if any(isinstance(job, Poll) for _, job in held) else self.release_at
 
     def released(self, now: float) -> list[Job]:
         """Take the jobs whose rest is over."""
@@ -106,7 +107,8 @@ class JobQueue:
 
     def over(self, job: Job) -> None:
         """Forget a job that is over; its slave ids are free again."""
-        self._shares.pop(job, None)
+        if self._shares:
+            self._shares.pop(job, None)
         if job in self._excluding:
             self._excluding.remove(job)
             self.excluded = frozenset().union(*(other.excludes for other in self._excluding))

@@ -175,8 +175,10 @@ class Line:
 
     def _take_over(self, events: list[Event]) -> None:
         self._inbox.append(events)
-        with contextlib.suppress(RuntimeError):  # the loop is closed: we are ending
+        try:
             self._loop.call_soon_threadsafe(self._empty)
+        except RuntimeError:  # the loop is closed: we are ending
+            log.debug("the asyncio loop is closed: the last events of the line are not reported")
 
     def _tell_failed(self, error: BaseException) -> None:
         with contextlib.suppress(RuntimeError):

@@ -118,8 +118,7 @@ class PollQueue:
 
     def _first(self, now: float) -> Device | Poll | None:
         due = self._due[0][0] if self._due else inf
-        flat = self._flat_due() if self._flat else inf
-        if due <= min(now, flat):
+        if due <= now and (not self._flat or due <= self._flat_due()):
             return heappop(self._due)[2]
         return self._flat.popleft() if self._flat else None
 

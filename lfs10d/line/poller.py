@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from math import inf
 from typing import TypeAlias
 
@@ -119,9 +119,8 @@ class Poller:
     def turn(self, now: float, *, readable: bool = True) -> Wait:
         """Do what can be done now and say when to come back."""
         while True:
-            if self.bus.idle:
-                while self._posted:
-                    self._posted.popleft()(now)
+            while self._posted and self.bus.asked is None:
+                self._posted.popleft()(now)
             wait = self._advance(now, readable=readable)
             if wait is not None:
                 break
@@ -133,7 +132,7 @@ class Poller:
         """Hand over what happened, or have the turn after `wait` come when that is due."""
         due = self.hand_over.due(self._events, now, self._asked)
         if due > now:
-            return wait if wait.until <= due else wait._replace(until=due, not_before=min(wait.not_before, due))
+            return wait if wait.until <= due else replace(wait, until=due, not_before=min(wait.not_before, due))
         self.hand_over.handed_over()
         events, self._events = self._events, []
         self._sink(events)
@@ -144,7 +143,7 @@ class Poller:
         if not self.bus.open:
             return self._reopen(now)
         resting = None
-        if self.bus.idle:
+        if self.bus.asked is None:
             decision = self.scheduler.next(now)
             if isinstance(decision, Rest):
                 resting = decision
@@ -153,25 +152,29 @@ class Poller:
                 self._asked = now
                 self._ask(decision)
         step = self.bus.step(now, readable=readable)
-        quiet_until = self.scheduler.second_answers.quiet_until
-        if self.bus.strays:
-            strays, self.bus.strays = self.bus.strays, []
-            self._events += self.scheduler.second_answers.on_strays(strays)
-        if isinstance(step, PortChanged):
-            self._port_changed(step)
-            return None
+        no_longer_quiet = self._on_strays() if self.bus.strays else False
         if isinstance(step, Wait):
             if resting is None:
                 return step
-            if self.scheduler.second_answers.quiet_until < quiet_until:
+            if no_longer_quiet:
                 return None
             held = self.scheduler.second_answers.held
             self._events += held.released(now)
             until = min(resting.until, held.next_at)
             return Wait(until, listen=True, hurried=not self.scheduler.patient(now))
-        self._settled(step)
-        self._count(self._clock())
+        if isinstance(step, PortChanged):
+            self._port_changed(step)
+        else:
+            self._settled(step, self._clock())
         return None
+
+    def _on_strays(self) -> bool:
+        """Take what was heard between two exchanges; whether the line need no longer be kept quiet by it."""
+        second_answers = self.scheduler.second_answers
+        quiet_until = second_answers.quiet.until
+        strays, self.bus.strays = self.bus.strays, []
+        self._events += second_answers.on_strays(strays)
+        return second_answers.quiet.until < quiet_until
 
     def _reopen(self, now: float) -> Wait | None:
         opened = Wait(inf, listen=False) if self._paused else self.bus.reopen(now)
@@ -184,13 +187,11 @@ class Poller:
         self._purpose = self.scheduler.purpose
         self.bus.ask(ask, self.scheduler.pending.by_slave, hurried=not self.scheduler.patient(self._asked))
 
-    def _settled(self, outcome: Outcome) -> None:
-        now = self._clock()
+    def _settled(self, outcome: Outcome, now: float) -> None:
         self.hand_over.on_exchange(outcome.ended - outcome.asked)
+        second_answers = self.scheduler.second_answers
         told = (
-            self.scheduler.second_answers.on_strays(outcome.strays, outcome)
-            if outcome.answer is not None and outcome.strays
-            else []
+            second_answers.on_strays(outcome.strays, outcome) if outcome.answer is not None and outcome.strays else []
         )
         readings = self.scheduler.on_outcome(outcome, now)
         stray, self.bus.unsolicited = self.bus.unsolicited, 0
@@ -206,15 +207,18 @@ class Poller:
                 sent=outcome.sent,
                 heard=outcome.heard,
                 unsolicited=outcome.unsolicited + stray,
-                late=sum(late.ours for late in outcome.late),
+                late=sum(late.ours for late in outcome.late) if outcome.late else 0,
             )
         )
-        self._events += self.scheduler.second_answers.prove(outcome, readings)
-        self._events += self.scheduler.second_answers.on_answer(outcome)
+        self._events += second_answers.prove(outcome, readings)
+        self._events += second_answers.on_answer(outcome)
         self._events += told
         if outcome.answer is None and outcome.strays:
-            self._events += self.scheduler.second_answers.on_strays(outcome.strays, outcome)
-        self._events += self.scheduler.second_answers.held.released(outcome.ended)
+            self._events += second_answers.on_strays(outcome.strays, outcome)
+        if second_answers.held.entries:
+            self._events += second_answers.held.released(outcome.ended)
+        if now >= self._count_at:
+            self._count(now)
 
     def _port_changed(self, changed: PortChanged) -> None:
         self._events.append(changed)
@@ -227,9 +231,7 @@ class Poller:
             self._events += self.scheduler.on_port_lost(changed.fault, changed.at)
 
     def _count(self, now: float) -> None:
-        """Read the driver's counters now and then."""
-        if now < self._count_at:
-            return
+        """Read the driver's counters; it is time."""
         self._count_at = now + COUNTERS_EVERY
         counters = self.bus.counters()
         if counters is None:

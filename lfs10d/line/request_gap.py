@@ -69,19 +69,17 @@ class RequestGap:
         """
         apart, behind_answer = began - self._ended, self._spoke
         self._ended, self._spoke = ended, spoke
-        self._watch_sleep(apart, spoke=spoke, silent=silent)
+        if silent or self._helped or self._lost_after is not None:
+            self._watch_sleep(apart, spoke=spoke, silent=silent)
         if not behind_answer:
             return False
-        if spoke:
-            self._answered(apart)
-            return False
-        return silent and self._silent(apart)
-
-    def _answered(self, apart: float) -> None:
+        if not spoke:
+            return silent and self._silent(apart)
         self._closest = min(self._closest, apart)
-        if apart <= max(STEPS[0], NEAR * self.learned):
+        if (self._ignored or self._widening) and apart <= max(STEPS[0], NEAR * self.learned):
             self._ignored = 0
             self._widening = False
+        return False
 
     def _silent(self, apart: float) -> bool:
         if self._in_vain or apart >= self._closest * (1.0 if self._widening else NEARLY):

@@ -101,7 +101,7 @@ class Scheduler:
         """Whether the reading of this poll is of any use (rule 5)."""
         device = poll.device
         useful = device.spec.enabled or poll.purpose is Purpose.REQUEST
-        return useful and self.devices.get(device.name) is device
+        return useful and self.devices.get(device.spec.name) is device
 
     # -- jobs
 
@@ -109,8 +109,7 @@ class Scheduler:
         """Take a job; it is asked as soon as its class and its share allow. While the port is lost it is cut off."""
         wanted, lost = not isinstance(job, Poll) or self._wanted(job), self._lost
         if wanted and lost is None:
-            probes = job.purpose is Purpose.PROBE
-            self._jobs.submit(job, now, self._probing.account if probes else None)
+            self._jobs.submit(job, now, self._probing.account if job.purpose is Purpose.PROBE else None)
             return []
         job.cut_off(now)
         if not wanted or lost is None or not isinstance(job, Poll):
@@ -170,10 +169,11 @@ class Scheduler:
 
     def next(self, now: float) -> Decision:
         """Decide what is asked next; the outcome of an `Ask` must come back through `on_outcome`."""
-        if now < self.second_answers.quiet_until:
-            return Rest(self.second_answers.quiet_until)
-        for job in self._jobs.released(now):
-            self._resume(job, now)
+        if now < self.second_answers.quiet.until:
+            return Rest(self.second_answers.quiet.until)
+        if now >= self._jobs.release_at:
+            for job in self._jobs.released(now):
+                self._resume(job, now)
         while (chosen := self._choose(now)) is not None:
             decision = chosen.ask(now)
             if isinstance(decision, Ask):
@@ -202,16 +202,15 @@ class Scheduler:
             job.device.polled_at = now
 
     def _choose(self, now: float) -> Job | None:
-        job = self._jobs.choose(now)
-        if job is not None:
+        if (job := self._jobs.choose(now)) is not None:
             return job
-        if self._probing.anyone_online:
-            return self._choose_probe(now) or self._polls.choose(now, self._jobs.excluded)
-        return self._polls.choose(now, self._jobs.excluded) or self._choose_probe(now)
+        if not self._probing.anyone_online:
+            return self._polls.choose(now, self._jobs.excluded) or self._choose_probe(now)
+        probe = None if now < self._probing.next_at else self._choose_probe(now)
+        return probe or self._polls.choose(now, self._jobs.excluded)
 
     def _choose_probe(self, now: float) -> Poll | None:
-        device = self._probing.choose(now, self._jobs.excluded)
-        if device is None:
+        if (device := self._probing.choose(now, self._jobs.excluded)) is None:
             return None
         device.polling = True
         device.last_asked = now
@@ -235,6 +234,7 @@ class Scheduler:
         if self._current is None:
             raise RuntimeError("an outcome without an Ask")
         (job, ask), self._current = self._current, None
+        poll = job if isinstance(job, Poll) else None
         self.pending.on_outcome(outcome, ask.codec, ask.timeout, now)
         at_line_rate = ask.baudrate in (None, self.timing.baudrate)
         doubtful = at_line_rate and self.second_answers.is_doubtful(outcome, ask.timeout)
@@ -242,24 +242,23 @@ class Scheduler:
         widened = self._rests.learn(outcome, ask, self.devices.by_slave, line_rate=self.timing.baudrate)
         self._spend(job, outcome, now)
         ignored = self._ignored(outcome)
-        again = doubtful or widened or (ignored and isinstance(job, Poll) and self._benefits(job.device))
-        if again and isinstance(job, Poll) and self._wanted(job):
-            self._jobs.resume(job)
+        again = doubtful or widened or (ignored and poll is not None and self._benefits(poll.device))
+        if again and poll is not None and self._wanted(poll):
+            self._jobs.resume(poll)
             return []
         following = job.on_outcome(outcome, now)
-        if not isinstance(following, Continue):
-            self._surcharge.released()
-        if isinstance(job, Poll) and not self._wanted(job):
-            job.cut_off(now)
+        if isinstance(following, Continue):
+            self._jobs.continue_slice(job)
+            return []
+        self._surcharge.released()
+        if poll is not None and not self._wanted(poll):
+            poll.cut_off(now)
             return []
         if isinstance(following, Requeue):
             self._resume(job, following.key)
             return []
-        if isinstance(following, Continue):
-            self._jobs.continue_slice(job)
-            return []
         self._jobs.over(job)
-        return [self._finish(job, now)] if isinstance(job, Poll) else []
+        return [] if poll is None else [self._finish(poll, now)]
 
     def _ignored(self, outcome: Outcome) -> bool:
         """Whether the request may have been ignored only for the one before it (rule 4)."""
@@ -277,7 +276,7 @@ class Scheduler:
 
     def _spend(self, job: Job, outcome: Outcome, now: float) -> None:
         taken = outcome.ended - outcome.asked + self.timing.gap
-        if isinstance(job, Poll) and job.purpose is Purpose.PROBE:
+        if job.purpose is Purpose.PROBE and isinstance(job, Poll):
             self._probing.spend(job.device, taken, now)
         elif job.purpose is Purpose.CHANGE:
             self._jobs.spend(job, self._charge(job, outcome), now)
@@ -294,22 +293,23 @@ class Scheduler:
 
     def _finish(self, poll: Poll, now: float) -> Reading:
         device = poll.device
-        before, doubtful = device.health, device.doubtful
+        before, was_doubtful = device.health, device.doubtful
         if poll.fault is None:
             device.answered()
         else:
             device.failed(poll.fault, now)
+        doubtful = device.doubtful
         if poll.purpose is not Purpose.REQUEST:
             device.polling = False
-        if (before is not Health.ONLINE and device.online) or (doubtful and not device.doubtful):
+        if (before is not Health.ONLINE and device.online) or (was_doubtful and not doubtful):
             back_on_grid(device, now)
         if device.starting:
             self.devices.hurry()
         if not device.polling:
             self._polls.enqueue(device)
-        if (device.health, device.doubtful) != (before, doubtful):
+        if device.health is not before or doubtful != was_doubtful:
             self._probing.review(self.devices.values(), now)
-        elif device.doubtful:
+        elif doubtful:
             self._probing.plan(now)
         return poll.reading()
 

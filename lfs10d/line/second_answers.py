@@ -29,17 +29,13 @@ class SecondAnswers:
         self._overhearing = Overhearing()
         self._devices: Mapping[int, Device] = {}
         self._asked_by_another: dict[int, float] = {}
-        self._quiet = QuietWatch(pending.duplicates, 0.0)
+        self.quiet = QuietWatch(pending.duplicates, 0.0)
+        """Until its `until` nobody is asked, so that a second answer is heard."""
         self._doubts = DoubtfulAnswers(pending.duplicates)
         self._doubted: dict[int, float] = {}
         """The slaves whose last answer was not believed, with the last bit of its request: another answer to that, and
         nothing else being owed, is one too many."""
         self.held = HeldReadings()
-
-    @property
-    def quiet_until(self) -> float:
-        """Until when nobody is asked, so that a second answer is heard."""
-        return self._quiet.until
 
     def watch(self, devices: Mapping[int, Device]) -> None:
         """Watch these devices, by slave id, from now on."""
@@ -52,27 +48,31 @@ class SecondAnswers:
         for late in outcome.late:
             if late.request.slave in self._doubted:
                 self._spoil(late.request.slave, outcome.ended, outcome.heard[-FAULT_HEARD:])
-        device = self._devices.get(outcome.request.slave)
+        slave = outcome.request.slave
+        device = self._devices.get(slave)
         if device is None:
             return False
-        self._doubted.pop(device.slave, None)
-        by_another = self._asked_by_another.get(outcome.request.slave, float("-inf")) >= outcome.asked
-        if by_another and outcome.answer is not None:  # it began before the exchange, which saw the rest of it only
-            self._pending.duplicates.rest(device.slave, outcome.ended + timeout)
+        self._doubted.pop(slave, None)
+        by_another = self._asked_by_another
+        if outcome.answer is not None and by_another and by_another.get(slave, float("-inf")) >= outcome.asked:
+            # It began before the exchange, which saw the rest of it only.
+            self._pending.duplicates.rest(slave, outcome.ended + timeout)
             return True
-        explained = outcome.ended - max(self._asked_by_another.values(), default=float("-inf")) <= EXPLAINED
-        if not explained:
-            self._quiet.exchanged(outcome, online=device.online)
-        tardy = self._pending.tardy(device.slave)
+        explained = bool(by_another) and outcome.ended - max(by_another.values()) <= EXPLAINED
+        if not explained and (outcome.fault is not None or outcome.unsolicited):
+            self.quiet.exchanged(outcome, online=device.online)
+        tardy = slave in self._pending.tardy
         doubtful = self._doubts.exchanged(outcome, device.response_times, timeout, tardy=tardy, explained=explained)
         if doubtful and outcome.sent_end is not None:
-            self._doubted[device.slave] = outcome.sent_end
+            self._doubted[slave] = outcome.sent_end
             self._pending.unanswered(outcome.request, device.spec.codec, outcome.sent_end)
         if outcome.strays and _broken(outcome, device.spec.codec):
             self._doubt_held(outcome, explained=explained)
-        elif device.online and outcome.began is not None and not outcome.heard and not tardy:
+        elif not outcome.heard and device.online and outcome.began is not None and not tardy:
             self._doubt_held(outcome, explained=explained, silent=True)
-        self._demand_proof(device, outcome)
+        self._pending.barrier_first.discard(slave)
+        if self._doubts.unproved(slave):
+            self._demand_proof(device, outcome.ended)
         return doubtful
 
     def _doubt_held(self, outcome: Outcome, *, explained: bool, silent: bool = False) -> None:
@@ -95,10 +95,11 @@ class SecondAnswers:
         self.held.spoil(self._devices[slave].name, fault, at=at)
         self._doubts.decided(slave)
 
-    def _demand_proof(self, device: Device, outcome: Outcome) -> None:
+    def _demand_proof(self, device: Device, now: float) -> None:
         """Have a slave asked its barrier where its answers are unproved for long; left alone if that does not help."""
-        slave, now = device.slave, outcome.ended
-        self._pending.barrier_first(slave, wanted=self._doubts.overdue(slave, now))
+        slave = device.slave
+        if self._doubts.overdue(slave, now):
+            self._pending.barrier_first.add(slave)
         if self._doubts.overdue(slave, now if device.spec.profile.barrier is None else now - PROVED_WITHIN):
             self._pending.duplicates.rest(slave, self._doubts.held_until(slave))
 
@@ -109,16 +110,16 @@ class SecondAnswers:
         if device is None:
             return readings
         doubts = self._doubts
+        if not doubts.unproved(slave):
+            return [*self.held.released(device=device.name), *readings] if self.held.entries else readings
         until, own_by = doubts.held_until(slave), doubts.own_by(slave)
         proved: list[Reading] = []
-        if doubts.proved(slave) or not doubts.unproved(slave):
+        if doubts.proved(slave):
             proved += self.held.released(device=device.name)
         else:
             self.held.extend(device.name, until, own_by)
-        if doubts.unproved(slave):
-            self.held.hold(readings, until, own_by)
-            return proved
-        return proved + readings
+        self.held.hold(readings, until, own_by)
+        return proved
 
     def on_answer(self, outcome: Outcome) -> list[AnsweredTwice]:
         """Take an outcome that the scheduler knows of: a second answer may follow it, or none does any more."""
@@ -127,11 +128,11 @@ class SecondAnswers:
             return []
         request, barrier = outcome.request, device.spec.profile.barrier
         is_barrier = barrier is not None and (
-            (request.address, request.function) == (barrier.register, barrier.function)
+            (request.address, request.function) == (barrier.address, barrier.function)
             and len(outcome.answer) == barrier.count
         )
         ended = self._pending.duplicates.answered(device.slave, outcome.ended, barrier=is_barrier)
-        self._quiet.answered(device.slave, outcome.ended)
+        self.quiet.answered(device.slave, outcome.ended)
         return [AnsweredTwice(outcome.ended, device.name, device.slave, None)] if ended else []
 
     def on_strays(self, strays: Iterable[tuple[bytes, float]], outcome: Outcome | None = None) -> list[AnsweredTwice]:
@@ -160,7 +161,7 @@ class SecondAnswers:
             if not second:
                 continue
             twice = self._pending.duplicates.second(frame.slave, frame.at, misplaced=owing is not None)
-            self._quiet.second(frame.slave, frame.at)
+            self.quiet.second(frame.slave, frame.at)
             self._spoil(frame.slave, frame.at, codec.wrap(frame.body))
             if twice is not None:
                 fault = Fault(FaultCode.DUPLICATE_ID, diagnosis.twice(twice), heard=codec.wrap(frame.body))

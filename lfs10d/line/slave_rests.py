@@ -39,7 +39,7 @@ class SlaveRests:
             if isinstance(job, Poll) and not job.begun:
                 until = device.polled_at + device.spec.profile.min_interval
         ids = {slave}
-        if len(job.excludes) > 1:
+        if job.excludes and len(job.excludes) > 1:
             ids |= {each for each in job.excludes if each not in devices or slave not in devices}
             if len(ids) > 1:
                 gap = max(gap, *(devices[each].gap.seconds for each in job.excludes if each in devices), 0.0)

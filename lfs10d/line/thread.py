@@ -76,23 +76,25 @@ class LineThread(threading.Thread):
         Where the wait is not hurried nothing is done ahead of its time.
         """
         now = time.monotonic()
-        self.declared = now + min(max(wait.until - now, 0.0), IDLE_MOST)
+        until = min(wait.until, now + IDLE_MOST)
+        self.declared = max(until, now)
         waking = self.waking if wait.hurried else 0.0
         ahead = wait.not_before - waking - now
         if ahead > WORTH_SLEEPING:
             if self._select([self._woken], min(ahead, IDLE_MOST)):
                 return wait.listen
             now = time.monotonic()
-        left = min(wait.until - now, IDLE_MOST)
-        if left <= waking:
-            while time.monotonic() < wait.until:
+        left = until - now - waking
+        if left <= 0.0:
+            left = 0.0
+            while time.monotonic() < until:
                 pass
         # What came while nobody looked must be read before time is called: hence a look even where no time is left.
         if not wait.listen:
-            self._select([self._woken], max(left - waking, 0.0))
+            self._select([self._woken], left)
             return False
         port = self._poller.bus.port.fileno()
-        return port in self._select([self._woken, port], max(left - waking, 0.0))
+        return port in self._select([self._woken, port], left)
 
     def _select(self, watched: list[int], timeout: float) -> list[int]:
         """Wait until one of `watched` can be read, at most `timeout` s; return which; all where the system refuses."""

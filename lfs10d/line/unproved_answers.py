@@ -26,40 +26,35 @@ PROVED_WITHIN = 0.3
 
 
 @dataclass(frozen=True, slots=True)
-class _Unproved:
+class Unproved:
+    """An answer that may not be the slave's own, whole at `ended`."""
+
     look: Hashable
     ended: float
-    own_by: float
 
 
 class UnprovedAnswers:
-    """One slave's, the oldest first."""
+    """One slave's. `answers` are the oldest first; until `own_by` an own answer may still come, -inf where none may."""
 
     def __init__(self) -> None:
-        self._answers: tuple[_Unproved, ...] = ()
-
-    def __bool__(self) -> bool:
-        """Whether any answer is unproved."""
-        return bool(self._answers)
-
-    @property
-    def own_by(self) -> float:
-        """Until when an own answer may still come; -inf where none may."""
-        return max((each.own_by for each in self._answers), default=-inf)
+        self.answers: tuple[Unproved, ...] = ()
+        self.own_by = -inf
 
     def answered(self, began: float, look: Hashable) -> None:
         """Note the answer to the request begun at `began`, with nothing broken beside it: rules 2 and 3."""
-        if began >= self.own_by or all(each.look != look for each in self._answers):
-            self._answers = ()
+        if began >= self.own_by or all(each.look != look for each in self.answers):
+            self.forget()
 
     def add(self, look: Hashable, ended: float, own_by: float) -> None:
         """Note an answer, whole at `ended`, in whose place the slave's own may still come until `own_by`."""
-        self._answers = (*self._answers, _Unproved(look, ended, own_by))
+        self.answers = (*self.answers, Unproved(look, ended))
+        self.own_by = max(self.own_by, own_by)
 
     def overdue(self, now: float) -> bool:
         """Whether the oldest waits for its proof for too long."""
-        return bool(self._answers) and now - self._answers[0].ended > PROVED_WITHIN
+        return bool(self.answers) and now - self.answers[0].ended > PROVED_WITHIN
 
     def forget(self) -> None:
         """Forget them: what becomes of them is decided."""
-        self._answers = ()
+        self.answers = ()
+        self.own_by = -inf

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import inf
-from typing import Literal, NamedTuple, TypeAlias
+from typing import Literal, TypeAlias
 
 from lfs10d.errors import PortBusyError, PortError, PortGoneError
 from lfs10d.modbus.ask import Ask, LineContext
@@ -45,7 +45,8 @@ UNHURRIED_AFTER = 0.0001
 then, and one look is enough."""
 
 
-class Wait(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Wait:
     """Nothing to do before `until`; with `listen` also when bytes come, but not before `not_before`.
 
     `hurried`: somebody waits for the line, so that a tenth of a millisecond counts.
@@ -83,7 +84,8 @@ class Bus:
         self._settings = port.settings
         self._clock = clock
         self._echo = EchoLearner(rules.echo)
-        self._ask: Ask | None = None
+        self.asked: Ask | None = None
+        """What is on the line, or is to be put there next; None while nothing is asked."""
         self._hurried = True
         self._pending: Mapping[int, tuple[Pending, ...]] = {}
         self._exchange: Exchange | None = None
@@ -102,11 +104,6 @@ class Bus:
             stopbits=settings.stopbits,
             extra_gap=self.rules.extra_gap,
         )
-
-    @property
-    def idle(self) -> bool:
-        """Nothing is asked at the moment."""
-        return self._ask is None
 
     @property
     def echo(self) -> Echo:
@@ -156,7 +153,7 @@ class Bus:
     def close(self) -> None:
         """Close the port; the request under way is abandoned."""
         self.open = False
-        self._exchange = self._ask = None
+        self._exchange = self.asked = None
         self.port.close()
 
     def retry(self, now: float) -> None:
@@ -198,7 +195,7 @@ class Bus:
         `pending` are the requests to any slave whose answers may still come, by slave id; it may change until then.
         `hurried`: others wait for the line.
         """
-        self._ask = ask
+        self.asked = ask
         self._hurried = hurried
         self._pending = pending
 
@@ -219,22 +216,20 @@ class Bus:
                 self.unsolicited += len(heard)
                 self.strays.append((heard, now))
                 self._quiet_since = max(self._quiet_since, now)
-            if self._ask is None:
+            if self.asked is None:
                 return Wait(inf, listen=True)
-            settings = self._settings_for(self._ask)
-            if settings != self.port.settings:
+            settings = self._settings if self.asked.baudrate is None else self._settings_at(self.asked.baudrate)
+            if settings is not self.port.settings and settings != self.port.settings:
                 if now < self._quiet_since + RATE_SETTLE:
                     return Wait(self._quiet_since + RATE_SETTLE, listen=True)
                 self._change_rate(settings)
-            self._exchange = self._begin(self._ask, now)
+            self._exchange = self._begin(self.asked, now)
         elif heard:
             self._exchange.received(heard, now)
         return self._carry_on(self._exchange, now)
 
-    def _settings_for(self, ask: Ask) -> PortSettings:
-        if ask.baudrate is None or ask.baudrate == self._settings.baudrate:
-            return self._settings
-        return replace(self._settings, baudrate=ask.baudrate)
+    def _settings_at(self, baudrate: int) -> PortSettings:
+        return self._settings if baudrate == self._settings.baudrate else replace(self._settings, baudrate=baudrate)
 
     def _change_rate(self, settings: PortSettings) -> None:
         """Use other settings: drain the port, then keep the longer of the two gaps once."""
@@ -283,7 +278,7 @@ class Bus:
             exchange.sent(begun, now)
 
     def _settled(self, outcome: Outcome) -> Outcome:
-        self._exchange = self._ask = None
+        self._exchange = self.asked = None
         self._quiet_since = outcome.quiet_since
         if outcome.sent_end is not None:
             self._gap = None

@@ -68,7 +68,9 @@ class Duplicates:
 
         A second answer to a `barrier` has another length than that to a value, and needs no rest.
         """
-        state = self._slaves.setdefault(slave, _SlaveExtras())
+        state = self._slaves.get(slave)
+        if state is None:
+            state = self._slaves[slave] = _SlaveExtras()
         if state.answered_at == float("-inf") and not barrier:
             state.until = at + WATCHED
         state.answered_at = at

@@ -42,7 +42,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import StrEnum
 from math import isfinite
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 from lfs10d.modbus import diagnosis
 from lfs10d.modbus.ask import Ask, LineContext
@@ -54,6 +54,7 @@ from lfs10d.modbus.pending import Pending
 from lfs10d.modbus.reception import HEARD_KEPT, Reception
 from lfs10d.modbus.request import BROADCAST
 from lfs10d.reading import Fault
+from lfs10d.system.dataclass import dataclass
 
 ASCII_PAUSE = 1.0
 """Longest pause between two characters of an ASCII frame, s (Modbus over Serial Line V1.02, section 2.5.2.1)."""
@@ -95,19 +96,22 @@ TRANSITIONS: Mapping[tuple[State, Happening], State] = {
 """The whole machine; the picture in `docs/` is drawn from it."""
 
 
-class Quiet(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Quiet:
     """Let the line be silent: call `step` again at `until`, or when bytes have been given to `received`."""
 
     until: float
 
 
-class Send(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Send:
     """Look once more whether bytes wait; if none do, write `frame` at once and tell it by `sent`."""
 
     frame: bytes
 
 
-class Listen(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Listen:
     """Read what comes and give it to `received`; call `step` after that, or at `until`.
 
     Nothing can be decided on new bytes before `not_before`, so the caller may sleep to it. At `until` what is
@@ -118,7 +122,8 @@ class Listen(NamedTuple):
     not_before: float
 
 
-class Settled(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Settled:
     """The exchange is over."""
 
     outcome: Outcome
@@ -153,9 +158,11 @@ class Exchange:
         self._asked = asked
         self._quiet_since = quiet_since
         self._state = State.SILENCE
-        self._frame = ask.codec.encode(ask.request)
-        self._reception = Reception(ask, line, pending, self._frame)
-        self._answer_size = self._reception.answer_size
+        forms = ask.codec.forms(ask.request)
+        self._frame = forms.frame
+        self._reception = Reception(ask, line, pending, forms.frame, forms.answers)
+        self._answer_size = forms.answers[0].size
+        self._answer_takes = timing.transmission(self._answer_size)
         self._gap = timing.gap if line.gap is None else max(timing.gap, line.gap)
         # Silence that was still running when the line was given to us is no babble.
         self._give_up = max(asked + ask.timeout, quiet_since + self._gap)
@@ -219,10 +226,10 @@ class Exchange:
         self._reception.take(data, now)
 
     def _pass(self, happening: Happening) -> None:
-        following = TRANSITIONS.get((self._state, happening))
-        if following is None:
-            raise MisuseError(f"an exchange in state {self._state} cannot be told {happening}")
-        self._state = following
+        try:
+            self._state = TRANSITIONS[self._state, happening]
+        except KeyError:
+            raise MisuseError(f"an exchange in state {self._state} cannot be told {happening}") from None
 
     # -- listening
 
@@ -256,15 +263,14 @@ class Exchange:
             over = self._sent_end + line.broadcast_delay
             return over, over
         first = max(self._sent_end + ask.timeout, self._reception.late_at + self._patience)
-        size = self._answer_size
         if ask.codec.framing is Framing.ASCII and self._reception.begun:
-            return first, first + size * ASCII_PAUSE
-        return first, first + line.timing.transmission(size) + self._hush
+            return first, first + self._answer_size * ASCII_PAUSE
+        return first, first + self._answer_takes + self._hush
 
     def _until(self, first: float) -> float:
         """Return when silence ends the exchange (rule 6)."""
         reception = self._reception
-        if self._ask.request.slave == BROADCAST:
+        if self._ask.request.slave == BROADCAST or not reception.heard:
             return first
         hushed = self._last + self._hush
         if reception.spare is None:
@@ -299,9 +305,9 @@ class Exchange:
             sent_end=self._sent_end if sent else None,
             gap=self._measured_gap,
             ended=ended,
-            turnaround=max(0.0, frame.first_at - self._sent_end) if frame else None,
-            rtt=max(0.0, frame.last_at - self._began) if frame else None,
-            answered=sent and reception.begun and reception.displaced is None,
+            turnaround=None if frame is None else max(0.0, frame.first_at - self._sent_end),
+            rtt=None if frame is None else max(0.0, frame.last_at - self._began),
+            answered=sent and reception.displaced is None and (frame is not None or reception.begun),
             late=tuple(reception.late),
             echoed=reception.echoed if sent else None,
             sent=self._frame if sent else b"",

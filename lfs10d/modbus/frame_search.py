@@ -27,6 +27,9 @@ class ExpectedFrame:
     begun: bool = False
     partial: bool = False
     """At `start` lies the head of a frame whose rest has not come yet."""
+    tail: int = 0
+    """How many characters at the very end were the beginning of its head when `tail_of` were end and start."""
+    tail_of: tuple[int, int] = (0, 0)
 
     def skip(self, position: int) -> None:
         """Look for it at `position` and later only."""
@@ -61,8 +64,8 @@ class FrameSearch:
 
     def feed(self, data: bytes, now: float) -> None:
         """Add what was heard at `now`; call `seek` for every expected before the next."""
-        if len(self._stream) > 2 * KEPT:
-            self._forget(len(self._stream) - KEPT)
+        if self.end - self._base > 2 * KEPT:
+            self._forget(self.end - self._base - KEPT)
         self._stream += data
         self.end += len(data)
         self._mark_ends.append(self.end)
@@ -77,6 +80,8 @@ class FrameSearch:
     def seek(self, expected: ExpectedFrame) -> FoundFrame | None:
         """Return the next right frame of this shape, or None; goes on behind it at the next call."""
         head, size = expected.shape.head, expected.shape.size
+        if expected.partial and expected.start + size > self.end:
+            return None
         expected.partial = False
         while True:
             at = self._stream.find(head, max(0, expected.start - self._base))
@@ -91,7 +96,8 @@ class FrameSearch:
             body = expected.codec.unwrap(bytes(self._stream[at : at + size]))
             if body is not None:
                 expected.start = end = begin + size
-                return FoundFrame(body, begin, end, self._heard_at(begin), self._heard_at(end - 1))
+                last_at = self._mark_times[-1] if end == self.end else self._heard_at(end - 1)
+                return FoundFrame(body, begin, end, self._heard_at(begin), last_at)
             expected.start = begin + 1
 
     def _heard_at(self, position: int) -> float:
@@ -138,10 +144,11 @@ class FrameSearch:
 
     def unclaimed_count(self, start: int) -> int:
         """Return how many characters from `start` on belong to no claimed frame."""
-        if not self._claims:
-            return self.end - start
-        claimed = sum(max(0, end - max(begin, start)) for begin, end in self._claims)
-        return self.end - start - claimed
+        count = self.end - start
+        for begin, end in self._claims:
+            if end > start:
+                count -= end - max(begin, start)
+        return count
 
     def begins(self, expected: ExpectedFrame) -> bool:
         """Whether bytes came that begin as this answer: its head, or enough of it at the very end."""
@@ -149,11 +156,14 @@ class FrameSearch:
 
     def _tail(self, expected: ExpectedFrame) -> int:
         """Return how many characters at the very end are the beginning of this answer's head."""
-        head = expected.shape.head
-        for length in range(min(len(head), self.end - max(expected.start, self._base)), 0, -1):
-            if self._stream.endswith(head[:length]):
-                return length
-        return 0
+        if expected.tail_of != (self.end, expected.start):
+            expected.tail_of, expected.tail = (self.end, expected.start), 0
+            head = expected.shape.head
+            for length in range(min(len(head), self.end - max(expected.start, self._base)), 0, -1):
+                if self._stream.endswith(head[:length]):
+                    expected.tail = length
+                    break
+        return expected.tail
 
     def missing(self, expected_frames: Iterable[ExpectedFrame]) -> int:
         """Return how many characters must still come before any of these can be whole; 0 if none has begun.

@@ -18,6 +18,7 @@ from collections.abc import Iterator, Mapping
 from enum import StrEnum
 from functools import lru_cache
 from struct import unpack
+from typing import NamedTuple
 
 from pymodbus.framer import FramerAscii, FramerRTU
 from pymodbus.pdu import DecodePDU, ExceptionResponse, ModbusPDU
@@ -106,6 +107,13 @@ class Shape:
     sign: int
 
 
+class Forms(NamedTuple):
+    """A request as it goes over the wire, and how its normal answer and its exception answer look."""
+
+    frame: bytes
+    answers: tuple[Shape, Shape]
+
+
 @dataclass(frozen=True, slots=True)
 class Codec:
     """The frames of one slave. Sizes and offsets count characters on the wire."""
@@ -113,9 +121,13 @@ class Codec:
     framing: Framing
     checksum: Checksum = Checksum.CRC
 
+    def forms(self, request: Request) -> Forms:
+        """Return the request as it goes over the wire, and how its answers look."""
+        return _forms(self, request)
+
     def encode(self, request: Request) -> bytes:
         """Return the request as it goes over the wire."""
-        return _encoded(self, request)
+        return _forms(self, request).frame
 
     def size(self, body: int) -> int:
         """Return the characters of a frame whose slave id, function and data are `body` bytes."""
@@ -127,7 +139,7 @@ class Codec:
 
     def shapes(self, request: Request) -> tuple[Shape, Shape]:
         """Return how the normal answer and the exception answer look."""
-        return _shapes(self, request)
+        return _forms(self, request).answers
 
     def fold(self, data: bytes) -> bytes:
         """Return what was heard in the one form that `shapes` knows: hex digits of ASCII in upper case.
@@ -205,6 +217,10 @@ _ANSWERS = DecodePDU(is_server=False)
 
 
 @lru_cache(maxsize=1024)
+def _forms(codec: Codec, request: Request) -> Forms:
+    return Forms(_encoded(codec, request), _shapes(codec, request))
+
+
 def _encoded(codec: Codec, request: Request) -> bytes:
     pdu: ModbusPDU
     if isinstance(request, ReadRegisters):
@@ -224,7 +240,6 @@ _READ_PDUS: Mapping[int, type[ModbusPDU]] = {
 }
 
 
-@lru_cache(maxsize=1024)
 def _shapes(codec: Codec, request: Request) -> tuple[Shape, Shape]:
     address = bytes((request.slave, request.function))
     refused = bytes((request.slave, request.function | EXCEPTION_FLAG))

@@ -27,7 +27,7 @@ Rules
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 from lfs10d.modbus.duplicates import Duplicates
 from lfs10d.modbus.frames import Codec
@@ -43,7 +43,6 @@ _SILENT = frozenset({FaultCode.TIMEOUT, FaultCode.LATE, FaultCode.WRONG_SLAVE})
 """With these faults the asked slave itself said nothing."""
 OTHER_RATE = 0.9
 """In s; a scan waits a little longer for the last id of a round before it asks at the next rate."""
-_NO_RESTS = (None, None, None)
 EQUALS_KEPT = 16
 """Of equal pending requests so many are remembered, the newest: more than any sensor keeps in mind. The answer of one
 forgotten too soon would count as that of the next, and whatever was asked between the two as answered."""
@@ -65,50 +64,35 @@ class Pending:
 
 
 class PendingRequests:
-    """The unanswered requests of one line, by slave id."""
+    """The unanswered requests of one line, by slave id.
+
+    `tardy` are the slaves of which an answer has ever come after its time, whoever was asked meanwhile; `barrier_first`
+    those whose next poll is preceded by the barrier, which proves what was answered before.
+    """
 
     def __init__(self) -> None:
-        self._pending: dict[int, tuple[Pending, ...]] = {}
+        self.tardy: set[int] = set()
+        self.barrier_first: set[int] = set()
+        self.by_slave: dict[int, tuple[Pending, ...]] = {}
+        """The requests of every slave id whose answers may still come, each slave's oldest first; for others a view."""
         self._lingers: dict[Pending, float] = {}
         self._over: set[Pending] = set()
         self._quiet_until: dict[int, float] = {}
-        self._tardy: set[int] = set()
         self._baudrate: int | None = None
-        self._barrier_first: set[int] = set()
         self.duplicates = Duplicates()
         self.other_master = OtherMaster()
 
-    @property
-    def by_slave(self) -> Mapping[int, tuple[Pending, ...]]:
-        """The requests of every slave id whose answers may still come, each slave's oldest first; a view."""
-        return self._pending
-
     def earlier(self, slave: int) -> tuple[Pending, ...]:
         """Return the requests to `slave` whose answers may still come, the oldest first."""
-        return self._pending.get(slave, ())
+        return self.by_slave.get(slave, ())
 
     def begin(self, slave: int, baudrate: int, now: float) -> None:
         """Note that an exchange with `slave` begins at this rate: what it was asked at another may be over (rule 8)."""
         self._baudrate = baudrate
-        for each in self._pending.get(slave, ()):
+        for each in self.by_slave.get(slave, ()):
             if each.baudrate not in (None, baudrate) and now >= each.sent_end + OTHER_RATE:
                 self._lingers.pop(each, None)
                 self._drop(slave, [each], now)
-
-    def tardy(self, slave: int) -> bool:
-        """Whether an answer of `slave` has ever come after its time, whoever was asked meanwhile."""
-        return slave in self._tardy
-
-    def barrier_first(self, slave: int, *, wanted: bool) -> None:
-        """Have the next poll of a slave preceded by the barrier, which proves what was answered before, or not."""
-        if wanted:
-            self._barrier_first.add(slave)
-        else:
-            self._barrier_first.discard(slave)
-
-    def wants_barrier(self, slave: int) -> bool:
-        """Whether the next poll of a slave is to be preceded by the barrier."""
-        return slave in self._barrier_first
 
     def owes_besides(self, slave: int, sent_end: float) -> bool:
         """Whether a slave may still answer another request than the one whose last bit left at `sent_end`."""
@@ -133,7 +117,8 @@ class PendingRequests:
         until = self.left_alone_until(slave, now)
         if until is not None:
             return until
-        confusable = isinstance(request, ReadRegisters) and self.confusable(request, codec)
+        owes = slave in self.by_slave
+        confusable = owes and isinstance(request, ReadRegisters) and self.confusable(request, codec)
         if barrier is not None and (barrier_first or confusable) and self._tells(barrier, request, codec):
             return barrier
         if confusable:
@@ -141,25 +126,25 @@ class PendingRequests:
             until = self.left_alone_until(slave, now)
             if until is not None:
                 return until
-        until = self.lingering_until(request, codec, now)
+        until = self.lingering_until(request, codec, now) if owes else None
         return request if until is None else until
 
     def _tells(self, barrier: ReadRegisters, request: Request, codec: Codec) -> bool:
         """Whether the answer to the barrier can be told from those to `request` and to what else is pending of ours."""
         shape = codec.shapes(barrier)[0]
-        others = [each for each in self._pending.get(request.slave, ()) if each.ours and each.request != barrier]
+        others = [each for each in self.by_slave.get(request.slave, ()) if each.ours and each.request != barrier]
         return shape != codec.shapes(request)[0] and all(
             each in self._over or shape != each.codec.shapes(each.request)[0] for each in others
         )
 
     def confusable(self, request: Request, codec: Codec) -> bool:
         """Whether an answer to an older request could pass for that to `request`, unless a barrier goes first."""
-        pending = self._pending.get(request.slave)
+        pending = self.by_slave.get(request.slave)
         return pending is not None and any(each not in self._over and _alike(request, codec, each) for each in pending)
 
     def lingering_until(self, request: Request, codec: Codec, now: float) -> float | None:
         """Return until when `request` must not be asked though a barrier was answered (rule 5), None if it may be."""
-        pending = self._pending.get(request.slave)
+        pending = self.by_slave.get(request.slave)
         if pending is None:
             return None
         self._drop(request.slave, [each for each in pending if each in self._over], now)
@@ -168,19 +153,21 @@ class PendingRequests:
 
     def leave_alone(self, slave: int, timeout: float) -> None:
         """Decide that no barrier helps for `slave`, whose time-out is `timeout` s: rule 4."""
-        sent = max(pending.sent_end for pending in self._pending[slave])
+        sent = max(pending.sent_end for pending in self.by_slave[slave])
         self._quiet_until[slave] = sent + max(2 * timeout, QUIET_LEAST)
 
     def left_alone_until(self, slave: int, now: float) -> float | None:
         """Return until when `slave` must be left alone, None if it may be asked now."""
         until = self._quiet_until.get(slave)
         if until is not None and now >= until:
-            for each in self._pending.pop(slave, ()):
+            for each in self.by_slave.pop(slave, ()):
                 self._forget(each)
             del self._quiet_until[slave]
             until = None
-        rests = (until, self.duplicates.rests_until(slave, now), self.other_master.busy_until(slave, now))
-        return None if rests == _NO_RESTS else max(each for each in rests if each is not None)
+        rests, busy = self.duplicates.rests_until(slave, now), self.other_master.busy_until(slave, now)
+        if until is rests is busy is None:
+            return None
+        return max(each for each in (until, rests, busy) if each is not None)
 
     def asked_by_another(self, request: Request, codec: Codec, now: float) -> None:
         """Note that another master's request was heard, whole at `now`."""
@@ -220,10 +207,10 @@ class PendingRequests:
         slave = outcome.request.slave
         for late in outcome.late:
             self._came_late(late, now)
-        if outcome.sent_end is None or slave == 0:
+        pending = self.by_slave.get(slave, ())
+        if outcome.sent_end is None or slave == 0 or (outcome.answer is not None and not pending):
             return
         asked = Pending(outcome.request, codec, outcome.sent_end, baudrate=self._baudrate)
-        pending = self._pending.get(slave, ())
         if outcome.may_follow:
             self._remember(asked, lingers=asked.sent_end + max(2 * timeout, QUIET_LEAST))
         elif outcome.answer is None and not outcome.answered:
@@ -242,8 +229,8 @@ class PendingRequests:
         """Drop the request and, since a slave answers in order, what its slave was asked before."""
         slave = late.request.slave
         if late.ours:
-            self._tardy.add(slave)
-        pending = self._pending.get(slave, ())
+            self.tardy.add(slave)
+        pending = self.by_slave.get(slave, ())
         for place, each in enumerate(pending):
             if each.request == late.request:
                 self._lingers.pop(each, None)
@@ -252,12 +239,12 @@ class PendingRequests:
 
     def _remember(self, asked: Pending, lingers: float | None) -> None:
         slave = asked.request.slave
-        pending = self._pending.get(slave, ())
+        pending = self.by_slave.get(slave, ())
         equals = [each for each in pending if each.request == asked.request]
         if len(equals) >= EQUALS_KEPT:
             self._forget(equals[0])
             pending = tuple(each for each in pending if each is not equals[0])
-        self._pending[slave] = (*pending, asked)
+        self.by_slave[slave] = (*pending, asked)
         if lingers is not None:
             self._lingers[asked] = lingers
 
@@ -270,11 +257,11 @@ class PendingRequests:
             else:
                 self._forget(each)
                 gone.append(each)
-        kept = tuple(each for each in self._pending[slave] if each not in gone)
+        kept = tuple(each for each in self.by_slave[slave] if each not in gone)
         if kept:
-            self._pending[slave] = kept
+            self.by_slave[slave] = kept
         else:
-            del self._pending[slave]
+            del self.by_slave[slave]
             self._quiet_until.pop(slave, None)
 
     def _forget(self, each: Pending) -> None:

@@ -27,16 +27,23 @@ RATE_TOLERANCE = 0.9
 
 
 class Reception:
-    """What one exchange, which sent `frame`, has received so far.
+    """What one exchange, which sends `frame` and is answered by frames like `answers`, has received so far.
 
     `answer` is the right frame, once it is whole; `spare` a right frame that came too early to be believed at
     once, on a port without pace; `displaced` a right frame that may answer another master's request to the asked
     slave, which was heard. `late_at` is when the asked slave's last late answer was whole, `whole_at` when
-    the frame in progress can be whole. `answer_size` is how many characters a normal answer has.
+    the frame in progress can be whole.
     """
 
-    def __init__(self, ask: Ask, line: LineContext, pending: Mapping[int, tuple[Pending, ...]], frame: bytes) -> None:
-        normal, exception = ask.codec.shapes(ask.request)
+    def __init__(
+        self,
+        ask: Ask,
+        line: LineContext,
+        pending: Mapping[int, tuple[Pending, ...]],
+        frame: bytes,
+        answers: tuple[Shape, Shape],
+    ) -> None:
+        normal, exception = answers
         self._ask = ask
         self._line = line
         self._pending_by_slave = pending
@@ -45,17 +52,15 @@ class Reception:
         self._search = FrameSearch()
         self._normal = ExpectedFrame(ask.codec, normal)
         self._exception = ExpectedFrame(ask.codec, exception)
-        self.answer_size = normal.size
-        self._older = [older for each in earlier for older in self._expected_of(each)]
+        self._reads = isinstance(ask.request, ReadRegisters)
+        self._older = [older for each in earlier for older in self._expected_of(each)] if earlier else []
         self._pending = list(earlier)
         self._held: list[tuple[bytes, float]] = []
         self._matched = self._missing = self._from = self._sent_at = self._early_end = 0
         self._earliest = -inf
         self._undecided = self._echo_whole = self._owes_another = False
         # Echo and answer of a write look the same.
-        self._expects_echo = line.echo is Echo.ON or (
-            line.echo is Echo.UNKNOWN and not isinstance(ask.request, ReadRegisters)
-        )
+        self._expects_echo = line.echo is Echo.ON or (line.echo is Echo.UNKNOWN and not self._reads)
         self.sent_yet = False
         self.heard = bytearray()
         self.answer: FoundFrame | None = None
@@ -76,8 +81,8 @@ class Reception:
         timing = self._line.timing
         self._earliest = begun + timing.transmission(len(self._frame) - EARLY_TOLERANCE)
         self._undecided = self._line.echo is not Echo.OFF
-        self._owes_another = self._foreign(0, self._search.end, unanswered=True)
-        self._sent_at = self._early_end = self._search.end
+        self._sent_at = self._early_end = heard_before = self._search.end
+        self._owes_another = bool(heard_before) and self._foreign(0, heard_before, unanswered=True)
         self._begin_at(self._sent_at)
         self.heard.clear()
         self.sent_yet = True
@@ -113,13 +118,15 @@ class Reception:
         return data[len(part) :]
 
     def _sort(self, data: bytes, now: float) -> None:
-        early = self._too_early(len(data), now) if self.sent_yet else 0
+        wire = self._line.paced or now < self._earliest
+        early = self._too_early(len(data), now) if wire and self.sent_yet else 0
         if early:
             self._early_end = self._search.end + early
             if self._line.paced:
                 self._begin_at(self._early_end)
         self._search.feed(data, now)
-        self._seek_older(now)
+        if self._older:
+            self._seek_older(now)
         if self.sent_yet and self._ask.request.slave != BROADCAST:
             self._seek_ours()
 
@@ -135,8 +142,6 @@ class Reception:
         """
         if now < self._earliest:
             return count
-        if not self._line.paced:
-            return 0
         room = (now - self._earliest) / (RATE_TOLERANCE * self._line.timing.character)
         return max(0, count - 1 - int(room))
 
@@ -175,11 +180,12 @@ class Reception:
 
     def _seek_ours(self) -> None:
         expected_frames = [self._normal, self._exception]
-        if self._expects_echo and not self._echo_whole and not isinstance(self._ask.request, ReadRegisters):
+        if self._expects_echo and not self._echo_whole and not self._reads:
             del expected_frames[0]
         for expected in expected_frames:
             while self.answer is None and (found := self._search.seek(expected)) is not None:
-                foreign = self._owes_another or self._foreign(self._sent_at, found.begin)
+                between = found.begin > self._sent_at
+                foreign = self._owes_another or (between and self._foreign(self._sent_at, found.begin))
                 self._search.claim(found)
                 if foreign:
                     self.displaced = found
@@ -196,7 +202,7 @@ class Reception:
         unless it is known that the adapter has none.
         """
         ask = self._ask
-        if end - start < ask.codec.size(REQUEST_BODY) or not isinstance(ask.request, ReadRegisters):
+        if not self._reads or end - start < ask.codec.size(REQUEST_BODY):
             return False
         heard = self._search.unclaimed_between(start, end)
         if self.sent_yet and self._echo_possible:
@@ -213,7 +219,7 @@ class Reception:
         if self._held:
             missing = len(self._frame) - self._matched if self._line.echo is Echo.ON else 0
         else:
-            older = [expected for _, expected in self._older]
+            older = [expected for _, expected in self._older] if self._older else []
             missing = self._search.missing([self._normal, self._exception, *older])
         expected = now + missing * self._line.timing.character
         self.whole_at = min(self.whole_at, expected) if 0 < missing < self._missing else expected
@@ -224,11 +230,10 @@ class Reception:
     @property
     def rest(self) -> int:
         """How many characters came in the place of an answer and are neither echo nor an earlier answer."""
-        return self._search.unclaimed_count(self._from) + self._held_count
+        return self._search.unclaimed_count(self._from) + (self._held_count() if self._held else 0)
 
-    @property
     def _held_count(self) -> int:
-        return sum(len(held) for held, _ in self._held) if self._held else 0
+        return sum(len(held) for held, _ in self._held)
 
     def leftover(self) -> bytes:
         """Return these characters (the last of them where there were very many)."""
@@ -281,10 +286,9 @@ class Reception:
     def echoed(self) -> bool | None:
         """Whether our own bytes came back; None without evidence, for only an answer proves that they did not."""
         caught = self.answer or self.spare
-        writes = not isinstance(self._ask.request, ReadRegisters)
         if self._echo_whole:
-            return None if writes and self._line.echo is Echo.UNKNOWN and caught is None else True
-        if caught is None or writes:
+            return None if not self._reads and self._line.echo is Echo.UNKNOWN and caught is None else True
+        if caught is None or not self._reads:
             return None
         heard = self._ask.codec.fold(bytes(self.heard))
         if self._frame in heard:
@@ -298,7 +302,7 @@ class Reception:
         An exception tells nothing but the function. Where the same was asked before, either answer will do.
         """
         caught = self.answer or self.spare
-        if caught is None:
+        if caught is None or not self._pending:
             return False
         request = self._ask.request
         rivals = [each.request for each in self._pending if each.request.slave == request.slave]
@@ -310,7 +314,7 @@ class Reception:
     @property
     def unsolicited(self) -> int:
         """How many bytes are no echo and belong to no answer, of this or of an earlier request."""
-        count = self._search.unclaimed_count(0) + self._held_count
+        count = self._search.unclaimed_count(0) + (self._held_count() if self._held else 0)
         if self.answer is None and self.spare is None and self.displaced is None and self.begun:
             count -= min(self.rest, self.expected)
         return count

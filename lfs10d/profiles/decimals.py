@@ -79,17 +79,18 @@ def shortest(bits: int) -> float:
     12.99 for 0x414FD70A, where `struct` alone gives 12.989999771118164. Of several equally short ones the
     nearest, of two as near the even one. Minus zero stays minus zero: its bits are what the sensor sent.
     """
-    (exact,) = _FLOAT32.unpack(_WORD.pack(bits))
+    packed = _WORD.pack(bits)
+    (exact,) = _FLOAT32.unpack(packed)
     number: float = exact
     for digits in range(FLOAT32_DIGITS, _MOST_FLOAT32_DIGITS):
         number = float(f"{exact:.{digits}g}")
-        if float_bits(number, "float32") == bits:
+        if _FLOAT32.pack(number) == packed:
             return number
         if not bits & _MANTISSA:
             # Below a power of two the floats lie twice as dense: the nearest decimal may fall out of
             # the narrow lower half while the next one away from zero is still within the upper half.
             number = _next_decimal(f"{exact:.{digits - 1}e}")
-            if float_bits(number, "float32") == bits:
+            if _FLOAT32.pack(number) == packed:
                 return number
     return float(f"{exact:.{_MOST_FLOAT32_DIGITS}g}")
 

@@ -146,6 +146,11 @@ def test_it_is_idle_where_no_job_waits_and_no_rest_is_over(queue: JobQueue) -> N
     assert seen == [True, True, False, True, False]
 
 
+def test_a_poll_that_rests_is_late(queue: JobQueue) -> None:
+    queue.hold(a_poll(1), Hold(3.0))
+    assert not queue.idle(0.0)
+
+
 def test_what_is_dropped_is_forgotten_wherever_it_waits(queue: JobQueue) -> None:
     waiting, resting, kept = Task(excludes=frozenset({1})), Task(0.5), Task()
     for job in (waiting, resting, kept):

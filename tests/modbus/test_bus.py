@@ -132,13 +132,13 @@ def rig() -> Rig:
 
 
 def test_at_rest_it_listens(rig: Rig) -> None:
-    assert rig.bus.idle
+    assert rig.bus.asked is None
     assert rig.step() == Wait(inf, listen=True)
 
 
 def test_an_order_waits_for_silence_is_sent_and_answered(rig: Rig) -> None:
     rig.bus.ask(READ, {})
-    assert not rig.bus.idle
+    assert rig.bus.asked is not None
     assert rig.step() == Wait(100.0 + T9600.gap, listen=True)
     wait = rig.step(T9600.gap)
     assert rig.port.written == [REQUEST]
@@ -150,7 +150,7 @@ def test_an_order_waits_for_silence_is_sent_and_answered(rig: Rig) -> None:
     outcome = rig.step(0.006, ANSWER[4:])
     assert isinstance(outcome, Outcome)
     assert outcome.answer == (0x414F, 0xD70A)
-    assert rig.bus.idle
+    assert rig.bus.asked is None
 
 
 def test_where_nobody_waits_it_looks_once_when_all_of_the_answer_is_there(rig: Rig) -> None:
@@ -228,7 +228,7 @@ def test_the_loss_of_the_port_is_told_once_per_reason_and_it_is_opened_again(rig
     assert isinstance(changed, PortChanged)
     assert changed.fault is not None
     assert changed.fault.code is (FaultCode.PORT_LOST if isinstance(trouble, PortLostError) else FaultCode.PORT_BUSY)
-    assert (rig.bus.open, rig.bus.idle) == (False, True)
+    assert (rig.bus.open, rig.bus.asked) == (False, None)
     lost = rig.clock.now
     assert rig.bus.reopen(lost) == Wait(lost + REOPEN_FIRST, listen=False)
     rig.clock.now += REOPEN_FIRST

@@ -199,10 +199,10 @@ def test_no_answer_of_a_slave_that_answers_in_turn_is_taken_for_another(
 def test_a_slave_whose_answer_came_while_another_was_asked_is_tardy() -> None:
     line = Line()
     line.silent(WIND, 0.0)
-    assert not line.pending.tardy(1)
+    assert 1 not in line.pending.tardy
     line.answered(OTHER, 0.3, WIND)
-    assert line.pending.tardy(1)
-    assert not line.pending.tardy(2)
+    assert 1 in line.pending.tardy
+    assert 2 not in line.pending.tardy
 
 
 @pytest.mark.parametrize("exception", [5, 10, 11])
@@ -253,14 +253,10 @@ def test_what_may_have_been_answered_by_another_stays_pending_until_a_barrier_is
     assert pending.earlier(1) == ()
 
 
-def test_the_barrier_goes_first_in_a_poll_where_that_is_wanted() -> None:
+def test_the_barrier_goes_first_only_in_a_poll_where_that_is_wanted() -> None:
     pending = Line().pending
-    assert not pending.wants_barrier(1)
-    pending.barrier_first(1, wanted=True)
-    assert pending.wants_barrier(1)
-    assert pending.next_request(WIND, RTU, 0.0, barrier=WHO, timeout=0.2) == WIND  # of others than polls
-    pending.barrier_first(1, wanted=False)
-    assert not pending.wants_barrier(1)
+    pending.barrier_first.add(1)
+    assert pending.next_request(WIND, RTU, 0.0, barrier=WHO, timeout=0.2) == WIND
 
 
 def test_a_request_of_ours_is_not_answered_by_what_is_overheard() -> None:
@@ -276,7 +272,7 @@ def test_the_answer_to_another_master_that_comes_in_our_exchange_makes_nobody_ta
     outcome = ended(WHO, answer=(7,), fault=None, answered=True, late=(LateAnswer(WIND, 0.1, ours=False),))
     line.pending.on_outcome(replace(outcome, sent_end=0.1), RTU, 0.2, 0.2)
     assert line.pending.earlier(1) == ()
-    assert not line.pending.tardy(1)
+    assert 1 not in line.pending.tardy
 
 
 def test_a_slave_that_is_answered_for_twice_is_left_alone() -> None:

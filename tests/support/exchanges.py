@@ -72,7 +72,7 @@ class Attempt:
 
     def reception(self, frame: bytes | None = None) -> Reception:
         sent = self.codec.encode(self.request) if frame is None else frame
-        return Reception(self.ask, self.line, self.pending, sent)
+        return Reception(self.ask, self.line, self.pending, sent, self.codec.shapes(self.request))
 
 
 def framed(body: str, codec: Codec = RTU) -> bytes:

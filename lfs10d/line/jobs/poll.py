@@ -51,8 +51,8 @@ def _read(slave: int, address: int, count: int, function: int) -> ReadRegisters:
 class Poll:
     """One poll of `device`; `due` orders it among the others. `request` is the number of the request that wants it.
 
-    When it is over `values` or `fault` is set, `at` says when, `rtt` how long the last exchange took. `faults` say why
-    single values are None, `ages` (s) which are old.
+    `begun`: something was put on the line for it. When it is over `values` or `fault` is set, `at` says when, `rtt` how
+    long the last exchange took. `faults` say why single values are None, `ages` (s) which are old.
     """
 
     share = 1.0
@@ -78,14 +78,9 @@ class Poll:
         self._retries = device.retries if purpose is not Purpose.PROBE else 0
         self._barrier_due = purpose is Purpose.PROBE
         self._barrier_asked = False
-        self._begun = False
+        self.begun = False
         self._waking = False
         self._wakes = 0
-
-    @property
-    def begun(self) -> bool:
-        """Something was put on the line for it."""
-        return self._begun
 
     @property
     def good(self) -> Mapping[str, Value | None] | None:
@@ -106,11 +101,11 @@ class Poll:
             value,
             codec,
             now,
-            barrier=None if barrier is None else _read(device.slave, barrier.register, barrier.count, barrier.function),
+            barrier=None if barrier is None else _read(device.slave, barrier.address, barrier.count, barrier.function),
             timeout=usual,
             barrier_first=self._barrier_due
             or (self._waking and device.gap.sleeps)
-            or self._pending.wants_barrier(device.slave),
+            or device.slave in self._pending.barrier_first,
         )
         if isinstance(request, float):
             return Hold(request)
@@ -122,7 +117,7 @@ class Poll:
         """Take the outcome of what was asked."""
         device = self.device
         self.at = outcome.ended
-        self._begun = True
+        self.begun = True
         fault = outcome.fault
         waking, self._waking = self._waking, False
         if waking and fault is not None and fault.code is FaultCode.TIMEOUT:
@@ -131,7 +126,7 @@ class Poll:
                 self.failed_attempts.append(fault.code)
             self._barrier_due = False
             return Requeue(self.due)
-        if fault is None or fault.code is not FaultCode.LATE:  # else the attempt itself is counted as late
+        if outcome.late and (fault is None or fault.code is not FaultCode.LATE):  # else the attempt is counted as late
             self.failed_attempts += [
                 FaultCode.LATE for late in outcome.late if late.ours and late.request.slave == device.slave
             ]
@@ -204,7 +199,7 @@ def lost_reading(device: Device, fault: Fault, now: float, polls: Iterable[Poll]
 def _reading(device: Device, at: float, fault: Fault | None, requests: tuple[int, ...], poll: Poll | None) -> Reading:
     overruns, device.overruns = device.overruns, 0
     return Reading(
-        device=device.name,
+        device=device.spec.name,
         at=at,
         values=poll.good if poll else None,
         fault=fault,

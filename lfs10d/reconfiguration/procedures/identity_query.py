@@ -175,7 +175,7 @@ class IdentityQuery:
     def _ask(self, request: ReadRegisters, endpoint: Endpoint, timeout: float | None) -> Ask:
         baudrate = None if endpoint.baudrate == self.line_rate else endpoint.baudrate
         waits = self.timeout if timeout is None else timeout
-        if self._pending.tardy(endpoint.slave):
+        if endpoint.slave in self._pending.tardy:
             waits = max(waits, PATIENT)
         return Ask(request, self.codec, waits, None, baudrate, request_gap=self.profile.request_gap)
 
