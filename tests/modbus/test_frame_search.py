@@ -35,6 +35,14 @@ def test_a_frame_is_caught_the_moment_it_is_whole() -> None:
     assert search.seek(expected) == FoundFrame(ANSWER[:-2], 0, 9, 0.0, 7.0)
 
 
+def test_a_frame_that_came_in_part_is_caught_when_the_rest_comes_in_pieces() -> None:
+    search, expected, caught = fed(ANSWER[:4], ANSWER[4:6])
+    assert caught is None
+    assert expected.partial
+    search.feed(ANSWER[6:], 7.0)
+    assert search.seek(expected) == FoundFrame(ANSWER[:-2], 0, 9, 0.0, 7.0)
+
+
 @given(st.binary(max_size=40), st.binary(max_size=40), st.lists(st.integers(0, 89), max_size=6))
 def test_noise_and_pieces_hide_no_frame(before: bytes, after: bytes, cuts: list[int]) -> None:
     stream = before + ANSWER + after

@@ -116,6 +116,7 @@ def test_the_shapes_tell_slave_function_and_count_or_the_whole_write() -> None:
     assert RTU.shapes(WriteRegister(1, 5, 2))[0].head == bytes.fromhex("010600050002")
     assert ASCII.shapes(WIND)[0].head == b":010304"
     assert ASCII.shapes(WIND)[1].sign == 5
+    assert RTU.forms(WIND) == (RTU.encode(WIND), (normal, exception))
 
 
 @given(CODECS, st.one_of(READS, WRITES))
