@@ -1,4 +1,4 @@
-"""The changes that requests made to the configuration, each with the value that the file had then. Pure.
+"""The changes made by request, each with the value that the file had then. Pure.
 
 How the changes and the file as it is now are merged is in `lfs10d.config.merge`. The values of a device are a
 mapping of keys of `SlaveConfig`, without its name, to values as the program uses them.
@@ -13,14 +13,14 @@ from typing import Any, TypeAlias
 from lfs10d.system.dataclass import dataclass
 
 OPTIONS = ("interval", "enabled", "label", "response_timeout")
-"""What a request may change of a device, in the order of the file."""
+"""Keys of a device that a request may change, in the order of the file."""
 
 Values: TypeAlias = Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
 class FileValues:
-    """The values of the file: each slave by its name, in order; `usual` are the values of keys that are absent."""
+    """The values of the file: each slave by its name, in order; `usual` are the defaults of absent keys."""
 
     slaves: Mapping[str, Values]
     baudrate: int = 9600
@@ -37,7 +37,7 @@ class Rate:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a device answers: its slave id, and the rate, or the line's where that is None."""
+    """Where a device answers: its slave id and its rate (None: the line's)."""
 
     id: int
     baudrate: int | None = None
@@ -45,7 +45,7 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Verified:
-    """Where a device was verified last; `file` is the id in the file then, None where the file had no such device."""
+    """The place where a device was last verified; `file` is its id in the file then, None if it was not there."""
 
     place: Place
     file: int | None = None
@@ -73,13 +73,13 @@ class DeviceChange:
 
     @property
     def count(self) -> int:
-        """How many changes these are."""
+        """The number of changes."""
         wholes = (self.removed, self.added, self.verified)
         return sum(whole is not None for whole in wholes) + len(self.options)
 
     @property
     def proven(self) -> Place | None:
-        """Where the device that holds was verified last, None if it never was."""
+        """The place where the present device was last verified, None if it never was."""
         if self.added is not None:
             return self.added_at
         return None if self.verified is None else self.verified.place
@@ -87,39 +87,39 @@ class DeviceChange:
 
 @dataclass(frozen=True, slots=True)
 class Changes:
-    """All that requests changed; `baudrate` is the line's."""
+    """All changes made by request; `baudrate` is the line's."""
 
     devices: Mapping[str, DeviceChange] = field(default_factory=dict)
     baudrate: Rate | None = None
 
     @property
     def count(self) -> int:
-        """How many changes there are."""
+        """The number of changes."""
         return sum(change.count for change in self.devices.values()) + (self.baudrate is not None)
 
     def of(self, name: str) -> DeviceChange:
-        """Return what was changed of a device, which may be nothing."""
+        """Return the changes of a device, which may be none."""
         return self.devices.get(name, DeviceChange())
 
     def with_device(self, name: str, change: DeviceChange) -> Changes:
-        """Return the changes with another one of this device; one that changes nothing is left out."""
+        """Return the changes with another change of this device; one without effect is left out."""
         devices = {**self.devices, name: change}
         return replace(self, devices={key: value for key, value in devices.items() if value})
 
     # -- what requests do
 
     def adding(self, name: str, entry: Values, verified: Place | None = None) -> Changes:
-        """Return the changes with one more device; nobody has this name now."""
+        """Return the changes with one more device, whose name is free."""
         return self.with_device(name, replace(self.of(name), added=entry, added_at=verified))
 
     def removing(self, name: str, file_values: FileValues) -> Changes:
-        """Return the changes without this device, be it the file's or one that was added."""
+        """Return the changes that remove this device, be it the file's or one that was added."""
         return self.with_device(
             name, DeviceChange(removed=file_values.slaves.get(name), verified=self.of(name).verified)
         )
 
     def moving(self, name: str, place: Place, file_values: FileValues) -> Changes:
-        """Return the changes with another place for a device that is there now: there it was verified."""
+        """Return the changes with another verified place for a present device."""
         change = self.of(name)
         if change.added is not None:
             moved = replace(change, added={**change.added, "id": place.id}, added_at=place)
@@ -129,7 +129,7 @@ class Changes:
         return self.with_device(name, replace(change, verified=verified))
 
     def setting(self, name: str, options: Values, file_values: FileValues) -> Changes:
-        """Return the changes with other options of a device that is there now.
+        """Return the changes with other options of a present device.
 
         An option that is set to what the file gives anyway is no change any more.
         """
@@ -143,7 +143,7 @@ class Changes:
         return self.with_device(name, replace(change, options=wanted, instead_of=base))
 
     def resetting(self, name: str, keys: frozenset[str] | None = None) -> Changes:
-        """Return the changes without those of a device's options, or of these `keys` only; facts stay.
+        """Return the changes without those of a device's options, or of these `keys` only; verified places stay.
 
         Without `keys` a device that was added goes and one that was removed comes back.
         """
@@ -156,7 +156,7 @@ class Changes:
 
 
 def keys(changes: Changes) -> Iterator[str]:
-    """Yield what was changed, by key as in `lfs10d.config.diff`."""
+    """Yield the changed keys, as in `lfs10d.config.diff`."""
     if changes.baudrate is not None:
         yield "line.baudrate"
     for name, change in changes.devices.items():

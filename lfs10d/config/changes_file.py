@@ -1,4 +1,4 @@
-"""`changes.yaml` in the state directory: YAML that a person can read, the whole of it replaced at each change.
+"""`changes.yaml` in the state directory: readable YAML, replaced as a whole at each change.
 
 A file that cannot be understood (damaged, foreign, of a newer lfs10d) is put aside and reported, and nothing is
 changed by it. One that cannot be read at all stays where it is, and nothing is written in its place.
@@ -26,22 +26,22 @@ from lfs10d.system.disk import Disk
 
 FILE_NAME = "changes.yaml"
 VERSION = 1
-"""Of the form below."""
+"""Version of the format below."""
 ASIDE = "changes.yaml.unreadable"
-"""Where a file that cannot be understood is put; the last one is kept."""
+"""New name of a file that cannot be read; only the last one is kept."""
 MODE = 0o640
-"""Whoever may read the state directory may read what was changed."""
+"""Mode of the file: readable like the state directory."""
 
 HEADING = """\
-# What requests changed of the configuration file, and what the file said then. Written by lfs10d.
-# A change holds until somebody edits the same key of the file. `lfs10d config --merged` prints both as one file,
+# Changes made by request to the configuration file, and the file's values then. Written by lfs10d.
+# A change holds until the same key of the file is edited. `lfs10d config --merged` prints both as one file,
 # the request config/reset takes a change back.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class FoundChanges:
-    """What was in the file; `missing` if there is none, `trouble` in words if it cannot be used."""
+    """The content of the file; `missing` if there is none, `trouble` in words if it cannot be used."""
 
     changes: Changes
     missing: bool = False
@@ -57,7 +57,7 @@ class ChangesFile:
         self._unread: str | None = None
 
     def read(self) -> FoundChanges:
-        """Read it; it stays as it is. Raises StateError if it is there and cannot be read."""
+        """Read the file and leave it as it is; raises StateError if it exists and cannot be read."""
         content = self._content()
         if content is None:
             return FoundChanges(Changes(), missing=True)
@@ -75,7 +75,7 @@ class ChangesFile:
             raise StateError(f"{self.path} cannot be read: {reason(error)}") from None
 
     def take(self) -> FoundChanges:
-        """Read it for good: one that cannot be understood is put aside. Never fails."""
+        """Read the file for the daemon: one that cannot be read is put aside. Never fails."""
         try:
             found = self.read()
         except StateError as error:
@@ -87,18 +87,20 @@ class ChangesFile:
         with contextlib.suppress(OSError):
             self._disk.put_aside(self.path, aside)
             return FoundChanges(
-                Changes(), trouble=f"{found.trouble}; the file is now {aside}, and nothing is changed by it"
+                Changes(), trouble=f"{found.trouble}; the file is now {aside}, and its changes do not hold"
             )
         self._unread = found.trouble
         return found
 
     def save(self, changes: Changes) -> None:
-        """Put these changes on the disk; raises StateError, and then the file holds what it held."""
+        """Save these changes to the disk; raises StateError and leaves the file as it was."""
         if self._unread is not None:
             raise StateError(self._unread)
         content = written(changes)
         if len(content) > LARGEST_FILE:
-            raise StateError(f"{self.path} would be too large; put changes into the file (lfs10d config --merged)")
+            raise StateError(
+                f"{self.path} would be too large; move changes into the configuration file (lfs10d config --merged)"
+            )
         before = self._content()
         try:
             self._disk.replace(self.path, content, mode=MODE)
@@ -107,7 +109,7 @@ class ChangesFile:
             raise StateError(f"{self.path} cannot be written: {reason(error)}") from None
 
     def _restore(self, before: bytes | None, content: bytes) -> None:
-        """Take back what was written but, for all we know, not synced."""
+        """Take back a write that may not have been synced."""
         with contextlib.suppress(OSError, StateError):
             if self._content() == content != before:
                 if before is None:
@@ -181,7 +183,7 @@ class _ChangesContent(Section):
 
 
 def understood(content: bytes, file: str) -> Changes:
-    """Return the changes in a file's content; raises ConfigError if any of it is not ours."""
+    """Return the changes in a file's content; raises ConfigError for any other content."""
     document = parse(decode(content, file), file)
     if document.problems:
         raise ConfigError(document.problems)
@@ -228,7 +230,7 @@ def _place(place: Place) -> dict[str, int]:
 
 
 def in_words(values: Values) -> dict[str, Any]:
-    """Return the values of a device as one writes them into the file: durations with their unit, auto for None."""
+    """Return the values of a device as written in the file: durations with their unit, auto for None."""
     return {key: _word(key, value) for key, value in values.items()}
 
 

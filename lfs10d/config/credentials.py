@@ -1,4 +1,4 @@
-"""The files of the login: the password and the certificates, as they are found and read."""
+"""Finds and reads the files of the login: the password and the certificates."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LARGEST_PASSWORD = 65_535
 """Bytes: binary data of MQTT 5.0, section 1.5.6."""
 
 LONGEST_PATH = 4096
-"""Characters of a path that are shown: whole, for only whole it helps (PATH_MAX of Linux)."""
+"""Longest path that is shown, in characters (PATH_MAX of Linux)."""
 
 
 DENIED = "permission denied"
@@ -35,7 +35,7 @@ class UnreadableError(Exception):
 
 
 def reason(error: OSError | ValueError) -> str:
-    """Return why a file cannot be read, in the system's words."""
+    """Return why a file cannot be read, as the system says it."""
     return (getattr(error, "strerror", None) or str(error)).lower()
 
 
@@ -48,7 +48,7 @@ def readable(path: Path) -> None:
 
 
 def password_in(path: Path) -> Secret:
-    """Return the first line of a file, without a byte order mark; raises UnreadableError if there is none."""
+    """Return the first line of a file, without a byte order mark; raises UnreadableError if it is empty."""
     try:
         content = read_regular(path, len(BOM_UTF8) + LARGEST_PASSWORD + 2)
         first = content.decode("utf-8-sig").partition("\n")[0].removesuffix("\r")
@@ -69,7 +69,7 @@ def credential_file(environment: Mapping[str, str]) -> Path | None:
 
 
 def service_password(unit: str, run: Path = RUN, kept: Path = KEPT) -> tuple[Secret | None, str]:
-    """Return the password that systemd hands to a service, for a verb that its administrator calls.
+    """Return the password that systemd passes to a service, for a verb called by its administrator.
 
     It lies in `run` while the service runs, and in `kept`, where docs/installation.md puts it, always. Without one the
     text says where it was looked for and why it was not read; empty where there is none.
@@ -85,7 +85,7 @@ def service_password(unit: str, run: Path = RUN, kept: Path = KEPT) -> tuple[Sec
 
 
 def _is_there(path: Path) -> bool:
-    """Whether there is such a file, or may be: a folder that we may not look into."""
+    """Whether the file exists, or may exist in a folder that we may not read."""
     try:
         path.stat()
     except PermissionError:
@@ -96,7 +96,7 @@ def _is_there(path: Path) -> bool:
 
 
 def unreadable(mqtt: MqttConfig) -> Iterator[tuple[KeyPath, str]]:
-    """Yield what is wrong with the files that a broker's section names (absolute paths), with their keys."""
+    """Yield the problems of the files named in section `mqtt` (absolute paths), with their keys."""
     if mqtt.password_file is not None:
         try:
             password_in(Path(mqtt.password_file))
@@ -148,7 +148,7 @@ _STRICTLY_NEEDED = (
 
 
 def missing_in_authorities(file: str) -> tuple[str, ...]:
-    """Return what strict programs miss in a file of authorities; () for nothing, or where it cannot be read."""
+    """Return the extensions that strict clients miss in a file of authorities; () for none, or if it cannot be read."""
     import ssl  # noqa: PLC0415  # a megabyte, and only TLS needs it
 
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)

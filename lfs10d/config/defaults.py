@@ -1,4 +1,4 @@
-"""From what a file says to a configuration without gaps: inherited values, default names, %H. Pure."""
+"""Completes the configuration of a file: inherited values, default names, %H. Pure."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from lfs10d.schema.messages import KeyPath
 
 
 def resolved(config: Config, *, stem: str, host: str) -> Config:
-    """Return the configuration without gaps: names, inherited values, the broker's port, %H.
+    """Return the complete configuration: names, inherited values, the broker's port, %H.
 
     `stem` is the file's name without suffix, `host` the host's name.
     """
@@ -36,7 +36,7 @@ def resolved(config: Config, *, stem: str, host: str) -> Config:
 
 
 def unfit(config: Config, complete: Config) -> Iterator[tuple[KeyPath, str]]:
-    """Yield what the host's name makes of %H where that is not allowed; `complete` is `config` resolved."""
+    """Yield the problems that %H has with this host's name; `complete` is `config` resolved."""
     kinds: tuple[tuple[str, FieldKind], ...] = (("base_topic", BaseTopic()), ("client_id", Text(LONGEST_CLIENT_ID)))
     for key, kind in kinds:
         written, value = getattr(config.mqtt, key), getattr(complete.mqtt, key)
@@ -52,7 +52,7 @@ def unfit(config: Config, complete: Config) -> Iterator[tuple[KeyPath, str]]:
 
 
 def inherited(slave: SlaveConfig, poll: PollConfig) -> SlaveConfig:
-    """Return a slave as it is polled: with its name, and with what `poll` says where it says nothing itself."""
+    """Return a slave with its name, and with the values of `poll` for keys that it does not have."""
     update: dict[str, Any] = {"name": device_name(slave)}
     for key in ("interval", "response_timeout"):
         if key not in slave.model_fields_set:

@@ -1,4 +1,4 @@
-"""The difference of two configurations as effects: every reload, and later every request, takes this one path."""
+"""The difference between two configurations, as effects: used by every reload and every request."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from lfs10d.config.models import Config, SlaveConfig
 from lfs10d.system.dataclass import dataclass
 
 RESTART_KEYS = frozenset({"line.name", "mqtt.base_topic"})
-"""Left for a restart: under them stands every topic."""
+"""Keys that need a restart: they are part of every topic."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """What a reload has to do. `target` is the new configuration with what needs a restart left as it was.
+    """The effects of a reload. `target` is the new configuration; keys that need a restart have their old values.
 
     `added` and `removed` are names of devices; `changed` holds keys of what stays.
     """
@@ -41,13 +41,13 @@ class Difference:
 
     @property
     def applied(self) -> tuple[str, ...]:
-        """What takes effect, for the answer to `config/reload`."""
+        """The keys that take effect, for the response to `config/reload`."""
         devices = (f"slaves.{name}" for name in (*self.added, *self.removed))
         return (*(change.key for change in self.changed), *devices)
 
     @property
     def sections(self) -> frozenset[str]:
-        """Sections in which anything takes effect."""
+        """Sections with a key that takes effect."""
         return frozenset(key.partition(".")[0] for key in self.applied)
 
     def __bool__(self) -> bool:
@@ -55,7 +55,7 @@ class Difference:
 
 
 def difference(old: Config, new: Config) -> Difference:
-    """Return what leads from one resolved configuration to another; the running one is `old`."""
+    """Return the difference from the running configuration `old` to another; both are resolved."""
     target, restart = _without_restart(old, new)
     before = {slave.name: slave for slave in old.slaves}
     after = {slave.name: slave for slave in target.slaves}
@@ -93,7 +93,7 @@ def _without_restart(old: Config, new: Config) -> tuple[Config, tuple[str, ...]]
 
 
 def _plain(config: Config) -> list[tuple[str, Any]]:
-    """Return every key but the slaves'; `mqtt.tls` and `line.rs485` are null or a whole section."""
+    """Return every key except those of slaves; `mqtt.tls` and `line.rs485` are null or a whole section."""
     pairs: list[tuple[str, Any]] = []
     for section in type(config).model_fields:
         value = getattr(config, section)

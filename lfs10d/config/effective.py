@@ -1,4 +1,4 @@
-"""The effective configuration: the file and what requests changed, as one, every value with its origin.
+"""The effective configuration: the file with the changes made by request, every value with its origin.
 
 Every start, reload and request takes this one path. Nothing here refuses: a change that cannot hold beside the file
 as it is (its profile cannot be read, its id is out of the profile's range) is `suspended`, kept and reported; two
@@ -25,14 +25,14 @@ from lfs10d.schema.document import path_text
 from lfs10d.system.dataclass import dataclass
 
 CHANGED = Origin("changes.yaml")
-"""Of a value that a request changed."""
+"""Origin of a value that a request changed."""
 
 _STANDARD = SlaveConfig(id=1)
 
 
 @dataclass(frozen=True, slots=True)
 class Effective:
-    """What holds now.
+    """The effective configuration with its origins and conflicts.
 
     `file` is the file alone, `loaded` the same with the changes in its `config`, `profiles` and `origins`. `changes`
     are those left, `dropped` those a person overruled. `places` tells for each device where to look for it: one
@@ -52,22 +52,22 @@ class Effective:
 
     @property
     def config(self) -> Config:
-        """The configuration that holds."""
+        """The effective configuration."""
         return self.loaded.config
 
     @property
     def polled(self) -> Config:
-        """The configuration for the line: without the devices that must not be polled."""
+        """The configuration for the line: without devices that have a conflict."""
         slaves = tuple(slave for slave in self.config.slaves if slave.name not in self.conflicts)
         return self.config.model_copy(update={"slaves": slaves})
 
     def slave(self, name: str) -> SlaveConfig | None:
-        """Return a device of this name, None if there is none."""
+        """Return the device with this name, None if there is none."""
         return next((slave for slave in self.config.slaves if slave.name == name), None)
 
 
 def file_values_of(file: LoadedConfig) -> FileValues:
-    """Return what a file says itself, key by key."""
+    """Return the values of the file itself, by key."""
     config, document = file.config, file.document
     slaves: dict[str, dict[str, Any]] = {}
     for index, slave in enumerate(config.slaves):
@@ -79,7 +79,7 @@ def file_values_of(file: LoadedConfig) -> FileValues:
 
 
 def effective(file: LoadedConfig, changes: Changes) -> Effective:
-    """Return what holds of a valid file and the changes."""
+    """Return the effective configuration of a valid file and the changes."""
     file_values = file_values_of(file)
     merged = merge(file_values, changes)
     builder = _Builder(file, merged)
@@ -105,7 +105,7 @@ def effective(file: LoadedConfig, changes: Changes) -> Effective:
 
 
 class _Builder:
-    """Makes models of what was merged; a change that cannot hold is left out."""
+    """Builds the models of the merged values; a change that cannot hold is left out."""
 
     def __init__(self, file: LoadedConfig, merged: Merged) -> None:
         self._file = file
@@ -137,7 +137,7 @@ class _Builder:
         return why is None
 
     def _why_not(self, slave: SlaveConfig) -> str | None:
-        """Return why this cannot hold; None if it can."""
+        """Return why a change cannot hold; None if it can."""
         try:
             if slave.profile not in self.profiles:
                 folder = self._file.path.parent.absolute()
@@ -150,7 +150,7 @@ class _Builder:
 
 
 def _conflicts(config: Config, file_values: FileValues, changes: Changes) -> dict[str, str]:
-    """Return who must yield where two have one id: the one last verified there keeps it, or else the file's."""
+    """Return the devices that must give way where two have one id: the last verified one keeps it, else the file's."""
     holders: dict[int, str] = {}
     yielding: dict[str, str] = {}
 
@@ -166,7 +166,7 @@ def _conflicts(config: Config, file_values: FileValues, changes: Changes) -> dic
 
 
 def _origins(file: LoadedConfig, config: Config, merged: Merged) -> dict[str, Origin]:
-    """Return the origins of all values; those of the file's slaves follow them to their new places."""
+    """Return the origins of all values; slaves of the file are found by their names."""
     places = {slave.name: index for index, slave in enumerate(file.config.slaves)}
     origins: dict[str, Origin] = {}
     for path, _ in leaves(config):
@@ -189,7 +189,7 @@ def _origins(file: LoadedConfig, config: Config, merged: Merged) -> dict[str, Or
 
 
 def _inherited_origin(file: LoadedConfig, key: str) -> Origin:
-    """Return where a value comes from that a device does not have itself."""
+    """Return the origin of a value that a device inherits."""
     if key not in {"interval", "response_timeout"}:
         return DEFAULT
     origin = file.origins[f"poll.{key}"]
@@ -197,7 +197,7 @@ def _inherited_origin(file: LoadedConfig, key: str) -> Origin:
 
 
 def merged_data(now: Effective) -> Any:  # noqa: ANN401  # YAML
-    """Return the data of a file that says what holds now, so that every change becomes needless.
+    """Return the data of a file that expresses the effective configuration without any change.
 
     What the file says itself is left in its own words.
     """
@@ -225,11 +225,11 @@ def merged_data(now: Effective) -> Any:  # noqa: ANN401  # YAML
 
 
 def _named(name: str, entry: dict[str, Any]) -> dict[str, Any]:
-    """Return an entry that says its name, where the default would be another, after its id."""
+    """Return an entry with its name after its id, if the default would be another."""
     if name == f"slave-{entry['id']}" or "name" in entry:
         return entry
     return {"id": entry["id"], "name": name, **entry}
 
 
 Edit: TypeAlias = "Callable[[Effective], Changes]"
-"""What a request makes of the changes, given what holds. Called in a thread of its own; raises what refuses it."""
+"""Returns the changes after a request. Called in a thread of its own; raises what refuses the request."""

@@ -1,4 +1,4 @@
-"""The JSON Schema of lfs10d.yaml (draft 2020-12): editors complete keys by it and mark mistakes.
+"""The JSON Schema of lfs10d.yaml (draft 2020-12), for editors.
 
 It states what each key may hold. The rules between keys, and whether files and profiles exist, are left to
 `lfs10d check`.
@@ -20,11 +20,11 @@ from lfs10d.schema.quantities import duration_text, size_text
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 COMPUTED = "Default: "
-"""In the description of a key: its default is no constant."""
+"""Begins the default in a description, for a default that is no constant."""
 
 
 def json_schema() -> dict[str, Any]:
-    """Return the schema as JSON data; defaults are as one writes them in YAML."""
+    """Return the schema as JSON data; defaults are written as in YAML."""
     schema = Config.model_json_schema()
     models: set[type[BaseModel]] = {Config, *_sections(Config)}
     for model in models:

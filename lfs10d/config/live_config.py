@@ -1,4 +1,4 @@
-"""The configuration that holds while the daemon runs: the file and what requests changed. One path for every change.
+"""The effective configuration while the daemon runs. Every change of it goes through here.
 
 A request's change is on the disk before anything of it takes effect, and a person's edit of the file always wins.
 """
@@ -25,7 +25,7 @@ from lfs10d.system.threads import run_in_thread
 
 @dataclass(slots=True)
 class News:
-    """For a person: changes by request that were `dropped`, other `warnings`, and why the disk fails, if it does."""
+    """News for a person: changes by request that were `dropped`, other `warnings`, and an error of the disk."""
 
     dropped: list[DroppedChange] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
@@ -33,20 +33,20 @@ class News:
 
     @property
     def messages(self) -> list[str]:
-        """All of it in words, but for the disk."""
+        """All messages, without the error of the disk."""
         lost = (f"{each.key}: {each.message}: the change made by request is dropped" for each in self.dropped)
         return [*lost, *self.warnings]
 
 
 class ConfigEvents(Protocol):
-    """What another configuration takes effect by, and what is reported of it. Called in the loop's thread."""
+    """The events of a change of the configuration. Called in the loop's thread."""
 
     async def apply(self, plan: ReloadPlan, before: Effective) -> None:
-        """Put into force what `LiveConfig.now` holds already."""
+        """Apply the new `LiveConfig.now` to the daemon's parts."""
         ...
 
     def report(self, news: News) -> None:
-        """Report to people what became of changes."""
+        """Report dropped changes, warnings and errors of the disk."""
         ...
 
 
@@ -62,7 +62,7 @@ class LiveConfig:
         self._login: Mapping[str, bytes] = imprint(file)
         found = changes.take()
         self.missing = found.missing or found.trouble is not None
-        """No changes were known when the daemon began: there never were any, or their file is gone or damaged."""
+        """At the start there was no readable file of changes: none was made yet, or it is lost or damaged."""
         if found.trouble is not None:
             self._news.dropped.append(DroppedChange(FILE_NAME, None, None, found.trouble))
         self.now = effective(file, found.changes)
@@ -73,16 +73,16 @@ class LiveConfig:
 
     @property
     def loaded(self) -> LoadedConfig:
-        """What holds, as one configuration."""
+        """The effective configuration in the form of a loaded file."""
         return self.now.loaded
 
     def start(self, events: ConfigEvents) -> None:
-        """Take what is called from now on; what was found when this was built is reported."""
+        """Call `events` from now on; report what was found when this was built."""
         self._events = events
         self._report()
 
     async def reload(self) -> ReloadPlan:
-        """Read the file again and apply what changed; raises ConfigError and changes nothing if it is wrong."""
+        """Read the file again and apply what changed; raises ConfigError and changes nothing if it has errors."""
         async with self._lock:
             before = self.now.changes
             found = await run_in_thread(partial(read, self.now.file.path), "reload")
@@ -95,14 +95,14 @@ class LiveConfig:
         return plan
 
     async def change(self, edit: Edit) -> tuple[Effective, Effective]:
-        """Change what holds, on the disk first; return what held before and what holds now.
+        """Change the configuration, on the disk first; return the one before and the new one.
 
         Raises StateError if it cannot be put on the disk, and what `edit` raises; nothing is changed then.
         """
         return await self._change(edit, self._save)
 
     async def learn(self, edit: Edit) -> tuple[Effective, Effective]:
-        """Take a fact found on the line. It holds whether or not the disk keeps it; that is reported."""
+        """Take a fact found on the line; it holds even if it cannot be saved, which is reported."""
         return await self._change(edit, self._try_save)
 
     async def _change(self, edit: Edit, save: Callable[[Changes], None]) -> tuple[Effective, Effective]:
@@ -123,7 +123,7 @@ class LiveConfig:
             return before, self.now
 
     def _save(self, changes: Changes) -> None:
-        """Put the changes on the disk; raises StateError, which is reported too."""
+        """Save the changes; raises StateError and reports it."""
         try:
             self._file.save(changes)
         except StateError as error:
@@ -131,12 +131,12 @@ class LiveConfig:
             raise
 
     def _try_save(self, changes: Changes) -> None:
-        """Put the changes on the disk; if that fails the next start finds the same facts or edits again."""
+        """Save the changes if possible; otherwise the next start finds the same facts or edits again."""
         with contextlib.suppress(StateError):
             self._save(changes)
 
     def _note(self, now: Effective, reported: Mapping[str, str]) -> None:
-        """Note what cannot hold, unless it was `reported` already."""
+        """Note changes that cannot hold, unless they were `reported` already."""
         self._news.warnings += (
             f"{name}: {why}" for name, why in {**now.suspended, **now.conflicts}.items() if reported.get(name) != why
         )

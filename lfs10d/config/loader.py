@@ -1,4 +1,4 @@
-"""The configuration file: read, validated as a whole, its profiles and secrets found, every value with its origin."""
+"""Reads the configuration file with its profiles and secrets, validates it as a whole, and notes each origin."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ DEFAULT = Origin("default")
 
 @dataclass(frozen=True)
 class LoadedConfig:
-    """A valid file: `config` without gaps, `profiles` by `SlaveConfig.profile`, `origins` by path in words."""
+    """A valid file: the complete `config`, `profiles` by `SlaveConfig.profile`, `origins` by path in words."""
 
     path: Path
     document: Document
@@ -137,7 +137,7 @@ LARGEST_READ = 2**20
 
 
 def _validated(document: Document) -> tuple[Config, list[Problem], frozenset[KeyPath]]:
-    """Return the configuration, its problems, and the paths that are wrong: there defaults stand in."""
+    """Return the configuration, its problems, and the wrong paths, which have defaults."""
     problems = list(document.problems)
     try:
         return Config.model_validate(document.data), problems, frozenset()
@@ -148,7 +148,7 @@ def _validated(document: Document) -> tuple[Config, list[Problem], frozenset[Key
 
 
 def _mended(data: Any, wrong: Iterable[KeyPath]) -> dict[str, Any]:  # noqa: ANN401  # any YAML
-    """Return data without what is wrong, so that the rest can be checked; what must be there is made up."""
+    """Return the data without wrong values, so that the rest can be checked; required keys get a placeholder."""
     bad = frozenset(wrong)
 
     def keep(value: Any, path: KeyPath) -> Any:  # noqa: ANN401 - YAML of any shape
@@ -168,7 +168,7 @@ def _mended(data: Any, wrong: Iterable[KeyPath]) -> dict[str, Any]:  # noqa: ANN
 
 
 def _cut(path: KeyPath, key: str | int, item: object, bad: frozenset[KeyPath]) -> bool:
-    """Tell whether a key is left out: what it is, or what a list that is one value holds, is wrong."""
+    """Return whether a key is left out: its value, or an item of a list that is one value, is wrong."""
     place = (*path, key)
     if not isinstance(key, str) or place in bad:
         return True
@@ -176,7 +176,7 @@ def _cut(path: KeyPath, key: str | int, item: object, bad: frozenset[KeyPath]) -
 
 
 def _concerns(key: KeyPath, wrong: frozenset[KeyPath]) -> bool:
-    """Tell whether a key, what it is part of, or a part of it is wrong."""
+    """Return whether a key, its section, or a part of it is wrong."""
     return any(key[: len(path)] == path[: len(key)] for path in wrong)
 
 
@@ -206,7 +206,7 @@ def _profiles(
 
 
 def _anchored(config: Config, folder: Path) -> Config:
-    """Return the configuration with its paths relative to the file made absolute."""
+    """Return the configuration with absolute paths."""
     mqtt: MqttConfig = config.mqtt
     line = config.line.model_copy(update={"port": str(folder / config.line.port)})
     update: dict[str, Any] = {}
@@ -219,7 +219,7 @@ def _anchored(config: Config, folder: Path) -> Config:
 
 
 def leaves(model: BaseModel, path: KeyPath = ()) -> Iterable[tuple[KeyPath, Any]]:
-    """Yield every value of a configuration with its path; lists of words and null are values, sections are not."""
+    """Yield every value with its path; lists of words and null are values, sections are not."""
     for key in type(model).model_fields:
         value = getattr(model, key)
         if isinstance(value, BaseModel):

@@ -1,4 +1,4 @@
-"""The three-way merge of the file as it is, as it was when a request changed something, and that change. Pure.
+"""The three-way merge of the file, the file's values when a request changed something, and that change. Pure.
 
 Rules
 -----
@@ -26,7 +26,7 @@ _UNSAID = object()
 
 @dataclass(frozen=True, slots=True)
 class DroppedChange:
-    """A change that holds no more because a person edited the file: the value `lost`, and why.
+    """A change that no longer holds, since the file was edited: the value `lost`, and the reason.
 
     `key` is as in `lfs10d.config.diff`: `slaves.mast-top.interval`, or `slaves.mast-top` for all of it. The file of
     changes that could not be understood is one without a device.
@@ -40,7 +40,7 @@ class DroppedChange:
 
 @dataclass(frozen=True, slots=True)
 class Merged:
-    """What holds: `devices` by name, in order, with the values of each; `changed` are the keys set by changes.
+    """The result: `devices` by name, in order, with their values; `changed` are the keys set by changes.
 
     `changes` are those left, `dropped` those a person should know of. `contested` are the places where the file and
     what was verified differ: the file's first. `baudrate` is the line's.
@@ -55,7 +55,7 @@ class Merged:
 
 
 def merge(file_values: FileValues, changes: Changes) -> Merged:
-    """Return what the file and the changes give together, by the rules above."""
+    """Merge the file and the changes by the rules above."""
     names = [*file_values.slaves, *(name for name in changes.devices if name not in file_values.slaves)]
     devices: dict[str, Values] = {}
     changed: dict[str, frozenset[str]] = {}
@@ -79,7 +79,7 @@ def merge(file_values: FileValues, changes: Changes) -> Merged:
 
 
 def _merge_rate(file_values: FileValues, rate: Rate | None) -> tuple[Rate | None, int, tuple[int, ...]]:
-    """Return what is left of the change, the rate to begin with, and all that come into question."""
+    """Return the remaining change, the rate to begin with, and all possible rates."""
     if rate is None or file_values.baudrate == rate.now:
         return None, file_values.baudrate, (file_values.baudrate,)
     if file_values.baudrate == rate.file:
@@ -88,7 +88,7 @@ def _merge_rate(file_values: FileValues, rate: Rate | None) -> tuple[Rate | None
 
 
 def _places(slave: int, change: DeviceChange, rates: tuple[int, ...]) -> tuple[Place, ...]:
-    """Return where a device may be: where it is expected first, then where it was verified."""
+    """Return the possible places of a device: the expected one first, then the last verified one."""
     proven = change.proven
     if proven is None:
         return tuple(Place(slave, rate) for rate in rates)
@@ -100,7 +100,7 @@ def _places(slave: int, change: DeviceChange, rates: tuple[int, ...]) -> tuple[P
 
 
 def _entry(entry: Values | None, change: DeviceChange) -> tuple[Values | None, frozenset[str]]:
-    """Return what holds of a device, None for no device, and which keys of it changes say."""
+    """Return the values of a device (None: no device), and which keys come from changes."""
     if change.added is not None:
         return change.added, frozenset(change.added)
     if change.removed is not None or entry is None:
@@ -115,7 +115,7 @@ def _entry(entry: Values | None, change: DeviceChange) -> tuple[Values | None, f
 
 
 def _settle(name: str, file_values: FileValues, change: DeviceChange) -> tuple[DeviceChange, list[DroppedChange]]:
-    """Return what is left of the changes of one device, and what of it a person should know is lost."""
+    """Return the remaining changes of one device, and the dropped ones to report."""
     entry = file_values.slaves.get(name)
     if change.removed is not None:
         if entry == change.removed:
@@ -127,7 +127,7 @@ def _settle(name: str, file_values: FileValues, change: DeviceChange) -> tuple[D
         return (change, []) if entry is None else _adopted(name, entry, file_values, change)
     if entry is None:
         what = {**change.options, **({} if change.verified is None else {"id": change.verified.place.id})}
-        gone = "the file has this device no more"
+        gone = "the device is no longer in the file"
         return DeviceChange(), [_dropped(name, key, value, gone) for key, value in what.items()]
     return _kept(name, entry, file_values, change)
 
@@ -135,7 +135,7 @@ def _settle(name: str, file_values: FileValues, change: DeviceChange) -> tuple[D
 def _unremoved(
     name: str, entry: Values, file_values: FileValues, change: DeviceChange
 ) -> tuple[DeviceChange, list[DroppedChange]]:
-    """Give a device that was removed by request back to the file, where a person edited it."""
+    """Undo the removal of a device by request if its entry in the file was edited."""
     kept, lost = _kept(name, entry, file_values, DeviceChange(verified=change.verified))
     if entry != change.added:
         what = {"removed": True} if change.added is None else dict(change.added)
@@ -146,7 +146,7 @@ def _unremoved(
 def _adopted(
     name: str, entry: Values, file_values: FileValues, change: DeviceChange
 ) -> tuple[DeviceChange, list[DroppedChange]]:
-    """Take a device that was added by request for one of the file, where a person put it (rule 4)."""
+    """Treat a device that was added by request as one of the file, if it was put there (rule 4)."""
     added = change.added or _NOTHING
     options = {key: added[key] for key in OPTIONS if key in added}
     proof = None if change.added_at is None else Verified(change.added_at)
@@ -160,7 +160,7 @@ def _adopted(
 def _kept(
     name: str, entry: Values, file_values: FileValues, change: DeviceChange
 ) -> tuple[DeviceChange, list[DroppedChange]]:
-    """Compare what was changed of a device of the file, key by key."""
+    """Compare the changes of a device of the file, key by key."""
     options: dict[str, Any] = {}
     lost: list[DroppedChange] = []
     for key, value in change.options.items():
@@ -179,7 +179,7 @@ def _kept(
 
 
 def _says(entry: Values, key: str) -> str:
-    return "the file has another value now" if key in entry else "the file's own was taken out"
+    return "the file has another value now" if key in entry else "the device was removed from the file"
 
 
 def _dropped(name: str, key: str, lost: object, message: str) -> DroppedChange:

@@ -56,7 +56,7 @@ class Rs485Config(Section):
 
 
 class LineConfig(Section):
-    """The RS485 line and the port it hangs on."""
+    """The RS485 line and its port."""
 
     name: Annotated[str, Name()] = Field(
         "",
@@ -81,7 +81,9 @@ class LineConfig(Section):
         0.0, description="Added to the 3.5 characters of silence before each request."
     )
     turnaround_delay: Annotated[float, Duration(0, 10)] = Field(
-        0.1, description="Silence after a broadcast, which no slave answers. No request of lfs10d sends one."
+        0.1,
+        description="Silence after a broadcast, which no slave answers: the turnaround delay of Modbus over Serial "
+        "Line. No request of lfs10d sends a broadcast.",
     )
     echo: Annotated[Literal["auto", "on", "off"], Choice(("auto", "on", "off"))] = Field(
         "auto", description="Whether the adapter returns the bytes it sends; auto: detected."
@@ -126,7 +128,7 @@ class PollConfig(Section):
 
 
 class CalibrationConfig(Section):
-    """What a calibration certificate says of one value: `value * scale + offset`."""
+    """The calibration certificate of one value: `value * scale + offset`."""
 
     scale: Annotated[float, Field(ge=0.001, le=1000)] = Field(1.0, description="What the value is multiplied by.")
     offset: Annotated[float, Field(ge=-1e6, le=1e6)] = Field(
@@ -153,7 +155,7 @@ class SlaveConfig(Section):
         description="From the last bit of the request to the first byte of the answer. Default: poll.response_timeout.",
     )
     checksum: Annotated[Literal["crc", "sum"] | None, Choice(("crc", "sum"), null=True)] = Field(
-        None, description="Check of its rtu frames; null: the first of the profile."
+        None, description="Check of its rtu frames; null: the first that the profile lists."
     )
     request_gap: Annotated[float, Duration(0, 60)] = Field(
         0.0,
@@ -162,8 +164,8 @@ class SlaveConfig(Section):
     )
     calibration: dict[str, CalibrationConfig] = Field(
         {},
-        description="By value name what its calibration certificate says, {wind_speed: {scale: 1.013, offset: 0.06}}: "
-        "value * scale + offset, before the profile's range is judged. A wind_speed of 0 stays 0.",
+        description="Scale and offset of its calibration certificate, by value name: {wind_speed: {scale: 1.013, "
+        "offset: 0.06}}. value * scale + offset is then judged by the profile's range. A wind_speed of 0 stays 0.",
     )
 
     @property
@@ -185,7 +187,7 @@ class TlsConfig(Section):
 
 
 class MqttConfig(Section):
-    """The broker and who we are there."""
+    """The broker and our login there."""
 
     host: Annotated[str | tuple[str, ...], Hosts()] = Field(
         "localhost",
@@ -234,7 +236,7 @@ class MqttConfig(Section):
 
     @property
     def nodes(self) -> tuple[tuple[str, int], ...]:
-        """The broker's nodes in turn, host and port; one where `host` is no list."""
+        """The broker's nodes in order, host and port; one if `host` is not a list."""
         if isinstance(self.host, str):
             return ((self.host, self.port),)
         return tuple((host, self.port if port is None else port) for host, port in map(split_node, self.host))
@@ -279,7 +281,7 @@ def default_line_name(stem: str) -> str:
 
 
 def default_device_name(slave: int) -> str:
-    """Return the name of a device that has none in the file."""
+    """Return the default name of a device."""
     return f"slave-{slave}"
 
 

@@ -1,4 +1,4 @@
-"""What a reload has to do: the running configuration against the files as they are now. Pure but for the reading."""
+"""Plans a reload: compares the running configuration with the files. Pure, apart from reading them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from lfs10d.system.regular_file import read_regular
 
 @dataclass(frozen=True, slots=True)
 class ConfigFiles:
-    """A valid configuration, and by key a digest of each file of the login beside it."""
+    """A valid configuration, and a digest of each file of the login, by key."""
 
     loaded: LoadedConfig
     login: Mapping[str, bytes]
@@ -24,31 +24,31 @@ class ConfigFiles:
 
 @dataclass(frozen=True, slots=True)
 class ReloadPlan:
-    """What changes. `loaded` runs from now on: what needs a restart is in it as it was."""
+    """The effects of a reload. `loaded` is the new configuration; keys that need a restart have their old values."""
 
     loaded: LoadedConfig
     applied: tuple[str, ...]
     restart_required: tuple[str, ...]
     line: bool
-    """The port is set, or the line spoken on, in another way."""
+    """Settings of the port or the line differ."""
     realtime: bool
     polling: bool
-    """Devices came, went or changed, or how they are polled."""
+    """Devices or their polling differ."""
     broker: bool
-    """The connection is to be made anew."""
+    """The connection to the broker must be made again."""
     publishing: bool
-    """What is published, or how often, is another."""
+    """What is published, or how often, differs."""
     log: bool
 
 
 def read(path: Path) -> ConfigFiles:
-    """Read everything anew; raises ConfigError with all that is wrong."""
+    """Read all files again; raises ConfigError with all problems."""
     loaded = load(path)
     return ConfigFiles(loaded, imprint(loaded))
 
 
 def imprint(loaded: LoadedConfig) -> dict[str, bytes]:
-    """Return a digest of the password and of the certificates, by key; unreadable ones are left out."""
+    """Return a digest of the password and of each certificate, by key; unreadable ones are left out."""
     mqtt = loaded.config.mqtt
     digests: dict[str, bytes] = {}
     password = mqtt.password_file or loaded.credential
@@ -68,7 +68,7 @@ def _digest(file: Path) -> bytes:
 
 
 def plan(running: ConfigFiles, found: ConfigFiles) -> ReloadPlan:
-    """Return what leads from one to the other."""
+    """Return the plan from the running files to the new ones."""
     before, after = running.loaded, found.loaded
     changes = difference(before.config, after.config)
     target = changes.target
@@ -98,7 +98,7 @@ def plan(running: ConfigFiles, found: ConfigFiles) -> ReloadPlan:
 
 
 PUBLISHING = {"telemetry", "state_every"}
-"""Keys of `mqtt` that the connection does not depend on."""
+"""Keys of `mqtt` that do not affect the connection."""
 
 
 def _connection(mqtt: MqttConfig) -> dict[str, object]:

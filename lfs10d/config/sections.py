@@ -1,4 +1,4 @@
-"""Sections of the configuration that stand by themselves, and what all sections have in common."""
+"""Sections of the configuration without references to others, and the base of all sections."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from lfs10d.schema.steps import Steps
 MINUTE, HOUR, DAY = 60.0, 3600.0, 86400.0
 
 RECORD_LENGTHS = (60.0, 120.0, 300.0, 600.0, 900.0, 1200.0, 1800.0, 3600.0)
-"""Seconds that divide an hour, so that every record begins at a full one of them."""
+"""Seconds that divide an hour, so that records begin at full multiples."""
 
 
 class Section(BaseModel):
@@ -60,5 +60,5 @@ class WindConfig(Section):
         10.0, description="Time between two `wind` of a device, the figures of the last 2 and 10 min."
     )
     records: Annotated[float, Steps(MINUTE, HOUR, zero="none", steps=RECORD_LENGTHS)] = Field(
-        10 * MINUTE, description="Length of a `record`, the same figures of each such span of UTC."
+        10 * MINUTE, description="Length of a `record`: the same figures for each such span of UTC."
     )

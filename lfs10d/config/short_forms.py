@@ -1,4 +1,4 @@
-"""Short forms of the file: a bare slave id for a mapping with nothing else, a list for a tuple."""
+"""Short forms in the file: a bare slave id in place of a mapping; lists become tuples."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ SLAVE_ID = Whole(1, 255)
 
 
 def items(value: object) -> object:
-    """Turn a YAML list into a tuple; refuse anything else."""
+    """Turn a YAML list into a tuple; anything else is an error."""
     if not isinstance(value, list | tuple):
         raise plain_error(f"must be a list, [] for none, not {shown(value)}")
     return tuple(value)
 
 
 def slave_mapping(value: object) -> object:
-    """Let a bare id stand for a mapping with nothing else."""
+    """Turn a bare id into a mapping with that id."""
     if isinstance(value, int) and not isinstance(value, bool):
         return {"id": value}
     if not isinstance(value, dict):
@@ -31,7 +31,7 @@ def slave_mapping(value: object) -> object:
 
 
 class OrBareId:
-    """Says in the JSON Schema what `slave_mapping` permits."""
+    """Adds the bare id that `slave_mapping` permits to the JSON Schema."""
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         return {"anyOf": [SLAVE_ID.json_schema(), handler(schema)]}

@@ -1,4 +1,4 @@
-"""What is wrong between keys that are each right: pure rules over the configuration and its profiles."""
+"""Contradictions between valid keys: pure rules over the configuration and its profiles."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from lfs10d.system.dataclass import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Contradiction:
-    """A problem at `path`; it rests on the keys `on`, and means nothing where one of them is wrong itself.
+    """A problem at `path` that follows from the keys `on`; it is left out if one of them is wrong itself.
 
     `key`: it is the key that is wrong, not its value.
     """
@@ -25,7 +25,7 @@ class Contradiction:
 
 
 def contradictions(config: Config, profiles: Mapping[str, Profile]) -> Iterator[Contradiction]:
-    """Yield what is impossible. `config` may still have the gaps of the file; profiles not loaded are passed over."""
+    """Yield all contradictions. `config` may be incomplete; profiles that could not be loaded are passed over."""
     yield from _line(config)
     yield from _broker(config)
     yield from _taken(config)
@@ -110,7 +110,7 @@ def _against_profile(config: Config, index: int, slave: SlaveConfig, profile: Pr
 
 
 def unknown_value(name: str, profile: Profile) -> str:
-    """Return what to say of a name that none of the profile's values has."""
+    """Return the message for a name that no value of the profile has."""
     near = nearest(name, profile.value_names)
     what = f"is no value of profile {profile.name}; "
     return what + (f"did you mean {near}?" if near else f"its values: {', '.join(profile.value_names)}")

@@ -234,7 +234,7 @@ def test_what_cannot_be_understood_is_put_aside_and_a_new_file_begun() -> None:
     found = file.take()
     assert found.changes == Changes()
     assert found.trouble is not None
-    assert found.trouble.endswith("the file is now /state/changes.yaml.unreadable, and nothing is changed by it")
+    assert found.trouble.endswith("the file is now /state/changes.yaml.unreadable, and its changes do not hold")
     file.save(ONE)
     files.power_cut(())
     assert files.read(STATE / ASIDE) == b"nonsense"
