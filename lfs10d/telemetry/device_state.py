@@ -8,7 +8,8 @@ Rules
    before the state of such a reading and after a bad one. A partial reading clears the device's error as a good one
    does.
 3. The state shows the newest sample at most every `state_every`, but a change of quality or error at once, and of
-   `errors`: another value that is missing, or another reason.
+   `errors`: another value that is missing, or another reason. Where samples come no more often than states may, states
+   fall into step with them: one message in place of two, and none shows a sample that the next has overtaken.
 4. Before its first sample a device's state has no value and the error `starting` (a disabled one `disabled`), which
    is never in its error topic.
 5. A disabled device has one sample that says so, and then none but those of polls that a request wants; of these
@@ -46,6 +47,12 @@ from lfs10d.telemetry.publication import (
 STATE_EARLY: Final = 0.03
 """Seconds that a state may come before its time (the next one then waits as much longer): otherwise a device polled
 every second would miss its turn by the jitter of its polls, or by `mqtt.hold`, and be shown late each time."""
+
+OUT_OF_STEP: Final = 0.1
+"""Seconds before the time of a state from which on its sample is not merely early, but out of step with the states."""
+
+SAMPLE_LATE: Final = 0.25
+"""Seconds after its time for which a sample is waited for that a state is to go with."""
 
 
 class DeviceState:
@@ -246,10 +253,20 @@ class DeviceState:
         elif now.mono >= self._state_from - STATE_EARLY:
             published.append(self._state(now, refresh=True))
         else:
-            self.state_due = self._state_from
+            self.state_due = self._falls_into_step(now) or self._state_from
         if turned and not online:
             published.append(self._availability())
         return published
+
+    def _falls_into_step(self, now: Instant) -> float | None:
+        """Return until when the state waits for the next sample, to go with each one from then on; None: it does not.
+
+        It does where that makes it later once, by `state_every` at most.
+        """
+        interval, early = self.info.interval, self._state_from - now.mono
+        if early < OUT_OF_STEP or not self.info.state_every <= interval <= self.info.state_every + early:
+            return None
+        return now.mono + interval + SAMPLE_LATE
 
     def _telling(self, sample: Sample, payload: dict[str, object]) -> Publication:
         return Publication(self._telemetry, payload, PublicationKind.SAMPLE, retain=False, qos=1, sample=sample)
