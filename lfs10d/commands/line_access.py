@@ -25,7 +25,7 @@ from lfs10d.line.line import Line
 from lfs10d.modbus.request import Request as RegisterRequest
 from lfs10d.mqtt.publisher import Publisher
 from lfs10d.profiles.profile import Profile
-from lfs10d.reading import Event, Exchanged, Reading
+from lfs10d.reading import Exchanged, Reading
 from lfs10d.reconfiguration.reconfiguration import Reconfiguration
 from lfs10d.system.clock import Instant
 from lfs10d.system.threads import ThreadFuture, run_in_thread
@@ -111,13 +111,16 @@ class LineAccess:
 
     # -- what happens on the line
 
-    def on_event(self, event: Event, published: Iterable[Publication], now: Instant) -> list[Publication]:
-        """Take an event of the line with its publications; return those of a trace."""
-        if isinstance(event, Reading):
-            self._reads.on_reading(event, published)
-        elif isinstance(event, Exchanged) and self._trace is not None:
+    def on_reading(self, reading: Reading, published: Iterable[Publication]) -> None:
+        """Take a reading with its publications."""
+        if reading.requests:
+            self._reads.on_reading(reading, published)
+
+    def on_exchange(self, exchanged: Exchanged, now: Instant) -> list[Publication]:
+        """Take an exchange; return the publications of a trace."""
+        if self._trace is not None:
             if now.mono < self._trace.until:
-                return self._trace.publications(event, now)
+                return self._trace.publications(exchanged, now)
             self._trace = None
         return []
 

@@ -40,8 +40,6 @@ class PendingReads:
 
     def on_reading(self, reading: Reading, published: Iterable[Publication]) -> None:
         """Resolve the reads that wait for this reading, which led to the publications `published`."""
-        if not reading.requests:
-            return
         sample = next((each.payload for each in published if each.kind is PublicationKind.SAMPLE), None)
         for number in reading.requests:
             self._resolve(number, ReadResult(sample, reading.fault))

@@ -34,15 +34,23 @@ class LineReport:
         published: list[Publication] = []
         opened = False
         for event in events:
-            _log(self._event_log.on_event(event, port=port.settings.path, notices=port.notices, frames=frames))
-            self._watch_start(event)
             known = parts.publisher.on_event(event, now)
-            _log(self._event_log.on_publications(known))
-            published += [*known, *parts.access.on_event(event, known, now)]
-            if isinstance(event, PortChanged):
-                opened = opened or event.fault is None
-            if isinstance(event, Exchanged) or (isinstance(event, PortChanged) and event.fault is not None):
+            if isinstance(event, Exchanged):  # every poll has one: nothing but counting, as a rule
+                if frames:
+                    _log(self._event_log.on_exchange(event))
+                published += [*known, *parts.access.on_exchange(event, now)]
                 parts.signals.ready()
+                continue
+            _log(self._event_log.on_event(event, port=port.settings.path, notices=port.notices))
+            self._watch_start(event)
+            _log(self._event_log.on_publications(known))
+            published += known
+            if isinstance(event, Reading):
+                parts.access.on_reading(event, known)
+            elif isinstance(event, PortChanged):
+                opened = opened or event.fault is None
+                if event.fault is not None:
+                    parts.signals.ready()
         parts.publisher.publish([*published, *parts.publisher.due(now)])
         if opened:
             parts.publisher.on_readings(conflict_readings(parts.config.now.conflicts, now.mono))
@@ -58,8 +66,8 @@ class LineReport:
         """Report which devices answer after the port was opened."""
         report = self._start_report
         if isinstance(event, Reading):
-            report.on_reading(event)
             if report.due < inf:
+                report.on_reading(event)
                 self._report_start()
         elif isinstance(event, PortChanged):
             if event.fault is not None:

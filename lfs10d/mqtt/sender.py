@@ -9,7 +9,6 @@ import asyncio
 import logging
 from collections import deque
 from collections.abc import Callable
-from itertools import islice
 
 from lfs10d.mqtt.batch_assembly import BatchAssembly, room_for_batch
 from lfs10d.mqtt.connection import Connection
@@ -138,10 +137,12 @@ class Sender:
         sent = self._sent.pop(mid, None)
         if sent is None:
             return
-        if sent.qos:
-            self._prove(sent)
-        else:
+        if not sent.qos:
             self._unproved.append(sent)  # it was written, that is all
+        elif self._unproved or self._outbox.suspects.sizes:
+            self._prove(sent)
+        if sent.qos and sent.number > self._acknowledged:
+            self._acknowledged = sent.number
         now = self._now()
         if reason < REFUSED_FROM:
             self._outbox.on_ack(sent.item, now, nobody_listens=reason == NO_MATCHING_SUBSCRIBERS)
@@ -163,7 +164,6 @@ class Sender:
     def _prove(self, acknowledged: _Sent) -> None:
         """Note that the broker took this message, and all before it, without ending the connection."""
         suspects = self._outbox.suspects
-        self._acknowledged = max(self._acknowledged, acknowledged.number)
         suspects.acknowledged(acknowledged.item.topic, acknowledged.size)
         while self._unproved and self._unproved[0].number < acknowledged.number:
             proved = self._unproved.popleft()
@@ -187,31 +187,35 @@ class Sender:
     def _send_some(self) -> None:
         self._turn = None
         self._sending = True
-        if self._connection is not None:
-            self._connection.cork(on=True)
-        emptied = self._send_a_few()
-        if self._connection is not None:
-            self._connection.cork(on=False)
+        items, emptied = self._take_some()
+        connection = self._connection if len(items) > 1 else None  # one alone needs no cork
+        if connection is not None:
+            connection.cork(on=True)
+        for item in items:
+            self._send_encoded(item)
+        if connection is not None:
+            connection.cork(on=False)
         self._sending = False
         if emptied:
             self._set_alarm()
         else:
             self._turn = asyncio.get_running_loop().call_soon(self._send_some)
 
-    def _send_a_few(self) -> bool:
-        """Send up to `ITEMS_AT_ONCE`; return whether nothing more may go now."""
+    def _take_some(self) -> tuple[list[Retained | Message | LiveSample | LossNotice], bool]:
+        """Take up to `ITEMS_AT_ONCE`; return those to be sent now, and whether nothing more may go then."""
+        items: list[Retained | Message | LiveSample | LossNotice] = []
         now = self._now()
         for _ in range(ITEMS_AT_ONCE):
             item = self._outbox.next(now, batch=self._assembly is None)
             if item is None:
-                return True
+                return items, True
             if isinstance(item, HistoryBatch):
                 room = room_for_batch(self._topics.full(item.topic), self._accepted)
                 self._assembly = BatchAssembly(item, room)
                 asyncio.get_running_loop().call_soon(self._assemble, self._assembly)
             else:
-                self._send_encoded(item)
-        return False
+                items.append(item)
+        return items, False
 
     def _send_encoded(self, item: Retained | Message | LiveSample | LossNotice) -> None:
         if isinstance(item, LossNotice):
@@ -251,7 +255,7 @@ class Sender:
             return
         topic = self._topics.full(item.topic)
         retain, qos, correlation = False, 1, None
-        if not isinstance(item, HistoryBatch | LossNotice):
+        if not isinstance(item, (HistoryBatch, LossNotice)):
             retain, qos = item.publication.retain, item.publication.qos
         if isinstance(item, Message):
             correlation = item.correlation
@@ -275,18 +279,17 @@ class Sender:
 
     def _set_alarm(self) -> None:
         """Come back when time alone brings something to send, or shows that the broker is stuck."""
-        times = [sent.at + ACKNOWLEDGED_WITHIN for sent in islice(self._sent.values(), 1)]
-        due = self._outbox.due()
-        if due is not None:
-            times.append(due)
-        if not times:
+        due, oldest = self._outbox.due(), next(iter(self._sent.values()), None)
+        if oldest is not None and (due is None or oldest.at + ACKNOWLEDGED_WITHIN < due):
+            due = oldest.at + ACKNOWLEDGED_WITHIN
+        if due is None:
             return
         # One that comes too soon finds that out and is set anew: cheaper than to move it with every message.
         if self._alarm is not None:
-            if self._alarm.when() <= min(times):
+            if self._alarm.when() <= due:
                 return
             self._alarm.cancel()
-        self._alarm = asyncio.get_running_loop().call_at(min(times), self._alarmed)
+        self._alarm = asyncio.get_running_loop().call_at(due, self._alarmed)
 
     def _alarmed(self) -> None:
         self._alarm = None

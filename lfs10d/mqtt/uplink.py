@@ -198,16 +198,15 @@ class Uplink:
 
     def publish(self, publications: Iterable[Publication]) -> None:
         """Send these, or keep them while the broker is away."""
-        now = asyncio.get_running_loop().time()
-        shift = self._shift(now)
-        losses, dropped = self._outbox.backlog.losses, self._outbox.dropped
+        now, backlog = asyncio.get_running_loop().time(), self._outbox.backlog
+        shift, dropped = self._shift(now), backlog.losses.total
         for publication in publications:
             self._outbox.add(publication, now, shift=shift)
-        if losses.total > dropped and not self._drop_told:
+        if backlog.losses.total > dropped and not self._drop_told:
             self._drop_told = True
             log.warning("more samples wait for the broker than there is room for: the oldest are dropped")
         self._sender.wake()
-        if self._outbox.backlog.spill.away or self._outbox.backlog.spill.due() is not None:
+        if backlog.spill.away or (backlog.history.count and backlog.spill.due() is not None):
             self._poke()
 
     def respond(self, topic: str, payload: telemetry.Payload, correlation: bytes | None = None) -> None:
@@ -268,7 +267,8 @@ class Uplink:
                 self._events.on_announced()
                 self.discovery.begin(self._client.connection)
             self._clear_if_out()
-        self._clean_exit.on_progress()
+        if self._leaving:
+            self._clean_exit.on_progress()
 
     def subscribed(self, mid: int, reasons: tuple[int, ...]) -> None:
         """Report a refused subscription."""

@@ -38,6 +38,8 @@ class Congestion:
     """The rule above."""
 
     def __init__(self) -> None:
+        self.lasts = False
+        """Too little was carried in so many periods that `report` has something to say."""
         self._round_trip = 0.0
         self._period: int | None = None
         self._in_a_row = 0
@@ -48,6 +50,7 @@ class Congestion:
         self._round_trip = 0.0
         self._period = None
         self._in_a_row = 0
+        self.lasts = False
 
     def answered(self, seconds: float) -> None:
         """Take the time from a message to its acknowledgement."""
@@ -62,11 +65,12 @@ class Congestion:
         if period == self._period:
             return
         self._in_a_row = self._in_a_row + 1 if self._period == period - 1 else 1
+        self.lasts = self._in_a_row >= PERIODS
         self._period = period
 
     def report(self, now: float, window: int) -> Congested | None:
         """Return once what the window carries, if it carries too little."""
-        if self._in_a_row < PERIODS or not self._round_trip or now - self._reported_at < REPORTED_EVERY:
+        if not (self.lasts and self._round_trip) or now - self._reported_at < REPORTED_EVERY:
             return None
         self._reported_at = now
         return Congested(self._round_trip, window)

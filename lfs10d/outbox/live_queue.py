@@ -6,7 +6,6 @@ A device that is polled often delays no other: each waits for at most one sample
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
 
 from lfs10d.outbox.items import LiveSample
 from lfs10d.system.clock_step import ClockState
@@ -29,7 +28,11 @@ class LiveQueue:
     def add(self, live: LiveSample) -> None:
         """Put a new sample behind those of its device."""
         self.waiting[live] = None
-        self._devices.setdefault(live.queued.sample.device, deque()).append(live)
+        device = live.queued.sample.device
+        if device in self._devices:
+            self._devices[device].append(live)
+        else:
+            self._devices[device] = deque((live,))
 
     def put_back(self, live: LiveSample) -> None:
         """Put a sample that did not arrive before all others."""
@@ -69,11 +72,16 @@ class LiveQueue:
         live = self.oldest()
         return None if live is None else live.queued.since + LIVE_FOR
 
-    def take_old(self, now: float) -> Iterator[LiveSample]:
+    def take_old(self, now: float) -> list[LiveSample]:
         """Take the samples that are history by now."""
-        while (live := self.oldest()) is not None and now - live.queued.since > LIVE_FOR:
+        old = []
+        for live in self.waiting:
+            if now - live.queued.since <= LIVE_FOR:
+                break
+            old.append(live)
+        for _ in old:
             self.take_oldest()
-            yield live
+        return old
 
     def correct(self, shift: int, clock: ClockState = "synced") -> None:
         """Give all the time that the clock tells now, as `QueuedSample.at` does; the turns stay."""

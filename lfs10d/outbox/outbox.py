@@ -39,7 +39,7 @@ from lfs10d.outbox.backlog import BATCH_MOST, Backlog
 from lfs10d.outbox.congestion import Congested, Congestion
 from lfs10d.outbox.history import QueuedSample
 from lfs10d.outbox.in_flight import InFlight
-from lfs10d.outbox.items import HistoryBatch, LiveSample, LossNotice, Message, OutboxItem, Retained
+from lfs10d.outbox.items import HistoryBatch, LiveSample, Message, OutboxItem, Retained
 from lfs10d.outbox.last_message import LastMessage
 from lfs10d.outbox.queues import Queues
 from lfs10d.outbox.refusals import Refusals
@@ -159,7 +159,8 @@ class Outbox:
             return None
         if self._refusals.topics:
             self._queues.lift_due(now)
-        self._repeat(now)
+        if self.backlog.repeat(now):
+            self._make_room()
         self.age(now)
         item = self._queues.next(now, batch=batch)
         return None if item is None else self._in_flight.begin(item, now)
@@ -180,15 +181,17 @@ class Outbox:
     def on_ack(self, item: OutboxItem, now: float, *, nobody_listens: bool = False) -> None:
         """Note that the broker has it; `nobody_listens`: it said that no subscription matches."""
         since = self._over(item)
-        self._refusals.accepted(item.topic)
-        if isinstance(item, LiveSample | HistoryBatch | LossNotice):
+        if self._refusals.reported:
+            self._refusals.accepted(item.topic)
+        if not isinstance(item, (Retained, Message)):
             self._congestion.answered(now - since)
-            self._repeat(now)
+            if self.backlog.repeat(now):
+                self._make_room()
             self.backlog.on_ack(item, now, nobody_listens=nobody_listens)
 
     def congested(self, now: float) -> Congested | None:
         """Return once what the window carries, where that is less than what is published."""
-        return self._congestion.report(now, self._in_flight.window)
+        return self._congestion.report(now, self._in_flight.window) if self._congestion.lasts else None
 
     def refused(self, item: OutboxItem, reason: int, now: float) -> bool:
         """Note that the broker refused it, not as `UNFIT` (`refusals`); return True if its topic is to be reported."""
@@ -232,13 +235,9 @@ class Outbox:
             self._last_message.note(item)
         if isinstance(item, Retained):
             self._queues.retained.over(item)
-        elif isinstance(item, HistoryBatch | LossNotice):
+        elif not isinstance(item, (LiveSample, Message)):
             self.backlog.over(item)
         return since
-
-    def _repeat(self, now: float) -> None:
-        if self.backlog.repeat(now):
-            self._make_room()
 
     # What waits
 
@@ -295,13 +294,15 @@ class Outbox:
 
     def age(self, now: float) -> None:
         """Let live samples that are too old for it wait with the backlog."""
-        for live in self._queues.live.take_old(now) if self._queues.live.waiting else ():
+        lives = self._queues.live
+        for live in lives.take_old(now) if lives.waiting else ():
             self.backlog.history.add(live.queued)
             self._displaced(now)
 
     def _make_room(self) -> None:
         history, lives = self.backlog.history, self._queues.live
-        if len(lives) + len(self.backlog) + BATCH_MOST * len(self._in_flight) <= self._capacity:
+        waiting = len(lives.waiting) + history.count + len(self.backlog.spill.samples)
+        if waiting + BATCH_MOST * len(self._in_flight) <= self._capacity:
             return  # there is room whatever is under way
         while self._in_memory() > self._capacity and (history or lives):
             live = None if history else lives.take_oldest()

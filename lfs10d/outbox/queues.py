@@ -73,7 +73,9 @@ class Queues:
     def next(self, now: float, *, batch: bool) -> OutboxItem | None:
         """Take what goes next, None where nothing may; no history unless `batch`."""
         self._now = now
-        if self._keeps_back(now):
+        if self.retained.last is None:
+            self._burst_until = None
+        elif self._keeps_back(now):
             retained = self.retained.next_change(self._refused)
             if retained is not None or self.retained.last is not None:
                 return retained
@@ -90,23 +92,25 @@ class Queues:
 
     def _waiting(self, *, batch: bool) -> list[int]:
         """Return the classes that hold something, in order; no history unless `batch`."""
-        retained, messages = self.retained, self.messages
-        held = {
-            CHANGES: retained.changes or retained.last,
-            MESSAGES: messages.messages,
-            LIVE: self.live.waiting,
-            HISTORY: batch and self.backlog.waits,
-            REFRESHES: retained.refreshes,
-            TRACES: messages.traces,
-            CLEARINGS: retained.clearings,
-        }
-        return [number for number, some in held.items() if some]
+        retained, messages, waiting = self.retained, self.messages, []
+        if retained.changes or retained.last is not None:
+            waiting.append(CHANGES)
+        if messages.messages:
+            waiting.append(MESSAGES)
+        if self.live.waiting:
+            waiting.append(LIVE)
+        if batch and self.backlog.waits:
+            waiting.append(HISTORY)
+        if retained.refreshes:
+            waiting.append(REFRESHES)
+        if messages.traces:
+            waiting.append(TRACES)
+        if retained.clearings:
+            waiting.append(CLEARINGS)
+        return waiting
 
     def _keeps_back(self, now: float) -> bool:
-        """Tell whether nothing but the burst may go now."""
-        if self.retained.last is None:
-            self._burst_until = None
-            return False
+        """Tell whether nothing but the burst may go now, whose `last` waits."""
         if self._burst_until is None:
             self._burst_until = now + BURST_FIRST
         return now < self._burst_until
@@ -123,7 +127,9 @@ class Queues:
 
     def __bool__(self) -> bool:
         """Tell whether anything but the backlog waits."""
-        return bool(self.live.waiting or self.retained or self.messages)
+        retained, messages = self.retained, self.messages
+        waiting = self.live.waiting or retained.changes or retained.refreshes or retained.clearings
+        return bool(waiting or retained.last or messages.messages or messages.traces)
 
     def due(self) -> float | None:
         """Return when `next` may have something though nothing happens before; None: not by time alone."""

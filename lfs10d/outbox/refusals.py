@@ -58,7 +58,8 @@ class Refusals:
         self._until: dict[str, float] = {}
         self._delay: dict[str, float] = {}
         self._bans: dict[str, float] = {}
-        self._reported: set[str] = set()
+        self.reported: set[str] = set()
+        """Topics of which a refusal was reported and that nothing was accepted on since."""
         self._unfit: set[str] = set()
 
     def refused(self, topic: str, reason: int, now: float) -> bool:
@@ -70,9 +71,9 @@ class Refusals:
         else:
             self._until[topic] = _NEXT_CONNECT
         self.topics.add(topic)
-        if topic in self._reported:
+        if topic in self.reported:
             return False
-        self._reported.add(topic)
+        self.reported.add(topic)
         return True
 
     def unfit(self, topic: str) -> bool:
@@ -88,9 +89,8 @@ class Refusals:
 
     def accepted(self, topic: str) -> None:
         """Note that the broker took a message of a topic."""
-        if self._reported:
-            self._reported.discard(topic)
-            self._delay.pop(topic, None)
+        self.reported.discard(topic)
+        self._delay.pop(topic, None)
 
     def lift(self, now: float) -> frozenset[str]:
         """Return the topics whose time is over; they are passed over no longer."""
@@ -109,7 +109,7 @@ class Refusals:
         """Forget everything; return the topics that were passed over."""
         self._delay.clear()
         self._bans.clear()
-        self._reported.clear()
+        self.reported.clear()
         self._unfit.clear()
         return self.connected(now)
 

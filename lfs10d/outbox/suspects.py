@@ -34,20 +34,21 @@ class Suspects:
     def __init__(self) -> None:
         self.alone = False
         """Some go alone."""
-        self._sizes: dict[str, int] = {}
+        self.sizes: dict[str, int] = {}
+        """Bytes of the messages suspected, by topic."""
 
     def goes_alone(self, topic: str) -> bool:
         """Tell whether a message of this topic may only be sent while nothing else is under way."""
-        return self.alone and topic in self._sizes
+        return self.alone and topic in self.sizes
 
     def explain(self, sent: Mapping[str, int]) -> bool:
         """Tell whether one of these was under way at the last end too: then a message may be why."""
-        return not self._sizes.keys().isdisjoint(sent)
+        return not self.sizes.keys().isdisjoint(sent)
 
     def ended(self, sent: Mapping[str, int], *, certain: bool) -> Culprit | None:
         """Note that the broker ended the connection while these (topic -> size) were under way."""
-        again = {topic: size for topic, size in sent.items() if topic in self._sizes}
-        self._sizes = again or dict(sent)
+        again = {topic: size for topic, size in sent.items() if topic in self.sizes}
+        self.sizes = again or dict(sent)
         self.alone = bool(again) or certain
         if len(again) != 1:
             return None
@@ -56,10 +57,10 @@ class Suspects:
 
     def cut(self, culprit: Culprit) -> None:
         """Note that what is sent on the culprit's topic is half as large from now on."""
-        self._sizes[culprit.topic] = culprit.size // 2
+        self.sizes[culprit.topic] = culprit.size // 2
 
     def acknowledged(self, topic: str, size: int) -> None:
         """Note that the broker has taken a message of `size` bytes."""
-        if self._sizes and size >= ABOUT_AS_LARGE * self._sizes.get(topic, float("inf")):
-            del self._sizes[topic]
-            self.alone = self.alone and bool(self._sizes)
+        if size >= ABOUT_AS_LARGE * self.sizes.get(topic, float("inf")):
+            del self.sizes[topic]
+            self.alone = self.alone and bool(self.sizes)

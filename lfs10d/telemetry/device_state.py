@@ -8,8 +8,8 @@ Rules
    before the state of such a reading and after a bad one. A partial reading clears the device's error as a good one
    does.
 3. The state shows the newest sample at most every `state_every`, but a change of quality or error at once, and of
-   `errors`: another value that is missing, or another reason. Where samples come no more often than states may, states
-   fall into step with them: one message in place of two, and none shows a sample that the next has overtaken.
+   `errors`: another value that is missing, or another reason. It goes with the first sample whose time that is, so that
+   none shows a sample that the next is about to overtake; by itself only where that sample does not come.
 4. Before its first sample a device's state has no value and the error `starting` (a disabled one `disabled`), which
    is never in its error topic.
 5. A disabled device has one sample that says so, and then none but those of polls that a request wants; of these
@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from math import inf
 from typing import Final
 
 from lfs10d.reading import NOTHING, PORT_CODES, AnsweredTwice, FaultCode, Reading
@@ -48,9 +49,6 @@ STATE_EARLY: Final = 0.03
 """Seconds that a state may come before its time (the next one then waits as much longer): otherwise a device polled
 every second would miss its turn by the jitter of its polls, or by `mqtt.hold`, and be shown late each time."""
 
-OUT_OF_STEP: Final = 0.1
-"""Seconds before the time of a state from which on its sample is not merely early, but out of step with the states."""
-
 SAMPLE_LATE: Final = 0.25
 """Seconds after its time for which a sample is waited for that a state is to go with."""
 
@@ -67,6 +65,7 @@ class DeviceState:
         "_line",
         "_payload",
         "_sample",
+        "_sampled",
         "_state_from",
         "_telemetry",
         "_topics",
@@ -91,6 +90,7 @@ class DeviceState:
         self._counters = DeviceCounters(info.response_timeout, info.request_gap)
         self._last_good: float | None = None
         self._state_from = now.mono
+        self._sampled = -inf
         code = FaultCode.STARTING if info.enabled else FaultCode.DISABLED
         self._sample = replace(self._form(0, now.ts(), now), error=code.value)
         self._payload = self._sample.payload(line)
@@ -241,8 +241,8 @@ class DeviceState:
 
     def _show(self, sample: Sample, now: Instant, *, online: bool) -> list[Publication]:
         """Publish a sample, and the state and availability as far as they change by it."""
-        shown = self._sample
-        self._sample = sample
+        shown, apart = self._sample, now.mono - self._sampled
+        self._sample, self._sampled = sample, now.mono
         self._payload = sample.payload(self._line)
         published = [self._telling(sample, self._payload)]
         turned, self.online = online is not self.online, online
@@ -253,20 +253,12 @@ class DeviceState:
         elif now.mono >= self._state_from - STATE_EARLY:
             published.append(self._state(now, refresh=True))
         else:
-            self.state_due = self._falls_into_step(now) or self._state_from
+            self.state_due = self._state_from
+            if apart <= self.info.state_every + SAMPLE_LATE:  # else the next sample is too far off to wait for
+                self.state_due = max(self._state_from, now.mono + apart + SAMPLE_LATE)
         if turned and not online:
             published.append(self._availability())
         return published
-
-    def _falls_into_step(self, now: Instant) -> float | None:
-        """Return until when the state waits for the next sample, to go with each one from then on; None: it does not.
-
-        It does where that makes it later once, by `state_every` at most.
-        """
-        interval, early = self.info.interval, self._state_from - now.mono
-        if early < OUT_OF_STEP or not self.info.state_every <= interval <= self.info.state_every + early:
-            return None
-        return now.mono + interval + SAMPLE_LATE
 
     def _telling(self, sample: Sample, payload: dict[str, object]) -> Publication:
         return Publication(self._telemetry, payload, PublicationKind.SAMPLE, retain=False, qos=1, sample=sample)

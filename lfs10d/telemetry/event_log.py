@@ -41,8 +41,15 @@ class EventLog:
         self._missing: set[tuple[str, str, FaultCode]] = set()
         """Device, value and reason of those missing values that were reported."""
 
-    def on_event(self, event: Event, *, port: str, notices: Sequence[str], frames: bool) -> list[LogEntry]:
-        """Return the log entries of one event of the line thread; exchanges only where `frames` are wanted.
+    def on_exchange(self, exchanged: Exchanged) -> list[LogEntry]:
+        """Return the log entry that shows the frames of an exchange."""
+        heard = exchanged.heard.hex(" ") or "nothing"
+        fault = f": {exchanged.fault}" if exchanged.fault else ""
+        text = f"slave {exchanged.slave}: sent {exchanged.sent.hex(' ')}, received {heard}{fault}"
+        return [LogEntry(logging.DEBUG, text)]
+
+    def on_event(self, event: Event, *, port: str, notices: Sequence[str]) -> list[LogEntry]:
+        """Return the log entries of one event of the line thread that is no exchange.
 
         `port` is the path, `notices` are warnings about the port that was opened.
         """
@@ -57,12 +64,6 @@ class EventLog:
             ]
         if isinstance(event, Reading) and (event.gap_learned or event.value_errors):
             return [*self._learned_rest(event), *self._missing_values(event)]
-        if frames and isinstance(event, Exchanged):
-            heard = event.heard.hex(" ") or "nothing"
-            fault = f": {event.fault}" if event.fault else ""
-            return [
-                LogEntry(logging.DEBUG, f"slave {event.slave}: sent {event.sent.hex(' ')}, received {heard}{fault}")
-            ]
         return []
 
     def _learned_rest(self, reading: Reading) -> list[LogEntry]:
@@ -94,8 +95,10 @@ class EventLog:
         entries: list[LogEntry] = []
         good: set[str] = set()
         for publication in publications:
-            if publication.sample is not None and publication.sample.quality != "bad":
-                good.add(publication.sample.device)
+            if publication.sample is not None:
+                if publication.sample.quality != "bad":
+                    good.add(publication.sample.device)
+                continue
             device = device_of(publication.topic, ERROR)
             if device is None:
                 continue

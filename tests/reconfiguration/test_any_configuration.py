@@ -25,7 +25,7 @@ from lfs10d.mqtt.publisher import Publisher
 from lfs10d.mqtt.topics import Topics
 from lfs10d.mqtt.uplink import Uplink
 from lfs10d.profiles.library import load_profile
-from lfs10d.reading import Event
+from lfs10d.reading import Event, Exchanged, Reading
 from lfs10d.simulator.blueprint import blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.system.clock import Clock, Instant
@@ -137,7 +137,11 @@ class Whole(Life):
         super()._heard(events)
         for event in events:
             now = self.clock.now()
-            self.access.on_event(event, self.publisher.on_event(event, now), now)
+            known = self.publisher.on_event(event, now)
+            if isinstance(event, Exchanged):
+                self.access.on_exchange(event, now)
+            elif isinstance(event, Reading):
+                self.access.on_reading(event, known)
 
     async def apply(self, plan: ReloadPlan, before: Effective) -> None:
         now = self.running.now

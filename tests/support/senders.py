@@ -52,6 +52,8 @@ class Wire:
     sent: list[tuple[str, bytes, int, bool, bytes | None]] = field(default_factory=list)
     gone: bool = False
     corked: bool = False
+    alone: bool = False
+    """A message went without cork in this turn: none may follow."""
 
     def cork(self, *, on: bool) -> None:
         self.corked = on
@@ -61,9 +63,16 @@ class Wire:
     ) -> int | None:
         if self.gone:
             return None
-        assert self.corked or topic.endswith("/history"), "what goes in one turn goes by one segment"
+        if not topic.endswith("/history"):  # each of those has a turn of its own
+            assert not self.alone, "what goes in one turn goes by one segment"
+            self.alone = not self.corked
+            asyncio.get_running_loop().call_soon(self.turned)
         self.sent.append((topic, payload, qos, retain, correlation))
         return len(self.sent)
+
+    def turned(self) -> None:
+        """Begin another turn."""
+        self.alone = False
 
 
 class Desk:
@@ -96,6 +105,7 @@ class Desk:
     def acknowledge(self, reason: int = 0) -> None:
         """Answer everything that was handed over."""
         for mid in range(1, len(self.wire.sent) + 1):
+            self.wire.turned()
             self.sender.acknowledged(mid, reason)
 
     def accept(self, topic: str) -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from lfs10d.reading import Fault, FaultCode
-from lfs10d.telemetry.device_state import OUT_OF_STEP, SAMPLE_LATE, STATE_EARLY
+from lfs10d.telemetry.device_state import SAMPLE_LATE, STATE_EARLY
 from lfs10d.telemetry.info import DeviceInfo
 from lfs10d.telemetry.publication import STATE
 from tests.support.device_states import FACTS, REFUSED, TIMEOUT, Watched, fields, instant
@@ -79,48 +79,53 @@ def test_a_state_just_at_its_early_time_is_shown() -> None:
     assert "state" in watched.poll(1.0 - STATE_EARLY, 2.0)
 
 
-def polled_every(interval: float) -> Watched:
-    """Return a device whose last state came at 0, as after a burst."""
+def polled_every(period: float) -> Watched:
+    """Return a device polled at 0, with a burst of all topics shortly before its next poll."""
     watched = Watched()
-    watched.device.reconfigure(replace(FACTS, interval=interval), instant(0))
     watched.poll(0, 1.0)
+    watched.device.burst(instant(0.9 * period))
     return watched
 
 
-def test_states_fall_into_step_with_samples_that_are_as_rare() -> None:
+def test_a_state_goes_with_the_first_sample_whose_time_it_is() -> None:
     watched = polled_every(1.0)
-    assert watched.poll(0.4, 2.0) == ["telemetry"]
-    assert watched.device.due_state(instant(1.0)) is None  # the next sample, at 1.4, shows more
-    assert [watched.poll(0.4 + second, 3.0) for second in range(1, 20)] == [["telemetry", "state"]] * 19
+    assert watched.poll(1.0, 2.0) == ["telemetry"]
+    assert watched.device.due_state(instant(1.9)) is None  # the next sample shows more
+    assert [watched.poll(1.0 + second, 3.0) for second in range(1, 20)] == [["telemetry", "state"]] * 19
+
+
+def test_flat_out_a_state_goes_with_a_sample_too() -> None:
+    watched = Watched()
+    watched.poll(0, 1.0)
+    shown = []
+    for number in range(1, 21):
+        at = number * 0.85
+        assert watched.device.due_state(instant(at)) is None
+        shown.append(STATE in watched.poll(at, 1.0 + number))
+    assert shown == [False, True] * 10
 
 
 def test_a_state_that_waits_for_a_sample_in_vain_shows_the_one_before() -> None:
     watched = polled_every(1.0)
-    watched.poll(0.4, 2.0)
-    due = watched.device.state_due
-    assert due == pytest.approx(1.4 + SAMPLE_LATE)
+    watched.poll(1.0, 2.0)
+    due = 2.0 + SAMPLE_LATE
+    assert watched.device.state_due == due
+    assert watched.device.due_state(instant(due - 0.001)) is None
     state = watched.device.due_state(instant(due))
     assert state is not None
     assert fields(state.payload, "wind_speed", "seq") == (2.0, 2)
 
 
-@pytest.mark.parametrize("interval", [0.5, 1.7, 10.0])
-def test_a_state_does_not_wait_for_a_sample_that_comes_sooner_or_much_later(interval: float) -> None:
-    watched = polled_every(interval)
-    watched.poll(0.4, 2.0)
-    assert watched.device.state_due == 1.0
-
-
-def test_a_sample_that_is_merely_early_is_shown_at_the_time_of_the_state() -> None:
-    watched = polled_every(1.0)
-    watched.poll(1.01 - OUT_OF_STEP, 2.0)
-    assert watched.device.state_due == 1.0
+def test_a_state_does_not_wait_for_a_sample_that_is_far_off() -> None:
+    watched = polled_every(10.0)
+    assert watched.poll(9.5, 2.0) == ["telemetry"]
+    assert watched.device.state_due == 10.0
 
 
 def test_a_fault_is_shown_at_once_while_a_state_waits_for_a_sample() -> None:
     watched = polled_every(1.0)
-    watched.poll(0.4, 2.0)
-    assert STATE in watched.poll(0.5, TIMEOUT)
+    watched.poll(1.0, 2.0)
+    assert STATE in watched.poll(1.1, TIMEOUT)
     assert watched.device.state_due is None
 
 

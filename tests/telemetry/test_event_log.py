@@ -78,10 +78,10 @@ def test_the_port_is_told_with_what_one_should_know_of_it() -> None:
     log = EventLog()
 
     lost = PortChanged(0.0, Fault(FaultCode.PORT_LOST, f"{PORT}: hung up"))
-    assert log.on_event(lost, port=PORT, notices=(), frames=False) == [
+    assert log.on_event(lost, port=PORT, notices=()) == [
         (logging.WARNING, f"{PORT}: hung up; tried again until it is back")
     ]
-    assert log.on_event(PortChanged(0.0, None), port=PORT, notices=("no RS485 mode",), frames=False) == [
+    assert log.on_event(PortChanged(0.0, None), port=PORT, notices=("no RS485 mode",)) == [
         (logging.INFO, f"{PORT}: the port is open"),
         (logging.WARNING, "no RS485 mode"),
     ]
@@ -89,7 +89,7 @@ def test_the_port_is_told_with_what_one_should_know_of_it() -> None:
 
 def test_a_port_that_is_freed_on_request_is_no_warning() -> None:
     freed = PortChanged(0.0, Fault(FaultCode.PORT_LOST, "freed"), freed=True)
-    told = EventLog().on_event(freed, port=PORT, notices=(), frames=False)
+    told = EventLog().on_event(freed, port=PORT, notices=())
     assert told == [(logging.INFO, f"{PORT}: freed for another program")]
 
 
@@ -100,15 +100,12 @@ def test_a_port_that_is_freed_on_request_is_no_warning() -> None:
         (b"", None, "slave 1: sent 01 03 00, received nothing"),
     ],
 )
-def test_frames_are_told_at_debug_where_they_are_wanted(heard: bytes, fault: FaultCode | None, words: str) -> None:
+def test_frames_of_an_exchange_are_told_at_debug(heard: bytes, fault: FaultCode | None, words: str) -> None:
     happened = Exchanged(
         at=1.0, asked=0.0, began=0.1, gap=0.004, slave=1, purpose=Purpose.POLL, fault=fault, sent=b"\x01\x03\x00",
         heard=heard,
     )  # fmt: skip
-    log = EventLog()
-
-    assert log.on_event(happened, port=PORT, notices=(), frames=True) == [(logging.DEBUG, words)]
-    assert not log.on_event(happened, port=PORT, notices=(), frames=False)
+    assert EventLog().on_exchange(happened) == [(logging.DEBUG, words)]
 
 
 def test_a_learned_rest_is_told_once_with_what_to_set() -> None:
@@ -117,7 +114,7 @@ def test_a_learned_rest_is_told_once_with_what_to_set() -> None:
     rested = replace(plain, request_gap=0.4, gap_learned=True)
 
     def told(reading: Reading) -> list[tuple[int, str]]:
-        return [*log.on_event(reading, port=PORT, notices=(), frames=False)]
+        return [*log.on_event(reading, port=PORT, notices=())]
 
     assert not told(plain)
     ((level, text),) = told(rested)
@@ -137,7 +134,7 @@ def test_a_value_that_is_missing_is_told_once_for_each_reason() -> None:
     partial = replace(usual, value_errors=errors)
 
     def told(reading: Reading) -> list[tuple[int, str]]:
-        return [*log.on_event(reading, port=PORT, notices=(), frames=False)]
+        return [*log.on_event(reading, port=PORT, notices=())]
 
     assert told(partial) == [
         (logging.INFO, "mast: rain has no value, the others go on: exception, the device refuses it (logged once)"),

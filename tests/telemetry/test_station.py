@@ -211,7 +211,7 @@ def test_statistics_tell_what_waits_for_the_broker() -> None:
 
 
 def test_a_state_that_waits_is_published_when_its_time_comes() -> None:
-    running = station(replace(ONE_VALUE, interval=0.25), replace(TWO_VALUES, interval=0.1))
+    running = station()
     for at in (1.0, 1.25, 1.5):
         running.on_event(good("a", at), instant(at))
     running.on_event(good("b", 1.6), instant(1.6))
