@@ -105,7 +105,8 @@ class Pump:
         finally:
             self.reading = False
         self._read()
-        self.watch_writing()
+        if self._client.want_write() is not self._writing:
+            self.watch_writing()
 
     def _writable(self) -> None:
         self._client.loop_write()

@@ -187,12 +187,13 @@ class Sender:
     def _send_some(self) -> None:
         self._turn = None
         self._sending = True
-        items, emptied = self._take_some()
+        now = self._now()
+        items, emptied = self._take_some(now)
         connection = self._connection if len(items) > 1 else None  # one alone needs no cork
         if connection is not None:
             connection.cork(on=True)
         for item in items:
-            self._send_encoded(item)
+            self._send_encoded(item, now)
         if connection is not None:
             connection.cork(on=False)
         self._sending = False
@@ -201,10 +202,9 @@ class Sender:
         else:
             self._turn = asyncio.get_running_loop().call_soon(self._send_some)
 
-    def _take_some(self) -> tuple[list[Retained | Message | LiveSample | LossNotice], bool]:
+    def _take_some(self, now: float) -> tuple[list[Retained | Message | LiveSample | LossNotice], bool]:
         """Take up to `ITEMS_AT_ONCE`; return those to be sent now, and whether nothing more may go then."""
         items: list[Retained | Message | LiveSample | LossNotice] = []
-        now = self._now()
         for _ in range(ITEMS_AT_ONCE):
             item = self._outbox.next(now, batch=self._assembly is None)
             if item is None:
@@ -217,7 +217,7 @@ class Sender:
                 items.append(item)
         return items, False
 
-    def _send_encoded(self, item: Retained | Message | LiveSample | LossNotice) -> None:
+    def _send_encoded(self, item: Retained | Message | LiveSample | LossNotice, now: float) -> None:
         if isinstance(item, LossNotice):
             loss = item.loss
             payload = publication.dropped(
@@ -230,7 +230,7 @@ class Sender:
         except (TypeError, ValueError) as error:
             self._unfit(item, f"cannot be written as JSON: {error}")
         else:
-            self._send(item, encoded)
+            self._send(item, encoded, now)
 
     def _encode(self, payload: publication.Payload) -> bytes:
         """Return the bytes of a payload: a sample and the state that shows it are one object, and encoded once."""
@@ -246,11 +246,11 @@ class Sender:
             assembly.batch = self._outbox.shorten(assembly.batch, count)
         if assembly.complete:
             self._assembly = None
-            self._send(assembly.batch, assembly.payload)
+            self._send(assembly.batch, assembly.payload, self._now())
         else:
             asyncio.get_running_loop().call_soon(self._assemble, assembly)
 
-    def _send(self, item: OutboxItem, payload: bytes) -> None:
+    def _send(self, item: OutboxItem, payload: bytes, now: float) -> None:
         if self._connection is None or self._accepted is None:
             return
         topic = self._topics.full(item.topic)
@@ -270,7 +270,7 @@ class Sender:
         mid = self._connection.publish(topic, payload, qos=qos, retain=retain, correlation=correlation)
         if mid is not None:  # else it is under way until `lost`, which follows
             self._number += 1
-            self._sent[mid] = _Sent(item, self._now(), len(payload), qos, self._number)
+            self._sent[mid] = _Sent(item, now, len(payload), qos, self._number)
 
     def _unfit(self, item: OutboxItem, why: str) -> None:
         if self._outbox.unfit(item):

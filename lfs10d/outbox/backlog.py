@@ -62,10 +62,11 @@ class Backlog:
         self._window = 1
         self._turn_at = 0.0
         self._under_way: dict[HistoryBatch | LossNotice, None] = {}
-        self._recent = RecentAcks(capacity=capacity, detection=detection)
+        self.recent = RecentAcks(capacity=capacity, detection=detection)
+        """What was acknowledged lately."""
         self.history = History()
         """What waits in memory."""
-        self.spill = Spill(self.history, self._recent, capacity)
+        self.spill = Spill(self.history, self.recent, capacity)
         """What of it goes to the store."""
         self.spool = Spool()
         """What waits in the store."""
@@ -89,13 +90,13 @@ class Backlog:
     def lost(self, now: float) -> None:
         """Note that it is gone; what was under way is put back by the outbox."""
         self.spill.lost(now)
-        self._recent.lost(now)
+        self.recent.lost(now)
         self._under_way.clear()
         self.spool.rewind()
 
     def on_clean_exit(self) -> None:
         """Note a clean exit from a broker that has acknowledged everything: nothing is sent to it a second time."""
-        self._recent.on_clean_exit()
+        self.recent.on_clean_exit()
         self.spool.release_all()
 
     # What goes
@@ -103,7 +104,7 @@ class Backlog:
     @property
     def waits(self) -> bool:
         """`next` may have something, now or later; False: nothing of it is in memory."""
-        recent = self._recent
+        recent = self.recent
         waiting = self.history.count or self.spool.page.count or self.losses.waiting
         return bool(waiting or recent.repeat or recent.without_listener)
 
@@ -159,17 +160,17 @@ class Backlog:
         self.spool.read_again(row for row in under_way if row is not None)
 
     def repeat(self, now: float) -> bool:
-        """Once the backlog is open, let what rule 2 says wait once more; return True if it does."""
-        if not (self._recent.repeat or self._recent.without_listener) or now < self._open_from:
+        """Once the backlog is open, let what is `recent` by rule 2 wait once more; return True if it does."""
+        if now < self._open_from:
             return False
-        self.history.extend(self._recent.again())
+        self.history.extend(self.recent.again())
         return True
 
     def due(self, refused: AbstractSet[str]) -> float | None:
         """Return when `next` may have something though nothing happens before; None: not by time alone."""
         declared = self.losses.due() if publication.EVENT not in refused and not self._notifying else None
         times = [] if declared is None else [declared]
-        in_memory = not self.spool.more and (self._recent.waiting or self.history.waits(self._passed_over(refused)))
+        in_memory = not self.spool.more and (self.recent.waiting or self.history.waits(self._passed_over(refused)))
         if self.spool.page or in_memory:
             times.append(max(self._batch_at, self._free_at))
         return max(self._open_from, min(times)) if times else None
@@ -184,7 +185,7 @@ class Backlog:
         """Note that the broker has it; `nobody_listens`: it said that no subscription matches."""
         without_listener = nobody_listens and now < self._open_from
         if isinstance(item, LiveSample):
-            self._recent.add((item.queued,), now, without_listener=without_listener)
+            self.recent.add((item.queued,), now, without_listener=without_listener)
         elif isinstance(item, HistoryBatch):
             if self.drain.on_ack(now):
                 self.drain.look(now, len(self) + self.spool.depth)
@@ -192,7 +193,7 @@ class Backlog:
             if rows:
                 self.spool.on_ack(rows, now)
             else:
-                self._recent.add(item.samples, now, without_listener=without_listener)
+                self.recent.add(item.samples, now, without_listener=without_listener)
 
     def dead(self, item: OutboxItem) -> None:
         """Note that it will never be delivered."""

@@ -93,8 +93,10 @@ class Outbox:
         if publication.sample is not None:
             if publication.sample.grouped and not self.telemetry:
                 return
-            self.age(now)
-            self._queues.live.add(LiveSample(publication, QueuedSample(publication.sample, now, shift=shift)))
+            lives = self._queues.live
+            if lives.waiting:
+                self.age(now)
+            lives.add(LiveSample(publication, QueuedSample(publication.sample, now, shift=shift)))
             self._make_room()
         elif publication.kind is PublicationKind.RETAINED:
             if (connected or publication.payload is None) and self._queues.retained.add(publication):
@@ -159,9 +161,9 @@ class Outbox:
             return None
         if self._refusals.topics:
             self._queues.lift_due(now)
-        if self.backlog.repeat(now):
-            self._make_room()
-        self.age(now)
+        self._repeat(now)
+        if self._queues.live.waiting:
+            self.age(now)
         item = self._queues.next(now, batch=batch)
         return None if item is None else self._in_flight.begin(item, now)
 
@@ -170,7 +172,7 @@ class Outbox:
         """Something may go, now or later; False: nothing before something is added."""
         if self._last_message is not None:
             return not self._last_message.sent
-        return self._in_flight.alone is not None or bool(self._queues) or self.due() is not None
+        return self._in_flight.alone is not None or bool(self._queues) or self._queues.due() is not None
 
     def due(self) -> float | None:
         """Return when `next` may have something though nothing happens before; None: not by time alone."""
@@ -185,8 +187,7 @@ class Outbox:
             self._refusals.accepted(item.topic)
         if not isinstance(item, (Retained, Message)):
             self._congestion.answered(now - since)
-            if self.backlog.repeat(now):
-                self._make_room()
+            self._repeat(now)
             self.backlog.on_ack(item, now, nobody_listens=nobody_listens)
 
     def congested(self, now: float) -> Congested | None:
@@ -238,6 +239,11 @@ class Outbox:
         elif not isinstance(item, (LiveSample, Message)):
             self.backlog.over(item)
         return since
+
+    def _repeat(self, now: float) -> None:
+        recent = self.backlog.recent
+        if (recent.repeat or recent.without_listener) and self.backlog.repeat(now):
+            self._make_room()
 
     # What waits
 
@@ -294,8 +300,7 @@ class Outbox:
 
     def age(self, now: float) -> None:
         """Let live samples that are too old for it wait with the backlog."""
-        lives = self._queues.live
-        for live in lives.take_old(now) if lives.waiting else ():
+        for live in self._queues.live.take_old(now):
             self.backlog.history.add(live.queued)
             self._displaced(now)
 

@@ -45,13 +45,14 @@ class RetainedQueue:
         return replaced
 
     def _wait(self, item: Retained) -> None:
-        topic, queue = item.topic, self.changes
-        if item.publication.payload is None:
+        publication, queue = item.publication, self.changes
+        topic = publication.topic
+        if publication.payload is None:
             queue = self.clearings
-        elif item.publication.refresh and topic not in self.changes:
+        elif publication.refresh and topic not in self.changes:
             queue = self.refreshes
         for other in (self.changes, self.refreshes, self.clearings):
-            if other is not queue:
+            if other and other is not queue:
                 other.pop(topic, None)
         queue[topic] = item
 
