@@ -80,8 +80,6 @@ class Outbox:
             self.backlog.lifted()
         self.backlog.telemetry = telemetry
 
-    # What comes in
-
     def add(
         self, publication: Publication, now: float, *, correlation: bytes | None = None, shift: int | None = None
     ) -> None:
@@ -93,10 +91,9 @@ class Outbox:
         if publication.sample is not None:
             if publication.sample.grouped and not self.telemetry:
                 return
-            lives = self._queues.live
-            if lives.waiting:
+            if self._queues.live.waiting:
                 self.age(now)
-            lives.add(LiveSample(publication, QueuedSample(publication.sample, now, shift=shift)))
+            self._queues.live.add(LiveSample(publication, QueuedSample(publication.sample, now, shift=shift)))
             self._make_room()
         elif publication.kind is PublicationKind.RETAINED:
             if (connected or publication.payload is None) and self._queues.retained.add(publication):
@@ -121,8 +118,6 @@ class Outbox:
         self._last_message = LastMessage(Retained(last))
         return self._last_message
 
-    # What happens to the connection
-
     def connected(self, now: float, *, window: int = IN_FLIGHT_MOST) -> None:
         """Begin to send: at most `window` items under way at once. `burst` is to follow."""
         self._in_flight.window = window
@@ -144,8 +139,6 @@ class Outbox:
         for item in reversed(under_way):
             self._queues.put_back(item)
         self._make_room()
-
-    # What goes out
 
     def next(self, now: float, *, batch: bool = True) -> OutboxItem | None:
         """Take what goes next; it is under way until acknowledged, refused, unfit or lost. None: nothing goes now.
@@ -177,8 +170,6 @@ class Outbox:
     def due(self) -> float | None:
         """Return when `next` may have something though nothing happens before; None: not by time alone."""
         return None if self._in_flight.closed or self._last_message is not None else self._queues.due()
-
-    # What became of it
 
     def on_ack(self, item: OutboxItem, now: float, *, nobody_listens: bool = False) -> None:
         """Note that the broker has it; `nobody_listens`: it said that no subscription matches."""
@@ -245,8 +236,6 @@ class Outbox:
         if (recent.repeat or recent.without_listener) and self.backlog.repeat(now):
             self._make_room()
 
-    # What waits
-
     @property
     def announced(self) -> bool:
         """We are connected, and the burst and its `last` are acknowledged."""
@@ -260,8 +249,8 @@ class Outbox:
     @property
     def idle(self) -> bool:
         """Nothing is under way, and nothing but the backlog waits."""
-        waiting = self._queues
-        return not (self._in_flight or waiting.retained or waiting.messages.messages or waiting.live.waiting)
+        queues = self._queues
+        return not (self._in_flight or queues.retained or queues.messages.messages or queues.live.waiting)
 
     @property
     def under_way(self) -> tuple[OutboxItem, ...]:

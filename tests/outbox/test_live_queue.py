@@ -84,6 +84,8 @@ def test_samples_are_old_after_three_seconds() -> None:
     assert [told(each) for each in queue.take_old(4.1)] == [("a", 1)]
     oldest = queue.old_at
     assert oldest == 2.0 + LIVE_FOR
+    assert [told(each) for each in queue.take_old(9.0)] == [("a", 2)]
+    assert not queue.waiting
 
 
 @given(st.lists(st.one_of(st.sampled_from("abc"), st.none(), st.just(""))))

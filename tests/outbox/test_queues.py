@@ -55,6 +55,22 @@ def test_changes_messages_and_live_samples_go_before_history_until_the_window_wa
     assert isinstance(queues.next(0.0, batch=True), HistoryBatch)
 
 
+def test_refreshes_traces_and_what_clears_a_topic_go_last(waiting: Waiting) -> None:
+    queues, trace_line = waiting.queues, trace()
+    queues.retained.add(publication.retained("device/gone/state", None))
+    queues.messages.traces.append(trace_line)
+    queues.retained.add(publication.retained("device/a/state", {}, refresh=True))
+    assert queues
+    went = [queues.next(0.0, batch=True) for _ in range(3)]
+    assert [each.topic for each in went if each is not None] == [
+        "device/a/state",
+        trace_line.topic,
+        "device/gone/state",
+    ]
+    assert not queues
+    assert queues.next(0.0, batch=True) is None
+
+
 def test_when_all_has_gone_the_first_classes_go_before_the_others_again(waiting: Waiting) -> None:
     queues = waiting.queues
     queues.full()
