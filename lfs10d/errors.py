@@ -1,4 +1,4 @@
-"""Every error that can reach a person, with its policy.
+"""Every error that can reach a person, with its policy: exit code, retries, topic.
 
 ::
 
@@ -26,7 +26,7 @@ class Lfs10dError(Exception):
 
 @dataclass(frozen=True, slots=True, order=True)
 class Problem:
-    """One thing wrong in a file; `line` and `column` count from 1."""
+    """One error in a file; `line` and `column` count from 1."""
 
     file: str
     line: int
@@ -78,4 +78,4 @@ class StateError(Lfs10dError):
 
 
 class FailedError(Lfs10dError):
-    """The thing asked for failed; exit 1."""
+    """A verb could not do what was asked; exit 1."""

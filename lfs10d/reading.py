@@ -19,7 +19,7 @@ Value: TypeAlias = int | float | str | bool
 """The value of one quantity: a number, a text or word of its profile, or a boolean."""
 
 NOTHING: Final[Mapping[str, Never]] = MappingProxyType({})
-"""Nothing by name, one object for all who have nothing to tell."""
+"""An empty mapping, one object for all that need one."""
 
 
 class FaultCode(StrEnum):
@@ -61,12 +61,12 @@ LineFaultCode: TypeAlias = Literal[
     FaultCode.DUPLICATE_CLIENT,
     FaultCode.STORAGE_FULL,
 ]
-"""What can be an error of the line; while several are active the first of these is shown."""
+"""Errors of the line; while several are active the first of these is shown."""
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """Why an exchange or a poll failed; `message` is for people, `heard` what came instead.
+    """Why an exchange or a poll failed; `message` is for people, `heard` are the bytes that came instead.
 
     `busy`: by the device's profile the exception says that it is busy: no error, asked again later.
     """
@@ -110,7 +110,7 @@ class Reading:
 
 
 class Purpose(StrEnum):
-    """What an exchange was for."""
+    """The purpose of an exchange."""
 
     POLL = "poll"
     PROBE = "probe"
@@ -153,7 +153,7 @@ class UartCounters:
 
 @dataclass(frozen=True, slots=True)
 class PortChanged:
-    """The port was opened (`fault` None) or is lost, or is lost for another reason than before.
+    """The port was opened (`fault` None), or is lost, or lost for another reason than before.
 
     `freed`: nothing happened to it, we gave it back for a while.
     """
@@ -165,7 +165,7 @@ class PortChanged:
 
 @dataclass(frozen=True, slots=True)
 class UartCounted:
-    """The driver's counters, every few seconds where there are any; since this daemon opened the port first."""
+    """The driver's counters since this daemon first opened the port; every few seconds, if the driver counts."""
 
     at: float
     counters: UartCounters
@@ -173,7 +173,7 @@ class UartCounted:
 
 @dataclass(frozen=True, slots=True)
 class AnsweredTwice:
-    """Two answers come to one request of a device (`fault` says what was heard), or no longer do (None).
+    """A device began (`fault` says how) or ceased (None) to answer each request twice.
 
     Its readings go on: the first answer is believed.
     """
@@ -188,8 +188,8 @@ Event: TypeAlias = Reading | Exchanged | PortChanged | UartCounted | AnsweredTwi
 
 
 START_POLLS = 3
-"""So many polls at once decide at the start whether a device answers."""
+"""Number of polls at once that decide at the start whether a device answers."""
 
 
 SILENT_CODES = frozenset({FaultCode.TIMEOUT, FaultCode.LATE, FaultCode.COLLISION, FaultCode.WRONG_SLAVE})
-"""With these faults the device itself said nothing that came in time, and its time-out was waited for."""
+"""Faults after which the whole time-out was waited without an answer of the device."""

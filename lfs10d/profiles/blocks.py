@@ -1,4 +1,4 @@
-"""Values that neighbour each other come in one read: batching, and decoding what a read brought."""
+"""Batches neighbouring values into one read, and decodes its registers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MOST_BITS = 2000
 
 
 NO_VALUE_NOW = (FaultCode.UNAVAILABLE, FaultCode.NOT_FINITE)
-"""Why a value of a device may be missing that is what it seems to be."""
+"""Faults of single values that do not mean that it is another device."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ class Block:
 
     @classmethod
     def of(cls, values: tuple[Value, ...]) -> Block:
-        """Span `values`, which are of one function, the first of them lowest."""
+        """Return the read that spans `values`, which have one function and begin with the lowest."""
         first = values[0]
         count = max(value.end for value in values) - first.register
         cells = tuple(value.cell(first.register) for value in values)
@@ -46,7 +46,7 @@ class Block:
     def take(
         self, registers: tuple[int, ...], values: dict[str, Published | None], faults: dict[str, Fault]
     ) -> Fault | None:
-        """Put every value into `values` by name; None where it has none, and into `faults` why.
+        """Put every value into `values` by name; a missing one is None, with its fault in `faults`.
 
         Return a fault, and take nothing, where the answer has another length than asked for.
         """
@@ -62,7 +62,7 @@ class Block:
         return None
 
     def decode(self, registers: tuple[int, ...]) -> dict[str, Published] | Fault:
-        """Return every value by name that the device has now, or the first fault that shows another device.
+        """Return the available values by name, or the first fault that shows another device.
 
         So a device is recognised. Of several values some may be unavailable, or not finite as a direction in calm often
         is. Where there is no value at all, and none that shows another device, the first fault is returned.
@@ -82,7 +82,7 @@ class Block:
 def batch(
     values: Iterable[Value], most_words: int, may_skip: int = 0, named: Iterable[Value] = ()
 ) -> tuple[Block, ...]:
-    """Put values that touch or overlap into one read of at most `most_words`.
+    """Batch values that touch or overlap into reads of at most `most_words`.
 
     At most `may_skip` registers between two values are read that no value names: none of these, and none of `named`,
     the others of the device, which it may lack. Each value fits `most_words` by itself. Values of one read have one

@@ -14,7 +14,7 @@ DIGITS = 7
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """What turns the profile's number into the calibrated one, in the value's unit.
+    """Turns the profile's number into the calibrated one, in the value's unit.
 
     `keeps_zero`: 0 stays 0, for an anemometer at rest measures no wind, whatever offset its certificate has.
     """

@@ -1,4 +1,4 @@
-"""Registers to values, on the path of every poll: a cell knows where one value lies in a read. Pure."""
+"""Turns registers into values, for every poll: a cell knows where one value lies in a read. Pure."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _SMALLEST = float_bits(SMALLEST_FLOAT, "float32")
 
 
 class Part(NamedTuple):
-    """Which bits of a content are meant: `width` of them, from bit `shift` on (0 is the lowest)."""
+    """The bits of a content that are the value: `width` bits from bit `shift` on (0 is the lowest)."""
 
     shift: int
     width: int
@@ -36,7 +36,7 @@ def _swap(word: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """Where one value lies in the registers (or bits) of a read, and what it becomes.
+    """Where one value lies in the registers (or bits) of a read, and how it is decoded.
 
     `offset` counts registers from the first one read; `low` and `high` bound the published number. `part` are the bits
     that are meant, None for all. From `signed_from` on a content is negative (0: never). `texts` are the words for the
@@ -60,12 +60,12 @@ class Cell:
     unavailable: frozenset[int] = frozenset()
     modulo: float | None = None
     calibration: Calibration | None = None
-    """Applied to the profile's number before it wraps and before its range is judged."""
+    """Applied to the profile's number before `modulo` and `range`."""
     shows_raw: bool = False
-    """Whether the number without calibration is returned of one that is believed with it."""
+    """Return the number without calibration, if the calibrated one is in range."""
 
     def decode(self, registers: tuple[int, ...]) -> Value | Fault:
-        """Return the value, or why there is none: `unavailable`, `not_finite` or `out_of_range` (a tiny float too)."""
+        """Return the value, or the fault: `unavailable`, `not_finite` or `out_of_range` (also for a tiny float)."""
         content = self._content(registers)
         bits = content if self.part is None else self.part.of(content)
         if self.unavailable and self._is_unavailable(content, bits):
@@ -74,7 +74,7 @@ class Cell:
         return value if isinstance(value, (Fault, str)) else self.believed(value)
 
     def believed(self, number: Number) -> Number | Fault:
-        """Return a number of the profile as it is published, calibrated, or why it is not."""
+        """Return the calibrated number as it is published, or the fault."""
         raw = number
         if self.calibration is not None:
             number = self.calibration.apply(number)

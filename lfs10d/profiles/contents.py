@@ -1,4 +1,4 @@
-"""What a value's registers may hold, and which part of it is meant. Pure."""
+"""The contents that a value's registers can hold, and the part of them that is the value. Pure."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ WORD_BITS = 16
 
 @dataclass(frozen=True)
 class RegisterContent(FieldKind):
-    """What a register may hold; of a float type a number with a decimal point is meant as that number."""
+    """A register content; for a float type a number with a decimal point is that number itself."""
 
     @property
     def words(self) -> str:
@@ -34,38 +34,38 @@ class RegisterContent(FieldKind):
 
 
 def words_of(kind: RegisterType, length: int | None) -> int:
-    """Return the registers that a value fills."""
+    """Return the number of registers of a value."""
     return length or WORDS.get(kind, 1)
 
 
 def width_of(kind: RegisterType, length: int | None) -> int:
-    """Return the bits of a value's content."""
+    """Return the number of bits of a value's content."""
     return 1 if kind == "bool" else WORD_BITS * words_of(kind, length)
 
 
 def says_text(data: Mapping[str, Any]) -> bool:
-    """Whether a value with these keys is text or a boolean."""
+    """Return whether a value with these keys is text or a boolean."""
     if data.get("function") in BIT_FUNCTIONS or data.get("map") is not None:
         return True
     return data.get("type") == "string"
 
 
 def part_problems(part: object, width: int) -> list[str]:
-    """Return what is wrong with a part of a whole number of so many bits."""
+    """Return the problems of a part of a whole number of `width` bits."""
     if isinstance(part, tuple):
         if part[0] > part[1]:
             return ["the first bit is greater than the last"]
-        return [f"there are bits 0 to {width - 1}"] if part[1] >= width else []
+        return [f"must be bits 0 to {width - 1}"] if part[1] >= width else []
     if isinstance(part, int):
         ones = part >> (part & -part).bit_length() - 1
         if part >= 1 << width:
             return [f"has more than the {width} bits there are"]
         return ["must be one run of ones, such as 0x0FF0"] if ones & ones + 1 else []
-    return [] if width == WORD_BITS else ["is of one register; write bits or mask"]
+    return [] if width == WORD_BITS else ["is for values of one register; write bits or mask"]
 
 
 def part_of(bits: tuple[int, int] | None, mask: int | None, byte: str | None, width: int) -> Part | None:
-    """Return the part of a content of so many bits that is meant; None for all of it."""
+    """Return the part of a content of `width` bits that is the value; None for all of it."""
     if byte is not None:
         bits = (8, 15) if byte == "high" else (0, 7)
     if mask is not None:
@@ -86,7 +86,7 @@ def no_content(content: float, kind: RegisterType, width: int) -> str | None:
 
 
 def limits_of(kind: RegisterType, width: int) -> tuple[int, int]:
-    """Return the least and the greatest whole number that so many bits of this type hold."""
+    """Return the least and the greatest whole number of this type in `width` bits."""
     low = -(1 << width - 1) if kind in SIGNED else 0
     return low, low + (1 << width) - 1
 

@@ -1,4 +1,4 @@
-"""Facts about a device itself: how it is found and recognised, where its id and rate are set."""
+"""Facts about the device itself: how it is recognised, and where its id and rate are set."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ MOST_WORDS = 125
 
 
 class Barrier(Registered):
-    """A read whose answer has another shape than any poll's, so that a late answer cannot pass for it."""
+    """A read whose answer has another length than any poll's, so that a late answer is never taken for it."""
 
     function: Literal[3, 4] = Field(3, description="3 reads holding registers, 4 input registers.")
     count: Annotated[int, Whole(1, MOST_WORDS)] = Field(description="Registers that it reads.")
@@ -44,11 +44,11 @@ class IdRegister(Registered):
 
 
 class Identity(Registered):
-    """A register by whose content a device of this profile is told from others; `holds` are the possible contents."""
+    """A register that identifies a device of this profile; `holds` are its possible contents."""
 
     function: Literal[3, 4] = Field(3, description="3 reads holding registers, 4 input registers.")
     holds: Annotated[tuple[Annotated[int, Whole(0, LAST_REGISTER)], ...], Field(strict=False)] = Field(
-        description="What it may hold, a list: [0x0090]."
+        description="Its possible contents, a list: [0x0090]."
     )
 
     @field_validator("holds", mode="after")
@@ -90,7 +90,7 @@ class RateRegister(Registered):
 
 
 class Factory(Fact):
-    """How a new device comes: its slave id and baud rate. `line/adopt` looks for it there."""
+    """Slave id and baud rate of a factory-new device; `line/adopt` looks for it there."""
 
     id: SlaveId = Field(description="Its slave id.")
     baudrate: Rate = Field(description="Its baud rate; it need not be among the rates that can be set.")

@@ -1,4 +1,4 @@
-"""What every fact of a profile has, and the kinds of words and numbers it is written in."""
+"""The base of every fact of a profile, and its kinds of words and numbers."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Factor(FieldKind):
     @property
     def words(self) -> str:
         """Its range."""
-        return "a number from 1e-12 to 1e12, or the same negative"
+        return "a number from 1e-12 to 1e12, or its negative"
 
     def accept(self, value: object) -> float:
         """Take numbers only."""
@@ -130,7 +130,7 @@ class Facts(BaseModel):
 
 
 class Fact(Facts):
-    """Something the maker states: `source` is where, `unverified` that nobody has seen it on hardware."""
+    """Something the maker states: `source` says where; `unverified`: nobody has seen it on hardware."""
 
     source: Sentence | None = Field(None, description="Where the maker states it.")
     unverified: bool = Field(default=False, description="Not verified on hardware or in the source documents.")
@@ -138,7 +138,7 @@ class Fact(Facts):
 
 
 class Registered(Fact):
-    """A fact about one place; in the file its key is `register`.
+    """A fact about one register; its key in the file is `register`.
 
     pydantic's metaclass, an ABCMeta, has a method `register`: a field of that name inherits it as its default.
     """

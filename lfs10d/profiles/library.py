@@ -1,4 +1,4 @@
-"""Where profiles are found: the built-in files of this package, and a user's own by path."""
+"""Finds profiles: the built-in files of this package, and a user's own by path."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ BUILTIN_NAMES = (
 
 
 def builtin_names() -> tuple[str, ...]:
-    """Return the names that need no file of the user's."""
+    """Return the names of the built-in profiles."""
     return BUILTIN_NAMES
 
 
@@ -64,7 +64,7 @@ def _read(path: Path, wanted: str) -> str:
 
 
 def parse_profile(text: str, file: str) -> Profile:
-    """Return the profile that a YAML text describes; `file` is its name in problems. Raises ConfigError."""
+    """Return the profile in a YAML text; `file` is its name in problems. Raises ConfigError."""
     source = document.parse(text, file)
     try:
         profile = Profile.model_validate(source.data)

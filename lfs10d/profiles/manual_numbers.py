@@ -9,17 +9,17 @@ from __future__ import annotations
 from typing import Final
 
 TABLES: Final = {1: ("discrete input", 2), 3: ("input register", 4), 4: ("holding register", 3)}
-"""By first digit: what it stands for, and the function that reads it."""
+"""By the first digit: its meaning, and the function that reads it."""
 FIVE_DIGITS: Final = 10_000
 SIX_DIGITS: Final = 100_000
 LAST_ADDRESS: Final = 0xFFFF
 DEFAULT_FUNCTION: Final = 3
 ROUND: Final = 0x1000
-"""Multiples of it are addresses that look like numbers by chance: 0x8000 is 32768."""
+"""Multiples of this are addresses that look like such numbers by chance: 0x8000 is 32768."""
 
 
 def hint_for_number(number: int) -> str | None:
-    """Return what a number of six digits stands for that is no address; None where it stands for nothing."""
+    """Return the meaning of a number of six digits that is no address; None if it has none."""
     digit, counted = divmod(number, SIX_DIGITS)
     if digit not in TABLES or not 1 <= counted <= LAST_ADDRESS + 1:
         return None
@@ -27,7 +27,7 @@ def hint_for_number(number: int) -> str | None:
 
 
 def hint_for_address(address: int, function: int | None) -> str | None:
-    """Return what an address probably stands for that looks like a number of five digits; None for another.
+    """Return the probable meaning of an address that looks like a number of five digits; None for others.
 
     `function` reads it, None where nothing can be said of that. An address from 10001 to 19999 is doubted only of a
     discrete input: holding registers often lie there.

@@ -1,4 +1,4 @@
-"""The schema of a device profile: what a YAML file may say about a device, and what it means.
+"""The schema of a device profile: the keys of its YAML file, and their meaning.
 
 A profile is a fact sheet: registers, limits, how id and rate are set, what may be written at all. Register
 addresses are those on the wire (0x0001 is sent as 00 01). There is no default where a guess would give a
@@ -57,7 +57,7 @@ class Profile(Facts):
     `busy_exceptions` are asked again later. `provenance` has the source of a plain key's fact.
     """
 
-    name: Annotated[str, Name()] = Field(description="What to call it, of a-z 0-9 _ -.")
+    name: Annotated[str, Name()] = Field(description="Its name, of the characters a-z 0-9 _ -.")
     title: Sentence = Field(description="What it is, for people.")
     manufacturer: Sentence | None = Field(None, description="The manufacturer, for Home Assistant.")
     model: Sentence | None = Field(None, description="Its model, for Home Assistant; the title where it is not given.")
@@ -90,7 +90,9 @@ class Profile(Facts):
     busy_exceptions: Annotated[tuple[Annotated[int, Whole(1, 255)], ...], Field(strict=False)] = Field(
         BUSY_EXCEPTIONS, description="Exception codes that mean: ask again later."
     )
-    factory: Factory | None = Field(None, description="How a new one comes; `line/adopt` needs it.")
+    factory: Factory | None = Field(
+        None, description="Slave id and baud rate of a factory-new one; `line/adopt` needs it."
+    )
     slave_id: IdRegister | None = Field(None, description="Where its slave id is set.")
     baudrate: RateRegister | None = Field(None, description="Where its baud rate is set.")
     identify: Annotated[tuple[Identity, ...], Field(strict=False)] = Field(
@@ -106,7 +108,9 @@ class Profile(Facts):
     run_commands: Annotated[tuple[Register, ...], Field(strict=False)] = Field(
         (), description="Registers that trigger an action; never written, whatever a request asks."
     )
-    provenance: dict[str, Sentence] = Field({}, description="Where a plain key's fact comes from, by key.")
+    provenance: dict[str, Sentence] = Field(
+        {}, description="Sources of keys that have no `source` of their own, by key."
+    )
     notes: Annotated[tuple[Sentence, ...], Field(strict=False)] = Field((), description="What else to know.")
 
     _blocks: tuple[Block, ...] = PrivateAttr(default=())
@@ -140,7 +144,7 @@ class Profile(Facts):
         most = _words_per_read(info.data)
         for index, value in enumerate(values):
             if value.words > most and value.function not in BIT_FUNCTIONS:
-                wanted = f"needs {value.words} registers, one read of this device brings {most} at most"
+                wanted = f"needs {value.words} registers, one read of this device returns {most} at most"
                 problems.append(((index, "type"), f"{value.type} {wanted}"))
         refuse(problems)
         return values
@@ -165,14 +169,14 @@ class Profile(Facts):
         if barrier and values:
             most = _words_per_read(info.data)
             if barrier.count > most:
-                refuse([(("count",), f"one read of this device brings {most} registers at most")])
+                refuse([(("count",), f"one read of this device returns {most} registers at most")])
             shapes = {(block.function, block.count) for block in batch(values, most, info.data.get("may_skip", 0))}
             if (barrier.function, barrier.count) in shapes:
                 refuse(
                     [
                         (
                             ("count",),
-                            "a poll reads as many registers; a late answer could pass for the barrier's",
+                            "a poll reads as many registers: a late answer could be taken for the barrier's",
                         )
                     ]
                 )
@@ -197,7 +201,7 @@ class Profile(Facts):
         self._blocks = batch(self.values, self.most_words, self.may_skip)
 
     def calibrated(self, calibration: Mapping[str, tuple[Number, Number]], *, shows_raw: bool = False) -> Profile:
-        """Return the profile of a device with certificates: scale and offset by value name; itself where there is none.
+        """Return the profile with a calibration (scale and offset by value name); itself if there is none.
 
         Names that it does not have are passed over. `shows_raw`: see `Value.calibrated`.
         """
@@ -214,7 +218,7 @@ class Profile(Facts):
 
     @property
     def plain(self) -> Profile:
-        """The profile without calibration: what the maker says."""
+        """The profile without calibration."""
         return self._plain or self
 
     @property
@@ -233,7 +237,7 @@ class Profile(Facts):
         return {value.name: value.unit for value in self.values}
 
     def doubts(self) -> tuple[str, ...]:
-        """Return what is valid and probably a mistake, one sentence each."""
+        """Return the valid facts that are probably a mistake, one sentence each."""
         facts: list[tuple[str, Registered | None]] = [(value.name, value) for value in self.values]
         facts += [("slave_id", self.slave_id), ("baudrate", self.baudrate), ("barrier", self.barrier)]
         facts += [("identify", each) for each in self.identify]
@@ -248,7 +252,7 @@ class Profile(Facts):
 
     @property
     def rates(self) -> tuple[int, ...]:
-        """The rates that a device may speak at: those that can be set, and the factory's; as far as is known."""
+        """The known rates of a device: those that can be set, and the factory's."""
         codes = () if self.baudrate is None else tuple(self.baudrate.codes)
         factory = () if self.factory is None else (self.factory.baudrate,)
         return tuple(dict.fromkeys((*factory, *codes)))
@@ -259,11 +263,11 @@ class Profile(Facts):
         return _words_per_read(self.__dict__)
 
     def first_of(self, device_class: str) -> Value | None:
-        """Return the first value of a class, None where there is none."""
+        """Return the first value of a class, None if there is none."""
         return next((value for value in self.values if value.device_class == device_class), None)
 
     def setting_at(self, register: int) -> Setting | None:
-        """Return the setting at a register; None where the profile knows none: never to be written."""
+        """Return the setting at a register; None if the profile names none: it must not be written."""
         return next((setting for setting in self.settings if setting.register == register), None)
 
     def reads(self) -> tuple[Block, ...]:
@@ -272,23 +276,23 @@ class Profile(Facts):
 
     @property
     def main_read(self) -> Block:
-        """The read that brings the first value, which is the primary one."""
+        """The read of the first value, which is the primary one."""
         name = self.values[0].name
         return next(block for block in self._blocks if any(value.name == name for value in block.values))
 
     def batched(self, values: Iterable[Value]) -> tuple[Block, ...]:
-        """Return the reads that bring some of its values, and touch no register that another one names."""
+        """Return the reads of some of its values, without registers of the others."""
         return batch(values, self.most_words, self.may_skip, self.values)
 
     def alone(self, values: Iterable[Value]) -> tuple[Block, ...]:
-        """Return a read for each of these values, one for those that are parts of the same registers."""
+        """Return a read for each of these values; values that are parts of the same registers share one."""
         places: dict[tuple[int, int], list[Value]] = {}
         for value in values:
             places.setdefault((value.function, value.register), []).append(value)
         return tuple(block for place in places.values() for block in self.batched(place))
 
     def without_optional(self, block: Block) -> tuple[Block, ...]:
-        """Return the reads of a block's required values; where it has none, those of each optional one alone.
+        """Return the reads of a block's required values, or if it has none, of each optional one alone.
 
         None where that would be the same read again.
         """
@@ -304,7 +308,7 @@ class Profile(Facts):
 
 
 def _words_per_read(data: dict[str, Any]) -> int:
-    """Return how many registers one read may bring in any framing; fields with an error do not bind."""
+    """Return the most registers of one read in every framing; fields with an error are ignored."""
     most: int = data.get("max_words", MOST_WORDS)
     limit: int | None = data.get("ascii_max_data")
     if limit is not None and "ascii" in data.get("framings", ()):

@@ -1,4 +1,4 @@
-"""A register that configures the device, and what may be written to it."""
+"""A register that configures the device, and the contents that may be written to it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Setting(Registered):
     `range` is in `unit`, after `scale`; `values` tells what each register content that is allowed means.
     """
 
-    name: Annotated[str, Word()] = Field(description="What to call it.")
+    name: Annotated[str, Word()] = Field(description="Its name.")
     type: Literal["int16", "uint16"] = Field("uint16", description="int16 or uint16.")
     scale: Scale = Field(1.0, description="What the register's content is multiplied by.")
     unit: UnitText = Field("1", description="The unit of the number; '1' for a bare one.")

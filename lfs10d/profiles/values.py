@@ -1,4 +1,4 @@
-"""A value of a profile: where it lies, how it becomes a number, a word or a boolean, and what is believed of it."""
+"""A value of a profile: its registers, how they become a number, a word or a boolean, and its range."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ NO_UNIT = "1"
 WIND_SPEED = "wind_speed"
 """The name of a wind speed, and its device class."""
 LONGEST = {"bcd": 4, "string": 60}
-"""Registers that a value of these types may fill; of the others the type says how many."""
+"""Most registers of a value of these types; other types have a fixed number."""
 
 
 Contents: TypeAlias = Annotated[tuple[Annotated[int | float, RegisterContent()], ...], Field(strict=False)]
@@ -50,14 +50,14 @@ MappedWord: TypeAlias = Annotated[str, Text(64)]
 
 
 class Value(Registered):
-    """A measured value: where it lies, how it becomes a number, and which numbers are believed.
+    """A measured value: its registers, how they become a value, and its range.
 
     `number = content * scale + offset` in `unit`, wrapped to `modulo`; a number outside `range` is `out_of_range`, one
     of the contents of `unavailable` is no value. With `map` the content becomes a word, by function 1 or 2 a boolean.
     `precision` (decimals) and `device_class` (Home Assistant's word) are for displays and change no value.
     """
 
-    name: Annotated[str, Word(RESERVED)] = Field(description="The key under which samples carry it.")
+    name: Annotated[str, Word(RESERVED)] = Field(description="Its key in samples.")
     function: ReadFunction = Field(
         3, description="3 reads holding registers, 4 input registers, 1 coils, 2 discrete inputs (both are booleans)."
     )
@@ -73,15 +73,19 @@ class Value(Registered):
         description="high_first or low_first: which of several registers holds the high part.",
     )
     byte_order: ByteOrder = Field("big", description="big, or little: the bytes within each register swapped.")
-    bits: Bits | None = Field(None, description="First and last bit of a whole number that are meant; 0 is the lowest.")
+    bits: Bits | None = Field(
+        None, description="First and last bit of the register's content that are the value; 0 is the lowest."
+    )
     mask: Annotated[int, Whole(1, (1 << 64) - 1)] | None = Field(
         None, description="The same by a mask: 0x0FF0 means bits 4 to 11."
     )
-    byte: Literal["high", "low"] | None = Field(None, description="high or low: the byte of a register that is meant.")
-    map: dict[int, MappedWord] | None = Field(
-        None, description="The word for each content, published in its place: {0: dry, 1: rain}."
+    byte: Literal["high", "low"] | None = Field(
+        None, description="high or low: the byte of the register that is the value."
     )
-    unavailable: Contents = Field((), description="Contents that mean that there is no value: [0xFFFF, 0x8000].")
+    map: dict[int, MappedWord] | None = Field(
+        None, description="A word for each content, published in place of the number: {0: dry, 1: rain}."
+    )
+    unavailable: Contents = Field((), description="Contents that mean 'no value': [0xFFFF, 0x8000].")
     optional: bool = Field(default=False, description="The device may lack it: exception 02 is no error of the poll.")
     scale: Scale = Field(1.0, description="What the register's content is multiplied by.")
     offset: Offset = Field(0.0, description="What is added after the scale.")
@@ -93,7 +97,7 @@ class Value(Registered):
         validate_default=True,
         description="The unit of the number ('1' for a bare one); required, but left out for text and booleans.",
     )
-    range: Range | None = Field(None, description="Least and greatest number that is believed.")
+    range: Range | None = Field(None, description="Least and greatest valid number; others are out_of_range.")
     precision: Annotated[int, Whole(0, 9)] | None = Field(None, description="Decimals on a display.")
     device_class: Annotated[str, Word()] | None = Field(None, description="Home Assistant's word for its kind.")
     interval: Annotated[float, Duration(0.02, 86400)] | None = Field(
@@ -172,10 +176,10 @@ class Value(Registered):
                 refuse([((), "a boolean has no bytes; leave the byte order out")])
             return part
         if kind not in INTEGERS:
-            refuse([((), f"is a part of a whole number, and the type is {kind}")])
+            refuse([((), f"selects a part of a whole number, and the type is {kind}")])
         others = [key for key in ("bits", "mask") if info.data.get(key) is not None]
         if others:
-            refuse([((), f"{others[0]} says already which part is meant")])
+            refuse([((), f"{others[0]} selects the part already")])
         refuse([((), problem) for problem in part_problems(part, WORD_BITS * WORDS[kind])])
         return part
 
@@ -185,7 +189,7 @@ class Value(Registered):
         kind: RegisterType | None = info.data.get("type")
         if words is not None and kind is not None:
             if kind not in {*INTEGERS, "bool"}:
-                refuse([((), f"words stand for whole numbers, and the type is {kind}")])
+                refuse([((), f"a map is for whole numbers, and the type is {kind}")])
             if not words:
                 refuse([((), "names no content")])
         return words
@@ -204,7 +208,7 @@ class Value(Registered):
     def _is_of_a_number(cls, wanted: Any, info: ValidationInfo) -> Any:  # noqa: ANN401 - a field's value
         usual = {"scale": 1.0, "offset": 0.0}.get(str(info.field_name))
         if wanted != usual and says_text(info.data):
-            refuse([((), "is of numbers, and this value is text or a boolean; leave it out")])
+            refuse([((), "is for numbers, and this value is text or a boolean; leave it out")])
         return wanted
 
     @field_validator("unit", mode="before")
@@ -218,7 +222,7 @@ class Value(Registered):
 
     @property
     def words(self) -> int:
-        """Registers (or bits, by function 1 or 2) it fills."""
+        """The number of its registers (bits, with function 1 or 2)."""
         return words_of(self.type, self.length)
 
     @property
@@ -228,7 +232,7 @@ class Value(Registered):
 
     @property
     def doubts(self) -> Iterator[str]:
-        """What is valid and probably a mistake: a unit of a word or text, a word for what its registers cannot hold."""
+        """Probable mistakes: a unit of a word or text, a word for a content that its registers cannot hold."""
         if self.is_text and self.unit != NO_UNIT:
             yield f"is text or a boolean, which has no unit: leave out unit {quoted(self.unit)}"
         width = width_of(self.type, self.length)
@@ -249,7 +253,7 @@ class Value(Registered):
         return WIND_SPEED in (self.name, self.device_class)
 
     def calibrated(self, scale: Number, offset: Number, *, shows_raw: bool = False) -> Value:
-        """Return the value of a device whose certificate says `number * scale + offset`; a wind speed of 0 stays 0.
+        """Return the value with a calibration of `number * scale + offset`; a wind speed of 0 stays 0.
 
         `shows_raw`: its range is that of the calibrated number, and what is shown is the one without calibration.
         """

@@ -1,4 +1,4 @@
-"""Kinds of values that lead to the broker: host, list of nodes, base topic."""
+"""Kinds of values about the broker: host, list of nodes, base topic."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from lfs10d.system.dataclass import dataclass
 
 @dataclass(frozen=True)
 class Host(FieldKind):
-    """A host name or an address. A wrong one is never shown: it may hold a login."""
+    """A host name or an address. A wrong one is never shown: it may contain a login."""
 
     pattern = re.compile(r"[\w.-]{1,253}|[0-9A-Fa-f]*:[0-9A-Fa-f:.]*:[0-9A-Fa-f:.]*(%[\w.-]+)?")
 
@@ -35,7 +35,7 @@ class Host(FieldKind):
 
 @dataclass(frozen=True)
 class Node(Host):
-    """One node of several: a host, with its port where it is not everybody's. A wrong one is never shown."""
+    """One node of several: a host, with its port if it has its own. A wrong one is never shown."""
 
     @property
     def words(self) -> str:
@@ -65,7 +65,7 @@ _NODE = re.compile(
 
 
 def split_node(text: str) -> tuple[str, int | None]:
-    """Return host and port (None: not given) of one node as it is written; a host that is none stays as it is."""
+    """Return host and port (None: not given) of a node as written; an invalid host stays as it is."""
     found = _NODE.fullmatch(text)
     if found is None:
         return text, None  # an IPv6 address without brackets, or nonsense
@@ -74,13 +74,13 @@ def split_node(text: str) -> tuple[str, int | None]:
 
 
 def node_text(host: str, port: int) -> str:
-    """Return a node as it is written, an IPv6 address in brackets (RFC 3986, section 3.2.2)."""
+    """Return a node as text, an IPv6 address in brackets (RFC 3986, section 3.2.2)."""
     return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
 
 
 @dataclass(frozen=True)
 class Hosts(FieldKind):
-    """One host, or a list of nodes. A wrong one is never shown: it may hold a login."""
+    """One host, or a list of nodes. A wrong one is never shown: it may contain a login."""
 
     most: int = 16
 

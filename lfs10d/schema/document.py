@@ -29,7 +29,7 @@ LARGEST_FILE = 256 * 1024
 """Bytes: three times a file with every key of 255 slaves written out."""
 
 MOST_VALUES = 50_000
-"""Keys and values after aliases are followed: what a file of aliases to aliases runs into."""
+"""Most keys and values after aliases are followed; stops a file of aliases to aliases."""
 
 # U+0085, U+2028 and U+2029 break lines in YAML 1.1 and not in 1.2: refused, or our line numbers would not be an
 # editor's. The rest is what YAML calls not printable.
@@ -57,7 +57,7 @@ def _end_of(text: str) -> tuple[int, int]:
 
 @dataclass(frozen=True, slots=True)
 class DocumentPlace:
-    """Where a value stands and, in a mapping, its key: lines and columns from 1."""
+    """The place of a value and, in a mapping, of its key: lines and columns from 1."""
 
     value: tuple[int, int]
     key: tuple[int, int] | None = None
@@ -94,15 +94,15 @@ class Document:
         return path_text(named)
 
     def holds(self, path: KeyPath) -> bool:
-        """Tell whether the file itself has a value at this path."""
+        """Return whether the file itself has a value at this path."""
         return path in self.places
 
     def line_of(self, path: KeyPath) -> int:
-        """Return the line of the value, or of what surrounds it."""
+        """Return the line of the value, or of the mapping or list around it."""
         return self.problem(path, "").line
 
     def problems_of(self, error: ValidationError, model: type[BaseModel] | None = None) -> tuple[Problem, ...]:
-        """Return what pydantic found as problems with places, in order of place; what is `unread` is told already.
+        """Return pydantic's errors as problems with places, in order of place; values in `unread` are reported already.
 
         With the `model` that was validated, an unknown key is answered with the nearest known one.
         """
@@ -132,7 +132,7 @@ class Document:
                 return self.problem(path if there else path[:-1], in_words(detail))
 
     def _walked(self, location: tuple[int | str, ...]) -> KeyPath:
-        """Drop the steps that pydantic adds for its unions and validators: they lead nowhere in the file."""
+        """Drop the steps that pydantic adds for its unions and validators: they are not in the file."""
         path: KeyPath = ()
         for index, step in enumerate(location):
             if (*path, step) in self.places or index == len(location) - 1:
@@ -153,7 +153,7 @@ def path_text(path: KeyPath) -> str:
 
 
 def parse(text: str, file: str) -> Document:
-    """Read one YAML document; raises ConfigError where it cannot be read at all."""
+    """Read one YAML document; raises ConfigError if it cannot be read at all."""
     odd = _UNPRINTABLE.search(text)
     if odd is not None:
         line, column = _end_of(text[: odd.start()])
@@ -195,7 +195,7 @@ _UNREAD = object()
 
 
 class _NodeReader:
-    """Turns nodes to data, notes every place, collects what is wrong."""
+    """Turns nodes into data, notes every place, collects problems."""
 
     def __init__(self, file: str) -> None:
         self.file = file
@@ -215,7 +215,7 @@ class _NodeReader:
                         self.file,
                         *place,
                         path_text(path),
-                        "is too large or too deep to read (an alias counts as what it stands for)",
+                        "is too large or too deep to read (an alias counts as its content)",
                     ),
                 )
             )
@@ -235,9 +235,7 @@ class _NodeReader:
 
     def within(self, node: Any, word: str, path: KeyPath, reader: Any) -> object:  # noqa: ANN401 - a node of any reader
         if id(node.value) in self.open:
-            raise ConfigError(
-                (Problem(self.file, *_place(node), path_text(path), "an alias may not stand for what surrounds it"),)
-            )
+            raise ConfigError((Problem(self.file, *_place(node), path_text(path), "an alias may not contain itself"),))
         if node.tag != TAG + word:
             self.report(node, path, f"the tag {quoted(node.tag)} is not known; leave it out")
         self.open.append(id(node.value))

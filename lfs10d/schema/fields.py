@@ -23,16 +23,16 @@ from lfs10d.system.dataclass import dataclass
 _SHOWN_CHARACTERS = 40
 
 PLAIN_ERROR = "plain"
-"""The type of a pydantic error whose message is already meant for a person."""
+"""The type of a pydantic error whose message is already for a person."""
 
 
 def plain_error(message: str) -> PydanticCustomError:
-    """Return the error with this message, in which braces are no placeholders."""
+    """Return an error with this message; braces in it are no placeholders."""
     return PydanticCustomError(PLAIN_ERROR, "{message}", {"message": message})
 
 
 def shown(value: object) -> str:
-    """Return a wrong value in words fit for one line: its kind, its beginning, nothing unescaped."""
+    """Return a wrong value in words on one line: its kind and its beginning, escaped."""
     match value:
         case None:
             return "empty"
@@ -74,11 +74,11 @@ class FieldKind:
     @property
     @abstractmethod
     def words(self) -> str:
-        """What a value of this kind is: completes "must be ..."."""
+        """The kind in words; completes "must be ..."."""
 
     @abstractmethod
     def accept(self, value: object) -> object:
-        """Return the value as the program uses it; raise FieldError with the whole message otherwise."""
+        """Return the value for the program; raise FieldError with the whole message if it is wrong."""
 
     def refusal(self, value: object) -> FieldError:
         """Return the error for this value."""
@@ -152,7 +152,7 @@ class Flag(FieldKind):
 
 @dataclass(frozen=True)
 class Choice(FieldKind):
-    """One of a few values; `meaning` maps a way of writing one to the value it means, `null` lets it be empty."""
+    """One of a few values; `meaning` maps other spellings to values, `null` permits an empty one."""
 
     values: tuple[int | str, ...]
     null: bool = False

@@ -11,18 +11,18 @@ from pydantic_core import ErrorDetails
 from lfs10d.schema.fields import PLAIN_ERROR, shown
 
 KeyPath: TypeAlias = tuple[str | int, ...]
-"""Where a value stands: keys of mappings and indexes of lists."""
+"""The path of a value: keys of mappings and indexes of lists."""
 
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
-    """Return which known word was probably meant, None if none is near."""
+    """Return the known word that is nearest, None if none is near."""
     from difflib import get_close_matches  # noqa: PLC0415  # only where something is misspelled
 
     return next(iter(get_close_matches(word, list(known), n=1)), None)
 
 
 def unknown_key(key: str, known: tuple[str, ...]) -> str:
-    """Return what to say of a key that is not one of those known in its place."""
+    """Return the message for an unknown key."""
     near = nearest(key, known)
     if near:
         return f"is not a known key; did you mean {near}?"
@@ -30,7 +30,7 @@ def unknown_key(key: str, known: tuple[str, ...]) -> str:
 
 
 def missing(model: type[BaseModel] | None, path: KeyPath) -> str:
-    """Return what to say of a key that must be there; with the model, what to write."""
+    """Return the message for a missing key; with the model it says what to write."""
     for found in _models_at(model, path[:-1]) if model else ():
         known = found.model_fields.get(str(path[-1]))
         if known is not None and (description := known.description):
@@ -91,7 +91,7 @@ _WORDS = {
 
 
 def in_words(detail: ErrorDetails) -> str:
-    """Return one error that is neither a missing nor an unknown key."""
+    """Return the message for any other error."""
     context = detail.get("ctx", {})
     if detail["type"] in _WORDS:
         wanted = _WORDS[detail["type"]].format_map(context)

@@ -27,7 +27,7 @@ SIZE_PATTERN = f"^{_SIZE.pattern}$"
 
 
 def seconds(value: object) -> float:
-    """Return the seconds meant by a non-negative number or by text such as `250ms`, `1.5s`, `5m`, `24h`, `7d`.
+    """Return the seconds of a non-negative number or of text such as `250ms`, `1.5s`, `5m`, `24h`, `7d`.
 
     Raises ValueError (without words) for anything else: negative, not finite, true, text of another form.
     """
@@ -42,7 +42,7 @@ def seconds(value: object) -> float:
 
 
 _LARGEST_NUMBER = 10**15
-"""Thirty million years, or a petabyte: beyond it a number is a slip, and a whole number may not fit a float."""
+"""Largest number: thirty million years, or a petabyte; a larger whole number may not fit a float."""
 
 
 def duration_text(duration: float) -> str:
@@ -60,7 +60,7 @@ def duration_text(duration: float) -> str:
 
 
 def size(value: object) -> int:
-    """Return the bytes meant by a whole number or by text such as `512MB` (powers of 1000).
+    """Return the bytes of a whole number or of text such as `512MB` (powers of 1000).
 
     Raises ValueError (without words) for anything else, also if it comes to a fraction of a byte.
     """

@@ -34,7 +34,7 @@ _FLOAT = re.compile(
     r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)"
 )
 FORMS = {"null": _NULL, "bool": _BOOL, "int": _INT, "float": _FLOAT}
-"""How a plain word of each type looks; every other word is text."""
+"""The form of plain words of each type; every other word is text."""
 
 
 class CoreSchema(BaseResolver):
@@ -47,7 +47,7 @@ for _word, _form in FORMS.items():
 
 
 class Loader(Reader, Scanner, Parser, Composer, CoreSchema):
-    """PyYAML's composer, with the core schema, a greatest depth, and aliases that know where they stand."""
+    """PyYAML's composer, with the core schema, a greatest depth, and places of aliases."""
 
     def __init__(self, text: str) -> None:
         Reader.__init__(self, text)

@@ -1,4 +1,4 @@
-"""Is the wall clock synchronised? Asked of systemd, for the daemon's sandbox forbids adjtimex.
+"""Finds out whether the wall clock is synchronised, from systemd: the daemon's sandbox forbids adjtimex.
 
 systemd-timesyncd leaves a mark in /run once it has set the clock. Any other (chrony, ntpd) is known to timedate1,
 which reads the kernel's flag. Without both the state is unknown.
@@ -27,10 +27,10 @@ QUESTION = ("timedatectl", "show", "--property=NTPSynchronized", "--value")
 """org.freedesktop.timedate1 in words; prints yes or no."""
 
 PATIENCE = 2.0
-"""Seconds that timedate1 may take: it is started by the question."""
+"""Seconds that timedate1 may take: the question starts it."""
 
 LOOK_AGAIN: dict[ClockState, float] = {"synced": 600.0, "unsynced": 15.0, "unknown": 600.0}
-"""Seconds until an answer is asked for again. A clock is usually synchronised within a minute of the network."""
+"""Seconds until timedate1 is asked again; a clock is usually synchronised within a minute of the network."""
 
 SOON_AFTER_START = 600.0
 """Seconds after the start during which `unknown` is asked again soon: timedate1 may still be starting."""
@@ -38,7 +38,7 @@ SOON_AFTER_START = 600.0
 
 LOOKS = 3
 TOGETHER = 0.0005
-"""s between two looks that count as one: `ts` is in ms."""
+"""s between two reads of the clocks that count as one moment: `ts` is in ms."""
 
 
 def look_again(state: ClockState, age: float) -> float:
@@ -85,7 +85,7 @@ def _ask(question: Sequence[str], patience: float) -> str | None:
 
 @dataclass(frozen=True, slots=True)
 class Instant:
-    """One moment: `mono` in s of the line thread's clock, `wall` in s since the epoch, how far to trust it."""
+    """One moment: `mono` in s of the line thread's clock, `wall` in s since the epoch, and how far `wall` is known."""
 
     mono: float
     wall: float
@@ -97,7 +97,7 @@ class Instant:
 
 
 def _together() -> tuple[float, float]:
-    """Return both clocks, read so close together that no other program ran between them for long, if that can be."""
+    """Return both clocks, read as close together as possible."""
     mono, wall = time.monotonic(), time.time()
     for _ in range(LOOKS):
         if time.monotonic() - mono < TOGETHER:
@@ -107,14 +107,14 @@ def _together() -> tuple[float, float]:
 
 
 class ClockEvents(Protocol):
-    """What `Clock.watch` reports to."""
+    """The events of `Clock.watch`."""
 
     def synchronised(self) -> None:
-        """Take that the wall clock has become synchronised."""
+        """Note that the wall clock has become synchronised."""
         ...
 
     def stepped(self) -> None:
-        """Take that the wall clock was set while it was not known to be synchronised."""
+        """Note that the wall clock was set while it was not known to be synchronised."""
         ...
 
 
@@ -126,7 +126,7 @@ class Clock:
         self._start = time.monotonic()
         self._shift = round((time.time() - self._start) * 1000)
         self._set = asyncio.Event()
-        """The wall clock was set since `watch` has looked."""
+        """The wall clock was set since the last check of `watch`."""
 
     def now(self) -> Instant:
         """Return this moment."""

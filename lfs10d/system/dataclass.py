@@ -30,7 +30,7 @@ else:
 
 
 def _completed(plain: type, made: Any, frozen: bool, eq: bool) -> type:  # noqa: ANN401, FBT001  # a class with new attributes; flags as Python's
-    """Give the class what is shared by all, where it has not its own."""
+    """Give the class the shared methods that it does not define itself."""
     fields = dataclasses.fields(made)
     methods: dict[str, object] = {"__repr__": _repr}
     if eq:
@@ -46,7 +46,7 @@ def _completed(plain: type, made: Any, frozen: bool, eq: bool) -> type:  # noqa:
 
 
 def _values(names: Iterable[str]) -> Callable[[Any], object]:
-    """Return what gives the values of these attributes of an object."""
+    """Return a function that returns the values of these attributes of an object."""
     wanted = tuple(names)
     return attrgetter(*wanted) if wanted else staticmethod(lambda _: ())
 

@@ -15,16 +15,16 @@ from lfs10d.system.regular_file import read_regular, write_new
 
 
 class Files(Protocol):
-    """The smallest steps on a file system. All raise OSError."""
+    """The basic steps on a file system. All raise OSError."""
 
     def read(self, path: Path) -> bytes:
         """Return the content."""
 
     def write(self, path: Path, data: bytes, *, mode: int) -> None:
-        """Write a new file, in the place of one that is there; nothing is safe yet."""
+        """Write a new file in place of an old one; it does not survive a power cut yet."""
 
     def sync(self, path: Path) -> None:
-        """Return when the content is on the disk."""
+        """Wait until the content is on the disk."""
 
     def rename(self, source: Path, target: Path) -> None:
         """Put one file in place of another, in one step."""
@@ -33,7 +33,7 @@ class Files(Protocol):
         """Remove the name."""
 
     def sync_folder(self, folder: Path) -> None:
-        """Return when the folder's names are on the disk."""
+        """Wait until the folder's names are on the disk."""
 
     def exists(self, path: Path) -> bool:
         """Return whether there is such a file."""
@@ -47,11 +47,11 @@ class SystemFiles:
         return read_regular(path)
 
     def write(self, path: Path, data: bytes, *, mode: int) -> None:
-        """Write a new file, in the place of one that is there."""
+        """Write a new file in place of an old one."""
         write_new(path, data, mode=mode)
 
     def sync(self, path: Path) -> None:
-        """Return when the content is on the disk."""
+        """Wait until the content is on the disk."""
         self._synced(path, os.O_RDONLY)
 
     def rename(self, source: Path, target: Path) -> None:
@@ -63,7 +63,7 @@ class SystemFiles:
         path.unlink()
 
     def sync_folder(self, folder: Path) -> None:
-        """Return when the folder's names are on the disk."""
+        """Wait until the folder's names are on the disk."""
         self._synced(folder, os.O_RDONLY | os.O_DIRECTORY)
 
     def _synced(self, path: Path, flags: int) -> None:
@@ -79,7 +79,7 @@ class SystemFiles:
 
 
 class Disk:
-    """Changes that are on the disk when the call returns, and else have not happened.
+    """Changes to files that are on the disk when the call returns, or have not happened.
 
     All raise OSError. New files are readable by their owner only, unless `mode` says otherwise.
     """
@@ -92,7 +92,7 @@ class Disk:
         return self.files.read(path)
 
     def replace(self, path: Path, data: bytes, *, mode: int = 0o600) -> None:
-        """Put `data` in the place of the whole file: after a cut the old content is there, or the new."""
+        """Replace the whole file by `data`: after a power cut it has the old content or the new."""
         draft = path.with_name(f".{path.name}.new")
         try:
             self.files.write(draft, data, mode=mode)

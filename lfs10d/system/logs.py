@@ -1,4 +1,4 @@
-"""Logging: one line per record, for the journal, a terminal or a pipe, and nothing foreign unescaped.
+"""Logging: one line per record, for the journal, a terminal or a pipe; foreign text is escaped.
 
 Standard error may be closed, full or unread: a record that cannot be written raises nothing and waits for nothing. Lost
 records are counted, and the count is the first thing written afterwards.
@@ -25,7 +25,7 @@ LIMIT = 4096
 """Most bytes of one line: a pipe that is ready takes this much (PIPE_BUF, pipe(7)) without blocking."""
 
 PATIENCE = 0.05
-"""How long the first refused record waits for a slow reader, s; those after it do not wait until one is taken."""
+"""Seconds that the first refused record waits for a slow reader; the following ones do not wait."""
 
 LEVELS = {"debug": logging.DEBUG, "info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
 
@@ -40,7 +40,7 @@ _CUT = b" ... "
 
 
 class Style(StrEnum):
-    """How a line looks."""
+    """The style of a log line."""
 
     JOURNAL = "journal"
     """`<4>message`: the journal takes the priority off and adds the time (sd-daemon(3))."""
@@ -53,7 +53,7 @@ class Style(StrEnum):
 
 
 def escape(text: str) -> str:
-    r"""Return text that cannot break a line, move a cursor or fool a reader: `\n`, `\x1b`, `\u2028` for what would.
+    r"""Return text without control and direction characters: `\n`, `\x1b`, `\u2028` for what would.
 
     Printable text is returned as it is; to escape twice changes nothing.
     """
@@ -63,7 +63,7 @@ def escape(text: str) -> str:
 
 
 def shortened(line: str, limit: int = LIMIT - 1) -> str:
-    """Return the line with its middle left out where it has more than `limit` bytes: both ends tell the most."""
+    """Return the line without its middle if it has more than `limit` bytes."""
     raw = line.encode("utf-8", "backslashreplace")
     if len(raw) <= limit:
         return line
@@ -84,7 +84,7 @@ def style_of(wanted: str, *, journal: bool, terminal: bool, coloured: bool = Tru
 
 
 def is_journal(descriptor: int, variables: Mapping[str, str]) -> bool:
-    """Tell whether the descriptor is the journal's, by `$JOURNAL_STREAM` (systemd.exec(5))."""
+    """Return whether the descriptor is the journal's, by `$JOURNAL_STREAM` (systemd.exec(5))."""
     try:
         status = os.fstat(descriptor)
     except OSError:
@@ -93,7 +93,7 @@ def is_journal(descriptor: int, variables: Mapping[str, str]) -> bool:
 
 
 def likes_colour(variables: Mapping[str, str]) -> bool:
-    """Heed `$NO_COLOR` (no-color.org) and terminals that know no colour."""
+    """Return whether colour is wanted: not with `$NO_COLOR` (no-color.org), and not on a dumb terminal."""
     return not variables.get("NO_COLOR") and variables.get("TERM") != "dumb"
 
 
@@ -137,7 +137,7 @@ class LineFormatter(logging.Formatter):
 
 
 class DescriptorHandler(logging.Handler):
-    """Writes each record to a file descriptor by one call; never raises and never waits for a reader who stopped.
+    """Writes each record to a file descriptor by one call; never raises, and never waits for a stopped reader.
 
     `dropped` counts the records nobody took since the last one that was taken.
     """
@@ -153,7 +153,7 @@ class DescriptorHandler(logging.Handler):
             self.dropped += 1
 
     def _told_dropped(self, record: logging.LogRecord) -> bool:
-        """Tell of what was lost, if anything was; False if that is not taken either."""
+        """Log the number of lost records, if any; return False if that cannot be written either."""
         if not self.dropped:
             return True
         lost = logging.LogRecord(
@@ -186,7 +186,7 @@ class DescriptorHandler(logging.Handler):
 
 
 def install(level: str = "info", wanted: str = "auto", *, descriptor: int = 2) -> None:
-    """Log to standard error from now on, in place of any handler before; again after a reload.
+    """Log to standard error, in place of any handler before; called again after a reload.
 
     `level` is one of `LEVELS`; other packages are heard from warning on. What nobody caught in a thread or a
     destructor is logged too, instead of a traceback on the screen.
@@ -218,7 +218,7 @@ def _log_thread(stray: threading.ExceptHookArgs) -> None:
 
 
 def _log_unraisable(stray: sys.UnraisableHookArgs) -> None:
-    _log_stray(stray.err_msg or "an error where none can be raised", stray.exc_value)
+    _log_stray(stray.err_msg or "an error that cannot be raised", stray.exc_value)
 
 
 def _log_stray(words: str, error: BaseException | None) -> None:

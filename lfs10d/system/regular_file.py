@@ -1,4 +1,4 @@
-"""Regular files opened so that nothing else is: a FIFO is not waited for, a symbolic link is not written through."""
+"""Opens regular files only: never waits for a FIFO, never writes through a symbolic link."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def write_new(path: Path, data: bytes, *, mode: int) -> None:
 
 
 def make_private(path: Path) -> None:
-    """Take from everybody but the owner what they may do with a file, if it is there. Raises OSError.
+    """Remove all permissions except the owner's from a file, if it is there. Raises OSError.
 
     Raises it for a symbolic link too, and for what is no regular file.
     """
@@ -85,7 +85,7 @@ def make_private(path: Path) -> None:
 
 
 def create_private(path: Path) -> None:
-    """Create an empty file that only its owner may use; one that is there is made so. Raises OSError."""
+    """Create an empty file that only its owner may use, or make an existing one private. Raises OSError."""
     try:
         descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
     except FileExistsError:

@@ -1,4 +1,4 @@
-"""A password that never prints itself, and a process that leaves no core with it."""
+"""A password that is never printed, and a process that leaves no core dump with it."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Secret:
 
 
 def leave_no_core() -> None:
-    """See to it that this process leaves no core: its memory holds the password, and keys. For ever, and inherited.
+    """Make this process and its children leave no core dump: its memory holds passwords and keys.
 
     Unlike PR_SET_DUMPABLE, which bars debuggers too, this takes nothing from the person who looks for a fault: the
     stacks that faulthandler prints on SIGABRT, `/proc`, py-spy.

@@ -1,4 +1,4 @@
-"""Where the files are that come with the program: units, sample configuration, documentation."""
+"""Finds the files that are shipped with the program: units, sample configuration, documentation."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ _REPOSITORY = Path(__file__).parents[2]
 
 
 def shipped(name: str, prefix: Path | None = None) -> Path:
-    """Return the place of a file named as in the repository, such as `systemd/lfs10d.service`.
+    """Return the path of a file named as in the repository, such as `systemd/lfs10d.service`.
 
     An installation has it below `share/lfs10d` of its prefix (default this Python's), a working copy in place.
     Raises FileNotFoundError where the installation is incomplete.

@@ -1,4 +1,4 @@
-"""A start that costs little: no search for plugins, no web client, no garbage collection of what was imported.
+"""Makes the start cheap: no search for plugins, no web client, no garbage collection of imported modules.
 
 Pydantic searches every installed distribution for plugins by `importlib.metadata`, which imports `email` and `zipfile`.
 paho imports `urllib.request` for a proxy that it looks for only where PySocks is installed. Together they cost 2.7 MB
@@ -15,7 +15,7 @@ import urllib
 from types import ModuleType
 
 _LOADER = "pydantic.plugin._loader"
-"""Where pydantic searches for plugins, as of 2.14."""
+"""The module in which pydantic searches for plugins, as of 2.14."""
 
 _WEB = "urllib.request"
 
@@ -24,7 +24,7 @@ class LazyModule(ModuleType):
     """Stands in for a module until one of its attributes is wanted; then the true module takes its place."""
 
     def __getattr__(self, name: str) -> object:
-        """Return what the true module has, unless it is Python's import that asks."""
+        """Return an attribute of the true module, except to Python's import."""
         if name.startswith("__"):
             raise AttributeError(name)
         if sys.modules.get(self.__name__) is self:

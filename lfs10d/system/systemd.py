@@ -1,4 +1,4 @@
-"""What the service manager is told: READY, RELOADING, STATUS, WATCHDOG, STOPPING (sd_notify(3)).
+"""Notifies the service manager: READY, RELOADING, STATUS, WATCHDOG, STOPPING (sd_notify(3)).
 
 Without `$NOTIFY_SOCKET` every call is silent. No call waits and none fails: a service manager that does not listen
 is no reason to stop measuring.
@@ -15,7 +15,7 @@ from lfs10d.system.logs import escape
 
 
 class Notifier:
-    """Tells the service manager how the daemon is; every method returns whether it was told.
+    """Notifies the service manager; every method returns whether the message was sent.
 
     `watchdog` is the longest time in seconds between two calls of `feed` that systemd forgives (WatchdogSec=), None
     if it does not watch this process. Calls may come from any thread.
@@ -31,11 +31,11 @@ class Notifier:
             self._socket.settimeout(0)
 
     def ready(self, status: str = "") -> bool:
-        """Say that the start, or a reload, is over."""
+        """Notify that the start, or a reload, is over."""
         return self._tell("READY=1", *_status(status))
 
     def reloading(self) -> bool:
-        """Say that a reload begins; `ready` ends it. Type=notify-reload wants the time of it."""
+        """Notify that a reload begins; `ready` ends it. Type=notify-reload needs its time."""
         # time.monotonic is CLOCK_MONOTONIC, which is what systemd compares with.
         return self._tell("RELOADING=1", f"MONOTONIC_USEC={time.monotonic_ns() // 1000}")
 
@@ -44,15 +44,15 @@ class Notifier:
         return self._tell(*_status(text))
 
     def feed(self) -> bool:
-        """Say that the daemon makes progress."""
+        """Notify that the daemon makes progress."""
         return self._tell("WATCHDOG=1")
 
     def stopping(self, status: str = "") -> bool:
-        """Say that the end has begun."""
+        """Notify that the end has begun."""
         return self._tell("STOPPING=1", *_status(status))
 
     def close(self) -> None:
-        """Close the socket; whatever is told afterwards is silent."""
+        """Close the socket; later messages are not sent."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None

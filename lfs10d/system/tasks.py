@@ -1,4 +1,4 @@
-"""Background tasks of the asyncio loop: none ends unheard.
+"""Background tasks of the asyncio loop; no failure goes unnoticed.
 
 `asyncio.create_task` keeps an exception until somebody asks for it, and a task that nobody holds may be collected.
 Every task that is not awaited where it begins is started here.
@@ -38,7 +38,7 @@ class BackgroundTasks:
         return task
 
     def cancel_all(self) -> None:
-        """Cancel what still runs, without waiting for it."""
+        """Cancel all running tasks without waiting for them."""
         for task in tuple(self._tasks):
             task.cancel()
 

@@ -76,7 +76,7 @@ class WorkerThread:
         return await future
 
     def end(self) -> None:
-        """Let the thread end after the calls that were made."""
+        """Let the thread end after the pending calls."""
         self._calls.put(None)
 
     def _run(self) -> None:

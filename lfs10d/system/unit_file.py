@@ -49,7 +49,7 @@ def for_user(unit: str, configurations: PurePath) -> str:
 
 
 def marked(unit: str, version: str) -> str:
-    """Return the unit with a first line by which `is_unchanged` knows it again."""
+    """Return the unit with a first line by which `is_unchanged` recognises it."""
     return (
         f"# Written by `lfs10d service install` ({version}, {_check(unit)}). Changed by hand it is left alone; "
         f"better is a drop-in: systemctl edit\n{unit}"
@@ -57,7 +57,7 @@ def marked(unit: str, version: str) -> str:
 
 
 def is_unchanged(text: str) -> bool:
-    """Tell whether a unit's file still is what `lfs10d service install` of any version wrote."""
+    """Return whether a unit's file is still as `lfs10d service install` of any version wrote it."""
     mark = _MARK.match(text)
     return mark is not None and mark["check"] == _check(text[mark.end() :])
 

@@ -28,7 +28,7 @@ def test_a_factor_is_any_number_that_keeps_results_finite(number: float) -> None
 
 @pytest.mark.parametrize("number", [0, 1e-13, -2e12, True, "1", None])
 def test_another_factor_is_refused(number: object) -> None:
-    with pytest.raises(FieldError, match=r"must be a number from 1e-12 to 1e12, or the same negative"):
+    with pytest.raises(FieldError, match=r"must be a number from 1e-12 to 1e12, or its negative"):
         Factor().accept(number)
 
 

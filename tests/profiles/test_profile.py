@@ -128,7 +128,7 @@ WRONG: list[tuple[dict[str, Any], tuple[int | str, ...], str]] = [
     ),
     ({"values": []}, ("values",), "names no value"),
     ({"values": [TWO_VALUES[0]] * 2}, ("values", 1, "name"), "'level' is the name of [0] already"),
-    (TOO_SHORT, ("values", 1, "type"), "float32 needs 2 registers, one read of this device brings 1 at most"),
+    (TOO_SHORT, ("values", 1, "type"), "float32 needs 2 registers, one read of this device returns 1 at most"),
     (
         {"settings": [{"name": "a", "register": 1}, {"name": "a", "register": 2}]},
         ("settings", 1, "name"),
@@ -147,12 +147,12 @@ WRONG: list[tuple[dict[str, Any], tuple[int | str, ...], str]] = [
     (
         {"max_words": 2, "barrier": {"register": 1, "count": 3}},
         ("barrier", "count"),
-        "one read of this device brings 2 registers at most",
+        "one read of this device returns 2 registers at most",
     ),
     (
         {"barrier": {"register": 9, "count": 1}},
         ("barrier", "count"),
-        "a poll reads as many registers; a late answer could pass for the barrier's",
+        "a poll reads as many registers: a late answer could be taken for the barrier's",
     ),
     ({"provenance": {"hair": "seen"}}, ("provenance", "hair"), "is no key of a profile"),
 ]

@@ -66,7 +66,7 @@ def test_the_reserved_names_are_the_keys_of_every_sample(units: dict[str, str]) 
 def test_a_scale_that_leads_nowhere_is_refused(scale: object) -> None:
     ((place, message),) = problems(Value, VALUE | {"scale": scale})
     assert place == ("scale",)
-    assert message.startswith("must be a number from 1e-12 to 1e12, or the same negative, not ")
+    assert message.startswith("must be a number from 1e-12 to 1e12, or its negative, not ")
 
 
 @given(
@@ -142,17 +142,17 @@ def test_a_number_that_its_calibration_makes_infinite_is_none() -> None:
     [
         (
             VALUE | {"type": "float32", "word_order": "low_first", "bits": [0, 3]},
-            [(("bits",), "is a part of a whole number, and the type is float32")],
+            [(("bits",), "selects a part of a whole number, and the type is float32")],
         ),
-        (VALUE | {"bits": [0, 3], "byte": "low"}, [(("byte",), "bits says already which part is meant")]),
-        (VALUE | {"bits": [9, 16]}, [(("bits",), "there are bits 0 to 15")]),
+        (VALUE | {"bits": [0, 3], "byte": "low"}, [(("byte",), "bits selects the part already")]),
+        (VALUE | {"bits": [9, 16]}, [(("bits",), "must be bits 0 to 15")]),
         (
             {"name": "on", "register": 1, "function": 1, "unit": "1", "byte_order": "little"},
             [(("byte_order",), "a boolean has no bytes; leave the byte order out")],
         ),
         (
             VALUE | {"type": "float32", "word_order": "low_first", "map": {0: "dry"}},
-            [(("map",), "words stand for whole numbers, and the type is float32")],
+            [(("map",), "a map is for whole numbers, and the type is float32")],
         ),
         (VALUE | {"map": {}}, [(("map",), "names no content")]),
         (VALUE | {"type": "int17", "byte": "low", "map": {0: "a"}, "unavailable": [7]}, [(("type",), None)]),

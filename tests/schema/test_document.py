@@ -120,7 +120,7 @@ def test_an_alias_stands_where_it_stands_and_not_at_its_anchor() -> None:
         ("a: \ud800", "f:1:4: the character U+D800 may not stand in the file; write it as an escape in quotes"),
         ("[" * 100_000, f"f:1:{DEEPEST_NESTING + 1}: is not valid YAML: nested more than 20 levels deep"),
         ("- " * 100, f"f:1:{2 * DEEPEST_NESTING + 1}: is not valid YAML: nested more than 20 levels deep"),
-        ("a: &x [*x]", "f:1:8: a[0]: an alias may not stand for what surrounds it"),
+        ("a: &x [*x]", "f:1:8: a[0]: an alias may not contain itself"),
         ("a: *nothing", "f:1:4: is not valid YAML: found undefined alias 'nothing'"),
         ('a: "\\UFFFFFFFF"', "f:1:7: is not valid YAML: a number is out of range"),
         ("%YAML 1." + "9" * 5000 + "\n--- a", "f:1:9: is not valid YAML: a number is out of range"),
@@ -134,15 +134,13 @@ def test_what_cannot_be_read_is_refused_with_its_place(text: str, message: str) 
 def test_aliases_to_aliases_are_refused_before_they_fill_the_memory() -> None:
     levels = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
     levels += [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 10)}]" for n in range(1, 10)]
-    assert refusal("\n".join(levels)).endswith(
-        "is too large or too deep to read (an alias counts as what it stands for)"
-    )
+    assert refusal("\n".join(levels)).endswith("is too large or too deep to read (an alias counts as its content)")
     assert MOST_VALUES < 10**5
 
 
 def test_aliases_cannot_nest_deeper_than_lists() -> None:
     chain = "a0: &a0 [x]\n" + "".join(f"a{n}: &a{n} [*a{n - 1}]\n" for n in range(1, 30))
-    assert refusal(chain).endswith("is too large or too deep to read (an alias counts as what it stands for)")
+    assert refusal(chain).endswith("is too large or too deep to read (an alias counts as its content)")
 
 
 @pytest.mark.parametrize(
