@@ -100,7 +100,8 @@ class Connection:
             if correlation is not None:
                 properties.CorrelationData = correlation
         info = self._client.publish(topic, payload, qos, retain, properties)
-        self._pump.watch_writing()
+        if self._client.want_write():
+            self._pump.watch_writing()
         return info.mid if info.rc == MQTTErrorCode.MQTT_ERR_SUCCESS else None
 
     def cork(self, *, on: bool) -> None:

@@ -89,7 +89,7 @@ class Outbox:
         """
         connected = self._in_flight.window > 0
         if publication.sample is not None:
-            if publication.sample.grouped and not self.telemetry:
+            if publication.sample.grouped and not self.backlog.telemetry:
                 return
             if self._queues.live.waiting:
                 self.age(now)

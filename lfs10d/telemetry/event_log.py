@@ -99,7 +99,7 @@ class EventLog:
                 if publication.sample.quality != "bad":
                     good.add(publication.sample.device)
                 continue
-            device = device_of(publication.topic, ERROR)
+            device = None if publication.refresh else device_of(publication.topic, ERROR)
             if device is None:
                 continue
             if isinstance(publication.payload, Mapping) and publication.payload["active"]:

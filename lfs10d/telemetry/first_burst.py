@@ -29,9 +29,11 @@ class FirstBurst:
             return list(publications)
         return [self._unknown.get(each.topic, each) for each in publications]
 
-    def passing(self, publications: Iterable[Publication]) -> list[Publication]:
+    def passing(self, publications: Iterable[Publication]) -> Iterable[Publication]:
         """Return what need not wait for the first burst."""
-        return [each for each in publications if self.settled or each.payload is None or not _held(each)]
+        if self.settled:
+            return publications
+        return [each for each in publications if each.payload is None or not _held(each)]
 
     def settle(self, publications: Iterable[Publication]) -> list[Publication]:
         """Take that the broker has the first burst; return of a new one what was held back, availability first."""

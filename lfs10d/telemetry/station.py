@@ -84,7 +84,7 @@ class Station:
         Readings of unknown devices, and of disabled ones that no request wants, are ignored: their poll was under
         way when the device went.
         """
-        published = self._watch_clock(now)
+        published = self._watch_clock(now) if now.clock != self._clock else []
         match happened:
             case Exchanged():
                 self._line.counters.exchanged(happened)
