@@ -90,7 +90,7 @@ EVENTS: Final[Mapping[EventType, EventPage]] = {
         },
     ),
     "change_conflict": EventPage(
-        "File and last verified place of a device differ, and the line was asked.",
+        "The slave id or rate of a device in the file is not the last verified one: it was searched for on the line.",
         {
             "device": _DEVICE,
             "file": (_PLACE, "what the file says"),
@@ -133,13 +133,14 @@ EVENTS: Final[Mapping[EventType, EventPage]] = {
         },
     ),
     "dropped": EventPage(
-        "Samples of a device are lost: there was no room for them, or the broker takes them in no form.",
+        "Samples of a device are lost: there was no room for them, or the broker accepts them in no form.",
         {
             "device": _DEVICE,
             "boot": ("text", "of the samples"),
             "from_seq": ("whole number", "first `seq` of the range"),
             "to_seq": ("whole number", "last `seq` of the range"),
             "count": ("whole number", "samples lost in the range"),
+            "topic": ("text", "`record`: records were lost, and `seq` is theirs; absent for samples"),
         },
         {"device": "mast-top", "boot": "k3f9a2c7", "from_seq": 9001, "to_seq": 9100, "count": 100},
     ),

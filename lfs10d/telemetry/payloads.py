@@ -158,8 +158,8 @@ class LineStatePayload(Payload):
 class Gaps(Payload):
     """Silence measured before our requests, in us."""
 
-    min: float | None = Field(description="since boot, or since the line's rate changed")
-    p50: float | None = Field(description="of the last 1000")
+    min: float | None = Field(description="least, since boot or since the line's rate changed")
+    p50: float | None = Field(description="median of the last 1000")
     p99: float | None
 
 
@@ -167,7 +167,7 @@ class Uart(Payload):
     """The driver's own counters."""
 
     framing: int = Field(description="stop bit missing: wrong rate, A and B swapped, noise")
-    parity: int = Field(description="parity wrong")
+    parity: int = Field(description="parity bit wrong")
     overrun: int = Field(description="bytes lost in the adapter or the kernel")
     break_: int = Field(alias="break", description="line held low for longer than a character")
 
@@ -185,8 +185,8 @@ class LineStats(Payload):
 
     v: Version
     ts: Milliseconds
-    load_pct: float | None = Field(ge=0, le=100, description="share of time in which the line is in use")
-    polls_per_s: float | None = Field(ge=0, description="good and failed")
+    load_pct: float | None = Field(ge=0, le=100, description="percent of the time in which the line is in use")
+    polls_per_s: float | None = Field(ge=0, description="good and failed polls")
     cycle_s: float | None = Field(ge=0, description="longest time between two polls of one device")
     gap_required_us: float = Field(description="silence kept before each request")
     gap_us: Gaps = Field(description="silence measured before requests")
@@ -215,7 +215,9 @@ class DeviceConfig(Payload):
     enabled: bool
     response_timeout: float | Literal["auto"] = Field(description="in s; auto: learned")
     request_gap: float = Field(ge=0, description="rest before each request to it in s, as set or learned")
-    calibration: dict[str, Calibrated] = Field(description="by value name what its certificate says; {}: none")
+    calibration: dict[str, Calibrated] = Field(
+        description="scale and offset of its calibration certificate by value name; {}: none"
+    )
 
 
 class RoundTrip(Payload):
@@ -234,7 +236,7 @@ class DeviceStats(Payload):
     good: Count
     partial: int = Field(ge=0, description="those among `good` that lacked values, since boot")
     errors: Errors
-    rtt_ms: RoundTrip = Field(description="of its last 100 answers")
+    rtt_ms: RoundTrip = Field(description="from request to answer, of its last 100 answers")
     response_timeout_ms: float | None = Field(description="as set or learned")
     request_gap_ms: float = Field(ge=0, description="rest before each request to it, as set or learned")
     last_good_ts: Milliseconds | None
