@@ -1,4 +1,4 @@
-"""From the configuration to what telemetry, outbox and mqtt are built from."""
+"""Turns the configuration into the settings of telemetry, outbox and mqtt."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from lfs10d.telemetry.wind.figures import METRES_PER_SECOND
 
 
 def daemon_info(now: Effective, boot: Boot) -> DaemonInfo:
-    """Return what is published about the daemon itself."""
+    """Return the info of the daemon itself."""
     config = now.config
     return DaemonInfo(
         version=__version__,
@@ -55,7 +55,7 @@ def broker_settings(config: LiveConfig) -> BrokerSettings:
 
 
 def line_info(line: LineConfig) -> LineInfo:
-    """Return what is published about the line."""
+    """Return the info of the line."""
     return LineInfo(
         name=line.name,
         port=line.port,
@@ -69,7 +69,7 @@ def line_info(line: LineConfig) -> LineInfo:
 
 
 def device_infos(config: Config, profiles: Mapping[str, Profile]) -> tuple[DeviceInfo, ...]:
-    """Return what is published about each device."""
+    """Return the info of each device."""
     return tuple(
         DeviceInfo(
             name=slave.name,

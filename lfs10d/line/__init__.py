@@ -1,1 +1,1 @@
-"""The line thread: which device is polled next, one exchange after the other; jobs; pauses between requests."""
+"""The line thread: which device is polled next, retries, probes and other jobs, pauses between requests."""

@@ -1,4 +1,4 @@
-"""The line's time budget: what the configured polls cost, computed, not measured."""
+"""The line's time budget: the time that the configured polls take, computed. What is measured: `telemetry.counters`."""
 
 from __future__ import annotations
 

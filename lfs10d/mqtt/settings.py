@@ -1,4 +1,4 @@
-"""Which broker is spoken to, and how. Plain values."""
+"""The settings of the connection to the broker, from section `mqtt`: plain values."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Version(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Tls:
-    """Paths; None: the system's authorities, no certificate of our own, a key that is in `cert`."""
+    """The files for TLS; None: the system's authorities, no certificate of our own, the key in `cert`."""
 
     ca: str | None = None
     cert: str | None = None
@@ -30,7 +30,7 @@ class Tls:
 
 
 def no_password() -> Secret | None:
-    """Return that there is none."""
+    """Return None: there is no password."""
     return None
 
 

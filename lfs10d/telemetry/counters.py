@@ -1,4 +1,4 @@
-"""Counts since boot and figures of the last half minute, for `line/stats` and `device/<name>/stats`.
+"""Counts since boot, and load and rates of the last half minute, for `line/stats` and `device/<name>/stats`.
 
 Adding an event costs a few additions, whatever the number of devices; sorting is done only when the figures
 are asked for. What is not known is None, never 0 and never NaN. Times are monotonic seconds.

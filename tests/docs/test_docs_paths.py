@@ -53,6 +53,7 @@ def test_every_recipe_names_files_and_tests() -> None:
         "A request",
         "A published topic",
         "A retry rule",
+        "A configuration key",
         "A CLI verb",
         "The page",
     ]

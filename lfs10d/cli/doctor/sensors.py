@@ -1,4 +1,4 @@
-"""Examines the sensors: as the running daemon shows them, or read one after the other where none runs."""
+"""Examines line and sensors: as the running daemon publishes them, or by reading each where none runs."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Jobs of the line, all pure: polls and probes, pings, register access, scans and procedures."""
+"""Jobs of the line, all pure: polls with retries, probes, pings, register access, scans and procedures."""

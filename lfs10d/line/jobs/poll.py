@@ -1,13 +1,13 @@
-"""A poll: read a device's values once, with retries as later exchanges; a probe: the same of an offline device.
+"""Polls: reads a device's values once, with retries as later exchanges; a probe is a poll of an offline device.
 
 Rules
 -----
 1. While a late answer could pass for a value's, the slave is asked its profile's barrier first, by retries too; see
    `lfs10d.modbus.pending`. Probes begin with the barrier always. Where the profile has none the slave is left
    alone until nothing can be pending.
-2. A fault of the line is tried again, `retries` times, as a later exchange. A right frame is not: an exception or
-   a value out of range would only be said twice.
-3. One poll, one outcome, whatever it took.
+2. A failed exchange is tried again, `retries` times, as a later exchange. An exception or a value out of range is not:
+   the answer would be the same.
+3. One poll has one outcome, however many exchanges it took.
 4. What is read is decided when it begins (`lfs10d.line.read_plan`); where the device refuses registers that are
    optional, the others are read in the same poll. A value that is there by itself is none where its registers say so;
    the poll fails only where no value is there, with the fault of the first.
@@ -33,7 +33,7 @@ from lfs10d.profiles.blocks import Block
 from lfs10d.reading import ALIVE_CODES, NOTHING, Fault, FaultCode, Purpose, Reading, Value
 
 WAKES = 3
-"""So often within one poll a silence after a pause is taken for sleep."""
+"""Most silences within one poll that are taken for a sleeping device."""
 _NOTHING: frozenset[int] = frozenset()
 
 
