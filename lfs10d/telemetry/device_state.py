@@ -9,7 +9,8 @@ Rules
    does.
 3. The state shows the newest sample at most every `state_every`, but a change of quality or error at once, and of
    `errors`: another value that is missing, or another reason. It goes with the first sample whose time that is, so that
-   none shows a sample that the next is about to overtake; by itself only where that sample does not come.
+   none shows a sample that the next is about to overtake; by itself only where that sample does not come, or is far
+   off, or where one came merely early.
 4. Before its first sample a device's state has no value and the error `starting` (a disabled one `disabled`), which
    is never in its error topic.
 5. A disabled device has one sample that says so, and then none but those of polls that a request wants; of these
@@ -48,6 +49,9 @@ from lfs10d.telemetry.publication import (
 STATE_EARLY: Final = 0.03
 """Seconds that a state may come before its time (the next one then waits as much longer): otherwise a device polled
 every second would miss its turn by the jitter of its polls, or by `mqtt.hold`, and be shown late each time."""
+
+MERELY_EARLY: Final = 0.1
+"""A state does not wait for the next sample where this one came early by so small a part of the time between two."""
 
 SAMPLE_LATE: Final = 0.25
 """Seconds after its time for which a sample is waited for that a state is to go with."""
@@ -254,7 +258,8 @@ class DeviceState:
             published.append(self._state(now, refresh=True))
         else:
             self.state_due = self._state_from
-            if apart <= self.info.state_every + SAMPLE_LATE:  # else the next sample is too far off to wait for
+            early, near = self._state_from - now.mono, self.info.state_every + SAMPLE_LATE
+            if early > MERELY_EARLY * apart and apart <= near:  # else the next sample is too far off to wait for
                 self.state_due = max(self._state_from, now.mono + apart + SAMPLE_LATE)
         if turned and not online:
             published.append(self._availability())

@@ -122,6 +122,15 @@ def test_a_state_does_not_wait_for_a_sample_that_is_far_off() -> None:
     assert watched.device.state_due == 10.0
 
 
+@pytest.mark.parametrize(("at", "due"), [(9.92, 10.0), (9.85, 9.85 + 0.85 + SAMPLE_LATE)])
+def test_a_sample_that_is_merely_early_is_shown_when_its_time_has_come(at: float, due: float) -> None:
+    watched = Watched()
+    for second in range(10):
+        watched.poll(float(second), 1.0)
+    assert watched.poll(at, 2.0) == ["telemetry"]
+    assert watched.device.state_due == pytest.approx(due)
+
+
 def test_a_fault_is_shown_at_once_while_a_state_waits_for_a_sample() -> None:
     watched = polled_every(1.0)
     watched.poll(1.0, 2.0)
