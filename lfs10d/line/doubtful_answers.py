@@ -128,8 +128,9 @@ class DoubtfulAnswers:
             state.proved = not unproved.answers
             state.held_until = max(state.held_until, outcome.ended + WATCHED)
             return False
-        self._settle(slave, state, outcome.ended)
-        if clean:
+        if state.doubted:
+            self._settle(slave, state, outcome.ended)
+        if clean and unproved.answers:
             unproved.forget()
         beside = _beside(outcome) if outcome.strays else b""
         look = _look(outcome, wanted)
@@ -137,8 +138,7 @@ class DoubtfulAnswers:
         state.proved = not unproved.answers
         state.held_until = max(outcome.ended + WATCHED, unproved.own_by)
         if outcome.answer is None:
-            if not explained and spoilt(outcome):
-                self._broken(slave, state, outcome)
+            self._without_answer(slave, state, outcome, explained=explained)
             return False
         if self._doubted(state, outcome, beside, None if clean else usual, explained=explained):
             rest = outcome.ended + max(WATCHED, timeout)
@@ -218,7 +218,10 @@ class DoubtfulAnswers:
         state.unproved.forget()
         return True
 
-    def _broken(self, slave: int, state: _SlaveTrust, outcome: Outcome) -> None:
+    def _without_answer(self, slave: int, state: _SlaveTrust, outcome: Outcome, *, explained: bool) -> None:
+        """Leave the slave alone where bytes came that are no right frame, if its noise is not trusted (rule 2)."""
+        if explained or not spoilt(outcome):
+            return
         near = outcome.asked - state.broken_at < APART
         state.broken_at = outcome.ended
         if near or not self._trusted(state, outcome.ended):
@@ -230,9 +233,7 @@ class DoubtfulAnswers:
 
     def _settle(self, slave: int, state: _SlaveTrust, now: float) -> None:
         """Trust the slave's noise if the doubt was in vain."""
-        doubted, state.doubted = state.doubted, False
-        if not doubted:
-            return
+        state.doubted = False
         if self._duplicates.extras(slave):
             state.vain = 0
             return

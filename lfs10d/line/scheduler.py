@@ -171,9 +171,8 @@ class Scheduler:
         """Decide what is asked next; the outcome of an `Ask` must come back through `on_outcome`."""
         if now < self.second_answers.quiet.until:
             return Rest(self.second_answers.quiet.until)
-        if now >= self._jobs.release_at:
-            for job in self._jobs.released(now):
-                self._resume(job, now)
+        for job in self._jobs.released(now):
+            self._resume(job, now)
         while (chosen := self._choose(now)) is not None:
             decision = chosen.ask(now)
             if isinstance(decision, Ask):
@@ -240,7 +239,8 @@ class Scheduler:
         doubtful = at_line_rate and self.second_answers.is_doubtful(outcome, ask.timeout)
         self.devices.learn(outcome, doubtful=doubtful)
         widened = self._rests.learn(outcome, ask, self.devices.by_slave, line_rate=self.timing.baudrate)
-        self._spend(job, outcome, now)
+        if job.purpose is not Purpose.POLL:  # which has no share of its own
+            self._spend(job, outcome, now)
         ignored = self._ignored(outcome)
         again = doubtful or widened or (ignored and poll is not None and self._benefits(poll.device))
         if again and poll is not None and self._wanted(poll):

@@ -89,6 +89,8 @@ class Bus:
         self._hurried = True
         self._pending: Mapping[int, tuple[Pending, ...]] = {}
         self._exchange: Exchange | None = None
+        self._context: LineContext | None = None
+        """The state of the line for the next exchange; None where anything but the echo has changed."""
         self._quiet_since = -inf
         self._gap: float | None = None
         self._reopen_at = -inf
@@ -130,7 +132,7 @@ class Bus:
         self._pause = REOPEN_FIRST
         self._echo.reopened()
         self._quiet_since = self._clock()
-        self._gap = None
+        self._gap = self._context = None
         return PortChanged(now, None)
 
     def _lost(self, error: PortError, now: float) -> PortChanged | None:
@@ -167,6 +169,7 @@ class Bus:
         if rules.echo != self.rules.echo:
             self._echo = EchoLearner(rules.echo)
         self.rules = rules
+        self._context = None
         before, self._settings = self._settings, settings
         if self.open and _at_opening(before) != _at_opening(settings):
             self.close()
@@ -239,18 +242,21 @@ class Bus:
         self.port.flush()
         self.timing = self._timing(settings)
         self._gap = self.timing.slower(before)
+        self._context = None
         self._quiet_since = self._clock() + RATE_SETTLE
 
     def _begin(self, ask: Ask, now: float) -> Exchange:
-        line = LineContext(
-            timing=self.timing,
-            echo=self._echo.state,
-            adapter_latency=self.port.adapter_latency,
-            broadcast_delay=self.rules.broadcast_delay,
-            gap=self._gap,
-            paced=self.port.paced,
-            echo_proved=self._echo.proved,
-        )
+        line = self._context
+        if line is None or line.echo is not self._echo.state:
+            line = self._context = LineContext(
+                timing=self.timing,
+                echo=self._echo.state,
+                adapter_latency=self.port.adapter_latency,
+                broadcast_delay=self.rules.broadcast_delay,
+                gap=self._gap,
+                paced=self.port.paced,
+                echo_proved=self._echo.proved,
+            )
         return Exchange(ask, line, self._pending, asked=now, quiet_since=self._quiet_since)
 
     def _carry_on(self, exchange: Exchange, now: float) -> Wait | Outcome:
@@ -280,8 +286,8 @@ class Bus:
     def _settled(self, outcome: Outcome) -> Outcome:
         self._exchange = self.asked = None
         self._quiet_since = outcome.quiet_since
-        if outcome.sent_end is not None:
-            self._gap = None
+        if self._gap is not None and outcome.sent_end is not None:
+            self._gap = self._context = None
         if isinstance(outcome.request, ReadRegisters):
             self._echo.observed(outcome.echoed)
         return outcome

@@ -22,23 +22,22 @@ class Echo(StrEnum):
 
 
 class EchoLearner:
-    """What is known of the adapter's echo; `setting` is the configuration's word."""
+    """What is known of the adapter's echo; `setting` is the configuration's word.
+
+    `proved`: what is known was observed, not only configured.
+    """
 
     def __init__(self, setting: Literal["auto", "on", "off"] = "auto") -> None:
         self._fixed = {"on": Echo.ON, "off": Echo.OFF}.get(setting)
         self.state = Echo.UNKNOWN if self._fixed is None else self._fixed
+        self.proved = False
         self._seen: bool | None = None
         self._agreeing = 0
-
-    @property
-    def proved(self) -> bool:
-        """Whether what is known was observed, not only configured."""
-        return self._fixed is None and self.state is not Echo.UNKNOWN
 
     def reopened(self) -> None:
         """Forget what was learned: the adapter may be another one."""
         if self._fixed is None:
-            self.state = Echo.UNKNOWN
+            self.state, self.proved = Echo.UNKNOWN, False
             self._seen, self._agreeing = None, 0
 
     def observed(self, echoed: bool | None) -> None:  # noqa: FBT001 - an observation, not a switch
@@ -48,4 +47,4 @@ class EchoLearner:
         self._agreeing = self._agreeing + 1 if echoed is self._seen else 1
         self._seen = echoed
         if self._agreeing >= AGREEING:
-            self.state = Echo.ON if echoed else Echo.OFF
+            self.state, self.proved = Echo.ON if echoed else Echo.OFF, True

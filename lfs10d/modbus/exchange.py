@@ -41,7 +41,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import StrEnum
-from math import isfinite
+from math import inf
 from typing import TypeAlias
 
 from lfs10d.modbus import diagnosis
@@ -169,7 +169,7 @@ class Exchange:
         self._hush = ASCII_PAUSE if ask.codec.framing is Framing.ASCII else timing.t35 + line.adapter_latency
         patience = ask.timeout if ask.patience is None else ask.patience
         self._patience = min(patience, ask.timeout)
-        self._began = self._sent_end = self._last = quiet_since
+        self._began = self._sent_end = quiet_since
         self._measured_gap: float | None = None
         self._outcome: Outcome | None = None
 
@@ -206,11 +206,11 @@ class Exchange:
             raise MisuseError("a request cannot have been written before it was begun")
         self._pass(Happening.SENT)
         gap = begun - self._quiet_since
-        self._measured_gap = gap if isfinite(gap) else None
+        self._measured_gap = gap if gap < inf else None
         self._began = begun
         # The latest its last bit can leave an adapter that holds nothing back: counted from after the write.
         self._sent_end = ended + self._line.timing.transmission(len(self._frame))
-        self._quiet_since = self._last = self._sent_end
+        self._quiet_since = self._sent_end
         self._reception.sent(begun)
 
     def received(self, data: bytes, now: float) -> None:
@@ -222,7 +222,6 @@ class Exchange:
             return
         if self._state is State.READY:
             self._pass(Happening.HEARD)
-        self._last = max(self._last, now)
         self._reception.take(data, now)
 
     def _pass(self, happening: Happening) -> None:
@@ -272,7 +271,7 @@ class Exchange:
         reception = self._reception
         if self._ask.request.slave == BROADCAST or not reception.heard:
             return first
-        hushed = self._last + self._hush
+        hushed = self._quiet_since + self._hush
         if reception.spare is None:
             if not reception.rest:
                 return first

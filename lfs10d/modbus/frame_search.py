@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable
+from math import inf
 
 from lfs10d.modbus.frames import Codec, Shape
 from lfs10d.system.dataclass import dataclass
@@ -51,15 +52,15 @@ class FoundFrame:
 class FrameSearch:
     """The stream of one exchange."""
 
-    __slots__ = ("_base", "_claims", "_mark_ends", "_mark_times", "_stream", "end")
+    __slots__ = ("_base", "_claims", "_marks", "_stream", "end")
 
     def __init__(self) -> None:
         self.end = 0
         """The position behind the last character heard."""
         self._stream = bytearray()
         self._base = 0
-        self._mark_ends: list[int] = []
-        self._mark_times: list[float] = []
+        self._marks: list[tuple[int, float]] = []
+        """The position behind each piece, and when it was heard."""
         self._claims: list[tuple[int, int]] = []
 
     def feed(self, data: bytes, now: float) -> None:
@@ -68,14 +69,12 @@ class FrameSearch:
             self._forget(self.end - self._base - KEPT)
         self._stream += data
         self.end += len(data)
-        self._mark_ends.append(self.end)
-        self._mark_times.append(now)
+        self._marks.append((self.end, now))
 
     def _forget(self, count: int) -> None:
         del self._stream[:count]
         self._base += count
-        gone = bisect_right(self._mark_ends, self._base)
-        del self._mark_ends[:gone], self._mark_times[:gone]
+        del self._marks[: self._mark(self._base)]
 
     def seek(self, expected: ExpectedFrame) -> FoundFrame | None:
         """Return the next right frame of this shape, or None; goes on behind it at the next call."""
@@ -96,12 +95,13 @@ class FrameSearch:
             body = expected.codec.unwrap(bytes(self._stream[at : at + size]))
             if body is not None:
                 expected.start = end = begin + size
-                last_at = self._mark_times[-1] if end == self.end else self._heard_at(end - 1)
-                return FoundFrame(body, begin, end, self._heard_at(begin), last_at)
+                last = self._marks[-1] if end == self.end else self._marks[self._mark(end - 1)]
+                return FoundFrame(body, begin, end, self._marks[self._mark(begin)][1], last[1])
             expected.start = begin + 1
 
-    def _heard_at(self, position: int) -> float:
-        return self._mark_times[bisect_right(self._mark_ends, position)]
+    def _mark(self, position: int) -> int:
+        """Return which piece has the character at this position, the first one being 0."""
+        return bisect_right(self._marks, (position, inf))
 
     def claim(self, found: FoundFrame) -> None:
         """Take a frame out of what is left to explain."""
@@ -126,9 +126,9 @@ class FrameSearch:
         at = max(start, self._base, self.end - KEPT)
         for begin, end in [*sorted(self._claims), (self.end, self.end)]:
             while at < begin:
-                mark = bisect_right(self._mark_ends, at)
-                until = min(begin, self._mark_ends[mark])
-                found.append((bytes(self._stream[at - self._base : until - self._base]), self._mark_times[mark]))
+                end_of_piece, heard_at = self._marks[self._mark(at)]
+                until = min(begin, end_of_piece)
+                found.append((bytes(self._stream[at - self._base : until - self._base]), heard_at))
                 at = until
             at = max(at, end)
         return found

@@ -35,29 +35,29 @@ class _SlaveRhythm:
 
 
 class OtherMaster:
-    """The requests of other masters on one line, by slave id."""
+    """The requests of other masters on one line; `slaves` are those that were asked lately, by slave id."""
 
     def __init__(self) -> None:
-        self._slaves: dict[int, _SlaveRhythm] = {}
+        self.slaves: dict[int, _SlaveRhythm] = {}
 
     def asked(self, slave: int, at: float) -> None:
         """Note a request, whole at `at`."""
-        self._slaves.setdefault(slave, _SlaveRhythm()).asked.append(at)
+        self.slaves.setdefault(slave, _SlaveRhythm()).asked.append(at)
 
     def answered(self, slave: int, at: float) -> None:
         """Note the answer to its last request, whole at `at`."""
-        rhythm = self._slaves.get(slave)
+        rhythm = self.slaves.get(slave)
         if rhythm is not None:
             rhythm.took = at - rhythm.asked[-1]
 
     def busy_until(self, slave: int, now: float) -> float | None:
         """Return until when a request of ours to the slave waits, None if it may be asked now."""
-        rhythm = self._slaves.get(slave)
+        rhythm = self.slaves.get(slave)
         if rhythm is None:
             return None
         last, took = rhythm.asked[-1], rhythm.took
         if now > last + FORGOTTEN:
-            del self._slaves[slave]
+            del self.slaves[slave]
             return None
         period = min((later - earlier for earlier, later in pairwise(rhythm.asked)), default=0.0)
         if not took or period < took * (1 + OURS):

@@ -164,7 +164,8 @@ class PendingRequests:
                 self._forget(each)
             del self._quiet_until[slave]
             until = None
-        rests, busy = self.duplicates.rests_until(slave, now), self.other_master.busy_until(slave, now)
+        rests = self.duplicates.rests_until(slave, now)
+        busy = self.other_master.busy_until(slave, now) if self.other_master.slaves else None
         if until is rests is busy is None:
             return None
         return max(each for each in (until, rests, busy) if each is not None)

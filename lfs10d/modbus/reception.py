@@ -8,7 +8,7 @@ from math import inf
 from lfs10d.modbus.ask import Ask, LineContext
 from lfs10d.modbus.echo import Echo
 from lfs10d.modbus.frame_search import ExpectedFrame, FoundFrame, FrameSearch
-from lfs10d.modbus.frames import EXCEPTION_FLAG, Shape
+from lfs10d.modbus.frames import EXCEPTION_FLAG, Framing, Shape
 from lfs10d.modbus.outcome import LateAnswer
 from lfs10d.modbus.pending import Pending
 from lfs10d.modbus.request import BROADCAST, ReadRegisters
@@ -43,25 +43,24 @@ class Reception:
         frame: bytes,
         answers: tuple[Shape, Shape],
     ) -> None:
-        normal, exception = answers
         self._ask = ask
         self._line = line
         self._pending_by_slave = pending
         earlier = pending.get(ask.request.slave, ())
         self._frame = frame
         self._search = FrameSearch()
-        self._normal = ExpectedFrame(ask.codec, normal)
-        self._exception = ExpectedFrame(ask.codec, exception)
+        self._normal = ExpectedFrame(ask.codec, answers[0])
+        self._exception = ExpectedFrame(ask.codec, answers[1])
         self._reads = isinstance(ask.request, ReadRegisters)
+        self._ascii = ask.codec.framing is Framing.ASCII
         self._older = [older for each in earlier for older in self._expected_of(each)] if earlier else []
         self._pending = list(earlier)
         self._held: list[tuple[bytes, float]] = []
         self._matched = self._missing = self._from = self._sent_at = self._early_end = 0
         self._earliest = -inf
-        self._undecided = self._echo_whole = self._owes_another = False
+        self.sent_yet = self._undecided = self._echo_whole = self._owes_another = False
         # Echo and answer of a write look the same.
         self._expects_echo = line.echo is Echo.ON or (line.echo is Echo.UNKNOWN and not self._reads)
-        self.sent_yet = False
         self.heard = bytearray()
         self.answer: FoundFrame | None = None
         self.spare: FoundFrame | None = None
@@ -82,9 +81,10 @@ class Reception:
         self._earliest = begun + timing.transmission(len(self._frame) - EARLY_TOLERANCE)
         self._undecided = self._line.echo is not Echo.OFF
         self._sent_at = self._early_end = heard_before = self._search.end
-        self._owes_another = bool(heard_before) and self._foreign(0, heard_before, unanswered=True)
-        self._begin_at(self._sent_at)
-        self.heard.clear()
+        if heard_before:
+            self._owes_another = self._foreign(0, heard_before, unanswered=True)
+            self._begin_at(heard_before)
+            self.heard.clear()
         self.sent_yet = True
 
     def take(self, data: bytes, now: float) -> None:
@@ -92,7 +92,8 @@ class Reception:
         self.heard += data
         if len(self.heard) > 2 * HEARD_KEPT:
             del self.heard[:-HEARD_KEPT]
-        data = self._ask.codec.fold(data)
+        if self._ascii:
+            data = self._ask.codec.fold(data)
         if self._undecided:
             data = self._compare(data, now)
         if data:
@@ -118,8 +119,7 @@ class Reception:
         return data[len(part) :]
 
     def _sort(self, data: bytes, now: float) -> None:
-        wire = self._line.paced or now < self._earliest
-        early = self._too_early(len(data), now) if wire and self.sent_yet else 0
+        early = self._too_early(len(data), now) if self.sent_yet and (self._line.paced or now < self._earliest) else 0
         if early:
             self._early_end = self._search.end + early
             if self._line.paced:
