@@ -21,10 +21,7 @@ WORD_BITS = 16
 class RegisterContent(FieldKind):
     """A register content; for a float type a number with a decimal point is that number itself."""
 
-    @property
-    def words(self) -> str:
-        """Its range."""
-        return "a register content such as 0xFFFF, or the number that stands for no value"
+    words = "a register content such as 0xFFFF, or the number that stands for no value"
 
     def accept(self, value: object) -> int | float:
         """Take numbers only."""

@@ -45,10 +45,7 @@ class Word(FieldKind):
     reserved: frozenset[str] = frozenset()
     pattern = re.compile(r"[a-z][a-z0-9_]{0,47}")
 
-    @property
-    def words(self) -> str:
-        """Its characters."""
-        return "a name of 1 to 48 of the characters a-z 0-9 _ that begins with a letter"
+    words = "a name of 1 to 48 of the characters a-z 0-9 _ that begins with a letter"
 
     def accept(self, value: object) -> str:
         """Take text that fits."""
@@ -63,10 +60,7 @@ class Word(FieldKind):
 class Factor(FieldKind):
     """A scale: not zero, and of a size that keeps every result finite."""
 
-    @property
-    def words(self) -> str:
-        """Its range."""
-        return "a number from 1e-12 to 1e12, or its negative"
+    words = "a number from 1e-12 to 1e12, or its negative"
 
     def accept(self, value: object) -> float:
         """Take numbers only."""

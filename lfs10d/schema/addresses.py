@@ -17,10 +17,7 @@ class Host(FieldKind):
 
     pattern = re.compile(r"[\w.-]{1,253}|[0-9A-Fa-f]*:[0-9A-Fa-f:.]*:[0-9A-Fa-f:.]*(%[\w.-]+)?")
 
-    @property
-    def words(self) -> str:
-        """Its form."""
-        return "a host name or address, such as localhost or 192.0.2.7 (no mqtt://, no port, no login)"
+    words = "a host name or address, such as localhost or 192.0.2.7 (no mqtt://, no port, no login)"
 
     def accept(self, value: object) -> str:
         """Take text that fits."""
@@ -37,12 +34,7 @@ class Host(FieldKind):
 class Node(Host):
     """One node of several: a host, with its port if it has its own. A wrong one is never shown."""
 
-    @property
-    def words(self) -> str:
-        """Its form."""
-        return (
-            'a host name or address, with a port or without, such as broker-b, "broker-b:8884" or "[2001:db8::7]:1883"'
-        )
+    words = 'a host name or address, with a port or without, such as broker-b, "broker-b:8884" or "[2001:db8::7]:1883"'
 
     def accept(self, value: object) -> str:
         """Take text that fits."""

@@ -167,10 +167,8 @@ def parse(text: str, file: str) -> Document:
         raise ConfigError((Problem(file, mark.line + 1, mark.column + 1, "", _syntax(error)),)) from None
     except (yaml.YAMLError, ValueError, OverflowError):
         # Numbers that PyYAML converts without looking: "\UFFFFFFFF", %YAML 1.999...
-        mark = loader.get_mark()
-        raise ConfigError(
-            (Problem(file, mark.line + 1, mark.column + 1, "", "is not valid YAML: a number is out of range"),)
-        ) from None
+        mark, message = loader.get_mark(), "is not valid YAML: a number is out of range"
+        raise ConfigError((Problem(file, mark.line + 1, mark.column + 1, "", message),)) from None
     if node is None:
         raise ConfigError((Problem(file, 1, 1, "", "the file is empty"),))
     reader = _NodeReader(file)
@@ -207,19 +205,10 @@ class _NodeReader:
 
     def read(self, node: Node, path: KeyPath, key: tuple[int, int] | None) -> object:
         self.values += 1
-        place = _place(node)
         if self.values > MOST_VALUES or len(path) > DEEPEST_NESTING:
-            raise ConfigError(
-                (
-                    Problem(
-                        self.file,
-                        *place,
-                        path_text(path),
-                        "is too large or too deep to read (an alias counts as its content)",
-                    ),
-                )
-            )
-        self.places[path] = DocumentPlace(place, key)
+            message = "is too large or too deep to read (an alias counts as its content)"
+            raise ConfigError((self.problem(node, path, message),))
+        self.places[path] = DocumentPlace(_place(node), key)
         match node:
             case ScalarNode():
                 value = self.scalar(node, path)
@@ -235,7 +224,7 @@ class _NodeReader:
 
     def within(self, node: Any, word: str, path: KeyPath, reader: Any) -> object:  # noqa: ANN401 - a node of any reader
         if id(node.value) in self.open:
-            raise ConfigError((Problem(self.file, *_place(node), path_text(path), "an alias may not contain itself"),))
+            raise ConfigError((self.problem(node, path, "an alias may not contain itself"),))
         if node.tag != TAG + word:
             self.report(node, path, f"the tag {quoted(node.tag)} is not known; leave it out")
         self.open.append(id(node.value))
@@ -295,8 +284,11 @@ class _NodeReader:
             self.report(node, path, "has too many digits")
             return _UNREAD
 
+    def problem(self, node: Node, path: KeyPath, message: str) -> Problem:
+        return Problem(self.file, *_place(node), path_text(path), message)
+
     def report(self, node: Node, path: KeyPath, message: str) -> None:
-        self.problems.append(Problem(self.file, *_place(node), path_text(path), message))
+        self.problems.append(self.problem(node, path, message))
 
 
 def _place(node: Node) -> tuple[int, int]:

@@ -134,10 +134,7 @@ class Whole(FieldKind):
 class Flag(FieldKind):
     """True or false, in these words only."""
 
-    @property
-    def words(self) -> str:
-        """The two words."""
-        return "true or false"
+    words = "true or false"
 
     def accept(self, value: object) -> bool:
         """Take booleans only."""
@@ -250,10 +247,7 @@ class Name(FieldKind):
 
     pattern = re.compile(r"[a-z0-9_-]{1,32}")
 
-    @property
-    def words(self) -> str:
-        """Its characters."""
-        return "a name of 1 to 32 of the characters a-z 0-9 _ -"
+    words = "a name of 1 to 32 of the characters a-z 0-9 _ -"
 
     def accept(self, value: object) -> str:
         """Take text that fits."""

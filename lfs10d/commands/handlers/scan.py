@@ -28,10 +28,7 @@ RATES = Choice(BAUDRATES)
 class SlaveIds(FieldKind):
     """Slave ids, as text of ids and ranges or as a list."""
 
-    @property
-    def words(self) -> str:
-        """Both ways to write them."""
-        return f'ids and ranges from 1 to {LAST_ID} such as "1-20,30", or a list such as [1, 2, 3]'
+    words = f'ids and ranges from 1 to {LAST_ID} such as "1-20,30", or a list such as [1, 2, 3]'
 
     def accept(self, value: object) -> tuple[int, ...]:
         """Take either way; return the ids in order, each once."""
@@ -50,10 +47,7 @@ class SlaveIds(FieldKind):
 class ScanRates(FieldKind):
     """Rates of a line, as a list."""
 
-    @property
-    def words(self) -> str:
-        """How to write them."""
-        return f"a list such as [9600, 19200] of the rates {RATES.words}; or null"
+    words = f"a list such as [9600, 19200] of the rates {RATES.words}; or null"
 
     def accept(self, value: object) -> tuple[int, ...] | None:
         """Take a list; return its rates in their order, each once."""
