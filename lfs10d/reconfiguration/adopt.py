@@ -118,11 +118,35 @@ class Adopt:
         run.begin(steps, clock, line_rate=now.config.line.baudrate, excludes=ids)
 
         def intend(write: IdWrite) -> OpenAdopt:
-            return self._intend(request, write, command)
+            name = request.name or default_device_name(write.new.slave)
+            move = Move(device=name, old=write.old, new=write.new, register_before=write.register_before)
+            facts = AdoptFacts(label=request.label, profile=request.profile)
+            return runner.journal.intend(OpenAdopt(moves=(move,), begun=runner.timestamp(), asked=command, facts=facts))
 
         async def conclude(report: adopt.AdoptReport | None, change: OpenAdopt | None) -> Result:
+            """Record the outcome on disk; return the result."""
             report = report or adopt.AdoptReport(ReaddressReport(ReaddressEnding.LOST_BEFORE))
-            return await self._conclude(request, wish, profile, report, change, command)
+            ending, to = report.readdress.ending, report.to or 0
+            name = request.name or default_device_name(to)
+            result = _result(name, wish.factory, to, report.readdress, profile, written=change is not None)
+            if ending is ReaddressEnding.TWINS:
+                rate = report.old.baudrate if report.old else None
+                runner.announce("duplicate_id", {"slave": wish.factory, "baudrate": rate})
+            if change is None or ending in NOTHING_WRITTEN:
+                return await runner.refuse(command, result)
+            try:
+                await self._save(name, report, change, runner.record(command, result))
+            except StateError as error:
+                if ending is ReaddressEnding.MOVED:
+                    return failed(
+                        "storage_full", f"the sensor is at slave id {to} now, but that cannot be saved: {error}"
+                    )
+                log.warning("%s", error)
+                return result
+            if ending is ReaddressEnding.MOVED:
+                facts = {"request": NAME, "id": command.key, "device": name, "from": None, "to": {"slave": to}}
+                runner.announce("change_applied", facts)
+            return result
 
         return await runner.perform(run, command, intend, conclude)
 
@@ -155,44 +179,6 @@ class Adopt:
         for change in self._runner.open:
             taken |= dict.fromkeys(change.slaves, "is reserved by an open change")
         return taken
-
-    def _intend(self, request: AdoptRequest, write: IdWrite, command: CommandRecord) -> OpenAdopt:
-        name = request.name or default_device_name(write.new.slave)
-        move = Move(device=name, old=write.old, new=write.new, register_before=write.register_before)
-        facts = AdoptFacts(label=request.label, profile=request.profile)
-        change = OpenAdopt(moves=(move,), begun=self._runner.timestamp(), asked=command, facts=facts)
-        return self._runner.journal.intend(change)
-
-    async def _conclude(
-        self,
-        request: AdoptRequest,
-        wish: adopt.AdoptWish,
-        profile: Profile,
-        report: adopt.AdoptReport,
-        change: OpenAdopt | None,
-        command: CommandRecord,
-    ) -> Result:
-        """Record the outcome on disk; return the result."""
-        runner, ending = self._runner, report.readdress.ending
-        to = report.to or 0
-        name = request.name or default_device_name(to)
-        result = _result(name, wish.factory, to, report.readdress, profile, written=change is not None)
-        if ending is ReaddressEnding.TWINS:
-            rate = report.old.baudrate if report.old else None
-            runner.announce("duplicate_id", {"slave": wish.factory, "baudrate": rate})
-        if change is None or ending in NOTHING_WRITTEN:
-            return await runner.refuse(command, result)
-        try:
-            await self._save(name, report, change, runner.record(command, result))
-        except StateError as error:
-            if ending is ReaddressEnding.MOVED:
-                return failed("storage_full", f"the sensor is at slave id {to} now, but that cannot be saved: {error}")
-            log.warning("%s", error)
-            return result
-        if ending is ReaddressEnding.MOVED:
-            facts = {"request": NAME, "id": command.key, "device": name, "from": None, "to": {"slave": to}}
-            runner.announce("change_applied", facts)
-        return result
 
     async def _save(self, name: str, report: adopt.AdoptReport, change: OpenAdopt, record: ResultRecord | None) -> None:
         """Record on disk where the sensor is, or that it is still to be found."""

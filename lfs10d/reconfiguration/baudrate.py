@@ -62,11 +62,26 @@ class BaudrateChange:
         run.begin(steps, clock, line_rate=0, excludes=frozenset(sensor.slave for sensor in sensors), share=1.0)
 
         def intend(_: WriteRates) -> OpenBaudrate:
-            return self._intend(wish, command)
+            moves = tuple(Move(device=each.name, old=each.at(wish.old), new=each.at(to)) for each in sensors)
+            facts = BaudrateFacts(old=wish.old, to=to, power_cycle=power_cycle)
+            change = OpenBaudrate(moves=moves, begun=runner.timestamp(), asked=command, facts=facts)
+            return runner.journal.intend(change)
 
         async def conclude(report: BaudrateReport | None, change: OpenBaudrate | None) -> Result:
+            """Record the outcome on disk; return the result."""
             report = report or BaudrateReport(BaudrateEnding.LOST_BEFORE)
-            return await self._conclude(wish, report, change, earlier, command)
+            result = baudrate_answers.result(wish.old, to, report, dry_run=dry_run)
+            if change is None or report.ended in UNTOUCHED:
+                return await runner.refuse(command, result)
+            for name in report.names if report.ended is BaudrateEnding.TWINS else ():
+                self.announce_twins(name, sensors)
+            try:
+                await self._save(wish, report, change, earlier, runner.record(command, result))
+            except StateError as error:
+                if report.ended is BaudrateEnding.MOVED:
+                    return failed("storage_full", f"all sensors are at {to} baud, but that cannot be saved: {error}")
+                log.warning("%s", error)
+            return result
 
         return await runner.perform(run, command, intend, conclude)
 
@@ -119,37 +134,6 @@ class BaudrateChange:
             for slave in slaves
             if slave is not None
         )
-
-    def _intend(self, wish: RateWish, command: CommandRecord) -> OpenBaudrate:
-        runner = self._runner
-        moves = tuple(
-            Move(device=sensor.name, old=sensor.at(wish.old), new=sensor.at(wish.to)) for sensor in wish.sensors
-        )
-        facts = BaudrateFacts(old=wish.old, to=wish.to, power_cycle=wish.power_cycle)
-        return runner.journal.intend(OpenBaudrate(moves=moves, begun=runner.timestamp(), asked=command, facts=facts))
-
-    async def _conclude(
-        self,
-        wish: RateWish,
-        report: BaudrateReport,
-        change: OpenBaudrate | None,
-        earlier: frozenset[int],
-        command: CommandRecord,
-    ) -> Result:
-        """Record the outcome on disk; return the result."""
-        runner = self._runner
-        result = baudrate_answers.result(wish.old, wish.to, report, dry_run=wish.dry_run)
-        if change is None or report.ended in UNTOUCHED:
-            return await runner.refuse(command, result)
-        for name in report.names if report.ended is BaudrateEnding.TWINS else ():
-            self.announce_twins(name, wish.sensors)
-        try:
-            await self._save(wish, report, change, earlier, runner.record(command, result))
-        except StateError as error:
-            if report.ended is BaudrateEnding.MOVED:
-                return failed("storage_full", f"all sensors are at {wish.to} baud, but that cannot be saved: {error}")
-            log.warning("%s", error)
-        return result
 
     async def _save(
         self,

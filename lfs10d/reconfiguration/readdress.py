@@ -10,7 +10,6 @@ from lfs10d.config.effective import Effective
 from lfs10d.config.models import SlaveConfig
 from lfs10d.errors import StateError
 from lfs10d.line.jobs.procedure import ProcedureClock
-from lfs10d.profiles.profile import Profile
 from lfs10d.reconfiguration import readdress_answers
 from lfs10d.reconfiguration.journal import CommandRecord, Endpoint, Move, OpenReaddress, ResultRecord
 from lfs10d.reconfiguration.procedures.readdress import (
@@ -82,37 +81,25 @@ class Readdress:
             return runner.journal.intend(OpenReaddress(moves=(move,), begun=runner.timestamp(), asked=command))
 
         async def conclude(report: ReaddressReport | None, change: OpenReaddress | None) -> Result:
+            """Record the outcome on disk; return the result."""
             report = report or ReaddressReport(ReaddressEnding.LOST_BEFORE)
-            return await self._conclude(slave.name, wish, report, change, command, profile)
+            result = readdress_answers.result(slave.name, wish, report, profile)
+            if report.ending is ReaddressEnding.TWINS:
+                runner.announce_duplicate(slave.name, slave.id, slave.id)
+            if change is None or report.ending in NOTHING_WRITTEN:
+                return await runner.refuse(command, result)
+            try:
+                await self._save(slave.name, wish, report, change, runner.record(command, result))
+            except StateError as error:
+                if report.ending is ReaddressEnding.MOVED:
+                    message = f"{slave.name} answers at slave id {to} now, but that cannot be saved: {error}"
+                    return failed("storage_full", message, data=result.data)
+                log.warning("%s", error)
+            if report.ending in (ReaddressEnding.BOTH, ReaddressEnding.GARBAGE):
+                runner.announce_duplicate(slave.name, to, slave.id)
+            return result
 
         return await runner.perform(run, command, intend, conclude)
-
-    async def _conclude(
-        self,
-        device: str,
-        wish: ReaddressWish,
-        report: ReaddressReport,
-        change: OpenReaddress | None,
-        command: CommandRecord,
-        profile: Profile,
-    ) -> Result:
-        """Record the outcome on disk; return the result."""
-        runner = self._runner
-        result = readdress_answers.result(device, wish, report, profile)
-        if report.ending is ReaddressEnding.TWINS:
-            runner.announce_duplicate(device, wish.old.slave, wish.old.slave)
-        if change is None or report.ending in NOTHING_WRITTEN:
-            return await runner.refuse(command, result)
-        try:
-            await self._save(device, wish, report, change, runner.record(command, result))
-        except StateError as error:
-            if report.ending is ReaddressEnding.MOVED:
-                message = f"{device} answers at slave id {wish.to} now, but that cannot be saved: {error}"
-                return failed("storage_full", message, data=result.data)
-            log.warning("%s", error)
-        if report.ending in (ReaddressEnding.BOTH, ReaddressEnding.GARBAGE):
-            runner.announce_duplicate(device, wish.new.slave, wish.old.slave)
-        return result
 
     async def _save(
         self,

@@ -68,9 +68,7 @@ class Recovery:
 
     def stop(self) -> None:
         """Send no new frame."""
-        for run, task in self._followed.values():
-            run.stop()
-            task.cancel()
+        self.leave(frozenset(self._followed))
 
     async def _follow(self, change: OpenChange, run: ProcedureRun) -> None:
         try:

@@ -61,9 +61,9 @@ class Recall(Protocol):
 class ChangeRunner:
     """Carries out one change after the other. Used in the thread of the asyncio loop.
 
-    `running()` is the configuration in force, `change` puts another into force, `learn` too, whether or not the disk
-    keeps it; `wire()` is the line. `announce` publishes an event; `recall` has a command of an earlier life of the
-    daemon remembered, or answered.
+    `running()` is the configuration in force, `change` puts another into force, saved to disk first (it raises
+    StateError where that fails), `learn` too, whether or not the disk keeps it; `wire()` is the line. `announce`
+    publishes an event; `recall` has a command of an earlier life of the daemon remembered, or answered.
     """
 
     def __init__(
@@ -80,6 +80,7 @@ class ChangeRunner:
     ) -> None:
         self.journal = journal
         self.running = running
+        self.change = change
         self.learn = learn
         self.wire = wire
         self.announce = announce
@@ -87,7 +88,6 @@ class ChangeRunner:
         self.reservations = Reservations(lambda: journal.open)
         self.underway: CommandRecord | None = None
         """The command that is being carried out now."""
-        self._change = change
         self._recall = recall
         self._now = now
         self._writing: asyncio.Future[Any] | None = None
@@ -258,10 +258,6 @@ class ChangeRunner:
 
     # -- what holds from now on
 
-    async def change(self, edit: Edit) -> None:
-        """Apply another configuration, saved to disk first; raises StateError if it cannot be written."""
-        await self._change(edit)
-
     async def save_endpoint(self, device: str, endpoint: Endpoint, added: Values | None = None) -> None:
         """Poll a device where it was found, saved to disk first; `added` is the entry of a new one."""
 
@@ -270,7 +266,7 @@ class ChangeRunner:
                 return now.changes if added is None else now.changes.adding(device, added, Place(endpoint.slave))
             return now.changes.moving(device, Place(endpoint.slave), now.file_values)
 
-        await self._change(edit)
+        await self.change(edit)
 
     def announce_duplicate(self, device: str, slave: int, former: int) -> None:
         """Announce that two sensors have the slave id `slave`, or had `former` both."""

@@ -22,13 +22,13 @@ from lfs10d.reconfiguration.journal import Endpoint
 from lfs10d.reconfiguration.procedures.baudrate import RateSensor, restore_rate, write_rate
 from lfs10d.reconfiguration.procedures.identity_query import IdentityQuery
 from lfs10d.reconfiguration.procedures.readdress import (
-    ECHO_READS,
     IdWrite,
     ReaddressEnding,
     ReaddressReport,
     alone,
     free,
     judge,
+    not_ready,
     present,
     undo_stored_id,
     verify,
@@ -106,15 +106,9 @@ def _check_before_write(
         )
     if refusal is not None:
         return AdoptReport(refusal, old, to)
-    for _ in range(ECHO_READS):
-        if echo_known():
-            break
-        yield from query.read_register(old)
-    if not echo_known():
-        return AdoptReport(ReaddressReport(ReaddressEnding.DEAF), old, to)
-    again = yield from present(old, query)
-    if not again.answers or not (yield from query.settle(old)):
-        return AdoptReport(ReaddressReport(ReaddressEnding.ABSENT), old, to)
+    ending = yield from not_ready(old, query, echo_known)
+    if ending is not None:
+        return AdoptReport(ReaddressReport(ending), old, to)
     return AdoptReport(newcomer.readdress, old, to, rate_code=newcomer.rate_code)
 
 

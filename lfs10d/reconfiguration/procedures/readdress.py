@@ -166,17 +166,22 @@ def check_before_write(
     for rate in sorted(set(wish.rates) - {wish.old.baudrate}):
         if not (yield from free(Endpoint(slave=wish.to, baudrate=rate), query)):
             return ReaddressReport(ReaddressEnding.TAKEN, at=rate), before
+    ending = yield from not_ready(wish.old, query, echo_known)
+    return None if ending is None else ReaddressReport(ending), before
+
+
+def not_ready(
+    old: Endpoint, query: IdentityQuery, echo_known: Callable[[], bool]
+) -> Generator[Step, Any, ReaddressEnding | None]:
+    """Return why a sensor cannot be written to now: the echo is not known, no answer, or an old request under way."""
     for _ in range(ECHO_READS):
         if echo_known():
             break
-        yield from query.read_register(wish.old)
+        yield from query.read_register(old)
     if not echo_known():
-        return ReaddressReport(ReaddressEnding.DEAF), before
-    # The long look at the new id over, it must answer now, and nothing from before may still be under way.
-    again = yield from present(wish.old, query)
-    if not again.answers or not (yield from query.settle(wish.old)):
-        return ReaddressReport(ReaddressEnding.ABSENT), before
-    return None, before
+        return ReaddressEnding.DEAF
+    again = yield from present(old, query)
+    return None if again.answers and (yield from query.settle(old)) else ReaddressEnding.ABSENT
 
 
 def absent(reply: IdentityReply) -> ReaddressReport:
@@ -220,8 +225,7 @@ def write(endpoint: Endpoint, register: int, value: int, query: IdentityQuery) -
     request = WriteRegister(endpoint.slave, register, value, query.profile.write_function)
     baudrate = None if endpoint.baudrate == query.line_rate else endpoint.baudrate
     asked = Ask(request, query.codec, WRITE_TIMEOUT, None, baudrate, request_gap=query.profile.request_gap)
-    outcome = yield from query.put(asked)
-    fault = outcome.fault
+    fault = (yield from query.put(asked)).fault
     if fault is not None and fault.code is FaultCode.EXCEPTION:
         return fault.exception_code
     return None
@@ -244,7 +248,7 @@ def verify(
     while query.clock.now < until:
         reply = yield from query.read_register(new)
         if reply.answers:
-            return (yield from read_both(old, new, query, look))
+            break
         yield from query.read_register(old)
         yield Hold(query.clock.now + PAUSE)
     return (yield from read_both(old, new, query, look))
