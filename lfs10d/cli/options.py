@@ -9,6 +9,7 @@ from typing import Any
 
 import click
 
+from lfs10d.line.jobs.scan_ids import ids_of
 from lfs10d.modbus.frames import Framing
 from lfs10d.modbus.port_settings import PARITIES, PortSettings
 from lfs10d.modbus.timing import LineTiming
@@ -105,6 +106,14 @@ def take(options: dict[str, Any]) -> LineOptions:
         framing=framing,
         timeout=options.pop("timeout"),
     )
+
+
+def id_list(context: click.Context, parameter: click.Parameter, value: str) -> tuple[int, ...]:
+    """Return the ids of text such as 1-8,12: the callback of an option; raises click.BadParameter."""
+    try:
+        return ids_of(value)
+    except ValueError as error:
+        raise click.BadParameter(str(error), context, parameter) from error
 
 
 def baudrate_of(text: str) -> int:

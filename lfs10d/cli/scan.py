@@ -15,14 +15,13 @@ import click
 from lfs10d.cli import EXIT_FAILED, EXIT_UNAVAILABLE, json_option, print_lines
 from lfs10d.cli.calibrated import NONE, Calibrations, calibration_option, calibrations_of
 from lfs10d.cli.direct_line import DirectLine
-from lfs10d.cli.options import PORT, LineOptions, baudrate_of, line_options, take
+from lfs10d.cli.options import PORT, LineOptions, baudrate_of, id_list, line_options, take
 from lfs10d.cli.port_holder import instead
 from lfs10d.cli.render import scan_findings, troubleshooting
 from lfs10d.cli.render.scan_progress import scan_view
 from lfs10d.errors import FailedError, PortBusyError, PortError
 from lfs10d.line.jobs.identification import FoundDevice, by_evidence
 from lfs10d.line.jobs.scan import Scan
-from lfs10d.line.jobs.scan_ids import ids_of
 from lfs10d.line.jobs.scan_plan import FIRST_TIMEOUT, ScanPlan
 from lfs10d.modbus.frames import Checksum, Codec, Framing
 from lfs10d.profiles.library import builtin_names, load_profile
@@ -39,13 +38,6 @@ Examples:
   lfs10d scan /dev/ttyUSB0 --baudrate 9600    one rate
   lfs10d scan /dev/ttyUSB0 --write site.yaml  keep what was found
 """
-
-
-def _ids(context: click.Context, parameter: click.Parameter, value: str) -> tuple[int, ...]:
-    try:
-        return ids_of(value)
-    except ValueError as error:
-        raise click.BadParameter(str(error), context, parameter) from error
 
 
 def _rates(context: click.Context, parameter: click.Parameter, value: str) -> tuple[int, ...]:
@@ -69,7 +61,7 @@ def given(name: str) -> bool:
 @click.argument("port", type=PORT)
 @click.option(
     "--ids",
-    callback=_ids,
+    callback=id_list,
     default="1-255",
     show_default=True,
     metavar="IDS",

@@ -13,11 +13,11 @@ from typing import Any
 import click
 
 from lfs10d.cli import json_option
-from lfs10d.cli.options import DurationType, profile_names
+from lfs10d.cli.options import DurationType, id_list, profile_names
 from lfs10d.profiles.library import load_profile
 from lfs10d.schema.quantities import BAUDRATES
 from lfs10d.simulator.blueprint import LFS10, blueprint_of
-from lfs10d.simulator.builder import LinePlan, build, slave_ids
+from lfs10d.simulator.builder import LinePlan, build
 from lfs10d.simulator.fault_file import FaultFile, load_faults, profiles_of
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
@@ -44,14 +44,6 @@ A faults file:
 
 SIGUSR1 switches the power of all sensors off and on.
 """
-
-
-def _ids(context: click.Context, parameter: click.Parameter, value: str) -> tuple[int, ...]:
-    """Return the ids of text such as 1-8,12."""
-    try:
-        return slave_ids(value)
-    except ValueError as error:
-        raise click.BadParameter(str(error), context, parameter) from error
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +86,7 @@ class SimulateOptions:
 
 @click.command("simulate", epilog=EXAMPLES)
 @click.option("--link", type=click.Path(path_type=Path), metavar="PATH", help="A lasting name for the terminal.")
-@click.option("--slaves", callback=_ids, default="1-8", show_default=True, metavar="IDS", help="Slave ids.")
+@click.option("--slaves", callback=id_list, default="1-8", show_default=True, metavar="IDS", help="Slave ids.")
 @click.option(
     "--baudrate",
     type=click.Choice([str(rate) for rate in BAUDRATES]),

@@ -37,6 +37,7 @@ from lfs10d.reconfiguration.baudrate_watch import BaudrateWatch
 from lfs10d.reconfiguration.journal import Journal
 from lfs10d.reconfiguration.reconfiguration import Reconfiguration
 from lfs10d.reconfiguration.restore import Restore
+from lfs10d.reconfiguration.runner import ChangeRunner
 from lfs10d.system.clock import Clock
 from lfs10d.system.disk import Disk
 from lfs10d.system.systemd import Notifier
@@ -69,17 +70,18 @@ def build(file: LoadedConfig, boot: Boot, state_directory: Path, notifier: Notif
     responder = Responder(
         Admission({name: each.spec for name, each in HANDLERS.items()}, frozenset(now.commands)), uplink
     )
-    reconfiguration = Reconfiguration(
+    runner = ChangeRunner(
         Journal(state_directory, Disk()),
         running=lambda: config.now,
         change=config.change,
         learn=config.learn,
         wire=lambda: line,
-        tell=publisher.announce,
+        announce=publisher.announce,
         recall=responder.recall,
-        act=publisher.act,
-        repoll=lambda polled: line.take(polled, config.loaded.profiles),
         now=clock.now,
+    )
+    reconfiguration = Reconfiguration(
+        runner, act=publisher.act, repoll=lambda polled: line.take(polled, config.loaded.profiles)
     )
     line.take(reconfiguration.polled(), loaded.profiles)
     watch = BaudrateWatch(

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import contextlib
 import logging
-from collections.abc import Awaitable, Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 from lfs10d.command import Command, Result
-from lfs10d.config.effective import Edit, Effective
 from lfs10d.config.models import Config
 from lfs10d.errors import StateError
 from lfs10d.reconfiguration import adopt, baudrate, readdress
@@ -19,15 +18,13 @@ from lfs10d.reconfiguration.adopt import Adopt
 from lfs10d.reconfiguration.adopt_request import AdoptRequest
 from lfs10d.reconfiguration.baudrate import BaudrateChange
 from lfs10d.reconfiguration.baudrate_recovery import BaudrateRecovery
-from lfs10d.reconfiguration.journal import Journal, OpenChange
+from lfs10d.reconfiguration.journal import OpenChange
 from lfs10d.reconfiguration.journal_commands import command_record
 from lfs10d.reconfiguration.locate import Locator
-from lfs10d.reconfiguration.procedure_run import ProcedureRun, Wire
+from lfs10d.reconfiguration.procedure_run import ProcedureRun
 from lfs10d.reconfiguration.readdress import Readdress
 from lfs10d.reconfiguration.recovery import Recovery
-from lfs10d.reconfiguration.runner import ChangeRunner, Recall
-from lfs10d.system.clock import Instant
-from lfs10d.telemetry.publication import EventType
+from lfs10d.reconfiguration.runner import ChangeRunner
 
 log = logging.getLogger(__name__)
 
@@ -35,35 +32,21 @@ log = logging.getLogger(__name__)
 class Reconfiguration:
     """Changes of the sensors of one line. Used in the thread of the asyncio loop.
 
-    `act` publishes what the line is busy with (None: polling), `repoll` has the line polled by a configuration; the
-    others are those of `ChangeRunner`.
+    `act` publishes what the line is busy with (None: polling), `repoll` has the line polled by a configuration.
     """
 
-    def __init__(  # noqa: PLR0913 - all that it touches of the daemon, each by one callable
-        self,
-        journal: Journal,
-        *,
-        running: Callable[[], Effective],
-        change: Callable[[Edit], Awaitable[object]],
-        learn: Callable[[Edit], Awaitable[object]],
-        wire: Callable[[], Wire],
-        tell: Callable[[EventType, Mapping[str, object]], None],
-        recall: Recall,
-        now: Callable[[], Instant],
-        act: Callable[[str | None], None],
-        repoll: Callable[[Config], None],
+    def __init__(
+        self, runner: ChangeRunner, *, act: Callable[[str | None], None], repoll: Callable[[Config], None]
     ) -> None:
-        runner = self._runner = ChangeRunner(
-            journal, running=running, change=change, learn=learn, wire=wire, announce=tell, recall=recall, now=now
-        )
-        self.journal = journal
+        self.journal = runner.journal
+        self._runner = runner
         self._act = act
         self._readdress = Readdress(runner)
         self._baudrate = BaudrateChange(runner)
         self._adopt = Adopt(runner)
         self._recovery = Recovery(runner, BaudrateRecovery(runner, self._baudrate))
         self._locator = Locator(runner, lambda: repoll(self.polled()))
-        trouble = journal.take()
+        trouble = runner.journal.take()
         if trouble is not None:
             log.error("%s", trouble)
         runner.reservations.update()

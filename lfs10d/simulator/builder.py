@@ -84,17 +84,3 @@ def _sensor(plan: LinePlan, slave: int, entry: SlaveEntry, seed: int, blueprint:
         source=None if plan.unique else Wind(seed * (LAST_ID + 1) + slave),
         seed=seed,
     )
-
-
-def slave_ids(text: str) -> tuple[int, ...]:
-    """Return the ids of text such as `1-8,12`, in order; raises ValueError that says what is wrong."""
-    ids: set[int] = set()
-    for part in text.split(","):
-        first, dash, last = part.strip().partition("-")
-        if not (first.isascii() and first.isdigit() and (not dash or (last.isascii() and last.isdigit()))):
-            raise ValueError(f"{part.strip()!r} is neither an id such as 3 nor a range such as 1-8")
-        low, high = int(first), int(last or first)
-        if not 1 <= low <= high <= LAST_ID:
-            raise ValueError(f"{part.strip()!r}: ids go from 1 to {LAST_ID}, the smaller first")
-        ids.update(range(low, high + 1))
-    return tuple(sorted(ids))

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import pytest
-
 from lfs10d.simulator.blueprint import Blueprint
-from lfs10d.simulator.builder import LinePlan, build, slave_ids
+from lfs10d.simulator.builder import LinePlan, build
 from lfs10d.simulator.fault_file import parse_faults
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.signals import Signal
@@ -60,16 +58,3 @@ def test_a_second_master_reads_what_the_device_measures() -> None:
     line = build(LinePlan((1,), blueprint=device), parse_faults(text, "f", (1,)), keep_log=True)
     line.advance(SECOND)
     assert line.log[0].body == bytes.fromhex("01 03 00 20 00 01")
-
-
-@pytest.mark.parametrize(
-    ("text", "ids"), [("3", (3,)), ("1-3", (1, 2, 3)), ("7, 2-3,2", (2, 3, 7)), ("255", (255,)), ("4-4", (4,))]
-)
-def test_ids_are_numbers_and_ranges(text: str, ids: tuple[int, ...]) -> None:
-    assert slave_ids(text) == ids
-
-
-@pytest.mark.parametrize("text", ["", "a", "0", "256", "3-1", "1-", "-3", "1,,2", "1-2-3", "\u0663"])
-def test_other_ids_are_refused_with_words(text: str) -> None:
-    with pytest.raises(ValueError, match=r"neither an id|ids go from"):
-        slave_ids(text)

@@ -35,6 +35,7 @@ from lfs10d.mqtt.topics import InboundRequest
 from lfs10d.reading import Event, PortChanged, Reading
 from lfs10d.reconfiguration.journal import Journal
 from lfs10d.reconfiguration.reconfiguration import Reconfiguration
+from lfs10d.reconfiguration.runner import ChangeRunner
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
@@ -106,17 +107,20 @@ class Life:
         handlers = self.handlers
         specs = {name: handler.spec for name, handler in handlers.items()}
         responder = Responder(Admission(specs, frozenset({"polling", "sensors", "registers"})), bench)
-        self.physical = Reconfiguration(
+        runner = ChangeRunner(
             Journal(STATE, disk),
             running=lambda: self.running.now,
             change=self._change,
             learn=self.running.learn,
             wire=lambda: Wire(self.poller),
-            tell=lambda kind, facts: self.events.append((kind, facts)),
+            announce=lambda kind, facts: self.events.append((kind, facts)),
             recall=responder.recall,
+            now=lambda: Instant(bench.clock.now, EPOCH + bench.clock.now, "synced"),
+        )
+        self.physical = Reconfiguration(
+            runner,
             act=lambda activity: self.events.append(("acting", {"activity": activity})),
             repoll=self._repoll,
-            now=lambda: Instant(bench.clock.now, EPOCH + bench.clock.now, "synced"),
         )
         config, profiles = self.physical.polled(), self.running.loaded.profiles
         bench.port = SimulatedPort(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 from lfs10d.cli.direct_line import DirectLine
@@ -11,12 +12,11 @@ from lfs10d.cli.doctor.finding import Finding, fail, ok, warn
 from lfs10d.cli.local_time import clock_text
 from lfs10d.cli.render.live_state import LiveState, ShownDevice
 from lfs10d.config.loader import LoadedConfig
-from lfs10d.config.models import LineConfig, SlaveConfig
+from lfs10d.config.models import LineConfig
 from lfs10d.errors import PortError
 from lfs10d.line.device import DeviceSpec, PollRules
-from lfs10d.modbus.frames import Checksum, Codec, Framing
+from lfs10d.line.settings import device_specs
 from lfs10d.modbus.port_settings import PortSettings
-from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Reading
 
 ATTEMPTS: Final = 3
@@ -83,10 +83,13 @@ def _since(ts: float | None) -> str:
 def by_asking(loaded: LoadedConfig) -> list[Finding]:
     """Read each enabled slave of a line that is free; return which answer."""
     config = loaded.config
-    slaves = [slave for slave in config.slaves if slave.enabled]
-    if not slaves:
+    specs = [
+        replace(spec, interval=max(0.5, spec.profile.min_interval), response_timeout=None)
+        for spec in device_specs(config, loaded.profiles)
+        if spec.enabled
+    ]
+    if not specs:
         return [warn("sensors", "none is configured", f"lfs10d scan {config.line.port}")]
-    specs = [_spec(loaded, slave, loaded.profiles[slave.profile]) for slave in slaves]
     try:
         readings = _polled(_settings(config.line, config.line.baudrate), specs)
         found = list(answers(specs, readings, config.line.port))
@@ -114,19 +117,6 @@ def _at_another_rate(line: LineConfig, specs: Sequence[DeviceSpec]) -> Iterator[
                 f"set line.baudrate to {rate}; then lfs10d request line/baudrate can move them",
             )
             return
-
-
-def _spec(loaded: LoadedConfig, slave: SlaveConfig, profile: Profile) -> DeviceSpec:
-    codec = Codec(Framing(loaded.config.line.framing), Checksum(slave.checksum or profile.checksum))
-    return DeviceSpec(
-        name=slave.name,
-        slave=slave.id,
-        profile=profile.calibrated(slave.certificates),
-        codec=codec,
-        interval=max(0.5, profile.min_interval),
-        response_timeout=None,
-        request_gap=max(slave.request_gap, profile.request_gap),
-    )
 
 
 def _polled(settings: PortSettings, specs: Sequence[DeviceSpec]) -> dict[str, Reading]:

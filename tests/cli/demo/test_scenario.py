@@ -6,7 +6,7 @@ from pathlib import Path
 
 from lfs10d.cli.demo.scenario import SENSORS, configuration, faults, slaves
 from lfs10d.config.loader import load
-from lfs10d.simulator.builder import slave_ids
+from lfs10d.line.jobs.scan_ids import ids_of
 from lfs10d.simulator.fault_file import parse_faults
 
 
@@ -22,7 +22,7 @@ def test_the_daemon_accepts_its_file(tmp_path: Path) -> None:
 
 
 def test_the_simulator_accepts_its_faults_one_silent_one_noisy() -> None:
-    ill = parse_faults(faults(), "faults.yaml", slave_ids(slaves())).slaves
+    ill = parse_faults(faults(), "faults.yaml", ids_of(slaves())).slaves
     assert {slave: [fault.fault for fault in entry.faults] for slave, entry in ill.items()} == {
         7: ["silent"],
         8: ["noisy"],
