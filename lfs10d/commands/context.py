@@ -28,41 +28,33 @@ class LineCommands(Protocol):
     @property
     def paused(self) -> bool:
         """Whether the port is freed for another program."""
-        ...
 
     async def read(self, device: str) -> ReadResult | None:
         """Poll a configured device now; None if it was removed or replaced before the poll."""
-        ...
 
     def trace(self, duration: float) -> None:
         """Publish every frame for `duration` s from now on, in place of what was set before."""
-        ...
 
     async def scan(self, ids: tuple[int, ...], rates: tuple[int, ...], share: float) -> Scan:
         """Search the line for devices, with at most that `share` of its time; return the scan that is over.
 
         No `rates` are the usual ones. Raises RefusedError while a change of sensors or another scan is under way.
         """
-        ...
 
     async def pause(self, duration: float) -> None:
         """Free the port for `duration` s from now on, in place of what was set before; return when it is free.
 
         Raises RefusedError while a change of sensors or a scan is under way.
         """
-        ...
 
     def cancel(self) -> tuple[str, ...]:
         """End trace, scan and pause; return those that were under way: `trace`, `scan`, `pause`."""
-        ...
 
     async def ping(self, slave: int, profile: Profile) -> Ping:
         """Ask a slave id that is not polled whether a device answers; return the job that is over."""
-        ...
 
     async def access(self, request: RegisterRequest, device: SlaveConfig | None) -> Access:
         """Read or write registers of a configured device, or of a slave that is not; return the job that is over."""
-        ...
 
 
 class SensorChanges(Protocol):
@@ -70,19 +62,15 @@ class SensorChanges(Protocol):
 
     def reserved(self) -> Mapping[int, str]:
         """Return the slave ids that no device may be given now, with the reason: `is reserved by ...`."""
-        ...
 
     async def readdress(self, device: str, to: int, *, dry_run: bool, call: Command) -> Result:
         """Give a sensor another slave id, verified on the line; with `dry_run` only check whether that is possible."""
-        ...
 
     async def baudrate(self, to: int, *, power_cycle: bool, dry_run: bool, call: Command) -> Result:
         """Move every sensor and the port to another rate, verified, or back."""
-        ...
 
     async def adopt(self, wanted: AdoptRequest, call: Command) -> Result:
         """Give a factory-new sensor its id and the line's rate, and poll it."""
-        ...
 
 
 class Announcements(Protocol):
@@ -90,15 +78,12 @@ class Announcements(Protocol):
 
     def health(self) -> dict[str, object]:
         """Return the state of the daemon, the line and the devices, as in `status.json`."""
-        ...
 
     def republish(self) -> int:
         """Publish every retained topic again; return their number."""
-        ...
 
     def applied(self, request: str, command: Command, **facts: object) -> None:
         """Publish on `event` what a request changed."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,11 +15,9 @@ class PausableLine(Protocol):
 
     async def pause(self) -> None:
         """Close the port; return when it is free."""
-        ...
 
     def resume(self) -> None:
         """Open the port again."""
-        ...
 
 
 class SetPaused(Protocol):
@@ -27,7 +25,6 @@ class SetPaused(Protocol):
 
     def __call__(self, *, paused: bool) -> None:
         """Publish it."""
-        ...
 
 
 class LinePause:

@@ -29,11 +29,9 @@ class Responses(Protocol):
 
     def respond(self, topic: str, payload: dict[str, object], correlation: bytes | None = None) -> None:
         """Publish a response on a topic under B."""
-        ...
 
     def clear_retained(self, topic: str) -> None:
         """Clear a retained request, by its topic under B."""
-        ...
 
 
 class Responder:

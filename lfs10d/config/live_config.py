@@ -43,11 +43,9 @@ class ConfigEvents(Protocol):
 
     async def apply(self, plan: ReloadPlan, before: Effective) -> None:
         """Apply the new `LiveConfig.now` to the daemon's parts."""
-        ...
 
     def report(self, news: News) -> None:
         """Report dropped changes, warnings and errors of the disk."""
-        ...
 
 
 class LiveConfig:

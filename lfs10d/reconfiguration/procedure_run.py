@@ -17,19 +17,15 @@ class Wire(Protocol):
     @property
     def pending(self) -> PendingRequests:
         """Which requests may still be answered."""
-        ...
 
     def echo_known(self) -> bool:
         """Whether it is known how the adapter echoes."""
-        ...
 
     def submit(self, job: Job) -> None:
         """Have a job done; what it calls, it calls in the line's thread."""
-        ...
 
     def resume_procedure(self, procedure: Procedure, result: object) -> None:
         """Give a procedure the result of what it awaited."""
-        ...
 
 
 class ProcedureRun:

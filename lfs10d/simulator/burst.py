@@ -44,7 +44,6 @@ class Receiver(Protocol):
 
     def offer(self, burst: Burst) -> None:
         """Take a burst that has just begun."""
-        ...
 
 
 def collide(one: Burst, other: Burst) -> None:

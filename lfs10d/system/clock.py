@@ -111,11 +111,9 @@ class ClockEvents(Protocol):
 
     def synchronised(self) -> None:
         """Note that the wall clock has become synchronised."""
-        ...
 
     def stepped(self) -> None:
         """Note that the wall clock was set while it was not known to be synchronised."""
-        ...
 
 
 class Clock:
