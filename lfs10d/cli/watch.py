@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import os
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
@@ -143,13 +144,14 @@ class Watch:
         places = " or ".join(str(path) for path in self._files)
         raise BrokerError(f"{self._why}; and no daemon on this machine has written its status to {places}")
 
-    async def show(self, view: LiveView) -> None:
-        """Show the better source until cancelled."""
+    async def show(self, view: LiveView, may_draw: Callable[[], bool] = lambda: True) -> None:
+        """Show the better source, whenever `may_draw()`, until cancelled."""
         with view:
             while True:
                 self._read()
                 live, source = self.best()
-                view.draw(live, source, now=time.monotonic(), wall=time.time())
+                if may_draw():
+                    view.draw(live, source, now=time.monotonic(), wall=time.time())
                 await asyncio.sleep(EVERY)
 
     def best(self) -> tuple[LiveState, DataSource]:

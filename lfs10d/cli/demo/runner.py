@@ -19,35 +19,12 @@ from lfs10d.cli.demo.processes import DAEMON, PYTHON, Children, temporary_folder
 from lfs10d.cli.demo.scenario import BAUDRATE, LINE, configuration, faults, slaves
 from lfs10d.cli.login import log_in
 from lfs10d.cli.render.live_state import LiveState
-from lfs10d.cli.render.live_table import DataSource
-from lfs10d.cli.render.live_view import LiveView, live_view
+from lfs10d.cli.render.live_view import live_view
 from lfs10d.cli.render.spinner import spinning
 from lfs10d.cli.watch import Watch
 from lfs10d.errors import FailedError
 
 STANDARD_OUTPUT: Final = 1
-
-
-class DemoView:
-    """The live view with the demo's remarks; each time it is drawn, the demo's processes must still run."""
-
-    def __init__(self, broker: Broker, page: Page | None, children: Children) -> None:
-        self._view = live_view(remarks=texts.remarks(broker, page))
-        self._children = children
-
-    def __enter__(self) -> None:
-        """Begin."""
-        self._view.__enter__()
-
-    def __exit__(self, *error: object) -> None:
-        """End."""
-        self._view.__exit__(*error)
-
-    def draw(self, live: LiveState, source: DataSource, *, now: float, wall: float) -> None:
-        """Draw where the output takes it; raises FailedError if a process has ended."""
-        self._children.check()
-        if _is_writable():
-            self._view.draw(live, source, now=now, wall=wall)
 
 
 async def show(*, duration: float | None, wanted: str) -> None:
@@ -63,12 +40,21 @@ async def show(*, duration: float | None, wanted: str) -> None:
     with temporary_folder() as folder:
         children = Children(folder)
 
+        def may_draw() -> bool:
+            children.check()
+            return _is_writable()
+
         async def play() -> None:
             nonlocal last
             async with spinning("starting the simulated line, the broker and the daemon ..."):
                 watch, broker, page = await _start(children, wanted)
             last = watch.live
-            await _show(watch, DemoView(broker, page, children), duration)
+            try:
+                with suppress(TimeoutError):
+                    async with asyncio.timeout(duration):
+                        await watch.show(live_view(remarks=texts.remarks(broker, page)), may_draw)
+            finally:
+                await watch.disconnect()
 
         try:
             await _until(over, play())
@@ -90,15 +76,6 @@ async def _until(over: asyncio.Event, play: Coroutine[None, None, None]) -> None
     playing.cancel()
     with suppress(asyncio.CancelledError, OSError):  # OSError: the terminal may be gone
         await playing
-
-
-async def _show(watch: Watch, view: LiveView, duration: float | None) -> None:
-    try:
-        with suppress(TimeoutError):
-            async with asyncio.timeout(duration):
-                await watch.show(view)
-    finally:
-        await watch.disconnect()
 
 
 async def _start(children: Children, wanted: str) -> tuple[Watch, Broker, Page | None]:
