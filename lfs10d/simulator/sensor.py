@@ -83,12 +83,6 @@ class Reply:
         """When its last bit is over."""
         return self.format.ends(self.start, len(self.data), self.pause)[-1]
 
-    def postponed(self, start: int) -> Reply:
-        """Return the same, what follows too, beginning no earlier than `start`."""
-        delay = max(0, start - self.start)
-        following = tuple(replace(each, start=each.start + delay) for each in self.following)
-        return replace(self, start=self.start + delay, following=following)
-
 
 class Sensor:
     """A device at a slave id, with its registers, faults and power. Switch anything at any time in a test."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from lfs10d.simulator.sensor import Reply, Sensor
 
 
@@ -15,7 +17,14 @@ class QueuedSensor(Sensor):
         reply = super().hear(body, ended, after_dead=after_dead)
         if reply is None:
             return None
-        reply = reply.postponed(self._free)
+        reply = _postponed(reply, self._free)
         own = [each for each in (reply, *reply.following) if not each.second]
         self._free = own[-1].ends + reply.format.t35
         return reply
+
+
+def _postponed(reply: Reply, start: int) -> Reply:
+    """Return the same, what follows too, beginning no earlier than `start`."""
+    delay = max(0, start - reply.start)
+    following = tuple(replace(each, start=each.start + delay) for each in reply.following)
+    return replace(reply, start=reply.start + delay, following=following)
