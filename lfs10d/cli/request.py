@@ -221,10 +221,7 @@ class _RequestOptions:
 
     def _parsed(self, parameters: Sequence[str]) -> dict[str, Any]:
         known = HANDLERS.get(self.name)
-        try:
-            return content_of(parameters, None if known is None else known.spec.parameters)
-        except KeyValueError as error:
-            raise click.UsageError(str(error)) from None
+        return content_of(parameters, None if known is None else known.spec.parameters)
 
 
 async def _ask(options: _RequestOptions, login: Login, content: dict[str, Any]) -> dict[str, Any] | None:
@@ -252,8 +249,8 @@ async def _ask(options: _RequestOptions, login: Login, content: dict[str, Any]) 
 # What is typed as the parameters of a request
 
 
-class KeyValueError(ValueError):
-    """An argument is no `KEY=VALUE`, or its key came before; the message is for the person who typed it."""
+class KeyValueError(click.UsageError):
+    """An argument is no `KEY=VALUE`, or its key came before."""
 
 
 def content_of(arguments: Iterable[str], form: type[Parameters] | None) -> dict[str, Any]:
