@@ -254,3 +254,9 @@ def parsed(payload: bytes) -> Any:  # noqa: ANN401  # any JSON
         return json.loads(payload)
     except (ValueError, RecursionError):
         return None
+
+
+def content(payload: bytes) -> Any:  # noqa: ANN401  # any JSON
+    """Return a payload's JSON, or its bare word."""
+    found = parsed(payload)
+    return payload.decode("utf-8", "replace") if found is None else found

@@ -13,17 +13,17 @@ from typing import Final
 import click
 
 from lfs10d.cli import config_option, event_loop, json_option
-from lfs10d.cli.client import RETAINED_WITHIN, CommandClient, parsed
+from lfs10d.cli.client import RETAINED_WITHIN, CommandClient, content
 from lfs10d.cli.login import Login, log_in, login_options
-from lfs10d.cli.render.live_state import LiveState
+from lfs10d.cli.render.live_state import FRESH, LiveState
 from lfs10d.cli.render.live_table import DataSource, age_text
 from lfs10d.cli.render.live_view import LiveView, live_view
 from lfs10d.cli.render.spinner import spinning
+from lfs10d.cli.status_source import read_status
 from lfs10d.daemon.state_directory import status_places
 from lfs10d.errors import BrokerError, FailedError
 from lfs10d.mqtt.messages import Filter, Incoming
 from lfs10d.system.dataclass import dataclass
-from lfs10d.system.regular_file import read_regular
 from lfs10d.telemetry import publication
 
 EVERY: Final = 0.5
@@ -32,10 +32,6 @@ SETTLES_WITHIN: Final = 0.2
 """s to wait for the remaining retained messages, so that no device is shown as unknown meanwhile."""
 CONNECTS_WITHIN: Final = 6.0
 """s to connect before the daemon's status file is shown; connecting goes on meanwhile."""
-FRESH: Final = 3.0
-"""s after which a status file, written every second, is no longer that of a running daemon."""
-LARGEST_STATUS: Final = 2**22
-"""Bytes; 255 devices take a tenth of it."""
 
 EXAMPLES = """\b
 Examples:
@@ -174,24 +170,14 @@ class Watch:
         relative = self._client.topics.relative(message.topic)
         if relative is None:
             return
-        payload = parsed(message.payload)
-        if payload is None:
-            payload = message.payload.decode("utf-8", "replace")
-        self._heard_at = time.time()
+        self._heard_at, payload = time.time(), content(message.payload)
         self._live.on_message(relative, payload, old=message.retained, now=time.monotonic(), wall=self._heard_at)
 
     def _read(self) -> None:
         """Read the status file of our line, if there is one; otherwise the last content stays and grows old."""
-        for path in self._files:
-            try:
-                status = parsed(read_regular(path, LARGEST_STATUS))
-            except OSError:
-                continue
-            line = status.get("line") if isinstance(status, dict) else None
-            if not isinstance(line, dict) or line.get("name") != self._line:
-                continue
+        if (found := read_status(self._files, self._line)) is not None:
+            path, status = found
             live = LiveState(self._line) if self._status is None else self._status.live
             live.on_status(status, now=time.monotonic())
             ts = status.get("ts")
             self._status = _Status(path, live, ts / 1000 if isinstance(ts, int) else 0.0)
-            return

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import os
 import time
 from collections.abc import Iterator, Sequence
@@ -11,20 +10,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from lfs10d.cli.client import CommandClient, parsed
+from lfs10d.cli.client import CommandClient, content
 from lfs10d.cli.login import Login
+from lfs10d.cli.status_source import read_status
 from lfs10d.daemon.state_directory import status_places
 from lfs10d.errors import BrokerError, FailedError
 from lfs10d.mqtt.messages import Filter, Incoming
 from lfs10d.mqtt.topics import Topics
-from lfs10d.system.regular_file import read_regular
 from lfs10d.telemetry import publication
 from lfs10d.web.line_model import LineModel
 from lfs10d.web.site_model import SiteModel
 
 CONNECTS_WITHIN: Final = 6.0
 LARGEST_PAYLOAD: Final = 2**18
-LARGEST_STATUS: Final = 2**22
 """Bytes."""
 _LEAVES: Final = ("state", "telemetry", "history", "availability", "stats", "error", "config", "wind")
 RELATIVE: Final = (
@@ -123,13 +121,8 @@ class Feed:
             elif line.name == self._own:
                 link.daemon = client.availability
         for line, places in self._files:
-            for place in places:
-                with contextlib.suppress(OSError):
-                    status = parsed(read_regular(place, LARGEST_STATUS))
-                    named = status.get("line") if isinstance(status, dict) else None
-                    if isinstance(named, dict) and named.get("name") == line.name:
-                        line.on_status(str(place), status, now=time.monotonic())
-                        break
+            if (found := read_status(places, line.name)) is not None:
+                line.on_status(str(found[0]), found[1], now=time.monotonic())
 
     def _lines(self) -> Iterator[LineModel]:
         return (line for line in self._site.lines.values() if line.base == self._base)
@@ -142,12 +135,10 @@ class Feed:
         name, _, rest = relative.partition("/")
         if len(message.payload) > LARGEST_PAYLOAD or not rest:
             return
-        payload = parsed(message.payload)
-        if payload is None:
-            payload = message.payload.decode("utf-8", "replace")
         line = self._line(name)
         if line is not None:
-            line.on_message(rest, payload, old=message.retained, now=time.monotonic(), wall=time.time())
+            now, wall = time.monotonic(), time.time()
+            line.on_message(rest, content(message.payload), old=message.retained, now=now, wall=wall)
 
 
 async def settle(feed: Feed, within: float = 1.0, rest: float = 0.3) -> None:

@@ -11,15 +11,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import field
 from typing import Any, Final, TypeGuard
 
-from lfs10d.cli.render.live_state import LiveState, ShownDevice
+from lfs10d.cli.render.live_state import FRESH, LiveState, ShownDevice
 from lfs10d.system.dataclass import dataclass
 from lfs10d.web.curve import Curve, Point
 from lfs10d.web.pruned import pruned
 from lfs10d.web.words import explained, meaning
 
 MOST_DEVICES: Final = 255
-FRESH: Final = 3.0
-"""s after which a status file, written every second, is no longer that of a running daemon."""
 FRAMES_KEPT: Final = 200
 EVENTS_KEPT: Final = 30
 OVERVIEW: Final = 600

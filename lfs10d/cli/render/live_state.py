@@ -20,6 +20,8 @@ MOVES_WITHIN: Final = 3.0
 """s over which a value's movement is measured."""
 STANDS_OUT: Final = 3.0
 """A value is marked if it moved this many times as far as the next one."""
+FRESH: Final = 3.0
+"""s after which a status file, written every second, is no longer that of a running daemon."""
 LATE_AFTER: Final = 3.0
 """s beyond three intervals after which a good value counts as old."""
 

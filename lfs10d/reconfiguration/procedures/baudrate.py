@@ -221,12 +221,12 @@ def write_rate(sensor: RateSensor, old: int, to: int) -> Generator[Step, Any, tu
 
 
 def find_rate(
-    sensor: RateSensor, rates: Sequence[int], *, tries: int = TRIES, timeout: float | None = None
+    sensor: RateSensor, rates: Sequence[int], *, tries: int = TRIES
 ) -> Generator[Step, Any, tuple[int | None, int | None]]:
     """Look for a sensor at these rates; return the content of its rate register, and the rate it answers at."""
     for _ in range(tries):
         for rate in rates:
-            reply = yield from sensor.query.read_register(sensor.at(rate), timeout, register=sensor.register)
+            reply = yield from sensor.query.read_register(sensor.at(rate), None, register=sensor.register)
             if reply.answers:
                 return reply.register, rate
     return None, None
