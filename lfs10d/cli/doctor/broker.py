@@ -54,11 +54,12 @@ class _Trial(Acknowledgements):
         self.topics.add(message.topic)
         self.changed.set()
 
-    async def answer(self, mid: int | None) -> int | None:
-        """Return the reason of an acknowledgement; None where none comes, or the connection ends."""
+    async def refusal(self, mid: int | None) -> str | None:
+        """Return in words why a packet is refused, or that no acknowledgement comes; None where it is accepted."""
         if mid is None or not await self.until(lambda: mid in self.settled):
-            return None
-        return self.settled[mid][0]
+            return self.ended_by or "no answer"
+        reason = self.settled[mid][0]
+        return None if reason < REFUSED_FROM else self.ended_by or reason_in_words(reason)
 
     async def until(self, condition: Callable[[], bool]) -> bool:
         """Wait until the condition holds; False where it does not in time, or the connection ends."""
@@ -174,10 +175,8 @@ async def _try_out(
     if connection is None:
         return
     advice = f"the broker's ACL must let this login publish and subscribe below {base}: docs/mqtt-security.md"
-    reason = await trial.answer(connection.subscribe([Filter(topic)]))
-    if reason is None or reason >= REFUSED_FROM:
-        words = trial.ended_by or ("no answer" if reason is None else reason_in_words(reason))
-        yield fail("broker", f"it refuses the subscription to {topic}: {words}", advice)
+    if (refused := await trial.refusal(connection.subscribe([Filter(topic)]))) is not None:
+        yield fail("broker", f"it refuses the subscription to {topic}: {refused}", advice)
         return
     times = []
     for _ in range(ROUND_TRIPS):
@@ -195,11 +194,8 @@ async def _try_out(
 async def _round_trip(connection: Connection, trial: _Trial, topic: str) -> float | str:
     """Publish once; return the s until the acknowledgement, or in words why it did not come back."""
     payload, began = secrets.token_hex(8).encode(), time.monotonic()
-    reason = await trial.answer(connection.publish(topic, payload))
-    if reason is None or reason >= REFUSED_FROM:
-        return (
-            f"it refuses to publish: {trial.ended_by or ('no answer' if reason is None else reason_in_words(reason))}"
-        )
+    if (refused := await trial.refusal(connection.publish(topic, payload))) is not None:
+        return f"it refuses to publish: {refused}"
     took = time.monotonic() - began
     return took if await trial.until(lambda: payload in trial.heard) else "what is published does not arrive"
 
@@ -207,9 +203,9 @@ async def _round_trip(connection: Connection, trial: _Trial, topic: str) -> floa
 async def _discovery(connection: Connection, trial: _Trial, prefix: str, base: str) -> Finding:
     """Return whether the line was announced to Home Assistant, and whether that runs."""
     own, birth = config_topic(prefix, object_id(base)), f"{prefix}/status"
-    reason = await trial.answer(connection.subscribe([Filter(own), Filter(birth)]))
+    refused = await trial.refusal(connection.subscribe([Filter(own), Filter(birth)]))
     advice = f"the broker's ACL must let this login publish below {prefix}: docs/mqtt-security.md"
-    if reason is None or reason >= REFUSED_FROM:
+    if refused is not None:
         return warn("integrations", f"it cannot be seen whether {own} was published", advice)
     with contextlib.suppress(TimeoutError):
         await asyncio.wait_for(trial.until(lambda: own in trial.topics), RETAINED_WITHIN)
