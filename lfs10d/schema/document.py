@@ -10,6 +10,7 @@ given twice, a key that is a list) is kept in `Document.problems`, so that a per
 from __future__ import annotations
 
 import re
+from codecs import BOM_UTF8
 from collections.abc import Mapping
 from dataclasses import field
 from typing import Any
@@ -39,15 +40,19 @@ _UNPRINTABLE = re.compile("[^\t\n\r\x20-\x7e\xa0-\u2027\u202a-\ud7ff\ue000-\ufff
 def decode(raw: bytes, file: str) -> str:
     """Return the text of a file; raises ConfigError if it is too large or no UTF-8."""
     if len(raw) > LARGEST_FILE:
-        limit = LARGEST_FILE // 1024
-        raise ConfigError((Problem(file, 1, 1, "", f"the file is too large; at most {limit} KiB are read"),))
+        message = f"the file is too large; at most {LARGEST_FILE // 1024} KiB are read"
+        raise ConfigError((Problem(file, 1, 1, "", message),))
+    return text_of(raw, file)
+
+
+def text_of(raw: bytes, file: str) -> str:
+    """Return the text of a file without its byte order mark; raises ConfigError if it is no UTF-8."""
+    raw = raw.removeprefix(BOM_UTF8)
     try:
-        return raw.decode("utf-8-sig")
+        return raw.decode()
     except UnicodeDecodeError as error:
-        before = raw[: error.start].decode("utf-8-sig")
-        line, column = _end_of(before)
         message = f"byte 0x{raw[error.start]:02x} is not UTF-8; save the file as UTF-8"
-        raise ConfigError((Problem(file, line, column, "", message),)) from None
+        raise ConfigError((Problem(file, *_end_of(raw[: error.start].decode()), "", message),)) from None
 
 
 def _end_of(text: str) -> tuple[int, int]:
@@ -156,9 +161,8 @@ def parse(text: str, file: str) -> Document:
     """Read one YAML document; raises ConfigError if it cannot be read at all."""
     odd = _UNPRINTABLE.search(text)
     if odd is not None:
-        line, column = _end_of(text[: odd.start()])
         message = f"the character U+{ord(odd[0]):04X} may not stand in the file; write it as an escape in quotes"
-        raise ConfigError((Problem(file, line, column, "", message),))
+        raise ConfigError((Problem(file, *_end_of(text[: odd.start()]), "", message),))
     loader = Loader(text)
     try:
         node = loader.get_single_node()

@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Final
 
 from lfs10d.errors import ConfigError, Problem
+from lfs10d.schema.document import text_of
 from lfs10d.schema.fields import quoted
 from lfs10d.simulator.wire import SECOND
 from lfs10d.system.dataclass import dataclass
@@ -118,14 +119,7 @@ def load_recording(path: Path, devices: Mapping[int, Collection[str]]) -> Record
     if len(raw) > LARGEST_FILE:
         message = f"the file is too large; at most {LARGEST_FILE // 1_000_000} MB are read"
         raise ConfigError((Problem(str(path), 1, 1, "", message),))
-    raw = raw.removeprefix(b"\xef\xbb\xbf")
-    try:
-        text = raw.decode()
-    except UnicodeDecodeError as error:
-        line = raw.count(b"\n", 0, error.start) + 1
-        column = error.start - raw.rfind(b"\n", 0, error.start)
-        message = f"byte 0x{raw[error.start]:02x} is not UTF-8; save the file as UTF-8"
-        raise ConfigError((Problem(str(path), line, column, "", message),)) from None
+    text = text_of(raw, str(path))
     del raw
     return parse_recording(text, str(path), devices)
 

@@ -175,6 +175,8 @@ def test_of_a_key_given_twice_the_first_counts() -> None:
     ("raw", "message"),
     [
         (b"a: 1\nb: caf\xe9\n", "f:2:7: byte 0xe9 is not UTF-8; save the file as UTF-8"),
+        (b"\xef\xbb\xbfb: caf\xe9\n", "f:1:7: byte 0xe9 is not UTF-8; save the file as UTF-8"),
+        (b"\xef\xbb\xbf\xc3\xbc\xe9\n", "f:1:2: byte 0xe9 is not UTF-8; save the file as UTF-8"),
         ("a: 1".encode("utf-16"), "f:1:1: byte 0xff is not UTF-8; save the file as UTF-8"),
         (b"#" * (LARGEST_FILE + 1), "f:1:1: the file is too large; at most 256 KiB are read"),
     ],
