@@ -1,4 +1,4 @@
-"""What went wrong in an exchange without an answer: the fault's code and a message for the installer."""
+"""Names the fault of an exchange without an answer: its code, and a message for the installer."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def milliseconds(seconds: float) -> str:
 
 
 def judge(ask: Ask, reception: Reception) -> Diagnosis | None:
-    """Name what went wrong when nothing more is to be expected; None where nothing did: a broadcast.
+    """Return the fault of an exchange that is over; None for a broadcast.
 
     The nearest thing to an answer counts: a frame with a right check, then a late answer, then broken bytes.
     """
@@ -63,19 +63,19 @@ def stranger_spoke(ask: Ask, reception: Reception) -> bool:
 
 
 def silent(timeout: float, *, own: bool = False) -> Diagnosis:
-    """Judge that nobody answered; `own`: our request came back though no echo was expected."""
+    """Return the fault of a silence; `own`: our request came back though no echo was expected."""
     hint = " but our own request came back: does the adapter echo?" if own else ""
     return Diagnosis(FaultCode.TIMEOUT, f"no answer in {milliseconds(timeout)}{hint}")
 
 
 def late(latency: float) -> Diagnosis:
-    """Judge that only the answer to an earlier request came, `latency` s after that."""
+    """Return the fault of an answer to an earlier request only, `latency` s after that."""
     since = milliseconds(latency)
     return Diagnosis(FaultCode.LATE, f"only the answer to an earlier request came, {since} after that request")
 
 
 def babble(waited_for: float) -> Diagnosis:
-    """Judge that the line did not fall silent in `waited_for` s."""
+    """Return the fault of a line that did not fall silent in `waited_for` s."""
     waited = milliseconds(waited_for)
     return Diagnosis(
         FaultCode.COLLISION,
@@ -84,19 +84,19 @@ def babble(waited_for: float) -> Diagnosis:
 
 
 def changed_echo() -> Diagnosis:
-    """Judge that our own bytes came back otherwise than we sent them."""
+    """Return the fault of a changed echo."""
     message = "our own request came back changed: another device sent at the same time, or noise"
     return Diagnosis(FaultCode.COLLISION, message)
 
 
 def displaced(slave: int) -> Diagnosis:
-    """Judge that an answer came which may be another master's."""
+    """Return the fault of an answer that may be another master's."""
     message = f"another master sent a request to slave {slave} at the same time: the answer may be for either"
     return Diagnosis(FaultCode.COLLISION, message)
 
 
 def twice(found: Twice) -> str:
-    """Return in words that a second answer comes to each request."""
+    """Return the message that each request gets a second answer."""
     return (
         f"slave {found.slave} is answered for twice, {milliseconds(found.delay)} apart: a second sensor with this id, "
         "or a repeater; the first answer is published"
@@ -110,13 +110,13 @@ RUN_INTO = "broken bytes came right behind the answer: noise, or another answer 
 
 
 def refusal(code: int, request: Request) -> Diagnosis:
-    """Judge an exception answer; the message names the registers that were asked."""
+    """Return the fault of an exception; the message names the requested registers."""
     name = EXCEPTION_NAMES.get(code, "of the device's own")
     return Diagnosis(FaultCode.EXCEPTION, f"exception {code:02X} {name}, {_asking(request)}")
 
 
 def _asking(request: Request) -> str:
-    """Return what was asked: `reading 2 registers at 0x0001`."""
+    """Return the request in words: `reading 2 registers at 0x0001`."""
     if isinstance(request, ReadRegisters):
         kind = _KINDS[request.function]
         return f"reading {request.count} {kind}{'s' * (request.count > 1)} at 0x{request.address:04X}"
@@ -133,14 +133,14 @@ _KINDS = {
 
 
 def stranger(request: Request, codec: Codec, heard: bytes) -> Diagnosis | None:
-    """Judge the nearest frame in `heard` that has a right check and is no answer to `request`; None without one."""
+    """Return the fault of the nearest valid frame in `heard` that is no answer to `request`; None without one."""
     size = codec.answer_size(request)
     diagnoses = [_judge(request, body) for _, _, body in codec.frames(heard, request.slave, size)]
     return max(diagnoses, key=_closeness, default=None)
 
 
 def broken(heard: bytes, size: int, *, begun: bool) -> Diagnosis:
-    """Judge bytes that hold no right frame at all in place of an answer of `size`; `begun`: they begin as one.
+    """Return the fault of bytes without a valid frame, for an answer of `size`; `begun`: they begin as one.
 
     `heard` is what is left when echo, earlier answers and what came too early are taken out, at least one byte.
     """
@@ -156,7 +156,7 @@ def broken(heard: bytes, size: int, *, begun: bool) -> Diagnosis:
 
 
 _CLOSENESS = {FaultCode.COLLISION: 4, FaultCode.MALFORMED: 3, FaultCode.WRONG_FUNCTION: 2, FaultCode.WRONG_SLAVE: 1}
-"""Which of several frames tells most: the asked slave's own, nearest to what was asked."""
+"""Rank of several frames: a frame of the asked slave that is nearest to the expected answer counts most."""
 
 
 def _closeness(diagnosis: Diagnosis) -> int:
@@ -164,7 +164,7 @@ def _closeness(diagnosis: Diagnosis) -> int:
 
 
 def _judge(request: Request, body: bytes) -> Diagnosis:
-    """Judge a frame with a right check that is no answer to `request`."""
+    """Return the fault of a valid frame that is no answer to `request`."""
     slave, function, data = body[0], body[1] & ~EXCEPTION_FLAG, body[2:]
     asked = len(body) == _REQUEST_BODY and function in READS
     if slave != request.slave:
@@ -183,5 +183,5 @@ def _judge(request: Request, body: bytes) -> Diagnosis:
         return Diagnosis(FaultCode.COLLISION, told)
     else:
         came, announced = max(0, len(data) - 1), sum(data[:1])
-        told = f"slave {slave} sent {came} data bytes, announced as {announced}, in place of {request.data_bytes}"
+        told = f"slave {slave} sent {came} data bytes (announced: {announced}) instead of {request.data_bytes}"
     return Diagnosis(FaultCode.MALFORMED, told)

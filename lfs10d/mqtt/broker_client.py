@@ -122,7 +122,7 @@ class BrokerClient:
             try:
                 await asyncio.wait_for(self._over.wait(), within)
             except TimeoutError:
-                self.drop("no end to the connection")
+                self.drop("the connection did not end in time")
         if self._connection is not None:
             self._connection.abandon()
             self._connection = None
@@ -174,7 +174,7 @@ class BrokerClient:
             return tuple(self._nodes[each].place for each in beside)
         self._reconnect.opened(self._nodes.index(race.node))
         for place, message in race.failures:
-            self._log_once(place, message, f"{message}; {race.node.place} is next")
+            self._log_once(place, message, f"{message}; trying {race.node.place} next")
         return ()
 
     # Events of the connection
@@ -221,7 +221,7 @@ class BrokerClient:
         if self._reconnect.duplicate:
             others = f"is another client using our id {self._settings.client_id}? trying again in {delay:.0f} s"
         elif self.settings.place != place and not beside:
-            others = f"{self.settings.place} is next"
+            others = f"trying {self.settings.place} next"
         self._log_once(place, ended.message, f"{ended.message}; {others}")
         self._logged.update(dict.fromkeys(beside, ended.message))
         if len(self._logged) < len(self._nodes):

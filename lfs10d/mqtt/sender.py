@@ -151,8 +151,8 @@ class Sender:
         congested = self._outbox.congested(now)
         if congested is not None:
             log.warning(
-                "the way to the broker carries about %.3g messages a second (round trip %.3g s, %d under way at most), "
-                "less than is published: states come less often, and samples that find no room follow as history; "
+                "the connection to the broker carries about %.3g messages a second (round trip %.3g s, %d under way at "
+                "most), fewer than are published: states come less often, and samples without room follow as history; "
                 "see mqtt.telemetry, mqtt.state_every and poll.interval",
                 congested.rate,
                 congested.round_trip,

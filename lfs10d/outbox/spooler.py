@@ -86,7 +86,9 @@ class Spooler:
                     await asyncio.wait([self._task])
                 await self._keep_everything()
         except TimeoutError:
-            log.warning("the disk is too slow: %d samples that wait for the broker are not kept", self._in_memory)
+            log.warning(
+                "the disk is too slow: %d samples that wait for the broker are not kept on disk", self._in_memory
+            )
         finally:
             self._thread.end()
             if self._task is not None:
@@ -250,7 +252,9 @@ class Spooler:
         self._backlog.spilled(evicted, self._now())
         self._works()
         if evicted:
-            log.warning("the backlog on disk has reached store.max_size or store.max_age: the oldest samples go")
+            log.warning(
+                "the backlog on disk has reached store.max_size or store.max_age: the oldest samples are dropped"
+            )
         self._wake()
 
     async def _take_page(self) -> None:
@@ -283,4 +287,4 @@ class Spooler:
                 await self._release()
             await self._thread.call(self._store.close)
         except StoreError as error:
-            log.warning("%s; %d samples that wait for the broker are not kept", error, self._in_memory)
+            log.warning("%s; %d samples that wait for the broker are not kept on disk", error, self._in_memory)

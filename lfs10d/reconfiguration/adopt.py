@@ -33,11 +33,11 @@ log = logging.getLogger(__name__)
 
 NAME = "line/adopt"
 FIRST_ID = 2
-"""The first id that is given; 1 is the factory's, and is kept free for the next new sensor."""
+"""The first id that is given; 1 is the factory id and stays free for the next new sensor."""
 LAST_ID = 247
 """The last id that is given: those above are reserved (Modbus over Serial Line V1.02, section 2.2)."""
 CANDIDATES = 8
-"""How many free ids are tried; where each turns out to be in use, the command is rejected."""
+"""Number of free ids that are tried; if all turn out to be in use, the command is rejected."""
 
 _ERRORS: Mapping[ReaddressEnding, tuple[ErrorCode, str]] = {
     ReaddressEnding.TAKEN: (
@@ -151,7 +151,7 @@ class Adopt:
         return await runner.perform(run, command, intend, conclude)
 
     def _wish(self, request: AdoptRequest, profile: Profile, now: Effective) -> adopt.AdoptWish | Result:
-        """Return what is to be done on the line, or the rejection if nothing needs to be asked there."""
+        """Return the adoption to carry out on the line, or the rejection if it cannot be."""
         line_rate = now.config.line.baudrate
         if profile.factory is None or (unfit := _unfit(profile, now.config.line)) is not None:
             why = f"profile {profile.name} has no factory settings" if profile.factory is None else unfit
@@ -198,7 +198,7 @@ class Adopt:
 def _refusal(
     request: AdoptRequest, factory: int, taken: Mapping[int, str], names: AbstractSet[str], now: Effective
 ) -> Result | None:
-    """Return why a request cannot be carried out whatever is on the line; None if it can."""
+    """Return why a request is rejected without an exchange on the line; None if it is not."""
     if factory in taken:
         message = f"slave id {factory} {taken[factory]}; keep the factory's id free for new sensors"
         return rejected("address_in_use", message, param="from")
@@ -221,7 +221,7 @@ def _candidates(
 
 
 def _at_rate(change: OpenAdopt) -> Move:
-    """Return where the new sensor is since it has the line's rate: where it was before another one may be now."""
+    """Return the new sensor's place once it has the line's rate: at its old place there may be another one."""
     (move,) = change.moves
     return move.model_copy(update={"old": Endpoint(slave=move.old.slave, baudrate=move.new.baudrate)})
 

@@ -88,7 +88,7 @@ class BaudrateChange:
     # -- open changes of the rate
 
     def _stored(self, to: int) -> frozenset[str]:
-        """Return the devices that have stored a rate and wait for their power cycle."""
+        """Return the devices that have stored a rate and need a power cycle."""
         waiting = (each.facts.pending or () for each in self.changes() if each.facts.to == to)
         return frozenset().union(*waiting)
 
@@ -97,7 +97,7 @@ class BaudrateChange:
         return [change for change in self._runner.open if change.kind == "baudrate"]
 
     def unsettled(self, device: str | None = None) -> Result | None:
-        """Return the rejection of what must wait until the rate of a device, or of all, is settled."""
+        """Return the rejection of a command while the rate of a device, or of all, is unsettled."""
         for change in self.changes():
             missing = sorted(change.devices) if change.facts.pending is None else change.facts.pending
             if missing and (device is None or device in missing):
@@ -161,7 +161,7 @@ class BaudrateChange:
             self._runner.announce_duplicate(device, slave, slave)
 
     async def save_rate(self, old: int, to: int) -> None:
-        """Have the line use the rate its sensors were found at, on the disk first."""
+        """Let the line use the rate at which its sensors were found; saved to disk first."""
 
         def edit(now: Effective) -> Changes:
             filed = now.file_values.baudrate

@@ -1,4 +1,4 @@
-"""The results of `line/baudrate`: the contract's codes, and messages to the person on the ladder. Pure.
+"""The results of `line/baudrate`: the contract's codes, and messages to the installer. Pure.
 
 Each message says what was observed and what to do next.
 """

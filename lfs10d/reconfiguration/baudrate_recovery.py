@@ -74,7 +74,7 @@ class BaudrateRecovery:
 
 
 class _Undo:
-    """Puts back at once the sensors that answer, and the others when they are found, within the share of probes."""
+    """Sets sensors back to the old rate: at once if they answer, else when found, within the share of probes."""
 
     def __init__(self, runner: ChangeRunner, changes: BaudrateChange, change: OpenBaudrate, run: ProcedureRun) -> None:
         self._runner = runner
@@ -88,7 +88,7 @@ class _Undo:
         """The rate at which each sensor was found last, None where it was not."""
         self._report: BaudrateReport | None = None
         self._twins: set[str] = set()
-        """Sensors that were announced as two."""
+        """Sensors for which a second one with the same id was announced."""
 
     async def carry_out(self) -> None:
         """Return when the change is closed, or the port was lost."""

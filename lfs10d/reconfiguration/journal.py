@@ -21,12 +21,12 @@ from lfs10d.system.disk import Disk
 
 FILE_NAME = "journal.json"
 ASIDE = "journal.json.unreadable"
-"""Where a file that cannot be read is put; the last one is kept."""
+"""New name of a file that cannot be read; only the last one is kept."""
 VERSION: Literal[1] = 1
 REMEMBERED = 256
-"""Results that are kept, the newest."""
+"""Number of results that are kept."""
 REMEMBERED_FOR_MS = 24 * 3600 * 1000
-"""How long a result is kept, in ms."""
+"""Milliseconds for which a result is kept."""
 
 
 class _Record(BaseModel):
@@ -41,7 +41,7 @@ class Endpoint(_Record):
 
 
 class Move(_Record):
-    """One sensor that is to answer elsewhere; `register_before` is what its id register held (None: not read)."""
+    """One sensor that is to have another place; `register_before` is the content of its id register (None: unread)."""
 
     device: str
     old: Endpoint
@@ -50,7 +50,7 @@ class Move(_Record):
 
 
 class CommandRecord(_Record):
-    """The command of a change: its name, id and content, and where its result goes (correlation in hex)."""
+    """The command of a change: its name, id, content, and the address of its result (correlation in hex)."""
 
     name: str
     id: str | int | None = None
@@ -66,18 +66,18 @@ class CommandRecord(_Record):
 
     @property
     def finished(self) -> CommandRecord:
-        """Return it without the address of its result, as kept once it has one: a repeat brings its own."""
+        """Return it without the address of its result, as kept after the response: a repeat has its own."""
         return self.model_copy(update={"topic": None, "correlation": None})
 
 
 class _Facts(_Record):
-    """What a kind of change needs besides to be finished; keys of other versions are ignored."""
+    """Further facts of a kind of change; keys of other versions are ignored."""
 
     model_config = ConfigDict(extra="ignore", populate_by_name=True)
 
 
 class ReaddressFacts(_Facts):
-    """What a re-address needs besides: nothing."""
+    """Further facts of a re-address: none."""
 
 
 class BaudrateFacts(_Facts):
@@ -102,7 +102,7 @@ class AdoptFacts(_Facts):
 
 
 class _OpenChange(_Record):
-    """A change that may have been written. `begun` is in epoch milliseconds; the journal gives the number.
+    """A change that may have been written. `begun` is in epoch milliseconds; the journal assigns the number.
 
     `answered`: its command has its result, and the sensors are followed until they are found.
     """
@@ -182,7 +182,7 @@ class Journal:
         self._unread: str | None = None
 
     def take(self) -> str | None:
-        """Read it, once, at the start; return what is wrong with it, as a message to a person. Never fails."""
+        """Read the file once, at the start; return its problem as a message to a person. Never fails."""
         try:
             content = self._disk.read(self.path)
         except FileNotFoundError:
@@ -206,12 +206,12 @@ class Journal:
 
     @property
     def open(self) -> tuple[OpenChange, ...]:
-        """The changes that are neither finished nor undone, the oldest first."""
+        """The open changes, the oldest first."""
         return self._content.changes
 
     @property
     def answers(self) -> tuple[ResultRecord, ...]:
-        """The results that were given, the oldest first."""
+        """The kept results, the oldest first."""
         return self._content.answers
 
     def intend(self, change: C) -> C:
@@ -224,11 +224,11 @@ class Journal:
         return numbered
 
     def amend(self, number: int, moves: tuple[Move, ...]) -> None:
-        """Record at which places the sensors of a change are looked for from now on."""
+        """Record the places at which the sensors of a change are searched for from now on."""
         self._save(changes=self._with(number, lambda change: change.model_copy(update={"moves": moves})))
 
     def set_pending(self, number: int, pending: tuple[str, ...]) -> None:
-        """Record which sensors of a change of the rate wait for their power cycle."""
+        """Record which sensors of a change of the rate need a power cycle."""
 
         def amended(change: OpenChange) -> OpenChange:
             return change.model_copy(update={"facts": change.facts.model_copy(update={"pending": pending})})
@@ -252,7 +252,7 @@ class Journal:
             self._save(changes=changes, answers=answers)
 
     def note(self, record: ResultRecord | None) -> None:
-        """Remember the result of a command of which nothing was written; the next `save` puts it on the disk.
+        """Remember the result of a command that wrote nothing; the next `save` puts it on the disk.
 
         Lost before that, a repeat of the command is judged anew.
         """
@@ -289,7 +289,7 @@ class Journal:
         self._content, self._unsaved = content, False
 
     def _restore(self, refused: _JournalContent) -> None:
-        """Take back what was written but, for all we know, not synced: an intent must not outlive its refusal."""
+        """Take back a write that may not have been synced: an intent must not outlive its refusal."""
         with contextlib.suppress(OSError):
             if self._disk.read(self.path) == refused.model_dump_json(indent=1).encode():
                 self._disk.replace(self.path, self._content.model_dump_json(indent=1).encode())

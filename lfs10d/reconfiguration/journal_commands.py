@@ -1,4 +1,4 @@
-"""Commands and results as the journal keeps them, and back. Pure."""
+"""Converts commands and results to records of the journal and back. Pure."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from lfs10d.reconfiguration.journal import CommandRecord, ResultRecord
 
 
 def command_record(name: str, command: Command) -> CommandRecord:
-    """Return a command as the journal keeps it."""
+    """Return a command as a record of the journal."""
     return CommandRecord(
         name=name,
         id=command.id,
@@ -19,7 +19,7 @@ def command_record(name: str, command: Command) -> CommandRecord:
 
 
 def command_of(record: CommandRecord) -> Command:
-    """Return a command as the dispatcher knows it."""
+    """Return a command from its record."""
     correlation = None if record.correlation is None else bytes.fromhex(record.correlation)
     return Command(
         record.id, record.transaction, fingerprint=record.fingerprint, topic=record.topic, correlation=correlation
@@ -27,14 +27,14 @@ def command_of(record: CommandRecord) -> Command:
 
 
 def result_record(command: CommandRecord | None, result: Result, ts: int) -> ResultRecord | None:
-    """Return a result given at `ts` (epoch ms) as the journal keeps it; None where no command is to be answered."""
+    """Return a result given at `ts` (epoch ms) as a record; None if there is no command to answer."""
     if command is None:
         return None
     return ResultRecord(asked=command, status=result.status, data=result.data, error=result.error(), at=ts)
 
 
 def result_of(record: ResultRecord) -> Result:
-    """Return a result as the dispatcher gives it."""
+    """Return a result from its record."""
     error = dict(record.error or {})
     code, message = error.pop("code", None), error.pop("message", "")
     return Result(record.status, record.data, code, message, error)

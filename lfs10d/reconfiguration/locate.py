@@ -22,18 +22,18 @@ log = logging.getLogger(__name__)
 
 
 class Locator:
-    """Queries the line; `repoll()` has the devices polled that are no longer `withheld`."""
+    """Searches on the line; `repoll()` polls the devices that are no longer `withheld`."""
 
     def __init__(self, runner: ChangeRunner, repoll: Callable[[], None]) -> None:
         self._runner = runner
         self._repoll = repoll
         self._answered_nowhere: dict[str, tuple[Place, ...]] = {}
-        """Devices that answered at none of these places when they were queried."""
+        """Places of devices that answered at none of them."""
         self._tasks = BackgroundTasks()
         self._searches: dict[str, tuple[tuple[Place, ...], ProcedureRun, asyncio.Task[None]]] = {}
 
     def contested(self) -> dict[str, tuple[Place, ...]]:
-        """Return the devices that may be at one of several places; less the id that another one was verified at."""
+        """Return the devices with several possible places; without ids at which another device was verified."""
         now = self._runner.running()
         contested: dict[str, tuple[Place, ...]] = {}
         for slave in now.config.slaves:
@@ -45,13 +45,13 @@ class Locator:
         return {name: places for name, places in contested.items() if places}
 
     def withheld(self) -> frozenset[str]:
-        """Return the devices that must not be polled before they were queried."""
+        """Return the devices that must not be polled before they were found."""
         return frozenset(
             name for name, places in self.contested().items() if self._answered_nowhere.get(name) != places
         )
 
     def begin(self) -> None:
-        """Query every contested device that is not queried now, and whose turn it is."""
+        """Search for every contested device whose turn it is, unless that is under way."""
         if self._runner.ending:
             return
         contested = self.contested()

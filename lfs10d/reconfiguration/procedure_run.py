@@ -1,4 +1,4 @@
-"""A running procedure as seen from the asyncio loop, which does for it what must not be done in the line thread."""
+"""Runs procedures from the asyncio loop, which does the work that must not be done in the line thread."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ class Wire(Protocol):
         """Whether it is known how the adapter echoes."""
 
     def submit(self, job: Job) -> None:
-        """Have a job done; what it calls, it calls in the line's thread."""
+        """Submit a job; its callbacks run in the line's thread."""
 
     def resume_procedure(self, procedure: Procedure, result: object) -> None:
-        """Give a procedure the result of what it awaited."""
+        """Give a procedure the result that it awaits."""
 
 
 class ProcedureRun:
@@ -43,16 +43,16 @@ class ProcedureRun:
         self._wire.submit(self._procedure)
 
     def _on_await(self, _: Procedure, awaited: object) -> None:
-        """Take over what is awaited, from the line's thread."""
+        """Take over an awaited work from the line's thread."""
         with contextlib.suppress(RuntimeError):  # the loop is closed: the daemon is stopping
             self._loop.call_soon_threadsafe(self._awaited.put_nowait, awaited)
 
     async def next_await(self) -> object:
-        """Wait for what the procedure awaits next, `Finished` in the end; it waits for `resume` then."""
+        """Return what the procedure awaits next, `Finished` in the end; it then waits for `resume`."""
         return await self._awaited.get()
 
     def resume(self, result: object = None) -> None:
-        """Give the procedure the result of what it awaited."""
+        """Give the procedure the result that it awaits."""
         if self._procedure is not None:
             self._wire.resume_procedure(self._procedure, result)
 

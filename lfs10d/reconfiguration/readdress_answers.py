@@ -1,4 +1,4 @@
-"""The results of `device/readdress`: the contract's codes, and messages to the person on the ladder. Pure.
+"""The results of `device/readdress`: the contract's codes, and messages to the installer. Pure.
 
 Each message says what was observed and what to do next, and names the other possible cause.
 """

@@ -59,7 +59,7 @@ class Reconfiguration:
 
     @property
     def open(self) -> tuple[OpenChange, ...]:
-        """The changes whose sensors are still to be found."""
+        """The open changes: their sensors are still to be found."""
         return self.journal.open
 
     @property
@@ -130,13 +130,13 @@ class Reconfiguration:
     # -- what else happens
 
     def follow(self) -> None:
-        """Look for the sensors of every open change, and for the devices that may be elsewhere."""
+        """Search for the sensors of every open change, and for devices with several possible places."""
         if not self._runner.ending:
             self._locator.begin()
             self._recovery.begin()
 
     async def reconfigured(self, before: Config, after: Config) -> None:
-        """Take note of another configuration: open changes of devices that are gone are dropped."""
+        """Take another configuration: open changes of removed devices are dropped."""
         gone = {slave.name for slave in before.slaves} - {slave.name for slave in after.slaves}
         for change in self.open:
             if self._runner.underway is not None and change.asked == self._runner.underway:

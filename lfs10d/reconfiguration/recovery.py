@@ -25,7 +25,7 @@ from lfs10d.telemetry import command_log
 log = logging.getLogger(__name__)
 
 RETRY_AFTER = 30.0
-"""Seconds after which what could not be put on the disk is tried again."""
+"""Seconds after which a failed write to the disk is tried again."""
 
 
 class Recovery:
@@ -38,7 +38,7 @@ class Recovery:
         self._followed: dict[int, tuple[ProcedureRun, asyncio.Task[None]]] = {}
 
     def begin(self) -> None:
-        """Look for the sensors of every open change that is not followed and has no slave id of the command underway.
+        """Search for the sensors of every open change, unless that is under way or the present command uses their ids.
 
         Once the daemon is ending it does nothing.
         """
@@ -60,7 +60,7 @@ class Recovery:
             del self._followed[number]
 
     def leave(self, changes: frozenset[int]) -> None:
-        """Stop looking for the sensors of these changes: more is to be written to them."""
+        """Stop searching for the sensors of these changes: a new command writes to them."""
         for number in changes & set(self._followed):
             run, task = self._followed.pop(number)
             run.stop()

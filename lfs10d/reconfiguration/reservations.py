@@ -10,7 +10,7 @@ from lfs10d.reconfiguration.journal import OpenChange
 
 
 class Reservations:
-    """`underway` is the name of the command that is being carried out, None if none is.
+    """`underway` is the name of the command under way, None if there is none.
 
     `opened()` are the open changes; `update` must be called when they are others.
     """
@@ -18,9 +18,9 @@ class Reservations:
     def __init__(self, opened: Callable[[], Iterable[OpenChange]]) -> None:
         self.underway: str | None = None
         self.brought: frozenset[int] = frozenset()
-        """The slave ids that the command underway may bring into use."""
+        """The slave ids that the command under way may use."""
         self.reserved: Mapping[int, str] = {}
-        """The slave ids that no device may be given now, with the reason."""
+        """The reserved slave ids, each with the reason."""
         self._opened = opened
 
     @property
@@ -44,7 +44,7 @@ class Reservations:
             self.update()
 
     def update(self) -> None:
-        """Take note of what is open now."""
+        """Update the open changes."""
         reserved: dict[int, str] = {}
         for change in self._opened():
             whose = ", ".join(sorted(change.devices))

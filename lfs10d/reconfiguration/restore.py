@@ -44,7 +44,7 @@ M = TypeVar("M", bound="_Payload")
 
 
 class _Payload(BaseModel):
-    """The keys that are read of a payload; another version of lfs10d may have more."""
+    """The keys that are read of a payload; other versions of lfs10d may have more."""
 
     model_config = ConfigDict(strict=True, extra="ignore", frozen=True)
 
@@ -67,7 +67,7 @@ class RetainedState:
 
 @dataclass(frozen=True, slots=True)
 class ConfirmedPlace:
-    """A device that answers at the file's place, though it was last published at another."""
+    """A device that answers at the place of the file, although it was last published at another."""
 
     device: str
     file: Place
@@ -100,7 +100,7 @@ class Restore:
         return topics(self._running())
 
     async def on_retained(self, payloads: Mapping[str, bytes]) -> None:
-        """Take what is retained on those topics."""
+        """Take the retained payloads of those topics."""
         state = retained_state(payloads)
         online = {device.spec.name for device in self._devices() if device.online}
         confirmed: tuple[ConfirmedPlace, ...] = ()
@@ -150,7 +150,7 @@ def _parsed(model: type[M], payload: bytes) -> M | None:
 def restored(
     now: Effective, state: RetainedState, online: AbstractSet[str]
 ) -> tuple[Changes, tuple[ConfirmedPlace, ...]]:
-    """Return the changes with what is to be queried, and the places that are confirmed already.
+    """Return the changes with the places to search at, and the places that are already confirmed.
 
     `online` are the devices that answer at the file's place now.
     """

@@ -45,7 +45,7 @@ log = logging.getLogger(__name__)
 T = TypeVar("T")
 
 REFUSALS_SAVED_AFTER = 10.0
-"""Seconds after which the results of commands that wrote nothing are on the disk, all in one step."""
+"""Seconds until the results of commands that wrote nothing are saved together."""
 OVERTAKEN = "the daemon ended before this change was finished; a later request has changed {device} since"
 
 
@@ -87,7 +87,7 @@ class ChangeRunner:
         self.ending = False
         self.reservations = Reservations(lambda: journal.open)
         self.underway: CommandRecord | None = None
-        """The command that is being carried out now."""
+        """The command under way."""
         self._recall = recall
         self._now = now
         self._writing: asyncio.Future[Any] | None = None
@@ -147,7 +147,7 @@ class ChangeRunner:
         intend: Callable[[Any], C],
         conclude: Callable[[Any, C | None], Coroutine[Any, Any, Result]],
     ) -> Result:
-        """Follow a procedure to its end, its intent journalled before it writes; return what `conclude` makes of it.
+        """Run a procedure to its end, its intent journalled before it writes; return the result of `conclude`.
 
         The end of the daemon cuts short what is under way on the line, but not the conclusion.
         """
@@ -175,7 +175,7 @@ class ChangeRunner:
             run.resume()
 
     async def _cut_short(self, command: CommandRecord) -> Result:
-        """Answer a command that the daemon's end cuts short; what it began is settled at the next start."""
+        """Answer a command that is interrupted by the daemon's end; its change is recovered at the next start."""
         if self._writing is not None:
             await asyncio.wait([self._writing])
         mine = next((each for each in self.open if each.asked == command and not each.answered), None)
@@ -199,11 +199,11 @@ class ChangeRunner:
             self.reservations.update()
 
     def record(self, command: CommandRecord | None, result: Result) -> ResultRecord | None:
-        """Return a result as the journal keeps it; None where no command is to be answered."""
+        """Return a result as a record of the journal; None if there is no command to answer."""
         return result_record(command, result, self.timestamp())
 
     async def refuse(self, command: CommandRecord, result: Result) -> Result:
-        """Return the result of a command of which nothing was written, kept for its repeats.
+        """Return the result of a command that wrote nothing, remembered for repeats.
 
         It is not waited for that the disk has it: a flood of such commands must not wear the disk out.
         """
@@ -229,14 +229,14 @@ class ChangeRunner:
         return change.model_copy(update={"answered": True})
 
     async def finish(self, numbers: frozenset[int], change: OpenChange, result: Result) -> None:
-        """Close changes; the command of `change` is answered if it is not yet."""
+        """Close changes, and answer the command of `change` unless it was answered."""
         record = None if change.answered else self.record(change.asked, result)
         await self.close(numbers, change, record)
         if record is not None:
             self._respond(record)
 
     async def close(self, numbers: frozenset[int], change: OpenChange, record: ResultRecord | None) -> None:
-        """Close changes, with the result of `change`; the commands of the others are answered as overtaken."""
+        """Close changes with the result of `change`; the commands of the others are answered as overtaken."""
         overtaken = [
             self.record(each.asked, failed("cancelled", OVERTAKEN.format(device=", ".join(each.devices))))
             for each in self.open
@@ -259,7 +259,7 @@ class ChangeRunner:
     # -- what holds from now on
 
     async def save_endpoint(self, device: str, endpoint: Endpoint, added: Values | None = None) -> None:
-        """Poll a device where it was found, saved to disk first; `added` is the entry of a new one."""
+        """Save where a device was found, then poll it there; `added` is the entry of a new one."""
 
         def edit(now: Effective) -> Changes:
             if now.slave(device) is None:
@@ -295,6 +295,6 @@ class ChangeRunner:
         self._recall(record.asked.name, command, result, forget_in=forget_in, respond=True)
 
     async def stop(self) -> None:
-        """Start no further change; write to disk what was only noted."""
+        """Start no further change; save what was only noted."""
         self._tasks.cancel_all()
         await self._save_noted()

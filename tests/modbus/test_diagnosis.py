@@ -37,16 +37,16 @@ def framed(*bodies: str) -> bytes:
         (WIND, "030404414FD70A", FaultCode.WRONG_FUNCTION, "slave 3 answered function 04 in place of 03"),
         (WIND, "034104414FD70A", FaultCode.WRONG_FUNCTION, "slave 3 answered function 41 in place of 03"),
         (WIND, "038602", FaultCode.WRONG_FUNCTION, "slave 3 answered function 06 in place of 03"),
-        (WIND, "030302414F", FaultCode.MALFORMED, "slave 3 sent 2 data bytes, announced as 2, in place of 4"),
-        (WIND, "030306414FD70A", FaultCode.MALFORMED, "slave 3 sent 4 data bytes, announced as 6, in place of 4"),
-        (WIND, "0303", FaultCode.MALFORMED, "slave 3 sent 0 data bytes, announced as 0, in place of 4"),
+        (WIND, "030302414F", FaultCode.MALFORMED, "slave 3 sent 2 data bytes (announced: 2) instead of 4"),
+        (WIND, "030306414FD70A", FaultCode.MALFORMED, "slave 3 sent 4 data bytes (announced: 6) instead of 4"),
+        (WIND, "0303", FaultCode.MALFORMED, "slave 3 sent 0 data bytes (announced: 0) instead of 4"),
         (
             WIND,
             "030300010002",
             FaultCode.COLLISION,  # the contract's new word for a second master
             "a request to slave 3 was received in place of its answer: an echo, or a second master",
         ),
-        (BITS, "030101FF", FaultCode.MALFORMED, "slave 3 sent 1 data bytes, announced as 1, in place of 2"),
+        (BITS, "030101FF", FaultCode.MALFORMED, "slave 3 sent 1 data bytes (announced: 1) instead of 2"),
         (
             BITS,
             "030100000009",

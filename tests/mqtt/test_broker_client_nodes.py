@@ -98,7 +98,7 @@ def test_of_several_nodes_the_one_that_accepts_us_is_kept_until_it_is_gone(
     places = {port: f"broker 127.0.0.1:{port}" for port in (unused_port, mosquitto.port, second_mosquitto.port)}
     refused = f"{places[unused_port]}: connection refused: is the broker running, and mqtt.port right?"
     assert told[:2] == [
-        f"{refused}; {places[mosquitto.port]} is next",
+        f"{refused}; trying {places[mosquitto.port]} next",
         f"{places[mosquitto.port]}: connected by MQTT 5",
     ]
 

@@ -92,7 +92,7 @@ def test_a_disk_that_hangs_does_not_hold_up_the_end(
 
     play(scenario())
     let_go.set()
-    assert "3 samples that wait for the broker are not kept" in caplog.text
+    assert "3 samples that wait for the broker are not kept on disk" in caplog.text
 
 
 def test_a_mistake_of_ours_is_told_and_ends_nothing_else(

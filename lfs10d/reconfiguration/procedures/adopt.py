@@ -59,9 +59,9 @@ class AdoptReport:
     old: Endpoint | None = None
     to: int | None = None
     at_rate: bool = True
-    """False: it ended with the write of the rate; its id is as it was."""
+    """False: it ended when the rate was written; the id is unchanged."""
     rate_code: int | None = None
-    """What its register of the rate held when it was recognised."""
+    """The content of its rate register when it was recognised."""
 
 
 def adopt(wish: AdoptWish, query: IdentityQuery, echo_known: Callable[[], bool]) -> Generator[Step, Any, AdoptReport]:
@@ -94,7 +94,7 @@ def adopt(wish: AdoptWish, query: IdentityQuery, echo_known: Callable[[], bool])
 def _check_before_write(
     wish: AdoptWish, query: IdentityQuery, echo_known: Callable[[], bool]
 ) -> Generator[Step, Any, AdoptReport]:
-    """Find the new sensor and a free id; `FREE` where it may be written."""
+    """Find the new sensor and a free id; return `FREE` if it may be written."""
     newcomer = yield from _newcomer(wish, query)
     old = newcomer.old
     if newcomer.readdress.ending is not ReaddressEnding.FREE or old is None:
@@ -138,7 +138,7 @@ def _newcomer(wish: AdoptWish, query: IdentityQuery) -> Generator[Step, Any, Ado
 def _free_id(
     wish: AdoptWish, old: Endpoint, query: IdentityQuery
 ) -> Generator[Step, Any, tuple[int | None, ReaddressReport | None]]:
-    """Return the first candidate that is silent, None if there is none, and why it must not be written.
+    """Return the first silent candidate (None if there is none), and why it must not be written.
 
     At the new sensor's own rate the candidate is read while it is checked that the new sensor is alone.
     """

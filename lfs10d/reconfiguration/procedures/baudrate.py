@@ -29,7 +29,7 @@ from lfs10d.reconfiguration.procedures.readdress import ECHO_READS, TRIES, VERIF
 from lfs10d.system.dataclass import dataclass
 
 ROLL_BACK = 60.0
-"""How long sensors are moved back, in s."""
+"""Longest time in s for moving sensors back."""
 FIRST_PAUSE = 1.0
 """Pause between two rounds of reads of missing sensors, in s; doubled after each."""
 
@@ -96,7 +96,7 @@ class RateWish:
     power_cycle: bool = False
     dry_run: bool = False
     stored: frozenset[str] = frozenset()
-    """Those that have stored the new rate since an earlier change, and would obey it at their next power-up."""
+    """Sensors that stored the new rate in an earlier change, and would use it after their next power-up."""
 
     def touched(self, last: int) -> tuple[RateSensor, ...]:
         """Return the sensors that have, or may have, stored the new rate when the `last` one was written."""
@@ -124,7 +124,7 @@ class BaudrateReport:
 
 @dataclass(frozen=True, slots=True)
 class WriteRates:
-    """The sensors are about to be written; answered with None when that is on the disk, else with why it is not."""
+    """The intent to write to the sensors; answered with None once it is on the disk, else with the reason."""
 
 
 def change_rate(wish: RateWish, echo_known: Callable[[], bool]) -> Generator[Step, Any, BaudrateReport]:
@@ -189,7 +189,7 @@ def _one_by_one(wish: RateWish, where: dict[str, int | None]) -> Generator[Step,
 
 
 def _twins(wish: RateWish, last: int, where: dict[str, int | None]) -> Generator[Step, Any, BaudrateReport]:
-    """Bring all sensors back, because the last one written turned out to be two."""
+    """Move all sensors back, because the last one written turned out to be two."""
     report = yield from roll_back(wish.touched(last), wish.old, wish.to, where)
     names = (wish.sensors[last].name,)
     return replace(report, ended=BaudrateEnding.TWINS, names=names) if report.restored else report
@@ -246,7 +246,7 @@ def restore_rate(sensor: RateSensor, rate: int, other: int) -> Generator[Step, A
 
 
 def write_back(sensor: RateSensor, rate: int) -> Generator[Step, Any, bool]:
-    """Have a sensor that answers at `rate` store it too; whether its register says so then."""
+    """Write `rate` to a sensor that answers at it; return whether its register has it then."""
     yield from write(sensor.at(rate), sensor.register, sensor.code(rate), sensor.query)
     for _ in range(TRIES):
         reply = yield from sensor.query.read_register(sensor.at(rate), PATIENT, register=sensor.register)
@@ -281,7 +281,7 @@ def roll_back(
 
 
 def _left_behind(sensors: Sequence[RateSensor], rate: int) -> Generator[Step, Any, list[RateSensor]]:
-    """Return the sensors that still answer at a rate they all have left: those were deaf after their last write."""
+    """Return the sensors that still answer at the rate that all others have left: they did not take the last write."""
     yield Hold(sensors[0].query.clock.now + VERIFY)
     left = []
     for sensor in sensors:

@@ -1,4 +1,4 @@
-"""Reads at the other rates where every sensor of the line has been offline for a while. Pure; writes nothing.
+"""Searches at the other rates after every sensor has been offline for some time. Pure; writes nothing.
 
 It reports what was found and uses nothing of it: a line at the wrong rate is for a person, or for `line/baudrate`, to
 put right.
@@ -63,7 +63,7 @@ def find_other_rates(
 
 
 def message(found: Found, line_rate: int, polled: int, *, filed: int) -> str:
-    """Return the message to a person: what was found, and what to do.
+    """Return the message: what was found, and what to do.
 
     `filed` is `line.baudrate` of the file; it differs from the `line_rate` where line/baudrate has moved the line.
     """

@@ -37,7 +37,7 @@ FIRST_PAUSE = 1.0
 """Between the first look and the first probes, in s; doubled after each."""
 
 DECIDED = frozenset({ReaddressEnding.MOVED, ReaddressEnding.LOCKED})
-"""With these the sensor is found: at the new place, or at the old one to stay."""
+"""Endings that mean that the sensor is found: at the new place, or for good at the old one."""
 
 
 def follow(
@@ -49,7 +49,7 @@ def follow(
     before: Endpoint | None = None,
     newcomer: bool = False,
 ) -> Generator[Step, Any, ReaddressReport]:
-    """Query until the sensor is found; each look that did not find it is awaited.
+    """Read both places until the sensor is found; each round without it is awaited.
 
     `before` is where it was before it came to `old`: it may be there still. `newcomer`: `old` is a factory's id.
     """

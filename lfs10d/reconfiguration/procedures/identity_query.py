@@ -35,11 +35,11 @@ from lfs10d.system.dataclass import dataclass
 QUICK = 0.2
 """The usual time-out, in s."""
 SLOW_FROM = 0.1
-"""A sensor that took longer than this, in s, gets the time-out `PATIENT` from then on."""
+"""A sensor that took longer than this (s) gets the time-out `PATIENT` from then on."""
 BARRIERS = 4
-"""After so many reads of the values another of the id is not tried."""
+"""After this many reads of the values the id is not read once more."""
 HEARD_WITHIN = 0.05
-"""So long after its last byte the answer to another master may not be known yet, in s."""
+"""Seconds after its last byte in which an answer to another master may not be recognised yet."""
 PATIENT = 1.0
 """Time-out for one that is slow, or must not be missed, in s."""
 
@@ -140,7 +140,7 @@ class IdentityQuery:
     def listen(
         self, silent: Endpoint, timeout: float, before: int
     ) -> Generator[Step, Outcome, tuple[IdentityReply, bool]]:
-        """Read a place that is expected to be silent directly behind another read; return what was received.
+        """Read a place that is expected to be silent right after another read; return what was received.
 
         The second says that a right frame of slave `before` came which answers no older request to it: another device
         of that id, or a repeater.

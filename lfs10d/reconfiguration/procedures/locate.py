@@ -1,4 +1,4 @@
-"""Looks for a sensor where the file and its last verified place differ. Pure; writes nothing."""
+"""Searches for a sensor whose place in the file is not the last verified one. Pure; writes nothing."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ from lfs10d.reconfiguration.procedures.recognition import look_for_twins
 from lfs10d.system.dataclass import dataclass
 
 VERIFY = 5.0
-"""How long after the write both places are read, in s."""
+"""Seconds after the write in which both places are read."""
 PAUSE = 0.25
 """Pause between two rounds of reads, in s."""
 TRIES = 3
@@ -86,7 +86,7 @@ class ReaddressEnding(StrEnum):
 
 NOTHING_WRITTEN = frozenset(takewhile(lambda ending: ending is not ReaddressEnding.MOVED, ReaddressEnding))
 STAYS_OPEN = frozenset({ReaddressEnding.GARBAGE, ReaddressEnding.PENDING, ReaddressEnding.NOWHERE})
-"""With these the sensor may yet appear at either place; so it may where its register says the new id."""
+"""Endings after which the sensor may still appear at either place; also if its register has the new id."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +107,7 @@ class ReaddressReport:
 
 @dataclass(frozen=True, slots=True)
 class IdWrite:
-    """What is about to be written; answered with None when it is on the disk, else with why it is not."""
+    """The intent to write; answered with None once it is on the disk, else with the reason."""
 
     old: Endpoint
     new: Endpoint
@@ -185,14 +185,14 @@ def not_ready(
 
 
 def absent(reply: IdentityReply) -> ReaddressReport:
-    """Return what it means that no id was read at a place: nothing there, a refusal, or answers that collide."""
+    """Return why no id was read at a place: nothing there, a refusal, or answers that collide."""
     if reply.noise and not reply.answers:
         return ReaddressReport(ReaddressEnding.TWINS, why="answers collide there")
     return ReaddressReport(ReaddressEnding.ABSENT, exception=reply.exception)
 
 
 def alone(old: Endpoint, to: int, query: IdentityQuery) -> Generator[Step, Any, ReaddressReport | None]:
-    """Find out whether one sensor is at a place and nothing at the slave id `to`; return what is wrong, if anything."""
+    """Check that one sensor is at a place and none at the slave id `to`; return the problem, if any."""
     look = yield from look_for_twins(old, Endpoint(slave=to, baudrate=old.baudrate), query)
     if look.twins is not None:
         return ReaddressReport(ReaddressEnding.TWINS, why=look.twins)
@@ -212,7 +212,7 @@ def present(endpoint: Endpoint, query: IdentityQuery) -> Generator[Step, Any, Id
 
 
 def free(endpoint: Endpoint, query: IdentityQuery) -> Generator[Step, Any, bool]:
-    """Whether not one byte is received in three reads at a place."""
+    """Return whether no byte is received in three reads at a place."""
     for timeout in PROBE_TIMEOUTS:
         reply = yield from query.read_values(endpoint, timeout)
         if not reply.silent:
@@ -233,7 +233,7 @@ def write(endpoint: Endpoint, register: int, value: int, query: IdentityQuery) -
 
 @dataclass(frozen=True, slots=True)
 class ReaddressFinding:
-    """What the two places answered in the end; `spoilt`: repeatedly bytes at the new one that make no frame."""
+    """The last replies of the two places; `spoilt`: repeatedly bytes without a frame at the new one."""
 
     new: IdentityReply
     old: IdentityReply
@@ -284,7 +284,7 @@ def read_both(
 def undo_stored_id(
     report: ReaddressReport, old: Endpoint, to: int, query: IdentityQuery
 ) -> Generator[Step, Any, ReaddressReport]:
-    """Have the one of two that stayed at `old` forget the new id, if it has stored that."""
+    """Let the one of two sensors that stayed at `old` forget the new id, if it stored that."""
     if report.ending is not ReaddressEnding.BOTH or report.register != to:
         return report
     for _ in range(TRIES):
@@ -300,7 +300,7 @@ def _nearer(one: IdentityReply, other: IdentityReply) -> IdentityReply:
 
 
 def judge(found: ReaddressFinding, register_before: int | None, exception: int | None, to: int) -> ReaddressReport:
-    """Return what follows from the answers of the two places, by the table."""
+    """Return the ending that follows from the replies of the two places, by the table."""
     new, old = found.new, found.old
     if old.answers and (new.answers or found.spoilt):
         ending = ReaddressEnding.BOTH

@@ -36,17 +36,17 @@ from lfs10d.reconfiguration.procedures.identity_query import PATIENT, QUICK, SIL
 from lfs10d.system.dataclass import dataclass
 
 READS = 3
-"""How often a value is read."""
+"""Number of reads of a value."""
 LISTENING = (QUICK, QUICK, 0.6)
-"""How long the line is listened to behind each read, in s."""
+"""Seconds for which the line is listened to after each read."""
 MORE_READS = 6
-"""How often it is read besides where the first reads jump back and forth."""
+"""Number of further reads if the first ones jump back and forth."""
 APART = 5.0
-"""Two groups of values are so many times as far apart as each is wide."""
+"""Least distance between two groups of values, in widths of a group."""
 LEAST = 0.02
 """The least distance between two groups, as a part of the range: a display that flickers by one digit is one sensor."""
 CROSSINGS = 3
-"""Two sensors take turns at least so often in nine reads; a gust comes and goes once."""
+"""Least number of jumps in nine reads that means two sensors; a gust comes and goes once."""
 FULL_CIRCLE = 360.0
 
 
@@ -78,7 +78,7 @@ class Look:
 def recognise(
     endpoint: Endpoint, identity: IdentityReply, query: IdentityQuery
 ) -> Generator[Step, Outcome, Recognition]:
-    """Find out whether a sensor of the profile is at a place where `identity` was the reply of its id register."""
+    """Check that a sensor of the profile is at a place where `identity` was the reply of its id register."""
     profile = query.profile
     if identity.exception is not None:
         return Recognition(f"it refuses register 0x{query.id_register:04X} (exception {identity.exception:02X})")
@@ -139,7 +139,7 @@ def _may_lack(block: Block, exception: int | None) -> bool:
 def _values_fit(
     block: Block, endpoint: Endpoint, query: IdentityQuery
 ) -> Generator[Step, Outcome, tuple[Recognition, Fault | None]]:
-    """Read a block of values `READS` times; the first answer that is none of such a device decides.
+    """Read a block of values `READS` times; the first answer that such a device cannot give decides.
 
     The second is why it has no value: it was refused, or says so.
     """
@@ -168,7 +168,7 @@ def _values_fit(
 
 
 def look_for_twins(endpoint: Endpoint, silent: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, Look]:
-    """Find out whether one sensor is at a place, not two (rules 2 to 4); `silent` is a slave id that nobody has."""
+    """Check that one sensor is at a place, not two (rules 2 to 4); `silent` is a slave id without a device."""
     look = yield from _read_and_listen(endpoint, silent, query)
     if look.twins is None and query.answered_twice(endpoint):
         return replace(look, twins="a second answer comes to each request")
@@ -206,7 +206,7 @@ def _number_in(blocks: Sequence[Block]) -> tuple[Value, Block]:
 
 
 def _whose(silent: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, Look]:
-    """Find out whether what was received behind a read came from the place that was to be silent."""
+    """Check whether bytes received after a read came from the place that was to be silent."""
     for _ in range(READS - 1):
         reply = yield from query.read_values(silent, QUICK)
         if not reply.silent:
@@ -217,7 +217,7 @@ def _whose(silent: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, L
 def _take_turns(
     value: Value, block: Block, numbers: list[float], endpoint: Endpoint, query: IdentityQuery
 ) -> Generator[Step, Outcome, Look]:
-    """Read it more often where the `numbers` so far jump back and forth; find out whether that goes on."""
+    """Read more often if the `numbers` so far jump back and forth; check whether that goes on."""
     if jumps(value, numbers) < READS - 1:
         return Look()
     for _ in range(MORE_READS):
