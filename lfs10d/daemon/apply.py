@@ -1,4 +1,4 @@
-"""Another configuration takes effect: each part is given what concerns it, in order."""
+"""Applies another configuration: each part gets the settings that concern it, in order."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class ConfigChanges:
         self._parts = parts
 
     async def apply(self, plan: ReloadPlan, before: Effective) -> None:
-        """Put into force what `LiveConfig.now` holds already."""
+        """Apply the new `LiveConfig.now` to the parts."""
         parts, now = self._parts, self._parts.config.now
         config = now.config
         if plan.log:

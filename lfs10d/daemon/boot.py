@@ -1,4 +1,4 @@
-"""The id of one life of the daemon: 8 characters, sortable by start."""
+"""The boot id of one run of the daemon: 8 characters, sortable by start."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TICKS_PER_SECOND = 100
 
 @dataclass(frozen=True, slots=True)
 class Boot:
-    """`id` of this life, the one `previous` to it (None: not known), and whether `id` is on the disk."""
+    """`id` of this run, that of the `previous` one (None: unknown), and whether `id` is on the disk."""
 
     id: str
     previous: str | None
@@ -29,7 +29,7 @@ class Boot:
 
 
 def begin(directory: Path, disk: Disk, wall: float) -> Boot:
-    """Begin a new life at `wall` (epoch seconds): one more than the last, at least the clock.
+    """Return the boot id of a new run at `wall` (epoch seconds): one more than the last, at least the clock.
 
     The counter in the state directory makes ids sort though a clock without battery begins in the past; the clock
     makes them sort though the state directory is gone. Never fails: without the directory the clock must do.
@@ -42,7 +42,7 @@ def begin(directory: Path, disk: Disk, wall: float) -> Boot:
 
 
 def keep(boot: Boot, directory: Path, disk: Disk) -> Boot:
-    """Put the id of this life on the disk, as the last one; return it as `kept` if that was possible."""
+    """Save the id of this run; return it as `kept` if that was possible."""
     try:
         disk.replace(directory / FILE_NAME, f"{boot.id}\n".encode())
     except OSError:

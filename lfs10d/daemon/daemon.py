@@ -26,7 +26,7 @@ log = logging.getLogger(__name__)
 SWITCH_INTERVAL = 1e-4
 """Seconds the interpreter lets one thread run on: at the default of 5 ms the line thread wakes up 5 ms late."""
 LINE_STOPS_WITHIN = 0.4
-"""Seconds the line thread is waited for at the end; with the uplink's 1.3 s the daemon ends within 2 s."""
+"""Longest wait in s for the line thread at the end; with the uplink's 1.3 s the daemon ends within 2 s."""
 
 
 async def run(loaded: LoadedConfig, boot: Boot, state_directory: Path) -> int:

@@ -1,4 +1,4 @@
-"""From the configuration and the profiles to what Home Assistant is told."""
+"""Builds the discovery payloads for Home Assistant from configuration and profiles."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ BARE_NUMBER = "1"
 
 
 def discovery_payloads(config: Config, profiles: Mapping[str, Profile]) -> dict[str, Announced]:
-    """Return the payloads by full topic; none where discovery is off."""
+    """Return the payloads by full topic; none if discovery is off."""
     if not config.homeassistant.discovery:
         return {}
     gateway = Gateway(
@@ -63,14 +63,14 @@ def _value(value: Value) -> DiscoveredValue:
 
 
 class AnnouncedPrefixes:
-    """What the next life is to know of what this one announced; best effort, where the disk is of no use."""
+    """The discovery prefixes in use, saved for the next run; best effort if the disk fails."""
 
     def __init__(self, directory: Path, disk: Disk) -> None:
         self._path = directory / FILE_NAME
         self._disk = disk
 
     def load(self) -> frozenset[str]:
-        """Return the prefixes under which earlier lives announced something."""
+        """Return the prefixes that earlier runs used."""
         try:
             lines = self._disk.read(self._path).decode().splitlines()
         except (OSError, UnicodeError):
@@ -83,7 +83,7 @@ class AnnouncedPrefixes:
         return frozenset(found)
 
     def save(self, prefixes: frozenset[str]) -> None:
-        """Put the prefixes on the disk; no file is none."""
+        """Save the prefixes; no file means none."""
         with contextlib.suppress(OSError):
             if prefixes:
                 self._disk.replace(self._path, "".join(f"{each}\n" for each in sorted(prefixes)).encode())

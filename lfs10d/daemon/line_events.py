@@ -1,4 +1,4 @@
-"""What the line reports, handed on in order: to the log, the station, the commands, the service manager."""
+"""Passes the events of the line on in order: to the log, the publisher, the commands, the service manager."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class LineReport:
         self._loop = asyncio.get_running_loop()
 
     def on_events(self, events: list[Event]) -> None:
-        """Log and publish what came of an exchange; one batch for the broker."""
+        """Log and publish the events of an exchange, as one batch for the broker."""
         parts, now = self._parts, self._parts.clock.now()
         port, frames = parts.line.port, log.isEnabledFor(logging.DEBUG)
         published: list[Publication] = []

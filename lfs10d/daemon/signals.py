@@ -1,4 +1,4 @@
-"""What signals do, and what the service manager is told of it: SIGTERM and SIGINT end, SIGHUP reloads."""
+"""Handles signals and notifies the service manager: SIGTERM and SIGINT end, SIGHUP reloads."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ENDING = (signal.SIGTERM, signal.SIGINT)
 
 
 class Signals:
-    """`end()` and `reload()` are what they do, `summary()` is one line for `systemctl status`."""
+    """`end()` and `reload()` are called by signals; `summary()` is one line for `systemctl status`."""
 
     def __init__(
         self,
@@ -37,13 +37,13 @@ class Signals:
         self._tasks = BackgroundTasks()
 
     def obey(self) -> None:
-        """Do from now on what signals say."""
+        """Handle signals from now on."""
         for number in ENDING:
             self._loop.add_signal_handler(number, self._end)
         self._loop.add_signal_handler(signal.SIGHUP, self._hang_up)
 
     def ready(self) -> None:
-        """Tell the service manager, once, that the start is over."""
+        """Notify the service manager, once, that the start is over."""
         if not self._ready:
             self._ready = True
             self._notifier.ready(self._summary())
@@ -70,7 +70,7 @@ class Signals:
 
 
 def ignore() -> None:
-    """Be deaf to them from now on: asked to end once more while ending, that is under way, and ends in order."""
+    """Ignore signals from now on: the daemon is ending already."""
     loop = asyncio.get_running_loop()
     for number in (*ENDING, signal.SIGHUP):
         loop.remove_signal_handler(number)

@@ -1,4 +1,4 @@
-"""Where the daemon keeps what it must not forget, and where it shows its status."""
+"""Finds the state directory and the status file of a daemon."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def state_directory(file: Path, line: str, *, chosen: Path | None, environment: 
 
 
 def in_system_folder(file: Path) -> bool:
-    """Tell whether a configuration file belongs to a service of the system."""
+    """Return whether a configuration file belongs to a service of the system."""
     return Path(os.path.abspath(file)).parent == SYSTEM_FOLDER  # noqa: PTH100  # resolve() would follow links
 
 
@@ -46,7 +46,7 @@ def _service(file: Path) -> str:
 
 
 def status_file(file: Path, line: str, environment: Mapping[str, str], *, root: bool = False) -> Path | None:
-    """Return where the daemon of a configuration file writes its status; None where there is no place for it.
+    """Return the status file of the daemon of a configuration file; None if there is no place for it.
 
     `root`: the user is root, who may write where the verbs look first. Run by hand (by sudo) there is no session; then
     the status of a service's file is there.

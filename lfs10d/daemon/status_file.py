@@ -1,4 +1,4 @@
-"""`status.json`: what `watch` shows when the broker is away. Written once a second, never half."""
+"""`status.json`, for `watch` while the broker is away: replaced as a whole once a second."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ class StatusFile:
         self._draft.replace(self.path)
 
     def remove(self) -> None:
-        """Take the file away: nobody stands behind it any more."""
+        """Remove the file: the daemon ends."""
         for path in (self.path, self._draft):
             with contextlib.suppress(OSError):
                 path.unlink(missing_ok=True)
 
 
 def _json(status: Mapping[str, object]) -> str:
-    """Return the status as JSON, each device by itself: the encoder holds the interpreter, and the line must wake."""
+    """Return the status as JSON, encoded device by device: the encoder would delay the line thread."""
     encode = _JSON.encode
     members = (
         f"{encode(key)}:" + (f"[{','.join(map(encode, value))}]" if isinstance(value, list) else encode(value))

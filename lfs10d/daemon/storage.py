@@ -1,4 +1,4 @@
-"""Whether files can be written: the state directory, the backlog in it, the changes by request."""
+"""Watches whether files can be written: the state directory, the backlog in it, the changes by request."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ log = logging.getLogger(__name__)
 
 
 LOOK_EVERY = 5.0
-"""Seconds from one look to the next while there is trouble."""
+"""Seconds between two checks while files cannot be written."""
 
 
 class Storage:
-    """Logs trouble, and raises it as an error of the line by `set_line_error`; None clears that.
+    """Logs failures to write, and raises them as an error of the line by `set_line_error`; None clears it.
 
     When the trouble is over, the id of this life (`boot`) is put on the disk if it is not there yet.
     """
@@ -33,11 +33,11 @@ class Storage:
         self._boot = boot
         self._set_line_error = set_line_error
         self._backlog: str | None = None
-        """Why the backlog cannot be kept."""
+        """Why the backlog cannot be kept on disk; None if it can."""
         self._reported: str | None = None
 
     def look(self) -> None:
-        """See whether files can be written."""
+        """Check whether files can be written."""
         trouble = self._backlog
         try:
             prepare(self._directory)
@@ -52,18 +52,18 @@ class Storage:
             self.on_failure(trouble)
 
     async def watch(self) -> None:
-        """Look again while there is trouble, until cancelled: where nothing is stored its end shows nowhere else."""
+        """Check again while files cannot be written, until cancelled."""
         while True:
             await asyncio.sleep(LOOK_EVERY)
             if self._reported is not None:
                 self.look()
 
     def on_backlog_trouble(self, trouble: str | None) -> None:
-        """Take that the backlog cannot be kept, or (None) can again."""
+        """Take why the backlog cannot be kept on disk; None: it can again."""
         self._backlog = trouble
         self.look()
 
     def on_failure(self, trouble: str) -> None:
-        """Take that something could not be written."""
+        """Take the error of a failed write."""
         log.warning("%s", trouble)
         self._set_line_error(FaultCode.STORAGE_FULL, trouble)

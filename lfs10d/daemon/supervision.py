@@ -1,4 +1,4 @@
-"""Once a second: tell the service manager how the daemon is, feed its watchdog, write `status.json`."""
+"""Once a second: notifies the service manager, feeds the watchdog, writes `status.json`."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from lfs10d.system.systemd import Notifier
 log = logging.getLogger(__name__)
 
 EVERY = 1.0
-"""s between two looks."""
+"""s between two checks."""
 
 
 class Supervision:
-    """Looks after the daemon from inside its loop.
+    """Supervises the daemon from its own loop.
 
     `declared()` is the time by which the line thread promised its next turn, `snapshot()` what `watch` shows,
     `summary()` one line for `systemctl status`.
@@ -44,7 +44,7 @@ class Supervision:
         self._writable = True
 
     async def run(self) -> None:
-        """Look once a second (more often where the watchdog is short), until cancelled."""
+        """Check once a second (more often if the watchdog is short), until cancelled."""
         every = EVERY if self._notifier.watchdog is None else min(EVERY, self._notifier.watchdog / 3)
         try:
             while True:

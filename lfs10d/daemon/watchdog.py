@@ -1,4 +1,4 @@
-"""The watchdog is fed by progress: the line thread keeps the time it declared, and the asyncio loop turns."""
+"""Decides whether the watchdog is fed: the line thread keeps its declared time, and the asyncio loop turns."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ import threading
 import traceback
 
 GRACE = 2.0
-"""How much later than declared the line thread may be, in s: opening a port and draining it may block that long."""
+"""Permitted delay of the line thread in s: opening a port and draining it may block that long."""
 
 
 def progressing(declared: float, now: float) -> bool:
-    """Whether the line thread, which promised a turn by `declared` (monotonic s), is on time at `now`."""
+    """Return whether the line thread, which promised a turn by `declared` (monotonic s), is on time at `now`."""
     return now <= declared + GRACE
 
 
 def stacks(threads: list[threading.Thread]) -> list[str]:
-    """Return one line per thread: where it stands now, for the log before the end."""
+    """Return the stack of each thread on one line, for the log before the end."""
     frames = sys._current_frames()  # noqa: SLF001 - the documented way to other threads' frames
     lines = []
     for thread in threads:

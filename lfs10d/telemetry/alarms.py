@@ -1,4 +1,4 @@
-"""Rise and clear of errors.
+"""The errors of devices and the line: when they become active, and when they are cleared.
 
 Rules
 -----
@@ -25,12 +25,12 @@ from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry.publication import VERSION
 
 HEARD_LIMIT = 32
-"""Bytes shown of those heard last."""
+"""Bytes of `heard`: the last ones received."""
 
 AT_ONCE = frozenset({FaultCode.CONFIG_CONFLICT})
 
 PRECEDENCE: Final[tuple[LineFaultCode, ...]] = get_args(LineFaultCode)
-"""Errors of the line; what comes first is shown while several are active."""
+"""Errors of the line; while several are active the first of these is shown."""
 
 
 @dataclass(slots=True)
@@ -92,7 +92,7 @@ class DeviceAlarm:
         self._cleared: int | None = None
 
     def failed(self, fault: Fault, ts: int) -> bool:
-        """Count one failed poll; return whether the error rose or changed its code."""
+        """Count one failed poll; return whether the error became active or changed its code."""
         run = self._run
         if run is None:
             run = self._run = _Run(fault, ts, ts)
@@ -106,7 +106,7 @@ class DeviceAlarm:
         return self.active
 
     def ended(self, ts: int) -> bool:
-        """End the run, for a good poll or a mask; return whether an error was cleared."""
+        """End the run of failures, after a good poll or while masked; return whether an error was cleared."""
         run, self._run = self._run, None
         if run is None or not self.active:
             return False
@@ -116,7 +116,7 @@ class DeviceAlarm:
         return True
 
     def set_lasting(self, fault: Fault | None, ts: int) -> bool:
-        """Take an error that no poll raises or clears, None where it is over; return whether that is a change."""
+        """Set an error that no poll raises or clears (None: it is over); return whether that is a change."""
         before = self._lasting
         if fault is None:
             self._lasting = None
@@ -139,7 +139,7 @@ class DeviceAlarm:
 
 
 class LineAlarm:
-    """The error of the line: the foremost of those that hold now."""
+    """The error of the line: the most important of the active ones."""
 
     __slots__ = ("_cleared", "_last_code", "_runs")
 
@@ -153,7 +153,7 @@ class LineAlarm:
         return next((self._runs[code] for code in PRECEDENCE if code in self._runs), None)
 
     def failed(self, code: LineFaultCode, message: str, ts: int) -> bool:
-        """Raise an error, or count it once more; return whether what is shown changed.
+        """Raise an error, or count it once more; return whether the shown error changed.
 
         The port has one fault at a time.
         """
@@ -170,7 +170,7 @@ class LineAlarm:
         return self._face() != before
 
     def ended(self, codes: frozenset[FaultCode], ts: int) -> bool:
-        """Clear those of `codes` that hold; return whether what is shown changed."""
+        """Clear the active ones of `codes`; return whether the shown error changed."""
         shown = self._shown
         for code in codes:
             self._runs.pop(code, None)
@@ -181,7 +181,7 @@ class LineAlarm:
         return True
 
     def payload(self) -> dict[str, object]:
-        """Return the error object; `also` lists what else holds."""
+        """Return the error object; `also` lists the other active codes."""
         shown = self._shown
         if shown is None:
             return _inactive(self._last_code, self._cleared)

@@ -13,10 +13,10 @@ from lfs10d.command import Command, Result
 from lfs10d.system.logs import escape
 
 LONGEST = 300
-"""Characters of one value that are logged."""
+"""Longest text of one value in the log, in characters."""
 PLACE = ("device", "slave", "address")
 OUTCOME = ("dry_run", "pending", "changed", "dropped", "applied", "restart_required", "added", "cancelled", "for")
-"""Further keys of an answer that are logged where they hold something."""
+"""Further keys of a result that are logged unless they are empty."""
 
 
 def line(name: str, call: Command, answer: Result) -> str:
@@ -60,9 +60,9 @@ _CHANGES: Mapping[str, Callable[[Mapping[str, Any]], tuple[object, object]]] = {
     "line/adopt": lambda data: (data.get("from"), data.get("slave")),
     "register/write": lambda data: (data.get("before"), data.get("value")),
 }
-"""What each request that changes something changed, as its answer tells it: what was, what is now."""
+"""Keys of the result that say what a request changed: the value before, the value now."""
 _MOVES = frozenset({"device/add", "device/remove", "line/adopt"})
-"""Requests whose slave id is among what changed."""
+"""Requests that changed a slave id."""
 
 
 def _short(value: object) -> str:

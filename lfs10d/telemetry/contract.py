@@ -1,4 +1,4 @@
-"""The table of what goes out: every topic under `B`, its payload's model, and when it is published.
+"""The table of published topics: every topic under `B`, the model of its payload, and when it is published.
 
 For `docs/mqtt.md` and for the tests; like `lfs10d.telemetry.payloads` it is not imported by the running daemon.
 """
@@ -32,7 +32,7 @@ from lfs10d.telemetry.wind.payloads import RecordPayload, WindPayload
 
 @dataclass(frozen=True, slots=True)
 class Outbound:
-    """One topic under `B`; `+` stands for any one level, `form` is what its JSON is validated against."""
+    """One topic under `B`; `+` is any one level, `form` is the model of its JSON."""
 
     topic: str
     form: Any
@@ -41,7 +41,7 @@ class Outbound:
     when: str
 
     def matches(self, topic: str) -> bool:
-        """Whether `topic` (under `B`) is one of these."""
+        """Return whether `topic` (under `B`) matches."""
         pattern, levels = self.topic.split("/"), topic.split("/")
         return len(pattern) == len(levels) and all(
             wanted in ("+", level) for wanted, level in zip(pattern, levels, strict=True)
@@ -102,7 +102,7 @@ OUTBOUND = (
 
 
 def outbound(topic: str) -> Outbound:
-    """Return the row of the table for a topic under `B`; KeyError if the daemon promises none such."""
+    """Return the row of the table for a topic under `B`; raises KeyError for an unknown topic."""
     for row in OUTBOUND:
         if row.matches(topic):
             return row
@@ -110,7 +110,7 @@ def outbound(topic: str) -> Outbound:
 
 
 def check(topic: str, text: str) -> object:
-    """Return the model of a payload as it goes over the wire; ValidationError if it breaks the promise.
+    """Return the model of an encoded payload; raises ValidationError if it does not fit.
 
     `text` is JSON, but for a bare word.
     """
@@ -121,5 +121,5 @@ def check(topic: str, text: str) -> object:
 
 @cache
 def _validator(pattern: str) -> TypeAdapter[object]:
-    """Return what validates the payloads of one row; building it takes milliseconds."""
+    """Return the validator for the payloads of one row; building it takes milliseconds."""
     return TypeAdapter(next(row.form for row in OUTBOUND if row.topic == pattern))

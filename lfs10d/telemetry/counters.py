@@ -18,13 +18,13 @@ WINDOW = 30
 """Seconds over which rates are computed."""
 
 LEAST_SPAN = 1.0
-"""Seconds below which a rate is chance, and is not published."""
+"""Shortest time in s for which a rate is published."""
 
 RECENT_GAPS = 1000
 RECENT_RTTS = 100
 
 OTHER_RATES = frozenset({Purpose.SCAN, Purpose.CHANGE})
-"""Purposes that may use another baud rate: their gaps say nothing about the line's own."""
+"""Purposes that may use another baud rate: their gaps are not counted."""
 
 
 def percentile(values: Iterable[float], percent: int) -> float | None:
@@ -40,7 +40,7 @@ def scaled(value: float | None, factor: float, digits: int) -> float | None:
 
 @dataclass(slots=True)
 class _Second:
-    """What happened in one second of the clock; `busy` is the line's time in s."""
+    """The counts of one second; `busy` is the line's time in use, in s."""
 
     number: int
     polls: int = 0
@@ -77,7 +77,7 @@ class LineCounters:
         self.uart: UartCounters | None = None
 
     def exchanged(self, event: Exchanged) -> None:
-        """Count one exchange; its fault is counted with the poll it belongs to, a dropped late answer here."""
+        """Count one exchange and its dropped late answers; its fault is counted with its poll."""
         self.exchanges += 1
         self.unsolicited += event.unsolicited
         if event.late:
@@ -90,7 +90,7 @@ class LineCounters:
                 self._least_gap = gap
 
     def polled(self, reading: Reading, apart: float | None) -> None:
-        """Count one poll and its failed attempts; `apart` is the time in s since the poll of it before."""
+        """Count one poll and its failed attempts; `apart` is the time in s since the device's previous poll."""
         second = self._second(reading.at)
         second.polls += 1
         if apart is not None and apart > second.longest:
@@ -110,7 +110,7 @@ class LineCounters:
         self.errors[code.value] += 1
 
     def retimed(self) -> None:
-        """Forget the gaps: the line has another rate, and the old ones would look too short or too long."""
+        """Forget the measured gaps: the line has another rate."""
         self._gaps.clear()
         self._least_gap = None
 
@@ -165,7 +165,7 @@ class LineCounters:
             self.errors[code.value] += 1
 
     def _second(self, at: float) -> _Second:
-        """Return the second `at` belongs to; what comes in late joins the newest."""
+        """Return the second of the time `at`; late events are counted in the newest."""
         seconds = self._seconds
         number = floor(at)
         if seconds and seconds[-1].number >= number:
@@ -196,7 +196,7 @@ class DeviceCounters:
         self.request_gap = request_gap
         self.polls = 0
         self.good = 0
-        """Polls that brought a value, the `partial` ones too."""
+        """Polls with a value, the `partial` ones too."""
         self.partial = 0
         self.errors: Counter[str] = Counter()
         self.last_good_ts: int | None = None
@@ -204,7 +204,7 @@ class DeviceCounters:
         self._last_poll: float | None = None
 
     def polled(self, reading: Reading, ts: int) -> float | None:
-        """Count one reading; return the time in s since the poll before, None where there is none to compare.
+        """Count one reading; return the time in s since the previous poll, None if there is none.
 
         Probes stand apart: their distance is the device's illness, not the line's pace.
         """

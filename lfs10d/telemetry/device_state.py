@@ -84,7 +84,7 @@ class DeviceState:
         self.seq = seq
         self.online = False
         self.state_due: float | None = None
-        """Monotonic time at which a newer state than the one shown may be published; None: none waits."""
+        """Monotonic time at which the waiting state may be published; None: none waits."""
         self._line = line
         self._boot = boot
         self._topics = {leaf: device_topic(info.name, leaf) for leaf in (STATE, AVAILABILITY, ERROR, STATS)}
@@ -100,7 +100,7 @@ class DeviceState:
         self._payload = self._sample.payload(line)
 
     def on_reading(self, reading: Reading, now: Instant, *, masked: bool) -> tuple[list[Publication], float | None]:
-        """Take and count one reading; return what it changes, and the seconds since the poll before (see `polled`).
+        """Take and count one reading; return its publications, and the seconds since the previous poll (see `polled`).
 
         `masked`: the port is lost, so that failures say nothing about the device.
         """
@@ -130,7 +130,7 @@ class DeviceState:
         return published + rested
 
     def _rest(self, gap: float) -> list[Publication]:
-        """Take the rest in s that the device is given; return its configuration where that changes it."""
+        """Take the rest in s between two requests; return the device's configuration if that changes it."""
         if gap == self._gap:
             return []
         self._gap = gap
@@ -143,12 +143,12 @@ class DeviceState:
         return self._show(sample, now, online=False) + self.mask(now)
 
     def mask(self, now: Instant) -> list[Publication]:
-        """Take the device's own error back: what ails it is not the device."""
+        """Clear the device's own error: the fault is not the device's."""
         ended = self._alarm.ended(now.ts())
         return [self._error()] if self._alarm.set_lasting(None, now.ts()) or ended else []
 
     def on_answered_twice(self, heard: AnsweredTwice, now: Instant) -> list[Publication]:
-        """Take that a second answer comes to each request, or no longer does."""
+        """Raise the error of a second answer to each request, or clear it."""
         ts = now.ts(heard.at)
         published = []
         if self._alarm.set_lasting(heard.fault, ts):
@@ -159,7 +159,7 @@ class DeviceState:
         return published
 
     def reconfigure(self, info: DeviceInfo, now: Instant) -> list[Publication]:
-        """Take new facts about the same device on the same profile; return what changed."""
+        """Take another configuration of the same device with the same profile; return the publications."""
         before, self.info = self.info, info
         self._alarm.rise_after = info.offline_after
         if info.request_gap != before.request_gap:
@@ -173,7 +173,7 @@ class DeviceState:
         return published
 
     def due_state(self, now: Instant) -> Publication | None:
-        """Return the state that waited, if its time has come."""
+        """Return the waiting state, if its time has come."""
         if self.state_due is None or self.state_due > now.mono:
             return None
         return self._state(now, refresh=True)
@@ -193,7 +193,7 @@ class DeviceState:
         return retained(self._topics[STATS], self._counters.payload(now.ts()), qos=0, refresh=True)
 
     def snapshot(self, now: Instant) -> dict[str, object]:
-        """Return what a live view shows of this device; `age_s` is the age of the last good reading."""
+        """Return this device for a live view; `age_s` is the age of the last good reading."""
         info, sample, last_good = self.info, self._sample, self._last_good
         values = sample.values or NOTHING
         return {
@@ -218,7 +218,7 @@ class DeviceState:
         }
 
     def _form(self, seq: int, ts: int, now: Instant, reading: Reading | None = None) -> Sample:
-        """Return the sample of a reading, or of none: bad, and nobody's fault."""
+        """Return the sample of a reading; without one a bad sample without an error."""
         values = fault = rtt = None
         errors: Mapping[str, FaultCode] = NOTHING
         ages: Mapping[str, float] = NOTHING
@@ -244,7 +244,7 @@ class DeviceState:
         )
 
     def _show(self, sample: Sample, now: Instant, *, online: bool) -> list[Publication]:
-        """Publish a sample, and the state and availability as far as they change by it."""
+        """Publish a sample, and state and availability if they change."""
         shown, apart = self._sample, now.mono - self._sampled
         self._sample, self._sampled = sample, now.mono
         self._payload = sample.payload(self._line)
@@ -269,7 +269,7 @@ class DeviceState:
         return Publication(self._telemetry, payload, PublicationKind.SAMPLE, retain=False, qos=1, sample=sample)
 
     def _state(self, now: Instant, *, refresh: bool = False) -> Publication:
-        """Return the newest state, which is then shown; `refresh`: quality and error are those shown before."""
+        """Return the newest state as published; `refresh`: quality and error are as before."""
         on_time = abs(now.mono - self._state_from) <= STATE_EARLY
         self._state_from = (self._state_from if on_time else now.mono) + self.info.state_every
         self.state_due = None
@@ -286,7 +286,7 @@ class DeviceState:
 
 
 RETAINED_LEAVES: Final = (STATE, CONFIG, AVAILABILITY, ERROR, STATS)
-"""What every device has."""
+"""Topics of every device."""
 
 CLEARED_LEAVES: Final = (*RETAINED_LEAVES, WIND)
-"""What is cleared of a device that is gone."""
+"""Topics to be cleared for a removed device."""

@@ -20,7 +20,7 @@ _MISSING: Final[Mapping[FaultCode, str]] = {
     FaultCode.OUT_OF_RANGE: "the number is impossible",
     FaultCode.EXCEPTION: "the device refuses it",
 }
-"""Why a value is not there."""
+"""Reasons of missing values, in words."""
 
 
 class LogEntry(NamedTuple):
@@ -39,7 +39,7 @@ class EventLog:
         self._rested: set[str] = set()
         """Devices whose learned rest was reported."""
         self._missing: set[tuple[str, str, FaultCode]] = set()
-        """Device, value and reason of those missing values that were reported."""
+        """Device, value and reason of the missing values that were reported."""
 
     def on_exchange(self, exchanged: Exchanged) -> list[LogEntry]:
         """Return the log entry that shows the frames of an exchange."""
@@ -76,7 +76,7 @@ class EventLog:
         return [LogEntry(logging.WARNING, f"{text} ({why}): set request_gap for it in the configuration")]
 
     def _missing_values(self, reading: Reading) -> list[LogEntry]:
-        """Return what is to be said of values that are not there while others are: of each and each reason once."""
+        """Return the entries about missing values of partial samples: one for each value and reason."""
         if reading.values is None:
             return []
         entries = []

@@ -1,4 +1,4 @@
-"""The first burst of a boot says that nothing is known of any device, whatever was measured meanwhile. Pure.
+"""The first burst of a boot: it shows no device as measured yet, and holds back what was measured meanwhile. Pure.
 
 A broker may retain publications from before a restart; a subscriber must see them replaced before anything new.
 Until that burst is settled, newer states are held back; then they follow at once. Every device's state in it has the
@@ -24,19 +24,19 @@ class FirstBurst:
         self.settled = False
 
     def burst(self, publications: Iterable[Publication]) -> list[Publication]:
-        """Return a burst with nothing known of the devices; the same one once the first is settled."""
+        """Return a burst without measured states; the burst itself once the first one is acknowledged."""
         if self.settled:
             return list(publications)
         return [self._unknown.get(each.topic, each) for each in publications]
 
     def passing(self, publications: Iterable[Publication]) -> Iterable[Publication]:
-        """Return what need not wait for the first burst."""
+        """Return the publications that need not wait for the first burst."""
         if self.settled:
             return publications
         return [each for each in publications if each.payload is None or not _held(each)]
 
     def settle(self, publications: Iterable[Publication]) -> list[Publication]:
-        """Take that the broker has the first burst; return of a new one what was held back, availability first."""
+        """Note that the broker has the first burst; return the publications held back, availability first."""
         if self.settled:
             return []
         self.settled = True

@@ -1,4 +1,4 @@
-"""What the station is told about the daemon, the line and the devices, and one moment on both clocks."""
+"""Configured facts about the daemon, the line and the devices, as they are published."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from lfs10d.telemetry.publication import VERSION
 
 @dataclass(frozen=True, slots=True)
 class DaemonInfo:
-    """What `info` says; `boot` stays the same for one life of the daemon, `mqtt` is any JSON object."""
+    """The content of `info`; `boot` stays the same during one run of the daemon, `mqtt` is any JSON object."""
 
     version: str
     host: str
@@ -111,7 +111,7 @@ class DeviceInfo:
     offline_after: int
     request_gap: float = 0.0
     calibration: Mapping[str, Mapping[str, float]] = field(default_factory=lambda: NOTHING)
-    """By value name what its certificate says: `scale` and `offset`."""
+    """`scale` and `offset` of its calibration certificate, by value name."""
     state_every: float = 1.0
     """Seconds from one state of the same quality and error to the next, at least."""
     wind: WindInfo | None = None

@@ -38,11 +38,11 @@ class LineState:
 
     @property
     def masked(self) -> bool:
-        """Whether failed polls say nothing about the devices now."""
+        """Whether failed polls do not count for the devices now."""
         return self._port_fault is not None or self.activity == PAUSED
 
     def on_port_changed(self, change: PortChanged, now: Instant) -> list[Publication]:
-        """Take that the port was opened, is lost, or is lost for another reason."""
+        """Take a change of the port: opened, lost, or lost for another reason."""
         fault = change.fault
         before = self.state()
         self._open = fault is None
@@ -57,14 +57,14 @@ class LineState:
         return published
 
     def on_activity(self, activity: str, now: Instant) -> list[Publication]:
-        """Take what the line is busy with; a pause clears the errors of the port."""
+        """Take the line's activity; a pause clears the errors of the port."""
         if activity == self.activity:
             return []
         self.activity = activity
         return [self.state(), *(self.recovered(PORT_CODES, now) if activity == PAUSED else [])]
 
     def on_requests(self, requests: Requests) -> list[Publication]:
-        """Take whether the broker lets requests through."""
+        """Take whether the broker permits requests."""
         if requests == self._requests:
             return []
         self._requests = requests
@@ -82,7 +82,7 @@ class LineState:
         return [self.error()] if self._alarm.failed(code, message, ts) else []
 
     def recovered(self, codes: frozenset[FaultCode], now: Instant) -> list[Publication]:
-        """Clear these errors of the line, as far as they are raised."""
+        """Clear these errors of the line, if they are active."""
         return [self.error()] if self._alarm.ended(codes, now.ts()) else []
 
     def state(self) -> Publication:
@@ -100,7 +100,7 @@ class LineState:
         return retained(LINE_STATS, payload, qos=0, refresh=True)
 
     def snapshot(self, now: Instant) -> dict[str, object]:
-        """Return what a live view shows of the line."""
+        """Return the line for a live view."""
         return {
             "name": self.info.name,
             **self._payload(),

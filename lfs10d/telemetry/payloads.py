@@ -1,7 +1,7 @@
 """Models of outbound payloads, for `docs/mqtt.md` and for the tests.
 
 The daemon builds plain dictionaries and never validates what it sends: these models say what it promises.
-Which of them goes to which topic is told by `lfs10d.telemetry.contract`.
+`lfs10d.telemetry.contract` assigns them to topics.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ Clock = Annotated[ClockState, Field(description="state of the wall clock")]
 ValueFault: TypeAlias = Literal[
     FaultCode.UNAVAILABLE, FaultCode.NOT_FINITE, FaultCode.OUT_OF_RANGE, FaultCode.EXCEPTION
 ]
-"""What can ail one value among others."""
+"""Faults of a single value among others."""
 Errors = Annotated[dict[FaultCode, Count], Field(description="how often each failure happened")]
 
 
 class Payload(BaseModel):
-    """What all share: exactly these keys, exactly these types, no NaN and no Infinity."""
+    """The base of all payloads: exactly these keys and types, no NaN and no Infinity."""
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -63,7 +63,7 @@ class SamplePayload(Payload):
 
     @model_validator(mode="after")
     def _speak_with_one_voice(self) -> Self:
-        """Refuse values that do not fit the quality, and errors, ages and units that do not fit the values."""
+        """Refuse values that contradict the quality, and errors, ages and units that contradict the values."""
         values = self.values.values()
         if not self.values:
             raise ValueError("a sample has a value")
@@ -173,7 +173,7 @@ class Uart(Payload):
 
 
 class StoreStats(Payload):
-    """What waits for the broker."""
+    """Samples that wait for the broker."""
 
     depth: int = Field(ge=0, description="samples")
     oldest_ts: Milliseconds | None
@@ -243,7 +243,7 @@ class DeviceStats(Payload):
 
 
 class Event(Payload):
-    """Something that happened once; each type has facts of its own."""
+    """Something that happened once; each type has keys of its own."""
 
     model_config = ConfigDict(extra="allow")
 
@@ -253,7 +253,7 @@ class Event(Payload):
 
     @model_validator(mode="after")
     def _leave_dropped_alone(self) -> Self:
-        """Refuse the one type that has a model of its own."""
+        """Refuse the type `dropped`, which has a model of its own."""
         if self.type == "dropped":
             raise ValueError("dropped has facts of its own")
         return self

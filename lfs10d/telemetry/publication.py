@@ -1,4 +1,4 @@
-"""What goes out: samples, publications and events as plain values, and the topics under `B` they go to.
+"""Samples, publications and events as plain values, and their topics under `B`.
 
 `B` is `<base topic>/<line name>`; nothing here knows it. The models of the payloads, for the documentation
 and the tests, are in `lfs10d.telemetry.payloads`: building them costs megabytes that a running daemon need not spend.
@@ -40,22 +40,22 @@ TELEMETRY = "telemetry"
 HISTORY = "history"
 
 ELSEWHERE = "/"
-"""Before a full topic that is not under `B`: what is published for Home Assistant."""
+"""Prefix of a full topic that is not under `B`, for Home Assistant."""
 
 
 def device_topic(device: str, leaf: str) -> str:
-    """Return the topic under `B` of one thing about a device: `device/mast-top/state`."""
+    """Return the topic under `B` of a device: `device/mast-top/state`."""
     return f"device/{device}/{leaf}"
 
 
 def device_of(topic: str, leaf: str) -> str | None:
-    """Return the device that `device_topic` gave this topic, None where it is another leaf or no device's."""
+    """Return the device of a topic with this leaf, None for other topics."""
     levels = topic.split("/")
     return levels[1] if len(levels) == 3 and levels[0] == "device" and levels[2] == leaf else None  # noqa: PLR2004 - device/<name>/<leaf>
 
 
 Quality: TypeAlias = Literal["good", "partial", "bad"]
-"""Every value is there; some are; none is."""
+"""All values, some, none."""
 
 
 EventType: TypeAlias = Literal[
@@ -78,9 +78,9 @@ class PublicationKind(StrEnum):
     """How a publication is treated while the broker is away."""
 
     RETAINED = "retained"
-    """Not kept: every burst after a connect holds its newest form."""
+    """Not kept: every burst after a connect has its newest version."""
     SAMPLE = "sample"
-    """Never lost while the daemon lives: kept, and sent as history when older than 3 s. Records too."""
+    """Never lost while the daemon runs: kept, and sent as history when older than 3 s. Records too."""
     EVENT = "event"
     RESPONSE = "response"
     TRACE = "trace"
@@ -119,12 +119,12 @@ class Sample:
 
     @property
     def source(self) -> str:
-        """What counts its `seq`: a device, or one series of records of a device."""
+        """The series that `seq` counts: a device, or the records of a device."""
         return self.device
 
     @property
     def history_topic(self) -> str:
-        """The topic under `B` that it goes to when it is no longer live."""
+        """The topic under `B` when it is no longer live."""
         return device_topic(self.device, HISTORY)
 
     @property
@@ -133,7 +133,7 @@ class Sample:
         return True
 
     def header(self, line: str) -> dict[str, object]:
-        """Return what every payload of a device begins with."""
+        """Return the first keys of every payload of a device."""
         return {
             "v": VERSION,
             "line": line,

@@ -14,10 +14,10 @@ from lfs10d.reading import PORT_CODES, SILENT_CODES, START_POLLS, Reading
 from lfs10d.telemetry.event_log import LogEntry
 
 WITHIN = 9.5
-"""Seconds after the opening of the port at which the report is made at the latest."""
+"""Longest time in s from the opening of the port to the report."""
 
 NAMED = 32
-"""Devices of one kind that are named."""
+"""Most devices of one kind that are named."""
 
 
 def _some(names: Sequence[str]) -> str:

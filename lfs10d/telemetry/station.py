@@ -1,4 +1,4 @@
-"""The line and its devices as the broker knows them: a pure fold of events and time into publications.
+"""Turns events of the line and time into publications about the line and its devices. Pure.
 
 `on_event` and `tick` return publications and keep what the next burst needs; nothing here waits, reads a clock
 or knows a broker. The rules of the line are in `line_state`, those of a device in `device_state`, rise and clear of
@@ -73,13 +73,13 @@ class Station:
         self._devices = {info.name: self._new_device(info, now) for info in devices}
         self._wind = WindStation(line.name, daemon.boot, devices, now)
         self._held_back: dict[str, float] = {}
-        """When the states are due that were held back, by device: monotonic s."""
+        """When the states held back are due, by device: monotonic s."""
         self._states_due = inf
         self.stats_due = now.mono + STATS_EVERY
-        """When `tick` is to be told what waits for the broker: monotonic s."""
+        """When `tick` next publishes statistics: monotonic s."""
 
     def on_event(self, happened: Event, now: Instant) -> list[Publication]:
-        """Take one event of the line thread; return what it changes, in order.
+        """Take one event of the line thread; return its publications, in order.
 
         Readings of unknown devices, and of disabled ones that no request wants, are ignored: their poll was under
         way when the device went.
@@ -105,7 +105,7 @@ class Station:
         return published
 
     def tick(self, now: Instant, backlog: BacklogStats = NOTHING_WAITS) -> list[Publication]:
-        """Return what time alone makes due: states that were held back, statistics.
+        """Return the publications that are due by time: states held back, statistics.
 
         `backlog` is what waits for the broker, wanted from `stats_due` on.
         """
@@ -159,7 +159,7 @@ class Station:
         return frozenset((*LINE_TOPICS, *leaves, *self._wind.topics()))
 
     def configure(self, line: LineInfo, devices: Sequence[DeviceInfo], now: Instant) -> list[Publication]:
-        """Take the configuration as it is now; return the difference, with the topics of removed devices cleared.
+        """Take another configuration; return the changed publications, with the topics of removed devices cleared.
 
         A device is the same while its name is; with another profile it starts anew, but for its sample numbers.
         `line.name` does not change while the process lives.
@@ -192,7 +192,7 @@ class Station:
         return published
 
     def introduce(self, daemon: DaemonInfo, now: Instant) -> list[Publication]:
-        """Take other facts about the daemon: protocol in use, count of changes, hash of the configuration."""
+        """Take other values of `info`: protocol in use, count of changes, hash of the configuration."""
         published = self._watch_clock(now)
         before, self._daemon = self._daemon, daemon
         if daemon != before:
@@ -200,7 +200,7 @@ class Station:
         return published
 
     def on_activity(self, activity: str, now: Instant) -> list[Publication]:
-        """Take what the line is busy with: `polling`, `scanning`, `changing_baudrate`, `paused` ...
+        """Take the line's activity: `polling`, `scanning`, `changing_baudrate`, `paused` ...
 
         When a pause ends, the poller reports the state of the port anew.
         """
@@ -210,7 +210,7 @@ class Station:
         return published + changed + masked
 
     def on_requests(self, requests: Requests, now: Instant) -> list[Publication]:
-        """Take whether the broker lets requests through: `denied` where it refused the subscription."""
+        """Take whether the broker permits requests: `denied` if it refused the subscription."""
         return self._watch_clock(now) + self._line.on_requests(requests)
 
     def line_failed(self, code: LineFaultCode, message: str, now: Instant) -> list[Publication]:
@@ -218,11 +218,11 @@ class Station:
         return self._watch_clock(now) + self._line.failed(code, message, now.ts())
 
     def line_recovered(self, code: LineFaultCode, now: Instant) -> list[Publication]:
-        """Clear such an error; nothing happens if it is not raised."""
+        """Clear such an error, if it is active."""
         return self._watch_clock(now) + self._line.recovered(frozenset({code}), now)
 
     def snapshot(self, now: Instant) -> dict[str, object]:
-        """Return what a live view shows, as plain data: the line, its error and pace, every device."""
+        """Return the data of a live view: the line, its error and rates, every device."""
         ts = now.ts()
         return {
             "v": VERSION,
@@ -273,7 +273,7 @@ class Station:
         return published
 
     def _watch_clock(self, now: Instant) -> list[Publication]:
-        """Return `info` if the trust in the clock changed; its start time is then corrected by the clock as well."""
+        """Return `info` if the state of the clock changed, with the start time corrected."""
         if now.clock == self._clock:
             return []
         self._clock = now.clock

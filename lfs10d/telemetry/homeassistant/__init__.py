@@ -1,1 +1,1 @@
-"""Home Assistant: what its MQTT discovery is told of a line and its devices. Pure."""
+"""Home Assistant: the MQTT discovery payloads of a line and its devices. Pure."""

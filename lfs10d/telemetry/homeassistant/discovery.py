@@ -1,4 +1,4 @@
-"""The discovery payloads of a daemon, one for the line and one for each device, and what leads from old to new. Pure.
+"""The discovery payloads of a daemon, one for the line and one per device, and the steps from old to new. Pure.
 
 Home Assistant keeps an entity that is merely left out of a newer payload. It goes when a payload names it with nothing
 but its platform; after that it is left out. A payload that is cleared removes its device with all entities.
@@ -21,7 +21,7 @@ from lfs10d.telemetry.homeassistant.gateway import (
 from lfs10d.telemetry.publication import AVAILABILITY, device_topic
 
 CLICK_EXPIRES: Final = 30
-"""Seconds after which the broker throws away a click that the daemon did not get."""
+"""Seconds after which the broker discards a command that the daemon did not receive."""
 
 Announced: TypeAlias = dict[str, object]
 """A discovery payload."""
@@ -30,7 +30,7 @@ Platforms: TypeAlias = Mapping[str, str]
 
 
 def announcements(gateway: Gateway, devices: Iterable[DiscoveredDevice]) -> dict[str, Announced]:
-    """Return the payload for each full topic, the line's first: the devices name it as what they are reached by."""
+    """Return the payload for each full topic, the line's first: the devices refer to it by `via_device`."""
     line = object_id(gateway.base)
     about_line: dict[str, object] = {
         "identifiers": [line],

@@ -41,7 +41,7 @@ Component: TypeAlias = dict[str, object]
 Platform: TypeAlias = Literal["sensor", "binary_sensor", "number", "switch", "button"]
 
 EXPIRES_LEAST: Final = 30.0
-"""Seconds that a value is shown at least after it came."""
+"""Shortest time in s for which a value is shown."""
 
 _LONGEST_INTERVAL: Final = 86_400
 _NO_FAULT: Final = "none"
@@ -57,7 +57,7 @@ _WIND: Final = (
 
 @dataclass(frozen=True, slots=True)
 class _Owner:
-    """Whose entities they are: the line's (no device), or a device's."""
+    """The owner of entities: the line (no device), or a device."""
 
     gateway: Gateway
     device: str | None = None
@@ -104,7 +104,7 @@ class _Owner:
 
 
 def device_components(gateway: Gateway, device: DiscoveredDevice) -> dict[str, Component]:
-    """Return what a device has: its values, wind statistics, fault, controls, and what is off by default."""
+    """Return the entities of a device: values, wind statistics, fault, controls, diagnostics."""
     owner = _Owner(gateway, device.name)
     components = dict(_values(owner, device))
     components.update(_wind(owner, device))
@@ -116,7 +116,7 @@ def device_components(gateway: Gateway, device: DiscoveredDevice) -> dict[str, C
 
 
 def line_components(gateway: Gateway) -> dict[str, Component]:
-    """Return what the line has."""
+    """Return the entities of the line."""
     owner, stats = _Owner(gateway), gateway.topic(LINE_STATS)
     figure = {"state_topic": stats, "state_class": MEASUREMENT, "entity_category": "diagnostic"}
     components = dict([
@@ -176,7 +176,7 @@ def _wind(owner: _Owner, device: DiscoveredDevice) -> Iterator[tuple[str, Compon
 
 
 def _controls(owner: _Owner, device: DiscoveredDevice) -> Iterator[tuple[str, Component]]:
-    """Yield what obeys requests of class polling."""
+    """Yield the controls that send requests of class `polling`."""
     state = owner.gateway.topic(device_topic(device.name, CONFIG))
     options = owner.gateway.topic("request/device/options")
     # The device's name is of [a-z0-9_-]: nothing in it can be taken for a template.
@@ -196,7 +196,7 @@ def _controls(owner: _Owner, device: DiscoveredDevice) -> Iterator[tuple[str, Co
 
 
 def _diagnostics(owner: _Owner, device: DiscoveredDevice) -> Iterator[tuple[str, Component]]:
-    """Yield what few people want: disabled until somebody enables it."""
+    """Yield the diagnostic entities, which are disabled by default."""
     shown = {
         "state_topic": owner.gateway.topic(device_topic(device.name, STATS)),
         "entity_category": "diagnostic",

@@ -1,4 +1,4 @@
-"""What is known of a line and its devices for discovery, and the names they have there. Pure values.
+"""The facts about a line and its devices that discovery needs, and their names there. Pure values.
 
 Every name here is made of names that are stable for life (base topic, line, device, value), never of a slave id.
 """
@@ -18,7 +18,7 @@ ValueKind: TypeAlias = Literal["number", "text", "boolean"]
 
 _PLAIN: Final = re.compile(r"[a-z0-9-]+/[a-z0-9-]+")
 _DIGEST: Final = 6
-"""Hex digits that tell bases apart which look the same in an object id."""
+"""Hex digits that distinguish base topics with the same object id."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class Gateway:
 
 
 def object_id(base: str, device: str | None = None) -> str:
-    """Return what names the line `base`, or a device on it: `[a-z0-9_-]` only, another for each.
+    """Return a unique name of the line `base`, or of a device on it: `[a-z0-9_-]` only.
 
     `lfs10d/line0` is `lfs10d_lfs10d_line0`, its mast-top `lfs10d_lfs10d_line0_mast-top`. Where that could be taken for
     another's (an underscore, a third level, a character that has no place in it), some digits of a hash follow.
@@ -75,17 +75,17 @@ def object_id(base: str, device: str | None = None) -> str:
 
 
 def entity_id(platform: str, base: str, *names: str) -> str:
-    """Return the entity id that is proposed: `sensor.lfs10d_line0_mast_top_wind_speed`."""
+    """Return the proposed entity id: `sensor.lfs10d_line0_mast_top_wind_speed`."""
     return f"{platform}.{re.sub(r'[^a-z0-9]+', '_', '_'.join((base, *names)).lower()).strip('_')}"
 
 
 def config_topic(prefix: str, identifier: str) -> str:
-    """Return the full topic that a device is announced on."""
+    """Return the full topic of a device's discovery payload."""
     return f"{prefix}/device/{identifier}/config"
 
 
 def is_about(payload: Mapping[str, object], availability: str) -> bool:
-    """Tell whether a discovery payload is that of the daemon with this availability topic (full)."""
+    """Return whether a discovery payload belongs to the daemon with this availability topic (full)."""
     match payload.get("availability"):
         case [{"topic": topic}, *_]:
             return bool(topic == availability)

@@ -1,4 +1,4 @@
-"""What a daemon announced before, as the broker retains it: found again after a connect. Pure; time is an argument."""
+"""Finds the earlier discovery payloads of a daemon at the broker, after a connect. Pure; time is an argument."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ QUIET: Final = 0.5
 LONGEST: Final = 30.0
 """Seconds after which a search ends in any case."""
 LARGEST: Final = 262_144
-"""Bytes of a payload that is looked at; ours have some 10 KB."""
+"""Largest payload that is read, in bytes; ours have some 10 KB."""
 
 
 @dataclass(slots=True)
 class DiscoverySearch:
-    """Collects what is announced under `prefix` for the daemon at `base`, from `begun` on (monotonic seconds).
+    """Collects the payloads under `prefix` of the daemon at `base`, from `begun` on (monotonic seconds).
 
     `wide`: all of it; else the line alone, whose payload is cleared last: where it is not, nothing is.
     """
@@ -34,7 +34,7 @@ class DiscoverySearch:
     found: dict[str, Platforms] = field(default_factory=dict)
     """The components of each payload by its full topic."""
     is_refused: bool = False
-    """The broker lets us see nothing."""
+    """The broker refused the subscription."""
     _last_at: float = 0.0
 
     def __post_init__(self) -> None:
@@ -46,11 +46,11 @@ class DiscoverySearch:
         return config_topic(self.prefix, "+" if self.wide else object_id(self.base))
 
     def refused(self) -> None:
-        """Note that the broker lets us see nothing."""
+        """Note that the broker refused the subscription."""
         self.is_refused = True
 
     def on_message(self, topic: str, payload: bytes, now: float) -> bool:
-        """Take one retained message; return False if it is not about a device of Home Assistant's."""
+        """Take one retained message; return False if it is no discovery payload."""
         parts = topic.removeprefix(f"{self.prefix}/").split("/")
         match parts:
             case ["device", identifier, "config"]:
