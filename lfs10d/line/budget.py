@@ -13,7 +13,7 @@ from lfs10d.profiles.profile import Profile
 from lfs10d.system.dataclass import dataclass
 
 ASSUMED_TURNAROUND = 0.005
-"""Seconds a slave thinks before it answers, where a figure is wanted before it was measured."""
+"""Assumed response time of a slave in s, before it is measured."""
 
 LONGEST_LEARNED_TIMEOUT = 1.0
 """Seconds: the upper bound of a learned time-out."""
@@ -21,7 +21,7 @@ LONGEST_LEARNED_TIMEOUT = 1.0
 
 @dataclass(frozen=True, slots=True)
 class LoadShare:
-    """What one device takes of the line. `wire` is the time of a usual poll without turnaround, in seconds.
+    """The line time of one device. `wire` is the time of a usual poll without turnaround, in seconds.
 
     `exchanges` make a usual poll, with `rest` s in all in which the device must be left in peace, and others are
     polled. The longest poll reads the slow values too (those with an interval of their own): `longest_wire` and
@@ -71,7 +71,7 @@ class Budget:
 
     @property
     def wire_load(self) -> float:
-        """The same of what goes over the wire alone, without the rests, in which others are polled."""
+        """The load of the wire time alone, without the rests, in which others are polled."""
         return sum(share.wire_load or 0.0 for share in self.shares)
 
     @property
@@ -87,7 +87,7 @@ class Budget:
 
     @property
     def slowest_cycle(self) -> float:
-        """Seconds for every device once, slow values too, if each answer begins at the end of its time-out."""
+        """Seconds to poll every device once, slow values too, if each answer begins at the end of its time-out."""
         alone = (share.slowest + share.longest_rest for share in self.shares)
         return max(sum(share.slowest for share in self.shares), *alone, 0.0)
 
@@ -133,7 +133,7 @@ def _share(slave: SlaveConfig, profile: Profile, timing: LineTiming, framing: Fr
     usual = [wire for wire, part in zip(wires, parts, strict=True) if part == 1.0]
 
     def load(more: float) -> float | None:
-        """Return the load if each read takes `more` s than on the wire."""
+        """Return the load if each read takes `more` s in addition."""
         taken = sum(part * (wire + more) for wire, part in zip(wires, parts, strict=True))
         return taken / slave.interval if slave.interval else None
 

@@ -42,9 +42,9 @@ from lfs10d.reading import ALIVE_CODES, SILENT_CODES, START_POLLS, Fault
 from lfs10d.system.dataclass import dataclass
 
 BAD_ANSWER_PATIENCE = 0.1
-"""How long one that was never heard and answers badly is waited for once bytes came that begin no answer, in s."""
+"""Seconds to wait, after bytes that begin no answer, for a device that has only answered badly so far."""
 FIRST_TIMEOUTS = (0.2, 0.4, 1.0)
-"""Time-outs in s of the first polls of a slave never heard; the last one holds on."""
+"""Time-outs in s of the first polls of a slave that never answered; the last one stays."""
 LEARNED_LEAST = 0.05
 """The shortest learned time-out in s."""
 LEARNED_MOST = 1.0
@@ -52,19 +52,19 @@ LEARNED_MOST = 1.0
 LEARNED_MARGIN = 0.02
 """Added to twice the p99, in s."""
 LEARNED_FROM = 100
-"""How many of the last answers are remembered."""
+"""Number of answers that are remembered."""
 CONFIDENT_FROM = 10
 """With fewer answers than this the learned time-out is at least the first one."""
 PROBE_TIMEOUT = 0.2
-"""How long a probe waits, in s."""
+"""Time-out of a probe in s."""
 PATIENT_PROBE_EVERY = 4
-"""Every so many probes one waits for 1 s."""
+"""Every n-th probe has a time-out of 1 s."""
 PROBE_INTERVAL_LEAST = 1.0
-"""The first interval between probes in s; doubled after each."""
+"""First interval between probes in s; doubled after each."""
 
 
 class Health(StrEnum):
-    """How a device is; see the rules above."""
+    """The health of a device; see the rules above."""
 
     UNHEARD = "unheard"
     ONLINE = "online"
@@ -73,7 +73,7 @@ class Health(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class DeviceSpec:
-    """A configured slave: what the configuration says of it. Durations in s; `response_timeout` None: learned.
+    """A slave as configured. Durations in s; `response_timeout` None: learned.
 
     `request_gap` is the rest it needs between two exchanges.
     """
@@ -88,7 +88,7 @@ class DeviceSpec:
     request_gap: float = 0.0
 
     def begins_anew(self, before: DeviceSpec) -> bool:
-        """Whether nothing that was learned of the device as it was `before` holds for it now."""
+        """Whether what was learned of the device `before` is no longer valid."""
         reborn = self.enabled and not before.enabled
         return reborn or (self.slave, self.profile.plain, self.codec) != (
             before.slave,
@@ -99,7 +99,7 @@ class DeviceSpec:
 
 @dataclass(frozen=True, slots=True)
 class PollRules:
-    """What holds for the polls of every device (`poll:` in the configuration). Durations in s."""
+    """Rules for the polls of every device (`poll:` in the configuration). Durations in s."""
 
     retries: int = 1
     offline_after: int = 3
@@ -138,7 +138,7 @@ class ResponseTimes:
         return bisect_right(self._ordered, turnaround + margin) - bisect_left(self._ordered, turnaround - margin)
 
     def forget(self) -> None:
-        """Begin anew, as after a change of rate."""
+        """Forget all response times, as after a change of rate."""
         self._last.clear()
         self._ordered = []
         self.p99 = self.timeout = None
@@ -188,22 +188,22 @@ class Device:
 
     @property
     def online(self) -> bool:
-        """It answered, and not too long ago."""
+        """Whether the device is online."""
         return self.health is Health.ONLINE
 
     @property
     def doubtful(self) -> bool:
-        """It is probed, not polled (rules 6 and 7)."""
+        """Whether it is probed, not polled (rules 6 and 7)."""
         return self.silent and not self.online and self.start_polls == 0
 
     @property
     def starting(self) -> bool:
-        """It was silent since the start, and is polled again at once (rule 6)."""
+        """Whether it has been silent since the start, and is polled again at once (rule 6)."""
         return self.silent and self.start_polls > 0
 
     @property
     def timeout(self) -> float:
-        """How long its next poll waits for the first byte of an answer, in s (rules 4 and 5)."""
+        """Time-out in s of its next poll: until the first byte of an answer (rules 4 and 5)."""
         if self.spec.response_timeout is not None:
             return self.spec.response_timeout
         if self.response_times.timeout is not None:
@@ -222,7 +222,7 @@ class Device:
 
     @property
     def probe_timeout(self) -> float:
-        """How long its next probe waits, in s (rule 5); a fixed time-out holds for probes too."""
+        """Time-out in s of its next probe (rule 5); a fixed time-out holds for probes too."""
         if self.spec.response_timeout is not None:
             return self.timeout
         if self.health is Health.UNHEARD:
@@ -233,7 +233,7 @@ class Device:
 
     @property
     def retries(self) -> int:
-        """How often its next poll may be tried again: never for one that is offline or was never heard."""
+        """Retries of its next poll: none while it is offline or has never answered."""
         return self.rules.retries if self.online else 0
 
     def answered(self) -> None:
@@ -279,7 +279,7 @@ class Device:
         self.reads.forget()
 
     def reconnected(self) -> None:
-        """Note that the port is open again: nothing is known of the device yet."""
+        """Note that the port is open again: the state of the device is unknown."""
         self.health = Health.UNHEARD
         self.failures = 0
         self.silent = False

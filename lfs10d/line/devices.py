@@ -1,4 +1,4 @@
-"""The configured devices of one line: which stay the same when the configuration changes, and what they learn. Pure."""
+"""The configured devices of one line, and what is learned of them; kept across reloads if unchanged. Pure."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from lfs10d.line.device import LEARNED_MOST, Device, DeviceSpec, PollRules
 from lfs10d.modbus.outcome import Outcome
 
 START_PATIENT = 8
-"""With more silent devices than this at the start none of them is waited for longer than 200 ms."""
+"""With more silent devices than this at the start their time-out is at most 200 ms."""
 
 
 class Devices(dict[str, Device]):
@@ -46,7 +46,7 @@ class Devices(dict[str, Device]):
         return fresh
 
     def learn(self, outcome: Outcome, *, doubtful: bool = False) -> None:
-        """Learn how long answers take, late ones included, whoever asked; nothing from a `doubtful` answer."""
+        """Learn response times, of late answers and of all kinds of requests; nothing from a `doubtful` answer."""
         for late in outcome.late:
             device = self.by_slave.get(late.request.slave)
             # What is later than any time-out says nothing of the usual time, and may be an older answer's.
@@ -63,7 +63,7 @@ class Devices(dict[str, Device]):
             device.response_times.forget()
 
     def hurry(self) -> None:
-        """Wait for none of the devices long that are silent at the start, where they are many."""
+        """Use short time-outs for devices that are silent at the start, if they are many."""
         starting = [device for device in self.values() if device.starting]
         for device in starting if len(starting) > START_PATIENT else ():
             device.hurried = True

@@ -38,23 +38,23 @@ from lfs10d.reading import FaultCode
 from lfs10d.system.dataclass import dataclass
 
 LEAST_MARGIN = 0.002
-"""In s: answers that differ by no more than this, or half their length if that is more, took as long."""
+"""Response times count as equal within this (s), or within half the answer's length if that is more."""
 APART = 0.15
-"""Broken answers nearer to each other than this, in s, are never trusted."""
+"""Broken answers closer together than this (s) are never trusted."""
 ALIKE = 2
-"""So many of the last answers must have taken as long; one of the first `CONFIDENT_FROM`."""
+"""Recent answers with an equal response time that make one trustworthy; one of the first `CONFIDENT_FROM`."""
 VAIN = 3
-"""So many doubts in vain, one after the other, and noise is trusted."""
+"""Number of unfounded doubts in a row after which noise raises none."""
 TRUST = 10.0
-"""How long noise raises no doubt after one in vain, in s; doubled after each."""
+"""Seconds for which noise raises no doubt after an unfounded one; doubled after each."""
 TRUST_MOST = 600.0
-"""The longest such time in s."""
+"""Longest such time in s."""
 OWN_MOST = 0.25
-"""An own answer is awaited for no longer than this after the one that came, in s."""
+"""Longest wait in s for the slave's own answer after the one that came."""
 TARDY = 1.0
-"""The same where the slave is answered twice, and some answer of it has come after its time."""
+"""The same for a slave that is answered twice and has sent a late answer."""
 YOUNG = 1.25
-"""While few answers are known the slowest of all is taken to be so many times as slow."""
+"""While few answers are known, the slowest is multiplied by this."""
 EXCEPTION_LOOK = -1
 """In place of its number of data bytes."""
 FRAME_LEAST = 5
@@ -64,14 +64,14 @@ FRAME_LEAST = 5
 @dataclass(slots=True)
 class _SlaveTrust:
     spoke: float = -inf
-    """When anything came last from it, or in an exchange with it, but for plain answers."""
+    """Time of the last bytes from it, or in an exchange with it, other than plain answers."""
     answered: dict[object, float] = field(default_factory=dict)
     """When each look of a plain answer came last: a second one looks the same."""
     second_at: float = -inf
-    """When its last right frame came that is no answer."""
+    """Time of its last valid frame that was no answer."""
     broken_at: float = -inf
     took: deque[float] = field(default_factory=lambda: deque(maxlen=LEARNED_FROM))
-    """How long its last answers took that were believed."""
+    """Response times of its last trusted answers."""
     unproved: UnprovedAnswers = field(default_factory=UnprovedAnswers)
     held_until: float = -inf
     """Until when a second frame of the slave shows that an unproved answer may not have been its own."""
@@ -80,15 +80,15 @@ class _SlaveTrust:
     doubted: bool = False
     """Noise raised a doubt that is not settled yet."""
     in_a_row: int = 0
-    """So many of the last answers, one after the other, were doubtful."""
+    """Number of doubtful answers in a row."""
     vain: int = 0
-    """How many doubts in a row were in vain."""
+    """Number of unfounded doubts in a row."""
     trust: float = TRUST
     trusted_until: float = -inf
 
 
 class DoubtfulAnswers:
-    """The slaves of one line."""
+    """The doubts about the slaves of one line."""
 
     def __init__(self, duplicates: Duplicates) -> None:
         self._duplicates = duplicates

@@ -40,7 +40,7 @@ class HeldReadings:
                 self.entries[place] = max(over, until), own_by, reading
 
     def holds(self, device: str, at: float) -> bool:
-        """Whether the own answer to a reading of a device, which is held back, may have come at `at` or later."""
+        """Whether the own answer to a held reading of a device may have come at `at` or later."""
         return any(reading.device == device and at <= own_by for _, own_by, reading in self.entries)
 
     def spoil(self, device: str, fault: Fault, *, at: float | None = None) -> None:

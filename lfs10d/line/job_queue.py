@@ -1,4 +1,4 @@
-"""The jobs that wait for the line: those without a share first, then those within their share, each in turn.
+"""The jobs waiting for the line: those without a share first, then those within their share, in turn.
 
 A poll asked for by a request is a job too; it waits while its slave id is another job's.
 """
@@ -13,7 +13,7 @@ from lfs10d.line.jobs.poll import Poll
 from lfs10d.line.quota import Quota
 
 JOB_CREDIT = 0.1
-"""Line time in s that a job may take ahead of its share: what it could not use while another spoke is not lost."""
+"""Line time in s that a job may take ahead of its share, so that time it could not use is not lost."""
 
 
 class JobQueue:
@@ -59,7 +59,7 @@ class JobQueue:
         return not self._waiting and now < self._wanted_from
 
     def hold(self, job: Job, hold: Hold) -> None:
-        """Let a job rest."""
+        """Keep a job that holds."""
         self._rest([*self._held, (inf if hold.until is None else hold.until, job)])
 
     def _rest(self, held: list[tuple[float, Job]]) -> None:
@@ -68,7 +68,7 @@ class JobQueue:
         self._wanted_from = -inf if any(isinstance(job, Poll) for _, job in held) else self.release_at
 
     def released(self, now: float) -> list[Job]:
-        """Take the jobs whose rest is over."""
+        """Take the jobs whose hold is over."""
         if now < self.release_at:
             return []
         over = [job for until, job in self._held if until <= now]
@@ -76,13 +76,13 @@ class JobQueue:
         return over
 
     def wake(self, job: Job) -> bool:
-        """Take `job` if it rests; whether it did."""
+        """Take `job` if it holds; return whether it did."""
         before = len(self._held)
         self._rest([entry for entry in self._held if entry[1] is not job])
         return len(self._held) < before
 
     def choose(self, now: float) -> Job | None:
-        """Take the job that may speak now."""
+        """Take the job that may use the line now."""
         if not self._waiting:
             return None
         if self._slice is self._waiting[0]:
@@ -96,7 +96,7 @@ class JobQueue:
         return chosen
 
     def next_at(self, now: float) -> float:
-        """When a job may speak, if nothing else happens; inf where none can."""
+        """When the next job may use the line by time alone; inf if none."""
         wishes = [self._shares[job].ready_at(now) for job in self._waiting if job in self._shares]
         return min([self.release_at, *wishes])
 
@@ -114,7 +114,7 @@ class JobQueue:
             self.excluded = frozenset().union(*(other.excludes for other in self._excluding))
 
     def drop(self, unwanted: Callable[[Job], bool]) -> list[Job]:
-        """Forget the unwanted jobs; return them."""
+        """Remove the unwanted jobs and return them."""
         dropped = [job for job in (*self._waiting, *(held for _, held in self._held)) if unwanted(job)]
         self._waiting = [job for job in self._waiting if job not in dropped]
         self._rest([entry for entry in self._held if entry[1] not in dropped])

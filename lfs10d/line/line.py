@@ -38,7 +38,7 @@ class LineEvents(Protocol):
     """What the line reports to, in the thread of the asyncio loop."""
 
     def on_events(self, events: list[Event]) -> None:
-        """Take what came of an exchange, in order."""
+        """Take the events of an exchange, in order."""
         ...
 
     def on_failure(self, error: BaseException) -> None:
@@ -85,17 +85,17 @@ class Line:
         return tuple(self.poller.scheduler.devices.values())
 
     def read(self, device: str, request: int) -> None:
-        """Have a device polled now for a request, whose number comes back with the reading."""
+        """Poll a device now for a request, whose number comes back with the reading."""
         self.poller.read(device, request)
         self.wake()
 
     def submit(self, job: Job) -> None:
-        """Have a job done; what it calls, it calls in the line's thread."""
+        """Submit a job; its callbacks run in the line's thread."""
         self.poller.submit(job)
         self.wake()
 
     def resume_procedure(self, procedure: Procedure, result: object) -> None:
-        """Give a procedure the result of what it awaited."""
+        """Give a procedure the result that it awaits."""
 
         def tell(now: float) -> None:
             procedure.resume(result)
@@ -109,7 +109,7 @@ class Line:
         self.poller.hand_over.at_once_until = until
 
     async def pause(self) -> None:
-        """Give the port back until `resume`; return when it is free."""
+        """Close the port until `resume`; return when it is free."""
         freed: asyncio.Future[None] = self._loop.create_future()
 
         def settle() -> None:

@@ -19,22 +19,22 @@ from lfs10d.modbus.pending import PendingRequests
 from lfs10d.reading import Purpose
 
 FLAT_OUT_PATIENCE = 5.0
-"""A device with interval 0 goes as one that became due so many s after it was asked last."""
+"""A device with interval 0 counts as due this many s after its last poll."""
 EXCLUDED_PAUSE = 0.25
-"""A device whose slave id belongs to a job for the moment is looked at again after so many s."""
+"""Seconds after which a device whose slave id belongs to a job is looked at again."""
 LATE = 0.25
-"""The line hurries for a device that has waited for so large a part of its interval."""
+"""Part of its interval that a device may wait before the line hurries."""
 SPREAD = 2.0
-"""Grids lie at most so many exchanges apart, so that every device is asked soon after the start."""
+"""Greatest distance of grids in exchanges, so that every device is polled soon after the start."""
 TOGETHER_FROM = 1.0
 """Polls of an interval (s) from this on follow each other where they leave enough of the line: code that has just run
 costs less of the processor. With shorter ones a job that waits in silence would make more of them miss their points."""
 TOGETHER_MOST = 1 / 3
-"""Enough is left where the polls fill at most so much of the line."""
+"""Largest part of the line that polls may fill for that."""
 
 
 def spread(devices: Iterable[Device], *, polled: int, wire_time: float, now: float) -> None:
-    """Lay the grids of `devices` side by side from `now` on, so that they do not want the line at one moment.
+    """Distribute the grids of `devices` from `now` on, so that they are not due at the same moment.
 
     `polled` is how many devices share the line, `wire_time` (s) what one exchange takes.
     """
@@ -70,7 +70,7 @@ class PollQueue:
         return [entry for _, _, entry in self._due if isinstance(entry, Poll)]
 
     def enqueue(self, device: Device) -> None:
-        """Let `device` wait for its next point of the grid, if it is to be polled and does not wait yet."""
+        """Let `device` wait for its next grid point, if it is polled and does not wait yet."""
         if device.queued or not device.spec.enabled or device.doubtful:
             return
         device.queued = True
@@ -100,7 +100,7 @@ class PollQueue:
         return self._due[0][0] if self._due else inf
 
     def choose(self, now: float, excluded: frozenset[int]) -> Poll | None:
-        """Take the poll whose turn it is; `excluded` slave ids are not asked now."""
+        """Take the next poll; `excluded` slave ids are not polled now."""
         for _ in range(len(self._due) + len(self._flat)):
             entry = self._first(now)
             if entry is None:
@@ -146,7 +146,7 @@ class PollQueue:
 
 
 def back_on_grid(device: Device, now: float) -> None:
-    """Go on at the next point of the grid after one that was offline has answered; what passed is no overrun."""
+    """Continue at the next grid point after an offline device has answered; points that passed are no overrun."""
     interval = device.spec.interval
     if interval > 0 and device.due <= now:
         device.due += (floor((now - device.due) / interval) + 1) * interval

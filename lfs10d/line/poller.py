@@ -24,16 +24,16 @@ from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.reading import Event, Exchanged, Fault, FaultCode, PortChanged, Purpose, UartCounted, UartCounters
 
 COUNTERS_EVERY = 10.0
-"""How often the driver's counters are read, in s."""
+"""Seconds between two reads of the driver's counters."""
 
 FREED = Fault(FaultCode.PORT_LOST, "the port is freed for another program")
-"""What is told of the devices while the line is paused."""
+"""The fault of devices while the line is paused."""
 
 Sink: TypeAlias = "Callable[[list[Event]], None]"
 
 
 class Poller:
-    """One line. `sink` takes what was heard, at most once per exchange; `clock` is the bus's.
+    """Polls one line. `sink` takes the events, at most once per exchange; `clock` is the bus's.
 
     `hand_over.hold` lets several exchanges go together; 0 s without it.
     """
@@ -56,19 +56,19 @@ class Poller:
     # -- from any thread (the thread must be woken afterwards)
 
     def post(self, action: Callable[[float], None]) -> None:
-        """Have `action(now)` done between two exchanges."""
+        """Call `action(now)` between two exchanges."""
         self._posted.append(action)
 
     def submit(self, job: Job) -> None:
-        """Have `job` done on the line."""
+        """Submit `job` to the line."""
         self.post(lambda now: self._events.extend(self.scheduler.submit(job, now)))
 
     def wake(self, job: Job) -> None:
-        """End the rest of `job`."""
+        """End the hold of `job`."""
         self.post(lambda now: self.scheduler.wake(job, now))
 
     def read(self, device: str, request: int) -> None:
-        """Have a device polled now for a request, whose number comes back with the reading; none for an unknown one."""
+        """Poll a device now for a request, whose number comes back with the reading; ignored for an unknown device."""
         self.post(lambda now: self._read(device, request, now))
 
     def _read(self, name: str, request: int, now: float) -> None:
@@ -95,7 +95,7 @@ class Poller:
         self.scheduler.retime(self.bus.line_timing)
 
     def pause(self, freed: Callable[[], None]) -> None:
-        """Give the port back after the exchange under way, until `resume`; `freed()` is called in the line thread."""
+        """Close the port after the exchange under way, until `resume`; `freed()` is called in the line thread."""
         self.post(lambda now: self._pause(freed, now))
 
     def _pause(self, freed: Callable[[], None], now: float) -> None:
@@ -117,7 +117,7 @@ class Poller:
     # -- in the line thread
 
     def turn(self, now: float, *, readable: bool = True) -> Wait:
-        """Do what can be done now and say when to come back."""
+        """Do what can be done now; return when to call again."""
         while True:
             while self._posted and self.bus.asked is None:
                 self._posted.popleft()(now)
@@ -129,7 +129,7 @@ class Poller:
         return self._hand_over(wait, now) if self._events else wait
 
     def _hand_over(self, wait: Wait, now: float) -> Wait:
-        """Hand over what happened, or have the turn after `wait` come when that is due."""
+        """Hand over the events, or end `wait` when they are due."""
         due = self.hand_over.due(self._events, now, self._asked)
         if due > now:
             return wait if wait.until <= due else replace(wait, until=due, not_before=min(wait.not_before, due))

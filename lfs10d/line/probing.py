@@ -17,13 +17,13 @@ PROBE_SHARE = 0.04
 """The part of the line that probes are given while any device answers: what one of them takes beyond that, and the
 polls that some sensors ignore right after it, must fit into the 5 % that all probes together may cost."""
 PROBE_CREDIT = 1.0
-"""Line time in s that probes may take ahead of their share, so that a single dead device is probed at 1, 2, 4 s."""
+"""Line time in s that probes may take ahead of their share, so that a single silent device is probed at 1, 2, 4 s."""
 PROBE_SPACING = 1.0
-"""While no device answers each is probed at most so often, in s."""
+"""Shortest interval in s between probes of a device while none answers."""
 
 
 class ProbeAccount:
-    """The share that all probes have together; it binds only while any device answers."""
+    """The common share of all probes; it limits them only while any device answers."""
 
     def __init__(self, probing: Probing, quota: Quota) -> None:
         self._probing = probing

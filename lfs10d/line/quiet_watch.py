@@ -26,19 +26,19 @@ from lfs10d.reading import FaultCode
 from lfs10d.system.dataclass import dataclass
 
 REACH = 0.2
-"""What is spoilt so long after an answer may have been spoilt by a second one, in s."""
+"""Seconds after an answer in which a second one may spoil an exchange."""
 SAME = 3
-"""So many answers followed by a spoilt exchange of the same slave raise a suspicion."""
+"""Answers followed by a spoilt exchange of the same slave that raise a suspicion."""
 ANY = 5
-"""So many followed by a spoilt exchange of any slave do."""
+"""Answers followed by a spoilt exchange of any slave that do."""
 MISS = 0.5
-"""An answer with nothing spoilt behind it takes back so much of one that has."""
+"""Part of such an answer that one without a spoilt exchange takes back."""
 AGAIN = 5.0
 """The first pause in s after a watch in vain; doubled after each."""
 AGAIN_MOST = 600.0
 """The longest pause in s between two watches of one slave."""
 VAIN = 2
-"""After so many times in a row in which no second answer came the line does not wait for one."""
+"""Number of watches in a row without a second answer after which the line does not wait for one."""
 SHARE = 0.005
 """The part of the line that watches for a suspicion may take."""
 CREDIT = 0.45
@@ -48,7 +48,7 @@ _SPOILT = frozenset({FaultCode.CRC, FaultCode.MALFORMED, FaultCode.COLLISION})
 
 
 def spoilt(outcome: Outcome) -> bool:
-    """Whether bytes came in an exchange that are no right frame."""
+    """Return whether bytes came in an exchange that are no valid frame."""
     if outcome.fault is None:
         return outcome.unsolicited > 0
     return outcome.fault.code in _SPOILT
@@ -58,7 +58,7 @@ def spoilt(outcome: Outcome) -> bool:
 class _SlaveQuiet:
     answered_at: float = -inf
     hit: set[int] = field(default_factory=set)
-    """The neighbours whose exchanges were spoilt since the last answer."""
+    """Neighbours whose exchanges were spoilt since the last answer."""
     same: dict[int, float] = field(default_factory=dict)
     any: float = 0.0
     awaited_until: float = -inf

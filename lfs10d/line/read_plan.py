@@ -26,16 +26,16 @@ from lfs10d.reading import Value as Published
 from lfs10d.system.dataclass import dataclass
 
 ABSENT_AGAIN = 600.0
-"""So long after it was refused an absent value is read again, in s."""
+"""Seconds after which an absent value is read again."""
 EARLY = 0.1
-"""A slow value is read so much too early, as a part of the device's interval: polls are not made to the millisecond."""
+"""Tolerance for slow values, as a part of the device's interval: polls are not made to the millisecond."""
 ILLEGAL_ADDRESS = 2
 """The exception of a register that there is not (Modbus Application Protocol V1.1b3, section 7)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Newest:
-    """What a value was when it was read last, `at` that time: `fault` says why it is None."""
+    """The last value that was read, at the time `at`; `fault` says why it is None."""
 
     at: float
     value: Published | None
@@ -43,7 +43,7 @@ class Newest:
 
 
 def part_of_polls(profile: Profile, block: Block, interval: float) -> float:
-    """Return in which part of the polls of a device that is polled every `interval` a read of the profile is asked.
+    """Return the part of the polls (every `interval`) in which a read of the profile is made.
 
     1.0: in each. With an interval of 0 (as often as the line allows) a slow value's part is not known: 0.0.
     """
@@ -76,7 +76,7 @@ class ReadPlan:
         self._batched: dict[tuple[frozenset[str], frozenset[str]], tuple[Block, ...]] = {}
 
     def forget(self) -> None:
-        """Know nothing of the device any more: it was away (rule 4)."""
+        """Forget everything about the device: it was offline (rule 4)."""
         self._absent: dict[str, tuple[Fault, float]] = {}
         self._newest: dict[str, Newest] = {}
         self._alone: set[str] = set()
@@ -118,7 +118,7 @@ class ReadPlan:
         return known
 
     def refused(self, block: Block, fault: Fault, now: float) -> tuple[Block, ...] | None:
-        """Take the refusal of a read; return what to read in its place, None where the poll fails by it."""
+        """Take the refusal of a read; return the reads in its place, None if the poll fails."""
         optional = tuple(value for value in block.values if value.optional)
         if fault.exception_code != ILLEGAL_ADDRESS or not optional:
             return None
@@ -133,7 +133,7 @@ class ReadPlan:
     def complete(
         self, values: dict[str, Published | None], faults: dict[str, Fault], at: float, interval: float
     ) -> Mapping[str, float]:
-        """Take what a poll brought that ended at `at`, and add what it did not read; return the ages of old values."""
+        """Take the values of a poll that ended at `at`, and add those not read; return the ages of old values."""
         for value in self._slow:
             if value.name in values:
                 self._newest[value.name] = Newest(at, values[value.name], faults.get(value.name))
@@ -155,7 +155,7 @@ class ReadPlan:
         return ages
 
     def _kept(self, name: str, at: float) -> Newest:
-        """Return what is known of a value that was not read."""
+        """Return the last value of one that was not read."""
         if name in self._absent:
             return Newest(at, None, self._absent[name][0])
         unknown = Fault(FaultCode.UNAVAILABLE, f"{name} was not read yet")  # forgotten while the poll was under way

@@ -20,23 +20,23 @@ from math import inf
 STEPS = (0.1, 0.2, 0.4, 0.8, 1.0)
 """The learned gaps in s: from 100 ms, doubled, to 1 s."""
 IGNORED = 2
-"""So many requests right behind an answer must be ignored before a gap is learned."""
+"""Ignored requests right after an answer before a gap is learned."""
 NEARLY = 0.7
 """A silence says nothing where an answer came after a pause that was at most this much longer (1 / NEARLY)."""
 NEAR = 2.0
-"""An answer after a pause of up to so many learned gaps shows that the gap is long enough."""
+"""An answer after at most this many learned gaps proves that the gap is long enough."""
 PAUSE = 0.25
 """The shortest pause in s after which a slave may be asleep."""
 LONG_PAUSE = 1.0
 """A slave that sleeps does so after this pause in s at the latest, as far as is known."""
 HELPED = 2
-"""So many times must asking again have helped before the first silence after a pause is no failure."""
+"""Successful immediate retries before the first silence after a pause is no failure."""
 AWAKE = 3
-"""So many first requests answered after a pause, and the slave is taken for one that does not sleep."""
+"""Answered first requests after a pause that show that the slave does not sleep."""
 
 
 class RequestGap:
-    """One slave at the line's own rate. `configured` is what profile and configuration say of its rest."""
+    """The gap of one slave at the line's own rate. `configured` is the gap of profile and configuration."""
 
     __slots__ = (
         "_awake", "_closest", "_ended", "_helped", "_ignored", "_in_vain", "_lost_after", "_sleeps_after", "_spoke",
@@ -63,7 +63,7 @@ class RequestGap:
         return max(self.configured, self.learned)
 
     def exchanged(self, began: float, ended: float, *, spoke: bool, silent: bool) -> bool:
-        """Learn from an exchange from `began` (its first bit) to `ended`; whether the gap was widened by it.
+        """Learn from an exchange from `began` (its first bit) to `ended`; return whether the gap grew.
 
         `spoke`: bytes came that begin as an answer. `silent`: nothing was heard. Neither: noise, which teaches nothing.
         """
@@ -128,7 +128,7 @@ class RequestGap:
                 self._helped = self._awake = 0
 
     def may_sleep(self, now: float) -> bool:
-        """Whether a request at `now` may be lost to sleep, and is worth another one at once: that has helped before."""
+        """Whether a request at `now` may be lost to sleep, and an immediate retry has helped before."""
         return self.may_sleep_after(now - self._ended)
 
     def may_sleep_after(self, pause: float) -> bool:

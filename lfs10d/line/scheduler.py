@@ -98,7 +98,7 @@ class Scheduler:
         self._probing.review(polled, now)
 
     def _wanted(self, poll: Poll) -> bool:
-        """Whether the reading of this poll is of any use (rule 5)."""
+        """Whether the reading of this poll is wanted (rule 5)."""
         device = poll.device
         useful = device.spec.enabled or poll.purpose is Purpose.REQUEST
         return useful and self.devices.get(device.spec.name) is device
@@ -223,7 +223,7 @@ class Scheduler:
 
     @property
     def purpose(self) -> Purpose:
-        """What the exchange on the line is for."""
+        """The purpose of the exchange on the line."""
         return self._current[0].purpose if self._current else Purpose.POLL
 
     # -- what came of it
@@ -261,7 +261,7 @@ class Scheduler:
         return [] if poll is None else [self._finish(poll, now)]
 
     def _ignored(self, outcome: Outcome) -> bool:
-        """Whether the request may have been ignored only for the one before it (rule 4)."""
+        """Whether the request may have been ignored because of the one before it (rule 4)."""
         before, self._silent = self._silent, None
         if outcome.fault is None or outcome.fault.code is not FaultCode.TIMEOUT:
             return False
@@ -284,7 +284,7 @@ class Scheduler:
             self._jobs.spend(job, taken, now)
 
     def _charge(self, job: Job, outcome: Outcome) -> float:
-        """Return what an exchange of a change costs, with what it costs the others."""
+        """Return the line time that an exchange of a change is charged, with its surcharge."""
         others = [each for each in self.devices.values() if each.online and each.spec.enabled]
         intervals = [each.spec.interval for each in others if each.slave not in job.excludes]
         wire_time = _wire_time(others[0], self.timing) if others else 0.0

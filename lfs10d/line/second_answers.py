@@ -18,7 +18,7 @@ from lfs10d.modbus.pending import PendingRequests
 from lfs10d.reading import AnsweredTwice, Fault, FaultCode, Reading
 
 EXPLAINED = 1.0
-"""So long after another master was heard what is spoilt is its doing, in s."""
+"""Seconds after another master's frame in which spoilt exchanges are attributed to it."""
 
 
 class SecondAnswers:
@@ -76,7 +76,7 @@ class SecondAnswers:
         return doubtful
 
     def _doubt_held(self, outcome: Outcome, *, explained: bool, silent: bool = False) -> None:
-        """Let the readings fail whose slaves' own answers may be what came broken in this exchange.
+        """Let held readings fail whose slave's own answer may be the broken one in this exchange.
 
         Or, of the slave that was `silent`, what was not heard because our request fell into it. When it came nobody
         knows: it may have lain unread.
@@ -90,7 +90,7 @@ class SecondAnswers:
                 self.held.spoil(device.name, fault)
 
     def _spoil(self, slave: int, at: float, heard: bytes) -> None:
-        """Let the readings of a slave fail that are held back: a frame of it, heard at `at`, is one too many."""
+        """Let the held readings of a slave fail: a frame of it, received at `at`, is one too many."""
         fault = Fault(FaultCode.COLLISION, diagnosis.UNDECIDED, heard=heard)
         self.held.spoil(self._devices[slave].name, fault, at=at)
         self._doubts.decided(slave)
@@ -104,7 +104,7 @@ class SecondAnswers:
             self._pending.duplicates.rest(slave, self._doubts.held_until(slave))
 
     def prove(self, outcome: Outcome, readings: list[Reading]) -> list[Reading]:
-        """Take the readings of an outcome; return those that are to be published, and hold back the others."""
+        """Take the readings of an outcome; return those to be published, and hold the others back."""
         slave = outcome.request.slave
         device = self._devices.get(slave)
         if device is None:
@@ -136,7 +136,7 @@ class SecondAnswers:
         return [AnsweredTwice(outcome.ended, device.name, device.slave, None)] if ended else []
 
     def on_strays(self, strays: Iterable[tuple[bytes, float]], outcome: Outcome | None = None) -> list[AnsweredTwice]:
-        """Take what was heard and belongs to no exchange, or is left over by `outcome`, with the times of its pieces.
+        """Take bytes that belong to no exchange, or are left over by `outcome`, with the times of the pieces.
 
         A right frame of a slave that owes nothing is one answer too many.
         """

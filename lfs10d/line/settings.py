@@ -19,12 +19,12 @@ from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.profiles.profile import Profile
 
 GREATEST_SHARE = 0.95
-"""A scan takes at most this share of the line, whatever is asked for, so that polling goes on."""
+"""Greatest share of the line for a scan, so that polling goes on."""
 DEFAULT_PROFILE = builtin_names()[0]
 
 
 def port_settings(line: LineConfig) -> PortSettings:
-    """Return how the port is to be opened."""
+    """Return the settings of the port."""
     return PortSettings(
         path=line.port,
         baudrate=line.baudrate,
@@ -37,22 +37,22 @@ def port_settings(line: LineConfig) -> PortSettings:
 
 
 def line_rules(line: LineConfig) -> LineRules:
-    """Return how the line is spoken on."""
+    """Return the settings of the bus."""
     return LineRules(extra_gap=line.extra_gap, broadcast_delay=line.turnaround_delay, echo=line.echo)
 
 
 def poll_rules(poll: PollConfig) -> PollRules:
-    """Return what holds for the polls of every device."""
+    """Return the rules for the polls of every device."""
     return PollRules(retries=poll.retries, offline_after=poll.offline_after, probe_interval_max=poll.probe_interval_max)
 
 
 def usual_codec(line: LineConfig) -> Codec:
-    """Return how the frames of a slave that is not configured are read."""
+    """Return the codec for slaves that are not configured."""
     return Codec(Framing(line.framing))
 
 
 def profile_codec(line: LineConfig, profile: Profile) -> Codec:
-    """Return how the frames of a device of this profile are read that is not configured yet."""
+    """Return the codec for a device of this profile that is not configured yet."""
     return Codec(Framing(line.framing), Checksum(profile.checksum))
 
 
@@ -105,7 +105,7 @@ def scan_plan(loaded: LoadedConfig, ids: tuple[int, ...], rates: tuple[int, ...]
 
 
 def access_target(loaded: LoadedConfig, slave: int, device: SlaveConfig | None) -> Target:
-    """Return how the registers of a configured device are accessed, or of a slave id where none is."""
+    """Return the target for access to the registers of a device, or of a slave id without a device."""
     config = loaded.config
     if device is None:
         return Target(slave, usual_codec(config.line), None, config.poll.response_timeout)

@@ -29,7 +29,7 @@ class SlaveRests:
         self._ended: dict[int, float] = {}
 
     def until(self, job: Job, ask: Ask, devices: Mapping[int, Device]) -> float:
-        """Return until when what `job` wants to ask must wait; in the past where it need not."""
+        """Return until when the request of `job` must wait; in the past if it need not."""
         slave, gap, until = ask.request.slave, ask.request_gap, -inf
         if ask.at_once:
             return until
@@ -52,7 +52,7 @@ class SlaveRests:
         self._ended[slave] = now
 
     def learn(self, outcome: Outcome, ask: Ask, devices: Mapping[int, Device], *, line_rate: int) -> bool:
-        """Note an exchange that is over; whether its slave is given more rest by what came of it."""
+        """Note an exchange that is over; return whether its slave gets a longer rest."""
         slave, began = outcome.request.slave, outcome.began
         if began is None:
             return False

@@ -15,16 +15,16 @@ from collections.abc import Collection
 from math import inf
 
 MISSED = 0.08
-"""The greatest part of the others' polls that a change makes them miss: what is left of a tenth is for chance."""
+"""Greatest part of the other polls that a change may make them miss; a little less than a tenth."""
 BUSY = 0.5
-"""The part of the line that polls may fill before it is crowded."""
+"""Part of the line that polls may fill before it counts as crowded."""
 CROWDED = 1.5
 TURNAROUND = 0.005
-"""s between request and answer of a usual sensor, for the estimate of how busy the line is."""
+"""Response time in s of a usual sensor, to estimate the load of the line."""
 
 
 class Surcharge:
-    """Follows how long a change has had the line, exchange after exchange. One for each line."""
+    """Adds up how long a change has had the line. One for each line."""
 
     def __init__(self) -> None:
         self._since: float | None = None
@@ -45,5 +45,5 @@ class Surcharge:
         return max((ended - began) * (CROWDED if busy else 1.0), missed * share / MISSED)
 
     def released(self) -> None:
-        """Note that others may have the line again."""
+        """Note that others may use the line again."""
         self._since = None

@@ -13,23 +13,23 @@ from lfs10d.line.poller import Poller
 from lfs10d.modbus.bus import Wait
 
 IDLE_MOST = 5.0
-"""The thread passes a turn at least so often, in s, so that a watchdog can tell idle from wedged."""
+"""Longest time in s between two turns, so that a watchdog can tell idle from hanging."""
 SPEAK_MOST = 0.3
-"""A request under way at the end is let out for so long, in s: eight characters at 1200 baud take 0.08."""
+"""Time in s for a request under way at the end to leave the wire: eight characters at 1200 baud take 0.08."""
 WORTH_SLEEPING = 0.0002
 """A wait shorter than this (s) is not split in two."""
 WAKING = 0.0001
-"""The thread is woken so long before a moment, in s, for the kernel needs 0.05 to 0.1 ms of it. It then takes a turn,
+"""The thread wakes up this many seconds before a deadline: scheduling takes 0.05 to 0.1 ms. It then takes a turn,
 which brings its code back into the processor's caches, and waits the rest awake."""
 WAKING_REALTIME = 0.0002
 """The same where the line goes before everything else: 0.3 to 0.7 % more polls for up to a tenth more of the processor,
 for where the processor sleeps deeply 0.1 ms is gone before the turn can be taken."""
 REFUSED_PAUSE = 0.01
-"""How long to wait where the system refuses to watch the port, in s: the next read tells why."""
+"""Wait in s if the system refuses to watch the port: the next read reports why."""
 
 
 class LineThread(threading.Thread):
-    """Runs `poller` until `stop`; `prepare` is called first, in the thread; `failed` with what ended it by mistake.
+    """Runs `poller` until `stop`; `prepare` is called first in the thread, `failed` with an internal error.
 
     `declared` is the monotonic time by which the next turn is promised: a watchdog may hold the thread to it. `waking`
     is how long before a moment, in s, it is to be awake.
@@ -46,7 +46,7 @@ class LineThread(threading.Thread):
         self._woken, self._waker = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
 
     def wake(self) -> None:
-        """Have the thread take a turn now; from any thread."""
+        """Make the thread take a turn now; callable from any thread."""
         with contextlib.suppress(BlockingIOError):  # full of wake-ups: one is enough
             os.write(self._waker, b"w")
 
@@ -71,7 +71,7 @@ class LineThread(threading.Thread):
             self._poller.bus.close()
 
     def _wait(self, wait: Wait) -> bool:
-        """Wait as told, or until woken, or until shortly before; return whether the port may have something to read.
+        """Wait until the time given, a wake-up or shortly before the deadline; return whether the port may be readable.
 
         Where the wait is not hurried nothing is done ahead of its time.
         """

@@ -22,7 +22,7 @@ from math import inf
 from lfs10d.system.dataclass import dataclass
 
 PROVED_WITHIN = 0.3
-"""Where answers are unproved for longer than this, in s, the slave is asked something that proves them."""
+"""Seconds after which unproved answers are proved by another request."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class UnprovedAnswers:
         self.own_by = max(self.own_by, own_by)
 
     def overdue(self, now: float) -> bool:
-        """Whether the oldest waits for its proof for too long."""
+        """Return whether the oldest answer has been unproved for too long."""
         return bool(self.answers) and now - self.answers[0].ended > PROVED_WITHIN
 
     def forget(self) -> None:

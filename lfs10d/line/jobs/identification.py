@@ -38,25 +38,25 @@ from lfs10d.reading import Fault, FaultCode, Value
 from lfs10d.system.dataclass import dataclass
 
 TRIES = 5
-"""How often a read is asked once something spoilt it."""
+"""Tries of a read after something spoilt it."""
 SPOILT = 3
-"""Spoilt so many times out of `TRIES`, an id that answers has probably two devices."""
+"""Spoilt tries out of `TRIES` after which an answering id probably has two devices."""
 ALL_SPOILT = 4
-"""As many are needed where no right answer came: there noise alone must not make a device."""
+"""The same if no valid answer came: noise alone must not make a device."""
 SILENCES = 3
-"""Silent so many times, a slave is given up."""
+"""Silent tries after which a slave is given up."""
 
 _NO_ANSWER = Fault(FaultCode.TIMEOUT, "no answer")
 _EXCEPTION_BODY = 3
 """Slave, function, code: the body of the shortest answer (Modbus Application Protocol V1.1b3, section 7)."""
 
 IdentificationSteps: TypeAlias = "Generator[ReadRegisters, Outcome, FoundDevice | None]"
-"""Yields what to read, is sent the outcome, returns what was found; None: nobody is there."""
+"""Yields reads, is sent outcomes, returns the device; None: there is none."""
 
 
 @dataclass(frozen=True, slots=True)
 class FoundDevice:
-    """What is at one slave id at one rate.
+    """The device at one slave id and rate.
 
     `answers`: a right frame came; without it only bytes that make none. `rtt` in s is the middle one of the
     answers'. `profile` is the one that fits best, with the `values` it read; `alternatives` are others that its answers
@@ -81,7 +81,7 @@ class FoundDevice:
 
 
 def speaks(outcome: Outcome, codec: Codec) -> bool:
-    """Whether the slave asked is there: a right frame of it came, be it an exception or another one than asked for."""
+    """Return whether the slave is there: a valid frame of it came, also an exception or an unexpected one."""
     fault = outcome.fault
     if fault is None or fault.code is FaultCode.EXCEPTION:
         return True
@@ -89,7 +89,7 @@ def speaks(outcome: Outcome, codec: Codec) -> bool:
 
 
 def strangers(outcome: Outcome, codec: Codec) -> frozenset[int]:
-    """Return the other slaves of which a right frame came."""
+    """Return the other slaves that sent a valid frame."""
     return frozenset() if outcome.fault is None else _speakers(outcome, codec) - {outcome.request.slave}
 
 
@@ -99,7 +99,7 @@ def _speakers(outcome: Outcome, codec: Codec) -> frozenset[int]:
 
 
 def spoilt(outcome: Outcome, codec: Codec) -> bool:
-    """Whether bytes came that make no right frame, or enough for one more frame than the right one."""
+    """Return whether bytes came that are no valid frame, or enough for a second frame."""
     fault = outcome.fault
     if fault is None or fault.code is FaultCode.EXCEPTION:
         return outcome.unsolicited >= shortest_answer(codec)
@@ -107,7 +107,7 @@ def spoilt(outcome: Outcome, codec: Codec) -> bool:
 
 
 def shortest_answer(codec: Codec) -> int:
-    """Return the characters of the shortest answer there is, an exception."""
+    """Return the length of the shortest answer, an exception."""
     return codec.size(_EXCEPTION_BODY)
 
 
@@ -122,7 +122,7 @@ def rate_fits(profile: Profile, code: int | None, baudrate: int) -> bool:
 
 
 def by_evidence(profiles: Iterable[Profile]) -> tuple[Profile, ...]:
-    """Return profiles in the order in which they are to be tried: those whose values alone speak for them come last."""
+    """Return profiles in the order to try: those identified by values alone come last."""
     return tuple(sorted(profiles, key=lambda profile: profile.slave_id is None and not profile.identify))
 
 
@@ -207,7 +207,7 @@ class Identification:
         self._found = replace(self._found, **changes)  # type: ignore[arg-type]  # replace checks the names
 
     def _choose(self, fits: Sequence[_Fit]) -> None:
-        """Note the profile for which most speaks, and the others (rule 6)."""
+        """Note the profile with the strongest evidence, and the others (rule 6)."""
         best = max(fits, key=lambda fit: (fit.own, fit.evidence, fit.words))  # the first of equals
         sure = best.evidence is _Evidence.IDENTITY
         others = () if sure else tuple(fit.profile.plain for fit in fits if fit is not best)
@@ -294,7 +294,7 @@ class Identification:
         return believed
 
     def _listen(self, outcome: Outcome) -> bool:
-        """Note what one outcome shows; whether it answers what was asked, beyond doubt."""
+        """Note one outcome; return whether it answers the request beyond doubt."""
         if not speaks(outcome, self._codec):
             return False
         self._note(answers=True)

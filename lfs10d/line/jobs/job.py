@@ -35,7 +35,7 @@ class Requeue:
 
 @dataclass(frozen=True, slots=True)
 class Continue:
-    """More to ask at once, whatever the share says: the slice at another rate goes on.
+    """More to ask at once, regardless of the share: the slice at another rate goes on.
 
     A job says so for a quarter of a second at most; the rate is changed per slice, never per exchange.
     """
@@ -61,7 +61,7 @@ class Account(Protocol):
 
 
 class Job(Protocol):
-    """One thing done on the line.
+    """One piece of work on the line.
 
     `share` is the greatest part of the line's time it may take, 0 < share <= 1; with 1 it goes before everybody.
     `excludes` are slave ids that nobody else may ask while it runs.
@@ -69,7 +69,7 @@ class Job(Protocol):
 
     @property
     def purpose(self) -> Purpose:
-        """What its exchanges are for."""
+        """The purpose of its exchanges."""
         ...
 
     @property
@@ -83,16 +83,16 @@ class Job(Protocol):
         ...
 
     def ask(self, now: float) -> Ask | Hold | Done:
-        """Decide what to put on the line now.
+        """Return the next request, or a decision to wait.
 
         What was decided is not sent yet where the slave must rest first: then the job is asked again after that.
         """
         ...
 
     def on_outcome(self, outcome: Outcome, now: float) -> Next:
-        """Take the outcome of what was asked."""
+        """Take the outcome of the request."""
         ...
 
     def cut_off(self, now: float) -> None:
-        """Learn that the job is over before its time: the port is lost, or its device is no longer configured."""
+        """Note that the job ends early: the port is lost, or its device is no longer configured."""
         ...

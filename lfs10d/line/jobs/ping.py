@@ -15,7 +15,7 @@ from lfs10d.reading import Fault, Purpose
 
 
 class Ping:
-    """Asks slave id `slave` what a device of `profile` is asked first, as patiently as one never heard before.
+    """Asks slave id `slave` as a device of `profile` is asked first, with the time-outs of a new device.
 
     Any right frame of the slave is an answer, an exception too. `over` is called once, with this job, when it is
     over: `answered`, or `fault` says what came instead; neither where the port is lost.
@@ -53,7 +53,7 @@ class Ping:
         return Done()
 
     def cut_off(self, now: float) -> None:
-        """Learn that the port is lost."""
+        """Note that the port is lost."""
         del now
         self.fault = None
         self._over(self)

@@ -44,7 +44,7 @@ def marked_busy(fault: Fault, exceptions: tuple[int, ...]) -> Fault:
 
 @lru_cache(maxsize=1024)
 def _read(slave: int, address: int, count: int, function: int) -> ReadRegisters:
-    """Return a request, the same object for the same read: it is asked again and again, and looked up by it."""
+    """Return a request, the same object for the same read, which is repeated and used as a key."""
     return ReadRegisters(slave, address, count, function)
 
 
@@ -88,7 +88,7 @@ class Poll:
         return self.values if self.fault is None else None
 
     def ask(self, now: float) -> Ask | Hold:
-        """Decide what to put on the line now."""
+        """Return the next request, or a decision to wait."""
         device = self.device
         codec, profile = device.spec.codec, device.spec.profile
         if not self._blocks:
@@ -114,7 +114,7 @@ class Poll:
         return Ask(request, codec, timeout, device.patience)
 
     def on_outcome(self, outcome: Outcome, now: float) -> Next:
-        """Take the outcome of what was asked."""
+        """Take the outcome of the request."""
         device = self.device
         self.at = outcome.ended
         self.begun = True
@@ -164,7 +164,7 @@ class Poll:
         return True
 
     def _go_on(self, heard: bytes) -> Next:
-        """Read the next block; where there is none, see what became of the values."""
+        """Read the next block; after the last one complete the values."""
         if self._block < len(self._blocks):
             return Requeue(self.due)
         device, names = self.device, self.device.reads.value_names
@@ -182,7 +182,7 @@ class Poll:
         self.values, self.faults, self.ages, self.rtt = {}, {}, NOTHING, None
 
     def cut_off(self, now: float) -> None:
-        """Learn that the port is lost."""
+        """Note that the port is lost."""
         self.at = now
 
     def reading(self) -> Reading:
@@ -191,7 +191,7 @@ class Poll:
 
 
 def lost_reading(device: Device, fault: Fault, now: float, polls: Iterable[Poll]) -> Reading:
-    """Return the reading of a device whose port is lost, in answer to the requested among `polls` of it too."""
+    """Return the reading of a device whose port is lost, also for the requested ones among its `polls`."""
     requests = tuple(each.request for each in polls if each.device is device and each.request is not None)
     return _reading(device, now, fault, requests, None)
 

@@ -28,14 +28,14 @@ class LineLostError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Await:
-    """Something to be done off the line; the procedure goes on when it is."""
+    """Work to be done off the line; the procedure goes on after it."""
 
     what: object
 
 
 @dataclass(frozen=True, slots=True)
 class Finished:
-    """The procedure is at its end: `result` is what it returned, None where the port was lost before it could say."""
+    """The procedure is over: `result` is its return value, None if the port was lost before."""
 
     result: Any
 
@@ -83,17 +83,17 @@ class Procedure:
         self._slice_until = -inf
 
     def halt(self) -> None:
-        """Send no new frame from now on, and report nothing; from any thread."""
+        """Send no new frame from now on, and report nothing; callable from any thread."""
         self._over = True
 
     def resume(self, answer: object = None) -> None:
-        """Take what came of the thing done off the line; the scheduler must be told to wake the job then."""
+        """Take the result of the work off the line; the scheduler must then wake the job."""
         self._answer = (answer,)
 
     # -- as a job
 
     def ask(self, now: float) -> Ask | Hold | Done:
-        """Decide what to put on the line now."""
+        """Return the next request, or a decision to wait."""
         self._clock.now = now
         if not self._begun:
             self._begun = True
@@ -137,7 +137,7 @@ class Procedure:
             self._following, self._result = None, end.value
 
     def on_outcome(self, outcome: Outcome, now: float) -> Next:
-        """Take the outcome of what was asked."""
+        """Take the outcome of the request."""
         self._clock.now = now
         asked = self._following
         if self._over or not isinstance(asked, Ask):
@@ -154,7 +154,7 @@ class Procedure:
         return Requeue(now)
 
     def cut_off(self, now: float) -> None:
-        """Learn that the port is lost: the procedure says what that makes of it."""
+        """Note that the port is lost: the procedure says what that makes of it."""
         self._clock.now = now
         if self._over or (self._begun and self._following is None):
             return

@@ -30,13 +30,13 @@ from lfs10d.reading import Fault, FaultCode, Purpose
 from lfs10d.system.dataclass import dataclass
 
 BUSY_PAUSE = 0.3
-"""A busy slave is left alone for so long, in s; so is one whose register does not hold yet what was written."""
+"""Pause in s before a busy slave, or one without the written content yet, is asked again."""
 ECHO_READS = 8
-"""So many reads are made at most to learn whether the adapter echoes; three that agree are enough."""
+"""Most reads to learn whether the adapter echoes; three that agree are enough."""
 VERIFY_WITHIN = 5.0
-"""For so long after a write a silent slave is asked what its register holds, in s."""
+"""Seconds after a write in which the register of a silent slave is read."""
 DIFFERING = 3
-"""Read back so often with another content than was written, the write did not take."""
+"""Reads with another content after which the write has failed."""
 
 Steps: TypeAlias = "Generator[Request, Outcome, End]"
 
@@ -52,12 +52,12 @@ class Target:
 
     @property
     def busy_exceptions(self) -> tuple[int, ...]:
-        """Which exceptions mean: ask again later."""
+        """Exceptions that mean: ask again later."""
         return BUSY_EXCEPTIONS if self.profile is None else self.profile.busy_exceptions
 
     @property
     def timeouts(self) -> tuple[float, ...]:
-        """How long the tries wait, in s."""
+        """Time-outs of the tries in s."""
         fixed = self.response_timeout
         return FIRST_TIMEOUTS if fixed is None else (fixed,) * len(FIRST_TIMEOUTS)
 
@@ -101,7 +101,7 @@ class Access:
     # -- as a job
 
     def ask(self, now: float) -> Ask | Hold:
-        """Decide what to put on the line now."""
+        """Return the next request, or a decision to wait."""
         self._shaping = False
         codec, wanted = self._target.codec, self._following
         if now < self._rest_until:
@@ -114,7 +114,7 @@ class Access:
         return Ask(request, codec, self._timeout)
 
     def on_outcome(self, outcome: Outcome, now: float) -> Next:
-        """Take the outcome of what was asked."""
+        """Take the outcome of the request."""
         self._now = now
         if self._shaping and (outcome.fault is None or _refused(outcome)):
             return Requeue(now)
@@ -126,7 +126,7 @@ class Access:
         return Requeue(now)
 
     def cut_off(self, now: float) -> None:
-        """Learn that the port is lost."""
+        """Note that the port is lost."""
         del now
         self.fault = None
         self._finish(End.CUT_OFF)
@@ -137,7 +137,7 @@ class Access:
         self._over(self)
 
     def _other_shape(self) -> ReadRegisters | None:
-        """Return a read whose answer cannot be taken for another's that may still come, if the profile has one."""
+        """Return a read whose answer cannot be mistaken for a pending one, if the profile has one."""
         profile, slave = self._target.profile, self._target.slave
         if profile is None:
             return None

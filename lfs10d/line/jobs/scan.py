@@ -29,22 +29,22 @@ from lfs10d.reading import Fault, FaultCode, Purpose
 from lfs10d.system.dataclass import dataclass
 
 PATIENT_TIMEOUT = 0.4
-"""How long an id is waited for while it is identified, or asked once more, in s."""
+"""Time-out in s for an id that is identified, or asked once more."""
 SLICE = 0.25
 """The longest stay at another rate than the line's, in s."""
 BEFORE_NOISE = 5
-"""So many ids before one with noise are asked again..."""
+"""Number of ids before one with noise that are asked again..."""
 RARE = 3
-"""... where no more ids than this had noise."""
+"""... if no more ids than this had noise."""
 COMMON = 0.25
 """Noise at more than this share of the ids (and more than `RARE`) is the line's."""
 SETTLING = 1.0
-"""After so many s of scanning the pace so far counts as much as the pace expected."""
+"""Seconds of scanning after which the measured pace counts as much as the expected one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a scan is: `asked` of `total` ids, `remaining` s to go, at `slave` and `baudrate` now."""
+    """The progress of a scan: `asked` of `total` ids, `remaining` s to go, at `slave` and `baudrate` now."""
 
     asked: int
     total: int
@@ -54,13 +54,13 @@ class Progress:
 
     @property
     def percent(self) -> float:
-        """How much of it is done, 0 to 100."""
+        """The finished part, 0 to 100."""
         return 100.0 * self.asked / self.total
 
 
 @dataclass(slots=True)
 class Noise:
-    """What was heard that is no answer, in the first round of questions.
+    """Bytes received that are no answer, in the first round.
 
     `ids` had bytes that make no right frame, or another's frame; `last` is the last such fault. `echoed`: the
     adapter returns our own bytes. `refused` ids were never asked, for the line did not fall silent.
@@ -77,7 +77,7 @@ def _ignore(_: Scan) -> None:
 
 
 class Scan:
-    """One scan. `over` when it is; `complete` if it came to its end, `lost` if the port was lost before.
+    """One scan. `over` when it has ended; `complete` if all was asked, `lost` if the port was lost before.
 
     `ended` is called once, with this job, when it is over.
     """
@@ -115,7 +115,7 @@ class Scan:
 
     @property
     def progress(self) -> Progress:
-        """How far it is, by the pace so far."""
+        """The progress, by the pace so far."""
         expected = self.plan.expected
         done = expected * self._asked / self._total
         elapsed = 0.0 if self._began is None else self._now - self._began
@@ -129,7 +129,7 @@ class Scan:
     # -- as a job
 
     def ask(self, now: float) -> Ask | Done:
-        """Decide what to put on the line now."""
+        """Return the next request, or a decision to wait."""
         if self._began is None:
             self._now = self._began = now  # in this order: `progress` may be read meanwhile
         if self._following is None:
@@ -139,7 +139,7 @@ class Scan:
         return self._following
 
     def on_outcome(self, outcome: Outcome, now: float) -> Next:
-        """Take the outcome of what was asked."""
+        """Take the outcome of the request."""
         asked, self._now = self._following, now
         if asked is not None:
             try:
@@ -157,7 +157,7 @@ class Scan:
         return Requeue(now)
 
     def cut_off(self, now: float) -> None:
-        """Learn that the port is lost."""
+        """Note that the port is lost."""
         self._now, self._following, self.lost = now, None, True
         self._end()
 
@@ -199,7 +199,7 @@ class Scan:
     def _question(
         self, slave: int, baudrate: int, timeout: float, *, again: bool = False
     ) -> Generator[Ask, Outcome, Outcome]:
-        """Ask one id; whoever is heard is identified at once, of bytes that are no frame only the second time."""
+        """Ask one id and identify what answers; bytes without a frame only the second time."""
         codec = self.plan.codec
         self._asked_at[baudrate].add(slave)
         outcome = yield Ask(self.plan.opening(slave), codec, timeout, None, baudrate)
@@ -209,7 +209,7 @@ class Scan:
         return outcome
 
     def _late_ones(self, baudrate: int) -> Generator[Ask, Outcome, None]:
-        """Identify those who answered later than they were waited for."""
+        """Identify devices that answered after their time-out."""
         while self._slow:
             slave = self._slow.pop()
             if (slave, baudrate) not in self._found:
@@ -232,12 +232,12 @@ class Scan:
                 self._found[slave, baudrate] = end.value
 
     def _note_late(self, outcome: Outcome, baudrate: int) -> None:
-        """Note whose answer came though another is asked now: an id asked before at this rate, slower than expected."""
+        """Note a late answer of an id that was asked before at this rate."""
         late = {late.request.slave for late in outcome.late}
         self._slow.update(self._asked_at[baudrate] & (late | strangers(outcome, self.plan.codec)))
 
     def _disturbed(self, outcome: Outcome) -> bool:
-        """Note what else was heard; whether it makes it worth asking this id again."""
+        """Note other bytes; return whether this id is worth asking again."""
         noise, fault = self.noise, outcome.fault
         noise.echoed = noise.echoed or outcome.echoed is True
         if fault is None or self._slow or speaks(outcome, self.plan.codec):

@@ -1,4 +1,4 @@
-"""The ids a scan may ask, and how a person writes them."""
+"""The slave ids of a scan, and their notation."""
 
 from __future__ import annotations
 

@@ -12,9 +12,9 @@ from lfs10d.profiles.profile import Profile
 from lfs10d.system.dataclass import dataclass
 
 FIRST_TIMEOUT = 0.1
-"""How long each id is waited for, in s: twenty times the usual turnaround, USB adapter included."""
+"""Time-out of each id in s: twenty times the usual turnaround, USB adapter included."""
 LAST_TIMEOUT = 1.0
-"""How long the last id of a round is waited for, in s: the longest learned time-out of a poll."""
+"""Time-out of the last id of a round in s: the longest learned time-out of a poll."""
 RESERVED_FROM = 248
 """The first id that Modbus reserves (Modbus over Serial Line V1.02, section 2.2); 255 may be a wildcard."""
 
@@ -25,7 +25,7 @@ def _as_it_is(_slave: int, _baudrate: int, profile: Profile) -> Profile:
 
 @dataclass(frozen=True, slots=True)
 class ScanPlan:
-    """What to look for: `ids` at each rate of `timings`, in this order; `profiles` are tried in their order.
+    """The scan to make: `ids` at each rate of `timings`, in this order; `profiles` are tried in their order.
 
     `line_rate` is the rate that others speak on the line, None where nobody does. `share` is the greatest part of
     the line's time. Times in s.
@@ -50,7 +50,7 @@ class ScanPlan:
 
     @property
     def expected(self) -> float:
-        """How long it takes if nobody answers, in s."""
+        """Duration in s if no device answers."""
         waiting = sum(
             len(ids) * (self.cost(timing) + self.timeout) + max(0.0, LAST_TIMEOUT - self.timeout)
             for timing, ids in self.rounds
