@@ -26,7 +26,7 @@ from lfs10d.reading import Fault, FaultCode, PortChanged, UartCounters
 from lfs10d.system.dataclass import dataclass
 
 REOPEN_FIRST = 0.2
-"""How long after the loss of the port it is tried again first, in s; doubled up to the last."""
+"""First pause in s before the lost port is tried again; doubled up to the longest."""
 REOPEN_LAST = 1.0
 """The longest pause between two tries to open the port, in s."""
 RATE_SETTLE = 0.005
@@ -47,7 +47,7 @@ then, and one look is enough."""
 
 @dataclass(frozen=True, slots=True)
 class Wait:
-    """Nothing to do before `until`; with `listen` also when bytes come, but not before `not_before`.
+    """Nothing to do before `until`, or with `listen` before bytes come, and not before `not_before`.
 
     `hurried`: somebody waits for the line, so that a tenth of a millisecond counts.
     """
@@ -80,7 +80,7 @@ class Bus:
         self.timing = self._timing(port.settings)
         self.unsolicited = 0
         self.strays: list[tuple[bytes, float]] = []
-        """What was heard between two exchanges, with the times at which it was read; whoever looks at it clears it."""
+        """Bytes received between two exchanges, with the times of their reads; the reader clears it."""
         self._settings = port.settings
         self._clock = clock
         self._echo = EchoLearner(rules.echo)
@@ -109,7 +109,7 @@ class Bus:
 
     @property
     def echo(self) -> Echo:
-        """What is known of the adapter's echo; no write may be asked while it is unknown."""
+        """The adapter's echo as far as it is known; nothing is written while it is unknown."""
         return self._echo.state
 
     # -- the port
@@ -136,7 +136,7 @@ class Bus:
         return PortChanged(now, None)
 
     def _lost(self, error: PortError, now: float) -> PortChanged | None:
-        """Close the port; report it once per reason. That an unplugged one is absent is the same reason."""
+        """Close the port and report it, once per reason; unplugged and absent are one reason."""
         hung_up, gone = self.open, isinstance(error, PortGoneError)
         self.close()
         code = FaultCode.PORT_BUSY if isinstance(error, PortBusyError) else FaultCode.PORT_LOST
@@ -149,7 +149,7 @@ class Bus:
 
     @property
     def speaking_until(self) -> float:
-        """When the request under way has left the wire; to close the port before would cut it."""
+        """When the request under way has left the wire; closing the port before would cut it."""
         return -inf if self._exchange is None else self._exchange.quiet_since
 
     def close(self) -> None:
@@ -159,7 +159,7 @@ class Bus:
         self.port.close()
 
     def retry(self, now: float) -> None:
-        """Try to open the closed port at once; the result is reported even if it is as it was before."""
+        """Try to open the closed port at once; the result is reported even if nothing changed."""
         self._reopen_at = now
         self._pause = REOPEN_FIRST
         self._fault = None
@@ -193,7 +193,7 @@ class Bus:
     # -- one exchange
 
     def ask(self, ask: Ask, pending: Mapping[int, tuple[Pending, ...]], *, hurried: bool = True) -> None:
-        """Take what to put on the line next; `step` carries it out.
+        """Take the next request; `step` carries it out.
 
         `pending` are the requests to any slave whose answers may still come, by slave id; it may change until then.
         `hurried`: others wait for the line.

@@ -15,11 +15,11 @@ _SEVERAL = frozenset({WRITE_MULTIPLE_COILS, WRITE_MULTIPLE_REGISTERS})
 _REQUEST_DATA = 4
 """Address and count, or address and value."""
 _DESCRIBED = 16
-"""So many frames of one piece are put into words."""
+"""Most frames of one piece that are described."""
 
 
 def describe(frame: bytes, codec: Codec) -> str:
-    """Return what was sent or heard in words, for traces and logs; our own words and hex digits only.
+    """Return sent or received bytes in words, for traces and logs; our own words and hex digits only.
 
     `frame` may hold several frames and noise.
     """
@@ -57,7 +57,7 @@ def _in_words(body: bytes) -> str:
 
 
 def _of_two_words(function: int, data: bytes, whose: str) -> str | None:
-    """Return a request or a confirmation in words, None where the function has no such."""
+    """Return a request or a confirmation in words, None for other functions."""
     first, second = int.from_bytes(data[:2], "big"), int.from_bytes(data[2:], "big")
     if function in READS:
         return f"read {second} {_plural(function, second)} at 0x{first:04X} of {whose}"

@@ -17,17 +17,17 @@ from __future__ import annotations
 from lfs10d.system.dataclass import dataclass
 
 WATCHED = 0.15
-"""How long a slave is left alone after an answer to see whether another one follows, in s."""
+"""Seconds for which a slave is left alone after an answer, to see whether another one follows."""
 LATEST = 1.0
-"""What comes later after an answer is no second one, in s."""
+"""Longest time in s from an answer to its second one."""
 MISPLACED_LATEST = 0.2
-"""What comes later than this in place of another's answer is no second one, in s."""
+"""The same for a second answer in place of another slave's answer."""
 AWAITED_MOST = 0.3
-"""For a second answer that may come later the rest of the line does not wait, in s."""
+"""Longest time in s for which the rest of the line waits for a second answer."""
 TELLING = 2
-"""So many extra answers tell."""
+"""Extra answers after which the id is reported."""
 CLEAN = 30
-"""So many answers in a row without another one behind them end it."""
+"""Single answers in a row that end it."""
 MARGIN = 0.05
 """Added to a quarter more than the longest time measured, in s."""
 
@@ -46,25 +46,25 @@ class _SlaveExtras:
 
 @dataclass(frozen=True, slots=True)
 class Twice:
-    """An id is answered twice: the second answer came `delay` s after the first."""
+    """An id that is answered twice: the second answer came `delay` s after the first."""
 
     slave: int
     delay: float
 
 
 class Duplicates:
-    """What is known of each slave id of one line."""
+    """The slave ids of one line that are answered twice."""
 
     def __init__(self) -> None:
         self._slaves: dict[int, _SlaveExtras] = {}
 
     def known(self, slave: int) -> bool:
-        """Whether the id is answered twice."""
+        """Return whether the id is answered twice."""
         state = self._slaves.get(slave)
         return state is not None and state.extras >= TELLING
 
     def answered(self, slave: int, at: float, *, barrier: bool = False) -> bool:
-        """Note that a request of ours was answered, whole at `at`; whether the id is no longer answered twice.
+        """Note an answer to us, complete at `at`; return whether the id is no longer answered twice.
 
         A second answer to a `barrier` has another length than that to a value, and needs no rest.
         """
@@ -86,7 +86,7 @@ class Duplicates:
         return False
 
     def awaited(self, slave: int) -> float | None:
-        """Return how long a second answer of this slave is to be awaited after its answer, in s; None: not at all."""
+        """Return how long to wait for a second answer of this slave, in s; None: not at all."""
         state = self._slaves.get(slave)
         if state is None or not state.extras:
             return None
@@ -96,24 +96,24 @@ class Duplicates:
         return longest if longest <= AWAITED_MOST else None
 
     def watched(self, slave: int) -> float:
-        """Return how long after its last answer a slave must have been silent for a second one to be over, in s."""
+        """Return the silence in s after the last answer of a slave that rules out a second one."""
         state = self._slaves.get(slave)
         if state is None or state.extras < TELLING:
             return WATCHED
         return 1.25 * state.delay + MARGIN
 
     def extras(self, slave: int) -> int:
-        """Return how many extra answers of this slave were heard."""
+        """Return the number of extra answers of this slave."""
         state = self._slaves.get(slave)
         return 0 if state is None else state.extras
 
     def rest(self, slave: int, until: float) -> None:
-        """Leave a slave alone until then: what it was asked may be answered still."""
+        """Leave a slave alone until then: an earlier request may still be answered."""
         state = self._slaves.setdefault(slave, _SlaveExtras())
         state.until = max(state.until, until)
 
     def second(self, slave: int, at: float, *, misplaced: bool = False) -> Twice | None:
-        """Note a right frame of a slave that owes nothing, whole at `at`; return what it tells, once.
+        """Note a valid frame of a slave that owes none, complete at `at`; return the finding, once.
 
         `misplaced`: it came in place of another slave's answer, which may have spoken with a wrong id.
         """
@@ -132,7 +132,7 @@ class Duplicates:
         return None if state is None or now >= state.until else state.until
 
     def forget(self, slave: int | None = None) -> None:
-        """Forget what is known of a slave, or of all: the port was opened, or another device is meant."""
+        """Forget a slave, or all: the port was opened, or the device was replaced."""
         if slave is None:
             self._slaves.clear()
         else:

@@ -1,4 +1,4 @@
-"""Whether the adapter returns our own bytes, learned from reads where the configuration does not say.
+"""Learns from reads whether the adapter returns our own bytes, unless it is configured.
 
 Three reads in a row must agree. Only a read that got an answer counts towards "no echo": where nobody answers,
 nothing is proved. Learned anew at each opening of the port; until it is known no write is sent.
@@ -10,7 +10,7 @@ from enum import StrEnum
 from typing import Literal
 
 AGREEING = 3
-"""So many observations in a row must agree."""
+"""Observations in a row that must agree."""
 
 
 class Echo(StrEnum):
@@ -22,7 +22,7 @@ class Echo(StrEnum):
 
 
 class EchoLearner:
-    """What is known of the adapter's echo; `setting` is the configuration's word.
+    """Learns the adapter's echo; `setting` is the configured value.
 
     `proved`: what is known was observed, not only configured.
     """
@@ -41,7 +41,7 @@ class EchoLearner:
             self._seen, self._agreeing = None, 0
 
     def observed(self, echoed: bool | None) -> None:  # noqa: FBT001 - an observation, not a switch
-        """Take what one read showed; None where it showed nothing."""
+        """Take the observation of one read; None if there is none."""
         if echoed is None or self._fixed is not None:
             return
         self._agreeing = self._agreeing + 1 if echoed is self._seen else 1

@@ -98,21 +98,21 @@ TRANSITIONS: Mapping[tuple[State, Happening], State] = {
 
 @dataclass(frozen=True, slots=True)
 class Quiet:
-    """Let the line be silent: call `step` again at `until`, or when bytes have been given to `received`."""
+    """Keep silent: call `step` again at `until`, or after bytes were given to `received`."""
 
     until: float
 
 
 @dataclass(frozen=True, slots=True)
 class Send:
-    """Look once more whether bytes wait; if none do, write `frame` at once and tell it by `sent`."""
+    """Check once more for bytes; if there are none, write `frame` at once and call `sent`."""
 
     frame: bytes
 
 
 @dataclass(frozen=True, slots=True)
 class Listen:
-    """Read what comes and give it to `received`; call `step` after that, or at `until`.
+    """Give received bytes to `received`; call `step` after that, or at `until`.
 
     Nothing can be decided on new bytes before `not_before`, so the caller may sleep to it. At `until` what is
     there must be read before `step` is called.
@@ -137,7 +137,7 @@ class MisuseError(RuntimeError):
 
 
 class Exchange:
-    """One request and its answer. Call `step`, obey what it returns, tell what happened, call `step` again.
+    """One request and its answer. Call `step`, carry out what it returns, report the events, call `step` again.
 
     `pending` are the requests whose answers may still come, by slave id, each slave's oldest first. `asked` is when the
     line was given to it, `quiet_since` the last byte heard or sent before, wanted or not.
@@ -175,12 +175,12 @@ class Exchange:
 
     @property
     def state(self) -> State:
-        """Where it stands."""
+        """Its state."""
         return self._state
 
     @property
     def quiet_since(self) -> float:
-        """The last byte heard or sent on the line so far."""
+        """The end of the last byte on the line, received or sent."""
         return self._quiet_since
 
     def step(self, now: float) -> Decision:
@@ -253,7 +253,7 @@ class Exchange:
         return Listen(until, min(max(now, reception.whole_at), until))
 
     def _limits(self) -> tuple[float, float]:
-        """Return until when the first byte of the answer may come, and when even a babbling line is given up.
+        """Return until when the answer may begin, and when even a babbling line is given up.
 
         A slave answers in order: after its late answer to an earlier request it gets its usual time again.
         """

@@ -20,7 +20,7 @@ KEPT = 1024
 
 @dataclass(slots=True)
 class ExpectedFrame:
-    """One answer looked for, from position `start` on; `begun` once its whole head was seen."""
+    """An answer to search for, from position `start` on; `begun` once its whole head was found."""
 
     codec: Codec
     shape: Shape
@@ -40,7 +40,7 @@ class ExpectedFrame:
 
 @dataclass(frozen=True, slots=True)
 class FoundFrame:
-    """A frame found right: its body without check, its place, and when its first and last byte were heard."""
+    """A valid frame: its body without check, its position, and the times of its first and last byte."""
 
     body: bytes
     begin: int
@@ -64,7 +64,7 @@ class FrameSearch:
         self._claims: list[tuple[int, int]] = []
 
     def feed(self, data: bytes, now: float) -> None:
-        """Add what was heard at `now`; call `seek` for every expected before the next."""
+        """Add bytes received at `now`; call `seek` for every expected answer before the next call."""
         if self.end - self._base > 2 * KEPT:
             self._forget(self.end - self._base - KEPT)
         self._stream += data
@@ -77,7 +77,7 @@ class FrameSearch:
         del self._marks[: self._mark(self._base)]
 
     def seek(self, expected: ExpectedFrame) -> FoundFrame | None:
-        """Return the next right frame of this shape, or None; goes on behind it at the next call."""
+        """Return the next valid frame of this shape, or None; the next call goes on behind it."""
         head, size = expected.shape.head, expected.shape.size
         if expected.partial and expected.start + size > self.end:
             return None
@@ -104,7 +104,7 @@ class FrameSearch:
         return bisect_right(self._marks, (position, inf))
 
     def claim(self, found: FoundFrame) -> None:
-        """Take a frame out of what is left to explain."""
+        """Mark the bytes of a frame as explained."""
         self._claims.append((found.begin, found.end))
 
     def claimed(self, found: FoundFrame) -> bool:
@@ -143,7 +143,7 @@ class FrameSearch:
         return bytes(rest)
 
     def unclaimed_count(self, start: int) -> int:
-        """Return how many characters from `start` on belong to no claimed frame."""
+        """Return the number of characters from `start` on that belong to no claimed frame."""
         count = self.end - start
         for begin, end in self._claims:
             if end > start:
@@ -151,7 +151,7 @@ class FrameSearch:
         return count
 
     def begins(self, expected: ExpectedFrame) -> bool:
-        """Whether bytes came that begin as this answer: its head, or enough of it at the very end."""
+        """Return whether this answer has begun: its head came, or enough of it at the very end."""
         return expected.begun or self._tail(expected) >= expected.shape.sign
 
     def _tail(self, expected: ExpectedFrame) -> int:

@@ -21,9 +21,9 @@ from math import ceil
 from lfs10d.system.dataclass import dataclass
 
 KEPT = 6
-"""So many of its requests are remembered."""
+"""Number of its requests that are remembered."""
 FORGOTTEN = 3.0
-"""So long after its last request it counts as gone, in s."""
+"""Seconds after its last request after which it counts as gone."""
 OURS = 1.4
 """Our exchange takes so many times as long as its answer did: that does not hold the request."""
 
@@ -51,7 +51,7 @@ class OtherMaster:
             rhythm.took = at - rhythm.asked[-1]
 
     def busy_until(self, slave: int, now: float) -> float | None:
-        """Return until when a request of ours to the slave waits, None if it may be asked now."""
+        """Return until when a request of ours to the slave must wait, None if it need not."""
         rhythm = self.slaves.get(slave)
         if rhythm is None:
             return None

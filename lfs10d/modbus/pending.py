@@ -38,11 +38,11 @@ from lfs10d.reading import FaultCode
 from lfs10d.system.dataclass import dataclass
 
 QUIET_LEAST = 1.0
-"""How long a slave is left alone where no barrier can tell, at least; in s."""
+"""Shortest time in s for which a slave is left alone if no barrier can prove anything."""
 _SILENT = frozenset({FaultCode.TIMEOUT, FaultCode.LATE, FaultCode.WRONG_SLAVE})
-"""With these faults the asked slave itself said nothing."""
+"""Faults with which the slave itself sent nothing."""
 OTHER_RATE = 0.9
-"""In s; a scan waits a little longer for the last id of a round before it asks at the next rate."""
+"""Seconds; a scan waits a little longer for the last id of a round before the next rate."""
 EQUALS_KEPT = 16
 """Of equal pending requests so many are remembered, the newest: more than any sensor keeps in mind. The answer of one
 forgotten too soon would count as that of the next, and whatever was asked between the two as answered."""
@@ -108,7 +108,7 @@ class PendingRequests:
         timeout: float,
         barrier_first: bool = False,
     ) -> Request | float:
-        """Return what to ask so that the answer to `request` is not mistaken: it, the barrier, or until when to wait.
+        """Return what to ask so that no answer is mistaken: the request, the barrier, or until when to wait.
 
         `barrier` is a read of another shape, if the slave has one. `timeout` is the slave's, in s. A write is always
         read back afterwards, so its own answer may be mistaken.

@@ -45,7 +45,7 @@ _ADVICE = {
         "in a container pass it in (--device)"
     ),
 }
-"""What each errno of open(2) or of a first look at the device means here."""
+"""The message for each errno of open(2), or of the first access to the device."""
 
 _MISSING = frozenset({errno.ENOENT, errno.ENOTDIR})
 _GONE = _MISSING | {errno.ENODEV, errno.ENXIO, errno.EIO}
@@ -54,7 +54,7 @@ _USED_ELSEWHERE = frozenset({errno.EBUSY, errno.EWOULDBLOCK})
 
 @dataclass(frozen=True, slots=True)
 class PortErrorFacts:
-    """What is known of a port that cannot be opened.
+    """The facts about a port that cannot be opened.
 
     `target` is where a symbolic link ends, `group` the group whose members may use the device ("" for both where
     there is none), `user` who we are, `holder` who has the port ("" if unknown).

@@ -19,7 +19,7 @@ PRIORITY = 10
 
 
 def sharpen_timers(*, proc: Path = PROC) -> bool:
-    """Set the calling thread's timer slack to 1 ns (PR_SET_TIMERSLACK, here by proc(5)); tell whether it took."""
+    """Set the calling thread's timer slack to 1 ns (PR_SET_TIMERSLACK, by proc(5)); return whether it worked."""
     # A file, not prctl by ctypes: that costs memory, and its import fails under MemoryDenyWriteExecute= on some.
     slack = proc / str(threading.get_native_id()) / "timerslack_ns"
     try:

@@ -14,10 +14,10 @@ from lfs10d.modbus.pending import Pending
 from lfs10d.modbus.request import BROADCAST, ReadRegisters
 
 HEARD_KEPT = 1024
-"""Bytes remembered as heard, the last ones; the longest frame has 513 (ASCII)."""
+"""Most bytes remembered as received; the longest frame has 513 (ASCII)."""
 
 EARLY_TOLERANCE = 1
-"""Characters by which an answer may seem to come before our request has left: clocks and rates differ a little."""
+"""Tolerance in characters for an answer that seems to begin before our request has left."""
 
 REQUEST_BODY = 6
 """Slave id, function and two words: what a master sends that reads registers or writes one."""
@@ -102,7 +102,7 @@ class Reception:
             self._foresee(now)
 
     def _compare(self, data: bytes, now: float) -> bytes:
-        """Hold back what may be echo; return what is none."""
+        """Hold back bytes that may be echo; return the others."""
         part = data[: len(self._frame) - self._matched]
         if not self._frame.startswith(part, self._matched):
             self._undecided = False

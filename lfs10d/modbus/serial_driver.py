@@ -57,14 +57,14 @@ _KNOBS = (
 
 @dataclass(frozen=True, slots=True)
 class Latency:
-    """How late the adapter may deliver (s), and what a person should know about it."""
+    """The longest delay of the adapter in s, and a message about it."""
 
     adapter: float
     notice: str | None = None
 
 
 def lower_latency(fd: int, *, wanted: bool, sysfs: Path = SYSFS) -> Latency:
-    """Ask for the low-latency mode where it is wanted, and tell by reading back whether it holds."""
+    """Set the low-latency mode if wanted; return the latency, verified by reading back."""
     refused = _ask_low_latency(fd) if wanted else None
     device = os.fstat(fd).st_rdev
     folder = sysfs / "dev" / "char" / f"{os.major(device)}:{os.minor(device)}"
@@ -88,7 +88,7 @@ def lower_latency(fd: int, *, wanted: bool, sysfs: Path = SYSFS) -> Latency:
 
 
 def switch_rs485(fd: int, rs485: Rs485) -> str | None:
-    """Have the driver switch the transceiver by RTS; returns what it refused, in words, or None."""
+    """Let the driver switch the transceiver by RTS; return what it refused, in words, or None."""
     current = bytearray(_RS485.size)
     try:
         fcntl.ioctl(fd, TIOCGRS485, current)

@@ -1,4 +1,4 @@
-"""Keeps one connection to the broker for as long as it is wanted: the shell around `Reconnect`.
+"""Keeps one connection to the broker: the shell around `Reconnect`.
 
 It does not know what is sent: the daemon's uplink and the verbs of the command line are above it.
 """
@@ -62,7 +62,7 @@ class BrokerClient:
 
     @property
     def settings(self) -> BrokerSettings:
-        """What is spoken to: where there are several nodes, the one that is connected or tried next."""
+        """The settings in use: of several nodes those of the one that is connected or tried next."""
         return self._nodes[self._reconnect.node]
 
     @property
@@ -72,7 +72,7 @@ class BrokerClient:
 
     @property
     def version(self) -> Version | None:
-        """The version spoken while the connection stands."""
+        """The version of MQTT in use; None without a connection."""
         return None if self._accepted is None else self._accepted.version
 
     @property
@@ -128,7 +128,7 @@ class BrokerClient:
             self._connection = None
 
     def drop(self, why: str) -> None:
-        """End the connection that stands without a word, as lost."""
+        """Close the connection without DISCONNECT, as if it were lost."""
         if self._connection is not None:
             self._connection.abandon()
             self.ended(Disconnect(DisconnectReason.LOST, f"{self.settings.place}: {why}"))
@@ -164,7 +164,7 @@ class BrokerClient:
         self._connection = self._connect(settings, self._reconnect.version, self, will=self._will)
 
     def _learn_node(self) -> tuple[str, ...]:
-        """Learn which of the nodes that were tried together answered; return those that failed with the first."""
+        """Note which of the nodes tried together answered; return those that failed with the first."""
         beside, self._beside = self._beside, ()
         race = None if self._connection is None or not beside else self._connection.race
         if race is None:
@@ -180,7 +180,7 @@ class BrokerClient:
     # Events of the connection
 
     def accepted(self, accepted: Accepted) -> None:
-        """Report that it stands."""
+        """Report that the connection is accepted."""
         self._accepted = accepted
         self._learn_node()
         self._reconnect.accepted(self._now())
@@ -195,7 +195,7 @@ class BrokerClient:
         self._events.accepted(accepted)
 
     def ended(self, ended: Disconnect) -> None:
-        """Report that it is over, and try again when `Reconnect` says."""
+        """Report that the connection ended, and try again when `Reconnect` says."""
         stood, self._accepted = self._accepted is not None, None
         beside = self._learn_node()
         self._connection = None
@@ -229,7 +229,7 @@ class BrokerClient:
         self._answer_waiters(BrokerError(ended.message))
 
     def _log_once(self, place: str, message: str, words: str) -> None:
-        """Log this of a node as a warning, unless it is as it was before."""
+        """Log a warning about a node, unless it is the same as before."""
         log.log(logging.DEBUG if message == self._logged.get(place) else logging.WARNING, "%s", words)
         self._logged[place] = message
 

@@ -1,4 +1,4 @@
-"""Sends what waits, then `offline`, then DISCONNECT at a clean exit; within the broker's Receive Maximum."""
+"""The clean exit: sends the queue, then `offline`, then DISCONNECT; within the broker's Receive Maximum."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LEAVE_WITHIN = 0.3
 
 
 class CleanExit:
-    """Used in the thread of the asyncio loop; `wake()` has the sender send what may go."""
+    """Used in the thread of the asyncio loop; `wake()` makes the sender send."""
 
     def __init__(self, client: BrokerClient, outbox: Outbox, wake: Callable[[], None]) -> None:
         self._client = client
@@ -53,7 +53,7 @@ class CleanExit:
         return self._client.connection is not None
 
     async def _until(self, reached: Callable[[], bool], deadline: float) -> bool:
-        """Wait until this is so; return False if it is not by the deadline, or the connection is lost."""
+        """Wait until the condition holds; return False at the deadline, or if the connection is lost."""
         try:
             async with asyncio.timeout_at(deadline):
                 while self._connected and not reached():

@@ -1,4 +1,4 @@
-"""Retained topics of devices that are gone: looked for at the broker, and cleared. A shell around `OrphanSearch`.
+"""Clears retained topics of removed devices at the broker: the shell around `OrphanSearch`.
 
 They are read over a second connection with a client id of its own: there may be tens of thousands, and the broker's
 acknowledgements of samples would wait behind them. Where the broker does not permit that, they are read over the
@@ -41,7 +41,7 @@ class Cleanup:
         connect: Callable[[Events, str], Connection],
     ) -> None:
         self.wanted = False
-        """To be begun as soon as what we clear ourselves has gone out: else the broker would show it as left over."""
+        """To begin once our own clearings have been sent; otherwise the broker would still return these topics."""
         self.single = False
         """The broker does not permit a second connection."""
         self._topics = topics
@@ -55,16 +55,16 @@ class Cleanup:
 
     @property
     def under_way(self) -> bool:
-        """The broker is asked what it retains, or is sending it."""
+        """Whether retained messages were requested and are arriving."""
         return self._first is not None
 
     @property
     def has_second(self) -> bool:
-        """The second connection is begun, and not over."""
+        """Whether there is a second connection."""
         return self._second is not None
 
     def begin(self, first: Connection | None) -> None:
-        """Have the broker send what it retains, unless that is under way or it is away."""
+        """Request the retained messages, unless that is under way or there is no connection."""
         self.wanted = False
         if first is None or self.under_way:
             return

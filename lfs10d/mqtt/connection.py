@@ -105,7 +105,7 @@ class Connection:
         return info.mid if info.rc == MQTTErrorCode.MQTT_ERR_SUCCESS else None
 
     def cork(self, *, on: bool) -> None:
-        """Let what is published from here on wait for the cork to be taken off."""
+        """Hold back publications until the cork is removed, to send them together."""
         self._pump.cork(on=on)
 
     def subscribe(self, filters: Sequence[Filter]) -> int | None:
@@ -126,13 +126,13 @@ class Connection:
         self._pump.watch_writing()
 
     def abandon(self) -> None:
-        """End it at once and say nothing more; the broker publishes the will."""
+        """Close it at once without DISCONNECT; the broker publishes the will."""
         self._abandoned = True
         self._events = None
         self._close()
 
     def _close(self) -> None:
-        """Stop watching the socket and close it without a word."""
+        """Stop watching the socket and close it."""
         self._cancel_connack()
         self._pump.end()
         opened = self._client.socket()
@@ -193,7 +193,7 @@ class Connection:
     # Callbacks of paho
 
     def _note(self, call: Callable[..., None], *values: object) -> None:
-        """Have it dealt with as soon as paho is done: in this turn of the loop by the pump, else in the next."""
+        """Call this as soon as paho is done: in this turn of the loop by the pump, else in the next."""
         if not (self._happened or self._pump.reading):
             self._loop.call_soon(self._deal)
         self._happened.append(partial(call, *values))

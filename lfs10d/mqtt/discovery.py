@@ -50,14 +50,14 @@ class Discovery:
         self._wanted: Mapping[str, Announced] = {}
         self._then: dict[str, Announced] = {}
         self._known: dict[str, Platforms] | None = None
-        """What was announced, by full topic; None while that is not known."""
+        """The announced payloads, by full topic; None while unknown."""
         self._connection: Connection | None = None
         self._search: DiscoverySearch | None = None
         self._to_search: list[tuple[str, bool]] = []
         """Prefixes, and whether to look for all devices or for the line alone."""
         self._found: dict[str, Platforms] = {}
         self._searched: set[str] = set()
-        """Prefixes under which the broker let us look and had nothing of ours."""
+        """Prefixes that were searched and had nothing of ours."""
         self._subscription: int | None = None
         self._birth: asyncio.TimerHandle | None = None
         self._taken_in: asyncio.TimerHandle | None = None
@@ -67,14 +67,14 @@ class Discovery:
         return f"{self._prefix}/status"
 
     def remember(self, prefixes: frozenset[str], on_change: Callable[[frozenset[str]], None]) -> None:
-        """Take under which prefixes earlier lives announced something; `on_change` is told what later ones are to know.
+        """Take the prefixes that earlier runs used; `on_change` gets those to remember for later runs.
 
         Before `configure`.
         """
         self._prefixes, self._on_prefixes = prefixes, on_change
 
     def configure(self, prefix: str, wanted: Mapping[str, Announced]) -> None:
-        """Take the payloads by full topic, none where discovery is off; publish what is another."""
+        """Take the payloads by full topic, none if discovery is off; publish those that changed."""
         before, self._wanted = self._wanted, wanted
         moved = prefix != self._prefix or bool(wanted) is not bool(before)
         left, self._prefix = self._status, prefix
@@ -93,7 +93,7 @@ class Discovery:
             self._perform(transition({**stay, **gone}, changed))
 
     def republish(self) -> int:
-        """Announce all once more; return how many payloads."""
+        """Announce everything again; return the number of payloads."""
         if self._known is not None:
             self._send({topic: payload for topic, payload in self._wanted.items() if topic not in self._then})
         return len(self._wanted)
@@ -101,7 +101,7 @@ class Discovery:
     # -- events of the connection
 
     def begin(self, connection: Connection | None) -> None:
-        """Ask over this connection what was announced before, then announce what is wanted."""
+        """Read earlier announcements over this connection, then announce the wanted ones."""
         self.lost()
         if connection is None:
             return
@@ -112,7 +112,7 @@ class Discovery:
         self._ask_next(connection)
 
     def lost(self) -> None:
-        """Note that the connection is gone: at the next everything begins anew."""
+        """Note that the connection is lost: everything begins again with the next."""
         self._connection = self._search = self._subscription = self._known = None
         self._then, self._found, self._searched = {}, {}, set()
         for timer in (self._birth, self._taken_in):
@@ -144,7 +144,7 @@ class Discovery:
     # -- what follows
 
     def _ask_next(self, connection: Connection) -> None:
-        """Ask the broker for what is left to be looked for; announce what is wanted once nothing is."""
+        """Read the next prefix at the broker; after the last one announce the wanted payloads."""
         if not self._to_search:
             self._search, self._known = None, {}
             gone = self._found.keys() - self._wanted.keys()
@@ -179,7 +179,7 @@ class Discovery:
         self._ask_next(connection)
 
     def _know(self, prefixes: frozenset[str]) -> None:
-        """Keep under which prefixes something of ours may be retained."""
+        """Remember the prefixes under which something of ours may be retained."""
         if prefixes != self._prefixes:
             self._prefixes = prefixes
             self._on_prefixes(prefixes)
@@ -193,7 +193,7 @@ class Discovery:
             self._taken_in = self._loop.call_later(TAKEN_IN, self._on_taken_in)
 
     def _on_taken_in(self) -> None:
-        """Leave out what was removed, if the payloads that said so are out."""
+        """Publish the payloads without the removed entities, once their removal has been sent."""
         self._taken_in = None
         if not self._is_out():
             self._taken_in = self._loop.call_later(TAKEN_IN, self._on_taken_in)

@@ -11,7 +11,7 @@ from lfs10d.telemetry.publication import Payload
 _JSON = json.JSONEncoder(ensure_ascii=False, allow_nan=False, check_circular=False, separators=(",", ":"))
 
 _REMAINING_LENGTH_STEPS = (127, 16_383, 2_097_151)
-"""Up to these the remaining length takes 1, 2, 3 bytes, else 4 (MQTT 5.0, section 1.5.5)."""
+"""Largest remaining lengths that take 1, 2 and 3 bytes; others take 4 (MQTT 5.0, section 1.5.5)."""
 
 
 def encode(payload: Payload) -> bytes:

@@ -1,4 +1,4 @@
-"""What this daemon itself published in an earlier life, read before anything is published over it. Pure."""
+"""Reads the daemon's own retained topics of an earlier run before they are overwritten. Pure."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from lfs10d.system.dataclass import dataclass
 from lfs10d.telemetry import publication
 
 QUIET_LEAST, QUIET_MOST = 0.05, 0.5
-"""Seconds after the broker's answer to the subscription, or after the last message, in which no more came."""
+"""Seconds without a message, after the broker's answer or the last message, that end the search."""
 
 QUIET_ROUNDS = 4
-"""So many times as long as that answer took is waited beside: a broker far away delivers in fits and starts."""
+"""Multiple of the broker's response time that is added: a distant broker delivers irregularly."""
 
 LONGEST = 5.0
-"""Seconds after which nothing is waited for any more, whatever the broker does."""
+"""Seconds after which the search ends in any case."""
 
 FILTERS = (publication.LINE_STATE, publication.device_topic("+", publication.CONFIG))
 """Two filters whatever is wanted: some brokers take eight at most."""
@@ -36,7 +36,7 @@ class Lookback:
 
     @property
     def filters(self) -> tuple[str, ...]:
-        """What to subscribe to."""
+        """The filters to subscribe to."""
         return tuple(self.topics.full(each) for each in FILTERS)
 
     def subscribed(self, now: float, *, refused: bool) -> None:
@@ -46,7 +46,7 @@ class Lookback:
         self._refused = refused
 
     def on_message(self, topic: str, payload: bytes, now: float) -> None:
-        """Take one retained message; what is not wanted is passed over, and no reason to wait longer."""
+        """Take one retained message; others are ignored, and do not prolong the search."""
         relative = self.topics.relative(topic)
         if relative is not None and relative in self.wanted:
             self._last_at = now

@@ -1,4 +1,4 @@
-"""What passes between a connection and those who use it. Plain values."""
+"""The values that a connection and its users exchange."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from lfs10d.mqtt.settings import Version
 from lfs10d.system.dataclass import dataclass
 
 RECEIVE_MAXIMUM_UNSAID = 65_535
-"""What the broker takes where it says nothing (MQTT 5.0, section 3.2.2.3.3)."""
+"""The broker's Receive Maximum if it names none (MQTT 5.0, section 3.2.2.3.3)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Will:
-    """What the broker publishes when we are gone without a word; retained, QoS 1."""
+    """The last will: published by the broker if we are gone without DISCONNECT; retained, QoS 1."""
 
     topic: str
     payload: bytes
@@ -22,7 +22,7 @@ class Will:
 
 @dataclass(frozen=True, slots=True)
 class Accepted:
-    """What the broker said in its CONNACK; `maximum_packet_size` is in bytes, None where there is no limit."""
+    """The broker's CONNACK; `maximum_packet_size` is in bytes, None without a limit."""
 
     version: Version
     receive_maximum: int = RECEIVE_MAXIMUM_UNSAID
@@ -51,7 +51,7 @@ class Incoming:
 
 
 class Events(Protocol):
-    """Whom a connection tells, always in the thread of the asyncio loop."""
+    """The events of a connection, always in the thread of the asyncio loop."""
 
     def accepted(self, accepted: Accepted) -> None:
         """Note that the connection stands."""

@@ -1,4 +1,4 @@
-"""Which of several nodes answers: TCP connections are begun half a second apart, and the first that opens is taken.
+"""Finds a node that answers: connects to several, half a second apart, and takes the first that opens.
 
 A node that swallows everything would cost 5 s each round. MQTT is spoken over the connection that is taken and over no
 other: never has the daemon two sessions. A node that fails at once is tried again every second while others are still
@@ -18,7 +18,7 @@ from lfs10d.mqtt.reasons import NoNodeError, failed
 from lfs10d.mqtt.settings import BrokerSettings
 
 STAGGER = 0.5
-"""Seconds from one node to the next: a node that answers slowly is still preferred to the next in turn."""
+"""Seconds from one node to the next: a node that answers slowly is still preferred."""
 
 AGAIN = 1.0
 """Seconds from one attempt at a node to the next."""

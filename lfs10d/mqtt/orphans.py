@@ -14,7 +14,7 @@ QUIET = 0.5
 """Seconds without a retained message, once the broker has answered, after which the broker has sent them all."""
 
 LONGEST = 120.0
-"""Seconds after which a search ends in any case; a slow gateway takes 30 s for 60 000 messages, which come anyway."""
+"""Seconds after which a search ends in any case; a slow gateway takes 30 s for 60 000 messages."""
 
 
 AT_ONCE = 64
@@ -46,7 +46,7 @@ class OrphanSearch:
 
     @property
     def due(self) -> float:
-        """When it is over if nothing more comes; a broker that has not answered yet may be slow."""
+        """When the search ends if nothing more comes."""
         latest = self.begun + LONGEST
         return latest if self._last_at is None else min(self._last_at + QUIET, latest)
 

@@ -1,4 +1,4 @@
-"""What we add to paho's client: packets of any size and reason codes of any value, and why a connection ended.
+"""Additions to paho's client: packets of any size, unknown reason codes, and why a connection ended.
 
 paho 2.2 takes a packet into memory whole, however large; it closes the connection at a reason code that is not in its
 table, for it calls that packet malformed; and it says only in its log what went wrong.
@@ -25,10 +25,10 @@ CONNECT_TIMEOUT = 5.0
 """Seconds for each address of the broker to answer, and for each step of the TLS handshake."""
 
 RECEIVE_MAXIMUM = 64
-"""Requests the broker may have under way to us: a flood waits there, not in our memory."""
+"""Our Receive Maximum: a flood of requests waits at the broker, not in our memory."""
 
 LARGEST_PACKET = 128 * 1024
-"""Bytes of a packet that are taken, the rest is passed over. By MQTT 5 the broker is asked to send none larger."""
+"""Largest packet in bytes; the rest is skipped. By MQTT 5 the broker is asked to send none larger."""
 
 PASSED_OVER_AT_ONCE = 64 * 1024
 PASSES = 16
@@ -104,7 +104,7 @@ class BoundedClient(Client):
 
     @property
     def trouble(self) -> BaseException | str | None:
-        """What went wrong last; None: nothing, so that the broker closed the connection."""
+        """The last error; None: the broker closed the connection."""
         return self._trouble.last
 
     dial: Callable[[], tuple[str, int, socket.socket]] | None = None

@@ -36,13 +36,13 @@ class Publisher:
         self._paused = False
 
     def start(self) -> None:
-        """Publish what is due, from now on whenever something is."""
+        """Publish what is due, now and whenever something is."""
         self._tick()
 
     # -- what is published
 
     def on_event(self, event: Event, now: Instant) -> list[Publication]:
-        """Take an event of the line; return what it makes known, for `publish`."""
+        """Take an event of the line; return its publications, for `publish`."""
         return self._station.on_event(event, now)
 
     def on_readings(self, readings: Iterable[Reading]) -> None:
@@ -59,7 +59,7 @@ class Publisher:
         return self._station.tick(now, backlog)
 
     def publish(self, publications: Iterable[Publication]) -> None:
-        """Publish these, but for what must wait until the broker has the first burst."""
+        """Publish these, except those that must wait until the broker has the first burst."""
         self._uplink.publish(self._first_burst.passing(publications))
         if self._timer is not None and self._station.due() + TICK_SLACK < self._timer.when():
             self._set_timer()
@@ -73,7 +73,7 @@ class Publisher:
         self.announce("change_applied", {"request": request, "id": command.key, **facts})
 
     def act(self, activity: str | None) -> None:
-        """Publish what the line is busy with; None: with polling. Ignored while the port is freed."""
+        """Publish the line's activity; None: polling. Ignored while the port is freed."""
         if not self._paused:
             self.publish(self._station.on_activity(activity or POLLING, self._clock.now()))
 
@@ -91,23 +91,23 @@ class Publisher:
             self.publish(self._station.line_failed(code, message, now))
 
     def configure(self, line: LineInfo, devices: Iterable[DeviceInfo]) -> None:
-        """Publish what is another in the line and its devices."""
+        """Publish the changes of the line and its devices."""
         self.publish(self._station.configure(line, tuple(devices), self._clock.now()))
 
     def introduce(self, **changes: Any) -> None:  # noqa: ANN401 - the fields of `DaemonInfo`
-        """Publish what is another in the daemon itself."""
+        """Publish the changes of the daemon itself."""
         self._info = replace(self._info, **changes)
         self.publish(self._station.introduce(self._info, self._clock.now()))
 
     def republish(self) -> int:
-        """Publish every retained topic once more; return how many."""
+        """Publish every retained topic again; return their number."""
         self._uplink.republish()
         return len(self._station.topics()) + 1 + self._uplink.discovery.republish()
 
     # -- what is asked
 
     def health(self) -> dict[str, object]:
-        """Return how the daemon, the line and the devices are, as in `status.json`."""
+        """Return the state of the daemon, the line and the devices, as in `status.json`."""
         backlog = self._uplink.backlog
         broker = {"connected": self._uplink.connected, "depth": backlog.depth, "dropped": backlog.dropped}
         return {**self._station.snapshot(self._clock.now()), "broker": broker}
@@ -127,7 +127,7 @@ class Publisher:
         return self._station.topics()
 
     def on_announced(self) -> None:
-        """Publish what waited until the broker had the first burst."""
+        """Publish what had to wait for the first burst."""
         self._uplink.publish(self._first_burst.settle(self._station.burst(self._clock.now(), self._uplink.backlog)))
 
     def on_uplink_change(self) -> None:

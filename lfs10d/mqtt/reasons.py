@@ -1,4 +1,4 @@
-"""Why a connection to the broker ended or never came to be, in a word for the program and in words for a person."""
+"""Why a connection to the broker ended or failed, as a value and in words."""
 
 from __future__ import annotations
 
@@ -71,15 +71,15 @@ class DisconnectReason(StrEnum):
     """What happened, as far as the next attempt depends on it."""
 
     UNREACHABLE = "unreachable"
-    """Nobody is there: no name, no route, no answer, or the port is closed."""
+    """The broker is unreachable: no name, no route, no answer, or the port is closed."""
     CLOSED = "closed"
-    """The broker closed the connection during TLS, without a word."""
+    """The broker closed the connection during TLS without an alert."""
     WRONG_VERSION = "wrong_version"
     """The broker refuses this version of MQTT, or sent no CONNACK at all, which old brokers do instead."""
     REFUSED = "refused"
     """The CONNACK says no for another reason, or there is no TLS, or our own password or certificate is of no use."""
     LOST = "lost"
-    """The connection was there and is gone."""
+    """The connection was made and is lost."""
     TAKEN_OVER = "taken_over"
     """Another client uses our client id."""
     LEFT = "left"
@@ -94,18 +94,18 @@ class Disconnect:
     message: str
     reason: int | None = None
     by_message: bool = False
-    """The broker ended it, and a message of ours may be why."""
+    """The broker ended it, perhaps because of a message of ours."""
 
 
 def reason_in_words(reason: int) -> str:
-    """Return what a reason code >= 0x80 says."""
+    """Return the meaning of a reason code >= 0x80."""
     return _REASONS.get(reason, f"reason code 0x{reason:02X}")
 
 
 def gone(
     place: str, *, left: bool, accepted: bool, reason: int | None = None, cause: BaseException | str | None = None
 ) -> Disconnect:
-    """Return what the end of a connection to the broker at `place` means.
+    """Return the end of a connection to the broker at `place`.
 
     `left`: we said so; `accepted`: the broker had accepted us; `reason` is that of its DISCONNECT, None without one;
     `cause` is why we ended it or could not go on, None: the broker closed it without a word.
@@ -145,7 +145,7 @@ def _words_of_loss(cause: BaseException | str | None) -> str:
 
 
 def failed(error: BaseException, settings: BrokerSettings) -> Disconnect:
-    """Return why no connection could be made: to none of the nodes, where there are several."""
+    """Return why no connection could be made, to any of the nodes."""
     if isinstance(error, NoNodeError):
         each = sorted(failed(caught, node).message for node, caught in error.failures)  # alike whoever is first in turn
         return Disconnect(DisconnectReason.UNREACHABLE, "; ".join(each))

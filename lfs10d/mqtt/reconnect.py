@@ -1,4 +1,4 @@
-"""When the next connection is tried, to which node, and in which version. Pure: time and chance are arguments.
+"""Decides when the next connection is tried, to which node, and in which version. Pure: time and chance are arguments.
 
 - A connection that held is renewed at once, with the same node. A node that is not there (no name, no route, no
   answer, port closed) is tried every second, shortened by chance by up to a quarter, so that a hundred gateways do
@@ -40,7 +40,7 @@ LONGEST_DELAY = 30.0
 """Seconds between two attempts where a node refuses us."""
 
 JITTER = 0.25
-"""The part of a delay that chance may take away."""
+"""Random part of a delay."""
 
 HELD = 10.0
 """Seconds after which a connection counts as one that held."""
@@ -63,7 +63,7 @@ _WORDLESS = frozenset({DisconnectReason.WRONG_VERSION, DisconnectReason.CLOSED})
 
 @dataclass(slots=True)
 class _Node:
-    """What is known of one node; `due` is the earliest time of its next attempt."""
+    """One node; `due` is the earliest time of its next attempt."""
 
     due: float = float("-inf")
     delay: float = FIRST_DELAY
@@ -182,7 +182,7 @@ class Reconnect:
         self._choose(now)
 
     def _absent(self, ended: Disconnect, now: float) -> bool:
-        """Tell whether the node is away, rather than refusing us."""
+        """Return whether the node is away, rather than refusing us."""
         node = self._current
         if ended.ending not in _WORDLESS or ended.reason is not None:
             node.silent_since = None

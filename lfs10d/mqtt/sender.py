@@ -107,7 +107,7 @@ class Sender:
 
     @property
     def under_way(self) -> dict[str, int]:
-        """What the broker may have got last: topics under `B`, each with the bytes of its largest message."""
+        """Messages under way: topics under `B`, each with the bytes of its largest message."""
         found: dict[str, int] = {}
         for each in (*self._sent.values(), *self._unproved):
             found[each.item.topic] = max(each.size, found.get(each.item.topic, 0))
@@ -115,7 +115,7 @@ class Sender:
 
     @property
     def explains_end(self) -> bool:
-        """Something is under way that was so when the connection before ended: it may be why this one does."""
+        """Whether a message is under way that was also under way when the previous connection ended."""
         return self._outbox.suspects.explain(self.under_way)
 
     def _report(self, culprit: Culprit, ended: Disconnect) -> None:
@@ -128,7 +128,7 @@ class Sender:
                         ended.message, culprit.size, topic)  # fmt: skip
 
     def wake(self) -> None:
-        """Send what there is to send: some at once, the rest soon."""
+        """Send the queue: some at once, the rest soon."""
         if self._connection is not None and self._turn is None and not self._sending:
             self._send_some()
 
@@ -278,7 +278,7 @@ class Sender:
         self.wake()
 
     def _set_alarm(self) -> None:
-        """Come back when time alone brings something to send, or shows that the broker is stuck."""
+        """Set a timer for the next message that is due by time, or for a broker that is stuck."""
         due, oldest = self._outbox.due(), next(iter(self._sent.values()), None)
         if oldest is not None and (due is None or oldest.at + ACKNOWLEDGED_WITHIN < due):
             due = oldest.at + ACKNOWLEDGED_WITHIN

@@ -1,4 +1,4 @@
-"""Where full topics are spelled: `B` = `<base topic>/<line name>`, and what lies under it.
+"""Builds and parses full topics: `B` = `<base topic>/<line name>`, and the topics under it.
 
 What a daemon publishes is named under `B` in `lfs10d.telemetry.publication`; here are `B` itself, the requests, the
 responses and the filters. Pure.
@@ -90,7 +90,7 @@ class Topics:
         return topic.removeprefix(prefix) if topic.startswith(prefix) else None
 
     def is_owned(self, relative: str) -> bool:
-        """Tell whether a topic under `B` is a retained topic of a device, as `retained_of_devices` has them."""
+        """Return whether a topic under `B` is a retained topic of a device (`retained_of_devices`)."""
         match relative.split("/"):
             case ["device", _, leaf]:
                 return leaf in OWNED_LEAVES

@@ -1,4 +1,4 @@
-"""The daemon at the broker: its will, its bursts, its requests, and what is left over from before.
+"""The daemon's session at the broker: will, bursts, requests, and cleanup of old topics.
 
 After a connect: subscribe to requests and to our own availability; every retained topic; when the broker has them
 all, availability `online`; then live samples; then clear the retained topics of devices that are no longer
@@ -103,16 +103,16 @@ class Uplink:
 
     @property
     def duplicate(self) -> bool:
-        """Another client takes our id away: `duplicate_client`."""
+        """Whether another client uses our client id: `duplicate_client`."""
         return self._client.duplicate
 
     @property
     def backlog(self) -> telemetry.BacklogStats:
-        """What waits, for `line/stats`."""
+        """The backlog, for `line/stats`."""
         return self._outbox.stats
 
     async def start(self, events: UplinkEvents, *, on_request: OnRequest, on_spool_trouble: OnSpoolTrouble) -> None:
-        """Begin to connect; what is published before waits."""
+        """Begin to connect; earlier publications wait."""
         self._events, self._on_request = events, on_request
         connect, clear = self._client.beside, self._clear_orphans
         self._cleanup = Cleanup(self._topics, owned=events.topics, clear=clear, connect=connect)
@@ -191,13 +191,13 @@ class Uplink:
             self._clear_if_out()
 
     def republish(self) -> None:
-        """Send every retained topic once more."""
+        """Send every retained topic again."""
         if self.connected:
             self._outbox.burst(self._events.burst(), _ONLINE)
             self._sender.wake()
 
     def publish(self, publications: Iterable[Publication]) -> None:
-        """Send these, or keep them while the broker is away."""
+        """Send publications, or keep them while the broker is away."""
         now, backlog = asyncio.get_running_loop().time(), self._outbox.backlog
         shift, dropped = self._shift(now), backlog.losses.total
         for publication in publications:
@@ -257,7 +257,7 @@ class Uplink:
         self._events.on_uplink_change()
 
     def acknowledged(self, mid: int, reason: int) -> None:
-        """Send what may go now."""
+        """Send the messages that may go now."""
         self._sender.acknowledged(mid, reason)
         if self._outbox.backlog.spool.rows:
             self._poke()

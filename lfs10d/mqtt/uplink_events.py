@@ -1,4 +1,4 @@
-"""What the uplink needs of whoever starts it, and what it reports to it."""
+"""The events of the uplink."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ OnSpoolTrouble: TypeAlias = Callable[[str | None], None]
 
 
 class UplinkEvents(Protocol):
-    """What the uplink publishes at each connect, and what it reports. Called in the thread of the asyncio loop."""
+    """The publications of each connect, and the events of the uplink. Called in the thread of the asyncio loop."""
 
     def burst(self) -> Iterable[Publication]:
         """Return every retained topic but `availability`, as it is now."""

@@ -1,4 +1,4 @@
-"""The backlog: samples that are no longer live, in the store and in memory, and what was lost of them. Pure.
+"""The backlog: samples that are no longer live, in the store and in memory, and their losses. Pure.
 
 The rules (contract, section 3):
 
@@ -54,7 +54,7 @@ class Backlog:
 
     def __init__(self, *, capacity: int, detection: float) -> None:
         self.telemetry = True
-        """Samples of polls are sent; False: they stay where they are, and only records go."""
+        """Whether samples of polls are sent; otherwise they stay, and only records are sent."""
         self._open_from = 0.0
         self._batch_at = 0.0
         self._batch_most = BATCH_MOST
@@ -65,15 +65,15 @@ class Backlog:
         self.recent = RecentAcks(capacity=capacity, detection=detection)
         """What was acknowledged lately."""
         self.history = History()
-        """What waits in memory."""
+        """The samples in memory."""
         self.spill = Spill(self.history, self.recent, capacity)
-        """What of it goes to the store."""
+        """Decides what is written to the store."""
         self.spool = Spool()
-        """What waits in the store."""
+        """The samples in the store."""
         self.losses = Losses()
-        """What will never come."""
+        """The lost samples."""
         self.drain = Drain()
-        """How much of the window the backlog takes."""
+        """The part of the window for the backlog."""
 
     # The connection
 

@@ -64,7 +64,7 @@ class History:
     """What waits; `len()` counts the samples. No sample is put here while it stands here already."""
 
     count: int = 0
-    """What `len()` says."""
+    """The number of samples."""
     _queues: dict[Key, list[QueuedSample]] = field(default_factory=dict)
     _repeated: int = 0
 

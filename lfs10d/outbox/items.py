@@ -80,7 +80,7 @@ class HistoryBatch:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LossNotice:
-    """Samples that will never come, for event `dropped`."""
+    """Lost samples, for event `dropped`."""
 
     loss: Loss
 

@@ -9,7 +9,7 @@ from lfs10d.outbox.items import Message
 from lfs10d.telemetry.publication import PublicationKind
 
 MESSAGES_MOST = 1000
-"""Responses and events that wait while the broker is away; and traces while it is slow. Beyond that the oldest go."""
+"""Most responses and events that wait while the broker is away, and traces while it is slow; the oldest are dropped."""
 
 
 class MessageQueue:

@@ -62,9 +62,9 @@ class Outbox:
         self._congestion = Congestion()
         self._refusals = Refusals()
         self.backlog = Backlog(capacity=capacity, detection=detection)
-        """What is no longer live."""
+        """The backlog: samples that are no longer live."""
         self.suspects = Suspects()
-        """What may have ended the last connection."""
+        """The messages that may have ended the last connection."""
         self._queues = Queues(self.backlog, self._refusals, self.suspects)
         self._in_flight = InFlight(self.suspects)
         self._last_message: LastMessage | None = None
@@ -269,7 +269,7 @@ class Outbox:
 
     @property
     def stats(self) -> BacklogStats:
-        """What `line/stats` says of it."""
+        """The figures for `line/stats`."""
         oldest_ts = self.backlog.spool.oldest()
         if oldest_ts is None:
             under_way = chain.from_iterable(self._in_flight.in_memory())

@@ -26,9 +26,9 @@ class Spill:
 
     def __init__(self, history: History, recent: RecentAcks, capacity: int) -> None:
         self.samples: list[QueuedSample] = []
-        """What is being handed over."""
+        """The samples being written to the store."""
         self.away = True
-        """The broker is."""
+        """Whether the broker is there."""
         self._history = history
         self._recent = recent
         self._capacity = capacity

@@ -34,7 +34,7 @@ class Spool:
     rows: int = 0
     oldest_ts: int | None = None
     more: bool = False
-    """There are rows after the page."""
+    """Whether there are rows after the page."""
     page: History = field(default_factory=History)
     after: int = 0
     """The id of the last row that was taken."""

@@ -14,7 +14,7 @@ CHANGES, MESSAGES, LIVE, HISTORY, REFRESHES, TRACES, CLEARINGS = range(7)
 """The classes of the outbox."""
 
 FIRST_CLASSES = HISTORY
-"""Those below go before the others while the window has room for all."""
+"""Classes below this go first while the window has room for all."""
 
 WEIGHT = 8
 REFRESH_WEIGHT = 4

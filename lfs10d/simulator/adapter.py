@@ -1,4 +1,4 @@
-"""What a master's adapter makes of the line: which bytes are readable when."""
+"""The adapter of a master: which bytes are readable when."""
 
 from __future__ import annotations
 

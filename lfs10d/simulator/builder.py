@@ -1,4 +1,4 @@
-"""A whole line from a few words: ids, rate, framing, device, faults."""
+"""Builds a simulated line from its plan: ids, rate, framing, device, faults."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LAST_ID = 255
 
 @dataclass(frozen=True, slots=True)
 class LinePlan:
-    """What kind of line; times in seconds."""
+    """The plan of a line; times in seconds."""
 
     slaves: Sequence[int]
     format: Format = field(default_factory=Format)
@@ -44,7 +44,7 @@ def build(
     *,
     keep_log: bool = False,
 ) -> SimulatedLine:
-    """Return the line with its sensors and everything that ails them and it, but for echo and latency.
+    """Return the line with its sensors and all faults, except echo and latency.
 
     `blueprints` has the devices of single slave ids, where they differ from the plan's. Echo and latency are the
     adapter's: hand `faults.line.echo` and `.latency` to the port or the `PtyLine`.

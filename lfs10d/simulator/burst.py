@@ -1,4 +1,4 @@
-"""Bytes on the wire, and what becomes of two speakers at once.
+"""Bytes on the wire, and collisions of two senders.
 
 The bytes of the one that began earlier are mangled where the other speaks, and of the other only what it sends
 afterwards comes through. Equal bytes at exactly the same time pass unharmed: two sensors that answer bit by bit the
@@ -40,7 +40,7 @@ class Burst:
 
 
 class Receiver(Protocol):
-    """What hears the line: an adapter."""
+    """A receiver on the line: an adapter."""
 
     def offer(self, burst: Burst) -> None:
         """Take a burst that has just begun."""

@@ -47,7 +47,7 @@ class _Entry(BaseModel):
 
 
 class WindowEntry(_Entry):
-    """When something holds; without times always."""
+    """A window of time; without keys always."""
 
     after: Time = Field(0.0, description="When it begins, after the simulator's start.")
     lasts: Time | None = Field(None, alias="for", description="How long it lasts; without it, for ever.")
@@ -113,14 +113,16 @@ Faults: TypeAlias = Annotated[
 
 
 class SlaveEntry(_Entry):
-    """One sensor's faults, and where it differs from the others."""
+    """The faults of one sensor, and its own settings."""
 
     profile: Annotated[str, Text(4096)] | None = Field(
-        None, description="What device it is: a profile's name, or its file relative to this one."
+        None, description="Its profile: a name, or a file relative to this one."
     )
     faults: Faults = Field((), description="Its faults.")
-    turnaround: Time | None = Field(None, description="From a request's last bit to its answer's first.")
-    jitter: Time | None = Field(None, description="Random additional time, up to this.")
+    turnaround: Time | None = Field(
+        None, description="Time from the last bit of a request to the first bit of its answer."
+    )
+    jitter: Time | None = Field(None, description="Longest random time added to that.")
     baudrate: Annotated[int, Choice(BAUDRATES)] | None = Field(None, description="Its rate, if not the line's.")
     copies: Annotated[int, Whole(1, MOST_COPIES)] = Field(1, description="Number of sensors with this id.")
 
@@ -148,7 +150,7 @@ class SecondMasterEntry(_Entry):
 
 
 class LineEntry(_Entry):
-    """What troubles the whole line."""
+    """The faults of the whole line."""
 
     echo: Annotated[bool, Flag()] = Field(default=False, description="The adapter returns the bytes of the master.")
     latency: Annotated[float, Duration(0, 1)] = Field(0.0, description="Interval at which the adapter delivers bytes.")

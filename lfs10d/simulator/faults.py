@@ -27,7 +27,7 @@ class FaultKind(StrEnum):
     NEEDS_REST = "needs_rest"
     """Ignores a request that ends sooner than `delay` (250 ms) after the end of its last answer."""
     SLEEPS = "sleeps"
-    """Is woken by a request, and loses it, where nothing was asked of it for `delay` (500 ms)."""
+    """Loses the request that wakes it, after `delay` (500 ms) without a request."""
     LATE = "late"
     """Answers `delay` later than it would, also into the next requests."""
     SLOW_BYTES = "slow_bytes"
@@ -100,7 +100,7 @@ STRIKES_FRAMES = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """When something holds: from `first` to before `last` (None: for ever), again after each `every`."""
+    """A window of time: from `first` to before `last` (None: for ever), again after each `every`."""
 
     first: int = 0
     last: int | None = None
@@ -135,7 +135,7 @@ def window(first: float = 0.0, last: float | None = None, every: float | None = 
 
 @dataclass(frozen=True, slots=True)
 class SensorFault:
-    """One fault of one sensor: what, in how many of its answers, when, and its particulars."""
+    """One fault of one sensor: its kind, the share of answers, its window, and details."""
 
     kind: FaultKind
     rate: float = 1.0

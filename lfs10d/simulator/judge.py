@@ -1,4 +1,4 @@
-"""The judge of the master: what it sent too early or torn, as a strict slave would see it.
+"""The judge of the master: finds requests that begin too early or are torn, as a strict slave does.
 
 Rules (Modbus over Serial Line V1.02, section 2.5.1.1; LFS10, DZB and EH600 manuals), for RTU:
 
@@ -30,7 +30,7 @@ EXCESS_EDGES_US: Final = (0, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000, 500
 
 
 class JudgeReport(StrEnum):
-    """What became of a request."""
+    """The verdict on a request."""
 
     HEARD = "heard"
     GAP = "gap"

@@ -1,4 +1,4 @@
-"""The wire itself: who speaks when, what collides, and what each party hears. Time is an argument.
+"""The wire: who sends when, what collides, and what each party receives. Time is an argument.
 
 `SimulatedLine` knows neither a clock nor a port: a master transmits at a time in nanoseconds, an `Adapter`
 collects what has arrived by a time. In virtual time and on a pseudo terminal it is the same object.

@@ -1,4 +1,4 @@
-"""What can trouble a whole line: babble, stray bytes, a second master. Times are seconds of the line's clock."""
+"""Faults of a whole line: babble, stray bytes, a second master. Times are seconds of the line's clock."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where simulated values come from: moving wind, or numbers that are unique in a run.
+"""Sources of simulated values: moving wind, or numbers that are unique in a run.
 
 Both are plain decimals of few digits, so a value read back from a float32 by its shortest decimal is equal.
 """

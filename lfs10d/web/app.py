@@ -1,4 +1,4 @@
-"""The page's addresses: what each answers, and who may ask."""
+"""The page's addresses: the response of each, and who may request it."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ class _Pages:
         self._files = _static_files()
 
     async def healthz(self, request: Request) -> Response:
-        """Tell that the server turns."""
+        """Report that the server runs."""
         del request
         return JSONResponse({"status": "ok", "version": __version__, **self._viewers.figures()})
 
@@ -145,7 +145,7 @@ class _Pages:
         return JSONResponse({"v": 1, "points": points})
 
     async def session(self, request: Request) -> Response:
-        """Tell whether this viewer may change anything; a cookie of an older token is taken back."""
+        """Return whether this viewer may change anything; a cookie of an older token is removed."""
         checked = self._judge(request)
         body = {"controls": self._token.known, "open": checked is TokenCheck.RIGHT}
         response = _refused(checked) if checked is TokenCheck.LIMITED else JSONResponse(body)
@@ -171,7 +171,7 @@ class _Pages:
         return response
 
     async def logout(self, request: Request) -> Response:
-        """Take the cookie back."""
+        """Remove the cookie."""
         if (foreign := _foreign(request)) is not None:
             return foreign
         response = JSONResponse({"status": "ok"})

@@ -1,4 +1,4 @@
-"""What feeds the lines: one connection for each base topic, and the status files of this machine's daemons."""
+"""The sources of the lines: one connection per base topic, and the status files of this machine's daemons."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ class Feed:
         await self._client.disconnect()
 
     def look(self) -> None:
-        """Take what the connection and the status files say now."""
+        """Take the news of the connection and the status files."""
         client = self._client
         for line in self._lines():
             link = line.link

@@ -1,4 +1,4 @@
-"""Who may ask what of the page: host names, origins, the token. Pure; `now` is monotonic seconds.
+"""Access to the page: host names, origins, the token. Pure; `now` is monotonic seconds.
 
 Rules
 -----
@@ -91,7 +91,7 @@ def loopback(host: str) -> bool:
 
 
 def viewer_of(host: str) -> str:
-    """Return who a viewer counts as: its address, of IPv6 the network, for each has a whole one."""
+    """Return the key of a viewer: its address, or of IPv6 its network."""
     return ":".join(host.split(":")[:4]) if host.count(":") > 3 else host  # noqa: PLR2004 - 64 of 128 bits
 
 

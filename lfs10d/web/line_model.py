@@ -35,7 +35,7 @@ _INFO_KEYS: Final = ("version", "host", "boot", "started", "clock", "changes", "
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """Where the figures come from: `broker`, `status` (the file), or `none` where they are not current; in words."""
+    """The source of the figures: `broker`, `status` (the file), or `none` if they are not current; and in words."""
 
     kind: str
     words: str
@@ -48,7 +48,7 @@ class Source:
 
 @dataclass(slots=True)
 class Side:
-    """The line as one source shows it: its live state, and the rest of what it said last."""
+    """The line as one source shows it: its live state and its other last payloads."""
 
     live: LiveState
     samples: dict[str, dict[str, Any]] = field(default_factory=dict)
@@ -127,7 +127,7 @@ class LineModel:
                 side.live.on_message(topic, payload, old=old, now=now, wall=wall)
 
     def _may_be(self, name: str) -> bool:
-        """Whether this may be a device: anybody may publish at a broker, and nothing here may grow without an end."""
+        """Whether this may be a device: any client may publish, and nothing here may grow without limit."""
         if name not in self._names and len(self._names) < 2 * MOST_DEVICES and _NAME.fullmatch(name):
             self._names.add(name)
         return name in self._names

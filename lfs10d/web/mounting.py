@@ -16,18 +16,18 @@ from lfs10d.errors import BrokerError, FailedError
 from lfs10d.web.words import answer
 
 LONGEST: Final = 2 * 3600.0
-"""s after which it ends by itself: somebody may have closed the page and gone home."""
+"""s after which it ends by itself: the page may have been closed."""
 FIRST: Final = "Plug in a sensor."
 NEXT: Final = "Plug in the next one."
 SETTING_UP: Final = "A sensor is being set up: leave it connected. This takes about 20 s."
 LONGEST_SEARCH: Final = 8.0
 """s for the daemon to find that no new sensor is there, where it has not done so yet; later it is known better."""
 LONGER: Final = 1.5
-"""So many times the longest search: what takes longer is a sensor that answered."""
+"""Multiple of the longest search: a request that takes longer has found a sensor."""
 
 
 class Mounting:
-    """The requests, until all names are given or it is stopped; `words` is what the person reads now."""
+    """One mounting: requests until all names are given or it is stopped; `words` is the present message."""
 
     def __init__(
         self,
@@ -43,7 +43,7 @@ class Mounting:
         self._words = "Looking for the daemon ..."
         self._problem = ""
         self._told: tuple[object, str] = (None, "")
-        """The code of the last problem, and its words: the loop tells each only once."""
+        """The code of the last problem, and its message: the loop reports each only once."""
         self._began = round(time.time() * 1000)
         self._task: asyncio.Task[None] | None = None
         self._client = client

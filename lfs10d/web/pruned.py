@@ -1,4 +1,4 @@
-"""What anybody may publish at a broker, cut to what a browser can read and a page can show. Pure."""
+"""Cuts foreign payloads to what a browser can read and a page can show. Pure."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ MOST_NUMBER: Final = 1e300
 
 
 def pruned(value: Any, depth: int = 6) -> Any:  # noqa: ANN401 - any JSON
-    """Return what may be shown of any JSON: finite numbers, texts, lists and objects of a reasonable size."""
+    """Return the part of any JSON that may be shown: finite numbers, texts, lists and objects of a reasonable size."""
     match value:
         case None | bool():
             return value

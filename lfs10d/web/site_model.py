@@ -1,4 +1,4 @@
-"""All lines together, as one document and as its changes: what the page is fed with. Pure."""
+"""All lines together, as one document and as changes of it, for the page. Pure."""
 
 from __future__ import annotations
 

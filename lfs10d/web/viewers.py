@@ -21,7 +21,7 @@ from lfs10d.web.site_model import SiteModel, Stream, event_bytes
 EVERY: Final = 0.5
 """s between two events: fast enough to follow a cup that is turned by hand."""
 AT_LEAST_EVERY: Final = 2.0
-"""s: a viewer who hears nothing for longer shows that it is not live."""
+"""s without an event after which a viewer shows that it is not live."""
 MOST_VIEWERS: Final = 64
 MOST_OF_ONE: Final = 40
 """Viewers of one address: nobody keeps all others out."""
@@ -31,7 +31,7 @@ RETRY: Final = b"retry: 2000\n\n"
 
 
 class Viewers:
-    """What is shown to all: the lines, their requests, and the open streams."""
+    """The lines, their requests, and the open streams to viewers."""
 
     def __init__(self, site: SiteModel, feeds: Sequence[Feed]) -> None:
         self.site = site

@@ -1,4 +1,4 @@
-"""What a code means and what to do about it, for a person at the mast or in the office. Pure.
+"""The meaning of each code and what to do about it, for viewers of the page. Pure.
 
 The long form is docs/when-it-goes-wrong.md.
 """
@@ -58,12 +58,12 @@ MEANINGS: Final[Mapping[str, tuple[str, str]]] = {
 
 
 def meaning(code: object) -> str:
-    """Return what a code means; the code itself where it is not known."""
+    """Return the meaning of a code; the code itself if it is unknown."""
     return MEANINGS[code][0] if isinstance(code, str) and code in MEANINGS else str(code)
 
 
 def remedy(code: object) -> str:
-    """Return what to do about a code; empty where it is not known."""
+    """Return what to do about a code; empty if it is unknown."""
     return MEANINGS[code][1] if isinstance(code, str) and code in MEANINGS else ""
 
 

@@ -1,1 +1,1 @@
-"""What the verbs show: tables, live views, progress."""
+"""The output of the verbs: tables, live views, progress."""

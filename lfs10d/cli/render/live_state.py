@@ -60,7 +60,7 @@ class ShownDevice:
     """The mean of the last 2 min."""
     trail: deque[tuple[float, float]] = field(default_factory=deque)
     turned: tuple[float, bool] | None = None
-    """When it came online or went offline last, and whether it came."""
+    """Time of the last change of availability, and whether it came online."""
 
     @property
     def value(self) -> float | None:
@@ -73,7 +73,7 @@ class ShownDevice:
         return next((self.units.get(name, "") for name, value in self.values.items() if _number(value) is not None), "")
 
     def moved(self, now: float) -> float:
-        """Return how far its value went to and fro in the last seconds."""
+        """Return the sum of the value's movements in the last seconds."""
         while self.trail and self.trail[0][0] < now - MOVES_WITHIN:
             self.trail.popleft()
         values = [value for _, value in self.trail]

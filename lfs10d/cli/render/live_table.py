@@ -23,7 +23,7 @@ LONGEST_WORD: Final = 200
 """Characters of one thing about the line: enough for the path of a port."""
 
 JUST: Final = 5.0
-"""s for which it is marked that a device came or went."""
+"""s for which a device that came or went is marked."""
 
 _MARKS: Final = {"moved": ">", "came": "+", "went": "-"}
 _MARK_STYLES: Final = {"moved": "bold black on green", "came": "bold green", "went": "bold red"}
@@ -31,7 +31,7 @@ _MARK_STYLES: Final = {"moved": "bold black on green", "came": "bold green", "we
 
 @dataclass(frozen=True, slots=True)
 class DataSource:
-    """Where the state comes from, in words; `alive`: it is current."""
+    """The source of the state, in words; `alive`: it is current."""
 
     words: str
     alive: bool
@@ -295,7 +295,7 @@ def screen(
 
 
 def _rank(row: TableRow) -> int:
-    """Return the order of importance: what moves, what fails, the rest."""
+    """Return the rank of a row: first what moved, then what fails, then the rest."""
     if row.just:
         return 0
     return 2 if row.good and not row.stale else 1

@@ -1,4 +1,4 @@
-"""What a scan found, in words: a table for people, YAML to paste, JSON for programs."""
+"""The findings of a scan: a table for people, YAML to paste, JSON for programs."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def value_text(finding: FoundDevice, calibrated: Mapping[str, Value | None] = NO
 
 
 def remarks(finding: FoundDevice) -> Iterator[str]:
-    """Yield what a person should know of it."""
+    """Yield remarks about a device."""
     if finding.duplicate:
         yield f"DUPLICATE? {finding.spoilt} of {finding.tries} replies garbled: two sensors with this id?"
     elif finding.spoilt:
@@ -232,7 +232,7 @@ def _word(profile: Profile, asked: ScanRequest) -> str:
 
 
 def _obstacle(finding: FoundDevice, baudrate: int) -> str | None:
-    """Return why it cannot be polled as it is."""
+    """Return why a device cannot be polled as it is."""
     if finding.suspect:
         return "suspect"
     if finding.duplicate:

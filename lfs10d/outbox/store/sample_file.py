@@ -62,7 +62,7 @@ class StoredRow:
 
 
 def unheard(evicted: tuple[Loss, ...]) -> None:
-    """Take what is about to be lost, and do nothing about it."""
+    """Ignore samples that are about to be lost."""
     del evicted
 
 
@@ -82,7 +82,7 @@ class SampleFile:
             self.losses = tuple(
                 Loss(*each) for each in self._db.execute("SELECT device, boot, from_seq, to_seq, count FROM loss")
             )
-            """What the table of losses says."""
+            """The table of losses."""
             self.rows = number(self._db, "SELECT count(*) FROM sample")  # reads every page of them
             """Samples in the file."""
             self.next = max(first, 1 + number(self._db, "SELECT coalesce(max(id), 0) FROM sample"))

@@ -85,13 +85,13 @@ class Store:
         self._doubtful: tuple[int, tuple[Loss, ...]] | None = None
         self._aside = 0
         self.reports: deque[FileSetAside] = deque()
-        """Files put aside that nobody has told of yet."""
+        """Files put aside that are not reported yet."""
         self.rows = 0
         """Samples on the disk."""
         self.oldest_ts: int | None = None
         """`ts` of the oldest of them."""
         self.losses: tuple[Loss, ...] = ()
-        """What is kept as to be declared."""
+        """The losses to be reported."""
 
     @property
     def open_for_more(self) -> bool:
