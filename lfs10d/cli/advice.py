@@ -62,7 +62,7 @@ def _load(loaded: LoadedConfig, budget: Budget) -> Iterator[tuple[KeyPath, str]]
 
 
 def loopback(host: str) -> bool:
-    """Tell whether a broker's host is this machine, judged by its name alone."""
+    """Return whether a broker's host is this machine, judged by its name alone."""
     if host.lower().rstrip(".") == "localhost" or host.lower().endswith(".localhost"):
         return True
     try:

@@ -143,9 +143,9 @@ def _lines(loaded: LoadedConfig, found: Budget) -> Iterator[str]:
         yield from columns(("device", "value", "calibration"), calibrated)
         yield ""
     yield (
-        f"load             {found.load:.1%} of the line without turnaround, "
+        f"load             {found.load:.1%} of the line if answers begin at once, "
         f"{found.load_with_turnaround:.1%} if each answer takes 5 ms to begin"
     )
-    yield f"fastest cycle    {found.shortest_cycle * 1e3:.1f} ms to poll each once, without turnaround"
+    yield f"fastest cycle    {found.shortest_cycle * 1e3:.1f} ms to poll each once, if answers begin at once"
     yield f"slowest cycle    {found.slowest_cycle:.3g} s if every answer begins at the last moment"
     yield f"silence          {found.gap * 1e6:.0f} us before each request"

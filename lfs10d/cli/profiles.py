@@ -74,7 +74,7 @@ def _overview(known: Iterable[Profile]) -> Table:
 
 
 def seen(profile: Profile) -> str:
-    """Return which facts nobody has seen on hardware or in the source documents; empty where there are none."""
+    """Return which facts are not verified on hardware or in the source documents; empty if all are."""
     places = {"slave_id": profile.slave_id, "baudrate": profile.baudrate, "barrier": profile.barrier}
     unverified = [value.name for value in profile.values if value.unverified]
     if len(unverified) == len(profile.values):

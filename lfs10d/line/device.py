@@ -214,7 +214,7 @@ class Device:
 
     @property
     def patience(self) -> float | None:
-        """How long after a request bytes may come that begin its answer, in s, where that is known."""
+        """Longest time in s from a request to the first bytes of its answer, if known."""
         p99 = self.response_times.p99
         if p99 is None and self.failures and not self.silent:
             return BAD_ANSWER_PATIENCE

@@ -29,7 +29,7 @@ class HandOver:
         self._since = inf
         """When the first of the events that wait was left."""
         self._seen = 0
-        """So many of them have been looked at, and can wait."""
+        """The number of events that were checked and can wait."""
 
     def on_exchange(self, took: float) -> None:
         """Note how long an exchange took with the silence before it, in s."""
@@ -57,7 +57,7 @@ class HandOver:
 
 
 def _can_wait(event: Event) -> bool:
-    """Tell whether an event may wait: no request waits for it, it reports no fault, and many like it come."""
+    """Return whether an event may wait: no request waits for it, it reports no fault, and many like it come."""
     match event:
         case Reading():
             return event.fault is None and not event.requests and not event.probe

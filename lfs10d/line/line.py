@@ -105,7 +105,7 @@ class Line:
         self.wake()
 
     def hand_over_at_once(self, until: float) -> None:
-        """Hand over each exchange by itself until that monotonic time: somebody watches the frames."""
+        """Hand over each exchange by itself until that monotonic time: the frames are being watched."""
         self.poller.hand_over.at_once_until = until
 
     async def pause(self) -> None:

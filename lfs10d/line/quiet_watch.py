@@ -63,7 +63,7 @@ class _SlaveQuiet:
     any: float = 0.0
     awaited_until: float = -inf
     vain: int = 0
-    """How often in a row, the last time included, a second answer was awaited that has not come."""
+    """Watches in a row, the last one included, in which no second answer came."""
     again_at: float = -inf
     again: float = AGAIN
 
@@ -73,7 +73,7 @@ def _counted(count: float, *, hit: bool) -> float:
 
 
 class QuietWatch:
-    """One line; `now` is its clock at the beginning. Until `until` nobody is asked."""
+    """One line; `now` is its clock at the beginning. No slave is asked before `until`."""
 
     def __init__(self, duplicates: Duplicates, now: float) -> None:
         self.until = -inf

@@ -247,7 +247,7 @@ def _open_tty(path: str) -> int:
 
 
 def _is_console(device: int) -> bool:
-    """Tell whether it is a console: raw mode would take the keyboard away."""
+    """Return whether it is a console: raw mode would take the keyboard away."""
     major, minor = os.major(device), os.minor(device)
     return major == _TERMINALS or (major == _CONSOLES and minor < _FIRST_UART)
 

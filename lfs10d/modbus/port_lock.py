@@ -39,7 +39,7 @@ class Holder:
 
 
 def is_pty(fd: int) -> bool:
-    """Tell whether the open device is the slave of a pty, not a UART."""
+    """Return whether the open device is the slave of a pty, not a UART."""
     return os.major(os.fstat(fd).st_rdev) in PTY_MAJORS
 
 

@@ -74,7 +74,7 @@ class ReadRegisters:
 
 @dataclass(frozen=True, slots=True)
 class WriteRegister:
-    """Write one register by function 6 or 16; slave 0 is a broadcast, which nobody answers."""
+    """Write one register by function 6 or 16; slave 0 is a broadcast, which no slave answers."""
 
     slave: int
     address: int

@@ -63,7 +63,7 @@ class LineTiming:
         )
 
     def transmission(self, characters: int) -> float:
-        """Return how long so many characters take on the wire without a pause."""
+        """Return the time in s of this many characters on the wire without a pause."""
         return characters * self.character
 
     def exchange(self, request_characters: int, answer_characters: int, turnaround: float = 0.0) -> float:

@@ -28,7 +28,7 @@ class Pumped(Protocol):
         """Send a ping if it is time, end a connection that answers none."""
 
     def want_write(self) -> bool:
-        """Tell whether something waits."""
+        """Return whether something waits."""
 
 
 class Pump:

@@ -72,7 +72,7 @@ class History:
         return self.count
 
     def __contains__(self, key: Key) -> bool:
-        """Tell whether a sample of this source and boot waits."""
+        """Return whether a sample of this source and boot waits."""
         return key in self._queues
 
     def add(self, queued: QueuedSample) -> None:
@@ -101,7 +101,7 @@ class History:
         self._repeated += sum(queued.repeated for queued in taken)
 
     def waits(self, passed_over: Container[str] = NONE) -> bool:
-        """Tell whether a sample waits of a source that is not `passed_over`."""
+        """Return whether a sample waits of a source that is not `passed_over`."""
         return any(source not in passed_over for source, _ in self._queues)
 
     def take(self, most: int, passed_over: Container[str] = NONE) -> tuple[QueuedSample, ...]:

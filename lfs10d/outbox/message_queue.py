@@ -22,7 +22,7 @@ class MessageQueue:
         self._passed_over: deque[Message] = deque(maxlen=MESSAGES_MOST)
 
     def __bool__(self) -> bool:
-        """Tell whether anything waits that the broker does not refuse."""
+        """Return whether anything waits that the broker does not refuse."""
         return bool(self.messages or self.traces)
 
     def next_message(self, refused: AbstractSet[str]) -> Message | None:

@@ -207,7 +207,7 @@ class Outbox:
         return self._refusals.unfit(item.topic)
 
     def passes_over(self, topic: str) -> bool:
-        """Tell whether nothing is sent to a topic now, because the broker refuses it."""
+        """Return whether nothing is sent to a topic now, because the broker refuses it."""
         return topic in self._refusals.topics
 
     def shorten(self, batch: HistoryBatch, count: int) -> HistoryBatch:

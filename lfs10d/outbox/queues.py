@@ -110,7 +110,7 @@ class Queues:
         return waiting
 
     def _keeps_back(self, now: float) -> bool:
-        """Tell whether nothing but the burst may go now, whose `last` waits."""
+        """Return whether nothing but the burst may go now, whose `last` waits."""
         if self._burst_until is None:
             self._burst_until = now + BURST_FIRST
         return now < self._burst_until
@@ -126,7 +126,7 @@ class Queues:
         return self.backlog.next(self._now, refused)
 
     def __bool__(self) -> bool:
-        """Tell whether anything but the backlog waits."""
+        """Return whether anything but the backlog waits."""
         retained, messages = self.retained, self.messages
         waiting = self.live.waiting or retained.changes or retained.refreshes or retained.clearings
         return bool(waiting or retained.last or messages.messages or messages.traces)

@@ -29,7 +29,7 @@ class RecentAcks:
         """What was passed to nobody on a young connection: `again` is to be called for it too."""
 
     def add(self, samples: tuple[QueuedSample, ...], now: float, *, without_listener: bool) -> None:
-        """Note that the broker has these; `without_listener`: it passed them to nobody, on a young connection."""
+        """Note that the broker has these; `without_listener`: no client received them, on a young connection."""
         if not self.repeat:  # what a loss now would not touch is of no use
             self._forget(now - AGAIN_WITHIN)
         acknowledged = self.without_listener if without_listener and not self.repeat else self._acknowledged

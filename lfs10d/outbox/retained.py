@@ -30,7 +30,7 @@ class RetainedQueue:
         self._closing: Retained | None = None  # the `last` that is not acknowledged yet
 
     def __bool__(self) -> bool:
-        """Tell whether anything waits."""
+        """Return whether anything waits."""
         return bool(self.changes or self.refreshes or self.clearings) or self.last is not None
 
     @property

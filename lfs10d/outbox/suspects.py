@@ -38,11 +38,11 @@ class Suspects:
         """Bytes of the messages suspected, by topic."""
 
     def goes_alone(self, topic: str) -> bool:
-        """Tell whether a message of this topic may only be sent while nothing else is under way."""
+        """Return whether a message of this topic may only be sent while nothing else is under way."""
         return self.alone and topic in self.sizes
 
     def explain(self, sent: Mapping[str, int]) -> bool:
-        """Tell whether one of these was under way at the last end too: then a message may be why."""
+        """Return whether one of these was under way at the last end too: then a message may be why."""
         return not self.sizes.keys().isdisjoint(sent)
 
     def ended(self, sent: Mapping[str, int], *, certain: bool) -> Culprit | None:

@@ -137,7 +137,7 @@ class Judge:
 
     @property
     def violations(self) -> int:
-        """How often the master broke a rule."""
+        """The number of violations by the master."""
         return self.gap_violations + self.t15_violations + self.collisions
 
     def summary(self) -> dict[str, object]:

@@ -38,7 +38,7 @@ def babble(line: SimulatedLine, first: float, last: float | None = None, every: 
 def stray(
     line: SimulatedLine, rate: float = 1.0, *, length: int = 3, delay: float = 0.001, window: Window = ALWAYS
 ) -> None:
-    """Put `length` random bytes on the line `delay` after that share of the requests, whoever answers them."""
+    """Put `length` random bytes on the line `delay` after that share of the requests, in addition to their answers."""
 
     def after(request: HeardRequest) -> None:
         if window.covers(request.ended) and line.random.random() < rate:
@@ -50,7 +50,7 @@ def stray(
 def second_master(
     line: SimulatedLine, body: bytes, first: float, every: float, check: Check = "crc", *, last: float | None = None
 ) -> Callable[[], None]:
-    """Let another master send this request from `first` to before `last`, `every` so many seconds, deaf to the line.
+    """Let another master send this request from `first` to before `last`, every `every` seconds, without listening.
 
     Return the function that ends it.
     """

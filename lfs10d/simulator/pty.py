@@ -30,7 +30,7 @@ from lfs10d.simulator.wire import SECOND, nanoseconds
 
 READ_SIZE: Final = 4096
 LOOK_FOR_MASTER: Final = 0.002
-"""How often it is looked whether somebody has opened the terminal (s); the kernel does not tell."""
+"""Seconds between two checks whether the terminal was opened; the kernel gives no notice."""
 LONGEST_SLEEP: Final = 1.0
 STOP_WITHIN: Final = 2.0
 _OUTPUT_RATE = 5  # place in what tcgetattr returns
@@ -229,7 +229,7 @@ class PtyLine:
         self.line.transmit(data, self._time(), self.adapter.format)
 
     def _find_master(self) -> None:
-        """Notice that somebody has opened the terminal."""
+        """Notice that the terminal was opened."""
         poll = select.poll()
         poll.register(self._master, select.POLLIN)
         if not any(flags & select.POLLHUP for _, flags in poll.poll(0)):

@@ -1,4 +1,4 @@
-"""The viewers' one stream: the changes of all lines twice a second, each written once and sent to everybody."""
+"""The viewers' one stream: the changes of all lines twice a second, encoded once for all viewers."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ class ShownDevice:
         return next((self.units.get(name, "") for name, value in self.values.items() if _number(value) is not None), "")
 
     def moved(self, now: float) -> float:
-        """Return the sum of the value's movements in the last seconds."""
+        """Return the range of its value in the last seconds."""
         while self.trail and self.trail[0][0] < now - MOVES_WITHIN:
             self.trail.popleft()
         values = [value for _, value in self.trail]

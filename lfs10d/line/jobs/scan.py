@@ -73,7 +73,7 @@ class Noise:
 
 
 def _ignore(_: Scan) -> None:
-    """Report to nobody."""
+    """Ignore the report."""
 
 
 class Scan:

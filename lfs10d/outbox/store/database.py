@@ -63,7 +63,7 @@ _PRAGMAS = (
 
 
 class ForeignError(Exception):
-    """The file is a database of somebody else's, or of a later lfs10d; `later` tells which."""
+    """The file is a database of another program, or of a later lfs10d (`later`)."""
 
     def __init__(self, message: str, *, later: bool) -> None:
         super().__init__(message)
@@ -134,7 +134,7 @@ def _prepare(db: sqlite3.Connection) -> None:
 
 
 def _ends_within_a_page(path: Path) -> bool:
-    """Tell whether a file was cut. Where it has a log nobody knows: that may be about to complete it."""
+    """Return whether a file was cut. Where it has a log nobody knows: that may be about to complete it."""
     log = path.with_name(f"{path.name}-wal")
     return path.exists() and path.stat().st_size % PAGE > 0 and not (log.exists() and log.stat().st_size)
 

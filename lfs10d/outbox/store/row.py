@@ -218,7 +218,7 @@ def content_of(series: Series, cells: tuple[Cell, ...]) -> Content:
 
 
 def beyond_first_schema(cells: tuple[Cell, ...]) -> bool:
-    """Tell whether a cell is of a kind that files of schema 1 do not have: anything but a number without an age."""
+    """Return whether a cell is of a kind that files of schema 1 do not have: anything but a number without an age."""
     return any(
         cell in _MEANT if isinstance(cell, bytes) else isinstance(cell, str) and not cell.lstrip("-").isdecimal()
         for cell in cells

@@ -104,7 +104,7 @@ DIRECTION_NAMES: Final = ("direction", "direction_stddev")
 
 
 def is_record(source: str) -> bool:
-    """Tell whether records have this source."""
+    """Return whether records have this source."""
     return source.endswith(_SUFFIX)
 
 

@@ -237,7 +237,7 @@ class HeldSeries:
 
     @property
     def _closed(self) -> int:
-        """How many blocks are summed up."""
+        """The number of blocks that are summed up."""
         return len(self._covered)
 
     def _drop(self, blocks: int) -> None:
