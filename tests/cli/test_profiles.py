@@ -66,7 +66,7 @@ def test_a_profile_is_explained_in_words() -> None:
     assert said["slave ids"] == ["1 to 255; 1 from the factory"]
     assert said["baud rates"] == ["9600, 19200; 9600 from the factory"]
     assert said["one poll"] == ["reads 0x0001-0x0002"]
-    assert said["after silence"] == ["0x0005 is read first (the barrier)"]
+    assert said["after no answer"] == ["0x0005 is read first (the barrier)"]
     text = run("show", "lfs10")
     assert "set in register 0x0005, unless the DIP switch overrules it" in text
     assert "set in register 0x0004 (1 for 9600, 2 for 19200)\n" in text
@@ -82,7 +82,7 @@ def test_what_is_unverified_says_so() -> None:
 
 def test_the_limits_and_alternatives_of_a_device_are_told() -> None:
     assert cells("fuling-dzb")["one read"] == ["at most 5 registers, 16 data bytes in ascii"]
-    assert cells("eh600")["check of rtu"] == ["crc, or sum by a slave's key checksum"]
+    assert cells("eh600")["check (rtu)"] == ["crc, or sum by a slave's key checksum"]
     assert cells("eh600")["one poll"] == ["reads 0x1001 and 0x8000"]
 
 
@@ -125,7 +125,7 @@ def test_a_bare_percent_sign_is_answered_with_its_quotes(tmp_path: Path) -> None
 def test_the_unusual_is_spelled_out() -> None:
     tables = explain(parse_profile(TANK, "tank.yaml"))
     device = dict(row for row in tables[0].rows if len(row) == 2)
-    assert device["after silence"] == "the line rests for twice the time-out, for no read of another length is known"
+    assert device["after no answer"] == "the line rests for twice the time-out, for no read of another length is known"
     assert device["interval"] == "at least 500ms"
     assert tables[1].rows == (("level", "input 0x0007", "int16, bytes swapped", "x 0.1 -40 m", "any", ""),)
     assert tables[2].rows == (("mode", "0x0009", "uint16 x 2", "0 = off, 1 = on", "no", ""),)

@@ -35,7 +35,7 @@ def explain(profile: Profile) -> list[Table]:
     """Return the profile as tables; those that would be empty are left out."""
     values = [_value(value) for value in profile.values]
     some_have_none = any(value.unavailable for value in profile.values)
-    heads = ("name", "registers", "content", "number", "believed", *(["no value"] if some_have_none else []), "")
+    heads = ("name", "registers", "content", "number", "valid", *(["no value"] if some_have_none else []), "")
     tables = [
         Table(f"{profile.title} (profile {profile.name})", (), tuple(_device(profile))),
         Table("Values in a sample", heads, tuple(row if some_have_none else (*row[:5], row[6]) for row in values)),
@@ -64,15 +64,15 @@ def _device(profile: Profile) -> Iterator[Row]:
         contents = " or ".join(map(_register, identity.holds))
         yield "recognised by", f"{_place(identity.function, identity.register, 1)} holding {contents}"
     yield "framings", ", ".join(profile.framings)
-    yield "check of rtu", _alternatives(profile.checksums)
+    yield "check (rtu)", _alternatives(profile.checksums)
     yield "one read", f"at most {profile.max_words} registers{_ascii_limit(profile)}{_skipped(profile.may_skip)}"
     yield "one poll", f"reads {_listed([_read(block) for block in profile.reads()])}"
     barrier = profile.barrier
     if barrier is None:
-        yield "after silence", "the line rests for twice the time-out, for no read of another length is known"
+        yield "after no answer", "the line rests for twice the time-out, for no read of another length is known"
     else:
         place = _place(barrier.function, barrier.register, barrier.count)
-        yield "after silence", f"{place} is read first (the barrier)"
+        yield "after no answer", f"{place} is read first (the barrier)"
     yield from _writes(profile)
     if profile.busy_exceptions:
         yield "busy", f"exception {', '.join(map(_exception, profile.busy_exceptions))}: it is asked again later"
@@ -84,7 +84,7 @@ def _device(profile: Profile) -> Iterator[Row]:
 
 def _writes(profile: Profile) -> Iterator[Row]:
     if profile.slave_id or profile.baudrate or any(setting.writable for setting in profile.settings):
-        yield "is written", f"by function {WRITE_FUNCTIONS[profile.write_function]}"
+        yield "writes", f"by function {WRITE_FUNCTIONS[profile.write_function]}"
     if profile.broadcast:
         yield "broadcast", "it obeys writes to slave 0; lfs10d sends none"
     if profile.run_commands:
@@ -184,7 +184,7 @@ def _number(value: Value) -> str:
     return f"{number}, wraps at {value.modulo:.12g}" if value.modulo is not None else number
 
 
-def _believed(value: Value) -> str:
+def _valid(value: Value) -> str:
     if value.map is not None:
         return ", ".join(f"{content} = {word}" for content, word in value.map.items())
     low, high = value.range or (None, None)
@@ -215,7 +215,7 @@ def _value(value: Value) -> Row:
         _place(value.function, value.register, value.words),
         _content(value),
         _number(value),
-        _believed(value),
+        _valid(value),
         _contents(value),
         ", ".join(remark for remark in remarks if remark),
     )

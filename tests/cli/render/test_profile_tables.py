@@ -77,7 +77,7 @@ def test_what_the_device_is_and_how_it_is_talked_to(everything: Profile) -> None
         ("", "set in register 0x0101 (1 for 4800, 2 for 9600), unless the jumper overrules it"),
         ("recognised by", "input 0x0160 holding 0x0090 or 0x0091"),
         ("framings", "rtu, ascii"),
-        ("check of rtu", "crc, or sum by a slave's key checksum"),
+        ("check (rtu)", "crc, or sum by a slave's key checksum"),
         (
             "one read",
             "at most 20 registers, 16 data bytes in ascii, and it may span 4 without a name between two values",
@@ -89,8 +89,8 @@ def test_what_the_device_is_and_how_it_is_talked_to(everything: Profile) -> None
                 "0x001E-0x0021 (every 5m)"
             ),
         ),
-        ("after silence", "input 0x0180-0x0184 is read first (the barrier)"),
-        ("is written", "by function 16 (several registers)"),
+        ("after no answer", "input 0x0180-0x0184 is read first (the barrier)"),
+        ("writes", "by function 16 (several registers)"),
         ("broadcast", "it obeys writes to slave 0; lfs10d sends none"),
         ("never written", "0x0900: run commands"),
         ("busy", "exception 06 (busy), 63: it is asked again later"),
@@ -150,12 +150,12 @@ def test_what_a_profile_does_not_say_is_not_shown() -> None:
         "slave ids",
         "baud rates",
         "framings",
-        "check of rtu",
+        "check (rtu)",
         "one read",
         "one poll",
-        "after silence",
+        "after no answer",
     ]
-    assert values.heads == ("name", "registers", "content", "number", "believed", "")
+    assert values.heads == ("name", "registers", "content", "number", "valid", "")
     assert values.rows == (("x", "0x0001", "uint16", "m", "any", ""),)
 
 
