@@ -106,8 +106,7 @@ def help_of(name: str) -> Iterator[str]:
         usual = "required" if each.usual is None else f"default {each.usual or 'none'}"
         yield f"  {each.key}"
         yield from _block(f"{each.words.replace('`', '')}; {usual}")
-        if each.meaning:
-            yield from _block(each.meaning.replace("`", ""))
+        yield from _block(each.meaning.replace("`", ""))
 
 
 def _block(text: str, indent: str = "      ") -> list[str]:

@@ -41,6 +41,11 @@ def test_the_help_of_a_request_says_what_each_parameter_may_be(name: str) -> Non
     assert ("It takes no parameters." in lines) is (not keys)
 
 
+@pytest.mark.parametrize("name", HANDLERS)
+def test_every_parameter_has_a_description(name: str) -> None:
+    assert all(each.meaning for each in parameters(name))
+
+
 def test_what_may_be_left_out_says_what_holds_then() -> None:
     (device,) = parameters("device/read")
     assert device == Parameter("device", device.words, None, "Name of the device.", ())

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 from pydantic import BaseModel, ValidationError
 
-from lfs10d.profiles.device_facts import Barrier, Factory, Identity, IdRegister, RateRegister
+from lfs10d.profiles.device_facts import Barrier, Factory, Identity, IdRegister, RateRegister, SlaveIds
+from lfs10d.profiles.facts import Facts
 
 
 def problems(model: type[BaseModel], data: dict[str, Any]) -> list[tuple[tuple[int | str, ...], str]]:
@@ -50,3 +51,17 @@ def test_a_barrier_a_lock_and_a_factory_are_what_the_file_says() -> None:
     assert IdRegister.model_validate({"register": 5, "locked_by": "DIP switch"}).locked_by == "DIP switch"
     assert Factory.model_validate({"id": 1, "baudrate": 4800}).baudrate == 4800
     assert [place for place, _ in problems(Factory, {"id": 256, "baudrate": 4801})] == [("id",), ("baudrate",)]
+
+
+class Numbered(Facts):
+    """Something with slave ids."""
+
+    ids: SlaveIds
+
+
+def test_slave_ids_are_the_first_and_the_last_in_order() -> None:
+    assert Numbered.model_validate({"ids": [1, 1]}).ids == (1, 1)
+    assert Numbered.model_validate({"ids": [1, 247]}).ids == (1, 247)
+    assert problems(Numbered, {"ids": [2, 1]}) == [(("ids",), "the first id is greater than the last")]
+    wanted = "must be the first and the last slave id, such as [1, 247], not an empty list"
+    assert problems(Numbered, {"ids": []}) == [(("ids",), wanted)]
