@@ -25,10 +25,10 @@ $(VENV)/.dev: $(VENV)/.demo
 demo: $(VENV)/.demo ## Show it at work: simulated line, broker, daemon; no hardware needed
 	@$(BIN)/lfs10d demo
 
-# Many tests wait for brokers, pseudo terminals and daemons: WORKERS share two cores. Five are quicker where nothing else
-# runs; on a busy machine answers come late then, and a test in thousands fails.
+# Many tests wait for brokers, pseudo terminals and daemons: all WORKERS but one run those, the last one computes at a
+# lower priority (tests/support/sharing.py).
 # Each of the hundreds of processes finds the modules compiled, also where PYTHONDONTWRITEBYTECODE is set.
-WORKERS ?= 3
+WORKERS ?= 6
 test test-oldest: export PYTHONDONTWRITEBYTECODE :=
 test: $(VENV)/.dev ## Run all tests
 	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder

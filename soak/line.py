@@ -58,7 +58,7 @@ class Line:
             sensor.source = numbered
         ail(simulated)
         self._names: dict[Sensor, str] = {sensor: f"slave-{sensor.slave}" for sensor in simulated.sensors}
-        self._served = PtyLine(simulated, link=link)
+        self._served = PtyLine(simulated, link=link, realtime=True)
         self._blocking: tuple[int, int] | None = None
         self._in = False
         self.settled_until = 0.0

@@ -5,63 +5,66 @@
 `needs("program", ...)` marks a test that starts a program: where it is absent the test fails in CI (`CI` is
 set) and is skipped elsewhere, with one line that says what to install.
 
-Where several workers share the tests, files of folders whose tests wait for other programs take turns with the others,
-so that from the beginning to the end most workers wait while the rest compute. Of both kinds the longest of the files
-marked `long(seconds)` begin first, so that none is waited for in the end; the rest are mixed by a hash of their names.
-Every worker collects all tests. In a new clone pytest rewrites the assertions of each file first, which takes half a
-minute: each worker begins in another folder, and finds written what the others have done.
+Where several workers share the tests (`make test`), tests that wait for other programs and tests that compute go to
+different workers: see `tests.support.sharing`. Every worker collects all tests. In a new clone pytest rewrites the
+assertions of each file first, which takes half a minute: each worker begins in another folder, and finds written what
+the others have done.
 """
 
 from __future__ import annotations
 
 import gc
 import os
-import re
 from collections.abc import Callable, Iterator
-from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import settings
 
 from bench.broker import free_port
+from tests.support import sharing
 from tests.support.brokers import Authority, Mosquitto, path_of
 
 settings.register_profile("ours", max_examples=int(os.environ.get("LFS10D_EXAMPLES", "100")), deadline=None)
 settings.load_profile("ours")  # without a deadline: a busy machine is no failure
 
-TESTS = Path(__file__).parent
-WAITING = frozenset({"bench", "cli", "daemon", "devices", "mqtt", "soak", "web"})
-"""The folders whose tests wait for other programs rather than compute."""
-
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Let each worker collect the folders in an order of its own; what is found is sorted afterwards."""
-    number = re.fullmatch(r"gw(\d+)", os.environ.get("PYTEST_XDIST_WORKER", ""))
-    if number is not None and config.args == ["tests"]:
+    """Let each worker collect the folders in an order of its own, and those that compute be last to be served."""
+    worker = sharing.this_worker()
+    if worker is not None and config.args == ["tests"]:
+        number, workers = worker
         entries = sorted(f"tests/{each.name}" for each in Path("tests").iterdir() if _collected(each))
-        workers = int(os.environ["PYTEST_XDIST_WORKER_COUNT"])
-        begin = len(entries) * int(number[1]) // workers
+        begin = len(entries) * number // workers
         config.args = entries[begin:] + entries[:begin]
+    if worker is not None and config.workerinput["sharing"]:  # type: ignore[attr-defined]  # xdist's
+        sharing.take_place(*worker)
 
 
 def _collected(path: Path) -> bool:
     return (path.is_dir() and path.name != "__pycache__") or path.match("test_*.py")
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node: Any) -> None:  # noqa: ANN401 - xdist's WorkerController
+    """Tell a worker whether the tests are shared by kind."""
+    node.workerinput["sharing"] = _by_kind(node.config)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> sharing.Sharing | None:
+    """Share the tests by kind where a file would go to one worker."""
+    return sharing.Sharing(config, log) if _by_kind(config) else None
+
+
+def _by_kind(config: pytest.Config) -> bool:
+    return bool(config.getoption("dist") == "loadfile")
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     if hasattr(config, "workerinput"):  # a worker of xdist's: every one finds the same order
-        seconds = {item.path: mark.args[0] for item in items if (mark := item.get_closest_marker("long"))}
-        turns: dict[Path, float] = {}
-        for waits in (True, False):
-            files = {item.path for item in items if _waits(item.path) is waits}
-            ordered = sorted(files, key=lambda file: (-seconds.get(file, 0), sha256(str(file).encode()).digest()))
-            turns.update({file: number / len(ordered) for number, file in enumerate(ordered)})
-        items.sort(key=lambda item: (turns[item.path], str(item.path)))
-
-
-def _waits(file: Path) -> bool:
-    return file.relative_to(TESTS).parts[0] in WAITING
+        items[:] = sharing.ordered(items)
 
 
 def pytest_collection_finish() -> None:

@@ -20,6 +20,7 @@ from lfs10d.config.live_config import LiveConfig
 from lfs10d.config.loader import LoadedConfig
 from lfs10d.daemon.boot import Boot
 from lfs10d.daemon.discovery import AnnouncedPrefixes, discovery_payloads
+from lfs10d.daemon.pace import USUAL, Pace
 from lfs10d.daemon.parts import Parts
 from lfs10d.daemon.settings import broker_settings, daemon_info, device_infos, line_info, store_limits
 from lfs10d.daemon.shutdown import Shutdown
@@ -44,7 +45,7 @@ from lfs10d.system.systemd import Notifier
 from lfs10d.telemetry.station import Station
 
 
-def build(file: LoadedConfig, boot: Boot, state_directory: Path, notifier: Notifier) -> Parts:
+def build(file: LoadedConfig, boot: Boot, state_directory: Path, notifier: Notifier, pace: Pace = USUAL) -> Parts:
     """Return the parts of a daemon, none of them started. Called in the asyncio loop, while it runs."""
     shutdown = Shutdown()
     clock = Clock()
@@ -58,6 +59,7 @@ def build(file: LoadedConfig, boot: Boot, state_directory: Path, notifier: Notif
         base=f"{now.mqtt.base_topic}/{now.line.name}",
         epoch_ms=clock.epoch_ms,
         store=Store(state_directory, boot=boot.id, limits=store_limits(now.store)),
+        history_wait=pace.history_wait,
     )
     uplink.send_samples(telemetry=now.mqtt.telemetry)
     prefixes = AnnouncedPrefixes(state_directory, Disk())
@@ -79,6 +81,7 @@ def build(file: LoadedConfig, boot: Boot, state_directory: Path, notifier: Notif
         announce=publisher.announce,
         recall=responder.recall,
         now=clock.now,
+        share=pace.change_share,
     )
     reconfiguration = Reconfiguration(
         runner, act=publisher.act, repoll=lambda polled: line.take(polled, config.loaded.profiles)

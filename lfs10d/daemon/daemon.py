@@ -17,6 +17,7 @@ from lfs10d.daemon.apply import ConfigChanges
 from lfs10d.daemon.boot import Boot
 from lfs10d.daemon.build import build
 from lfs10d.daemon.line_events import LineReport
+from lfs10d.daemon.pace import USUAL, Pace
 from lfs10d.daemon.parts import Parts
 from lfs10d.system.systemd import Notifier
 from lfs10d.system.tasks import BackgroundTasks
@@ -29,11 +30,11 @@ LINE_STOPS_WITHIN = 0.4
 """Longest wait in s for the line thread at the end; with the uplink's 1.3 s the daemon ends within 2 s."""
 
 
-async def run(loaded: LoadedConfig, boot: Boot, state_directory: Path) -> int:
+async def run(loaded: LoadedConfig, boot: Boot, state_directory: Path, pace: Pace = USUAL) -> int:
     """Run the daemon of one configuration until it is told to end; return the exit code."""
     notifier = Notifier()
     try:
-        parts = build(loaded, boot, state_directory, notifier)
+        parts = build(loaded, boot, state_directory, notifier, pace)
         _log_start(parts, boot)
         return await _run(parts)
     finally:

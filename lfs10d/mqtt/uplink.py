@@ -27,6 +27,7 @@ from lfs10d.mqtt.sender import Sender
 from lfs10d.mqtt.settings import BrokerSettings, Version
 from lfs10d.mqtt.topics import OFFLINE, ONLINE, Topics
 from lfs10d.mqtt.uplink_events import OnRequest, OnSpoolTrouble, UplinkEvents
+from lfs10d.outbox.backlog import HISTORY_AFTER
 from lfs10d.outbox.outbox import Outbox
 from lfs10d.outbox.spooler import Spooler
 from lfs10d.outbox.store.database import Limits
@@ -59,6 +60,7 @@ class Uplink:
         epoch_ms: Callable[[], int],
         store: Store | None = None,
         connect: type[Connection] = Connection,
+        history_wait: float = HISTORY_AFTER,
     ) -> None:
         self._topics = Topics(base)
         self._events: UplinkEvents  # given at the start
@@ -74,7 +76,7 @@ class Uplink:
             has_second=lambda: self._cleanup.has_second,
             connect=connect,
         )
-        self._outbox = Outbox(detection=2.0 * settings.keepalive)
+        self._outbox = Outbox(detection=2.0 * settings.keepalive, history_wait=history_wait)
         self.discovery = Discovery(self._topics, self.publish, is_out=lambda: self._outbox.retained_out)
         line = base.rpartition("/")[2]
         self._sender = Sender(self._outbox, self._topics, line, epoch_ms=epoch_ms, stuck=self._on_stuck)
@@ -230,8 +232,7 @@ class Uplink:
             self._begin(accepted)
 
     def _begin(self, accepted: Accepted) -> None:
-        connection = self._client.connection
-        if connection is None:
+        if (connection := self._client.connection) is None:
             return
         self._sender.connected(connection, accepted)
         self._subscription = connection.subscribe([Filter(self._topics.requests), Filter(self._topics.availability)])
@@ -293,8 +294,7 @@ class Uplink:
             self._retained_reader.arrived(message)
         if self._cleanup.on_message(message) or self.discovery.on_message(message):
             return
-        request = self._topics.command(message)
-        if request is not None:
+        if (request := self._topics.command(message)) is not None:
             self._retained_requests.received(request, self.version)
             self._on_request(request)
 

@@ -50,11 +50,15 @@ HISTORY_AFTER = 10.0
 
 
 class Backlog:
-    """The rules above. `detection`: seconds in which a dead connection is noticed at the latest."""
+    """The rules above. `detection`: seconds in which a dead connection is noticed at the latest.
 
-    def __init__(self, *, capacity: int, detection: float) -> None:
+    `history_wait`: seconds from a connect to the first history.
+    """
+
+    def __init__(self, *, capacity: int, detection: float, history_wait: float = HISTORY_AFTER) -> None:
         self.telemetry = True
         """Whether samples of polls are sent; otherwise they stay, and only records are sent."""
+        self._history_wait = history_wait
         self._open_from = 0.0
         self._batch_at = 0.0
         self._batch_most = BATCH_MOST
@@ -80,7 +84,7 @@ class Backlog:
     def connected(self, now: float, window: int) -> None:
         """Note that the broker is there, and takes `window` messages at once."""
         self.spill.away = False
-        self._open_from = self._batch_at = now + HISTORY_AFTER
+        self._open_from = self._batch_at = now + self._history_wait
         self._turn_at = self._open_from + TURN_EVERY
         self._window = window
         self.drain.begin(self._open_from)

@@ -35,7 +35,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import chain, islice
 
-from lfs10d.outbox.backlog import BATCH_MOST, Backlog
+from lfs10d.outbox.backlog import BATCH_MOST, HISTORY_AFTER, Backlog
 from lfs10d.outbox.congestion import Congested, Congestion
 from lfs10d.outbox.history import QueuedSample
 from lfs10d.outbox.in_flight import InFlight
@@ -55,13 +55,13 @@ IN_FLIGHT_MOST = 20
 
 
 class Outbox:
-    """The rules above. `detection`: seconds in which a dead connection is noticed at the latest."""
+    """The rules above. `detection`: seconds in which a dead connection is noticed; `history_wait` as in `Backlog`."""
 
-    def __init__(self, *, capacity: int = CAPACITY, detection: float = 40.0) -> None:
+    def __init__(self, *, capacity: int = CAPACITY, detection: float = 40, history_wait: float = HISTORY_AFTER) -> None:
         self._capacity = capacity
         self._congestion = Congestion()
         self._refusals = Refusals()
-        self.backlog = Backlog(capacity=capacity, detection=detection)
+        self.backlog = Backlog(capacity=capacity, detection=detection, history_wait=history_wait)
         """The backlog: samples that are no longer live."""
         self.suspects = Suspects()
         """The messages that may have ended the last connection."""

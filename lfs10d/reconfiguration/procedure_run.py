@@ -28,18 +28,26 @@ class Wire(Protocol):
         """Give a procedure the result that it awaits."""
 
 
-class ProcedureRun:
-    """Runs procedures on the line, one after the other. Used in the thread of the asyncio loop."""
+CHANGE_SHARE = 0.3
+"""The share of the line that a change of a sensor takes, where it can wait (contract, section 5)."""
 
-    def __init__(self, wire: Wire) -> None:
+
+class ProcedureRun:
+    """Runs procedures on the line, one after the other. Used in the thread of the asyncio loop.
+
+    `share` is that of the line which they take, where they do not say.
+    """
+
+    def __init__(self, wire: Wire, share: float = CHANGE_SHARE) -> None:
         self._wire = wire
+        self._share = share
         self._loop = asyncio.get_running_loop()
         self._awaited: asyncio.Queue[object] = asyncio.Queue()
         self._procedure: Procedure | None = None
 
     def begin(self, steps: Steps, clock: ProcedureClock, **settings: Any) -> None:  # noqa: ANN401 - those of Procedure
         """Start a procedure on the line."""
-        self._procedure = Procedure(steps, clock, self._on_await, **settings)
+        self._procedure = Procedure(steps, clock, self._on_await, **{"share": self._share, **settings})
         self._wire.submit(self._procedure)
 
     def _on_await(self, _: Procedure, awaited: object) -> None:

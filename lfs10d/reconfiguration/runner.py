@@ -33,7 +33,7 @@ from lfs10d.reconfiguration.journal import (
     ResultRecord,
 )
 from lfs10d.reconfiguration.journal_commands import command_of, result_of, result_record
-from lfs10d.reconfiguration.procedure_run import ProcedureRun, Wire
+from lfs10d.reconfiguration.procedure_run import CHANGE_SHARE, ProcedureRun, Wire
 from lfs10d.reconfiguration.procedures.identity_query import IdentityQuery
 from lfs10d.reconfiguration.reservations import Reservations
 from lfs10d.system.clock import Instant
@@ -62,11 +62,12 @@ class ChangeRunner:
     """Carries out one change after the other. Used in the thread of the asyncio loop.
 
     `running()` is the configuration in force, `change` puts another into force, saved to disk first (it raises
-    StateError where that fails), `learn` too, whether or not the disk keeps it; `wire()` is the line. `announce`
-    publishes an event; `recall` has a command of an earlier life of the daemon remembered, or answered.
+    StateError where that fails), `learn` too, whether or not the disk keeps it; `wire()` is the line, of which a change
+    takes `share`. `announce` publishes an event; `recall` has a command of an earlier life of the daemon remembered, or
+    answered.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - all that it touches of the daemon, each by one callable
         self,
         journal: Journal,
         *,
@@ -77,6 +78,7 @@ class ChangeRunner:
         announce: Callable[[EventType, Mapping[str, object]], None],
         recall: Recall,
         now: Callable[[], Instant],
+        share: float = CHANGE_SHARE,
     ) -> None:
         self.journal = journal
         self.running = running
@@ -90,6 +92,7 @@ class ChangeRunner:
         """The command under way."""
         self._recall = recall
         self._now = now
+        self._share = share
         self._writing: asyncio.Future[Any] | None = None
         self._tasks = BackgroundTasks()
         self._saving: asyncio.Task[None] | None = None
@@ -112,7 +115,7 @@ class ChangeRunner:
 
     def new_run(self) -> ProcedureRun:
         """Return a runner of procedures on the line, one after the other."""
-        return ProcedureRun(self.wire())
+        return ProcedureRun(self.wire(), self._share)
 
     async def profile(self, reference: str) -> Profile:
         """Return a profile by its name or path in the configuration; raises ConfigError where it cannot be read.

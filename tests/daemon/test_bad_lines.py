@@ -20,7 +20,7 @@ from soak.troubles import KINDS
 from tests.support.queued_sensor import QueuedSensor
 from tests.support.sites import Site, View, eventually, tell
 
-pytestmark = [pytest.mark.needs("mosquitto"), pytest.mark.long(55)]
+pytestmark = pytest.mark.needs("mosquitto")
 
 SLAVES = (1, 2, 3, 4)
 RATE = 115200
@@ -93,6 +93,7 @@ def told(view: View, begun: int, code: str) -> bool:
     return any(word in each.payload and each.topic.endswith("/telemetry") for each in view.heard[begun:])
 
 
+@pytest.mark.long(60)
 def test_under_every_fault_in_turn_the_broker_is_told_no_wrong_number_and_every_poll(site: Site, view: View) -> None:
     bad = Recorded(site)
     site.write(

@@ -15,9 +15,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.brokers import Mosquitto
-from tests.support.sites import PATIENCE, Site, View, eventually, good
-
-pytestmark = pytest.mark.long(50)
+from tests.support.sites import PATIENCE, QUICK, Site, View, eventually, good
 
 LIVE_FOR = 3.0
 """Seconds after which a sample is history (contract, section 3)."""
@@ -48,6 +46,7 @@ def test_online_and_samples_follow_a_connect_within_3_s_whatever_the_burst_holds
     assert time.monotonic() - connected < 3.0
 
 
+@pytest.mark.long(16)
 def test_what_was_measured_before_the_broker_came_is_history(site: Site, mosquitto: Mosquitto) -> None:
     mosquitto.stop()
     site.line()
@@ -73,8 +72,10 @@ def test_what_was_measured_before_the_broker_came_is_history(site: Site, mosquit
     assert run.log.count("connection refused") == 1
 
 
+@pytest.mark.long(10)
 def test_nothing_is_lost_when_the_broker_is_killed_at_full_rate(site: Site, mosquitto: Mosquitto) -> None:
     site.line()
+    site.pace = QUICK
     site.write(poll={"interval": 0})
     run = site.run()
     view = View(mosquitto.subscribe())
@@ -281,6 +282,7 @@ def test_a_gateway_moves_to_another_node_with_its_backlog_its_requests_and_its_w
 ) -> None:
     site.line()
     nodes = [f"127.0.0.1:{broker.port}" for broker in (mosquitto, second_mosquitto)]
+    site.pace = QUICK
     site.write(mqtt={"host": nodes}, poll={"interval": "100ms"})
     run = site.run()
     before, after = View(mosquitto.subscribe()), View(second_mosquitto.subscribe())

@@ -15,12 +15,10 @@ from lfs10d.simulator.wire import Format
 from lfs10d.telemetry.contract import check
 from tests.support import forked
 from tests.support.brokers import Mosquitto
-from tests.support.sites import Site, View, eventually, good, tell
-
-pytestmark = pytest.mark.long(50)
+from tests.support.sites import QUICK, Site, View, eventually, good, tell
 
 BASE = "lfs10d/line0"
-QUICK = [number for number, step in enumerate(WALK) if not step.slow]
+SHORT = [number for number, step in enumerate(WALK) if not step.slow]
 ANSWERED_WITHIN = 120.0
 """Seconds; an adoption takes about 20."""
 
@@ -42,6 +40,7 @@ def begun(site: Site, view: View) -> None:
     """Start the line and the daemon of the page."""
     served = site.line(SLAVES)
     tell(served, lambda line: line.add(Sensor(1, format=Format(9600), turnaround=0.003)))
+    site.pace = QUICK
     site.write(line={"baudrate": BAUDRATE}, **CONFIG)
     site.run()
     for device in ("mast-top", "slave-3"):
@@ -76,6 +75,7 @@ def test_the_page_walks_through_every_request() -> None:
 
 
 @pytest.mark.needs("mosquitto_pub")
+@pytest.mark.long(20)
 def test_by_mqtt_5_every_request_is_answered_where_it_asks_to_be(site: Site, mosquitto: Mosquitto, view: View) -> None:
     begun(site, view)
     for number, step in enumerate(WALK):
@@ -93,7 +93,7 @@ def test_by_mqtt_5_every_request_is_answered_where_it_asks_to_be(site: Site, mos
 @pytest.mark.needs("mosquitto_pub")
 def test_by_3_1_1_every_request_is_answered_with_its_id(site: Site, mosquitto: Mosquitto, view: View) -> None:
     begun(site, view)
-    for number in QUICK:
+    for number in SHORT:
         step = WALK[number]
         before = len(view.listener.on(f"{BASE}/response/{step.name}"))
         publish(mosquitto, step, {"id": f"p{number}", **step.parameters}, "-V", "mqttv311", "-q", "1")
@@ -107,7 +107,7 @@ def test_on_the_command_line_every_request_is_typed_as_the_page_shows(
 ) -> None:
     del mosquitto
     begun(site, view)
-    for number in QUICK:
+    for number in SHORT:
         step = WALK[number]
         done = forked.run(["request", *step.arguments, "--json", "-c", str(site.file)])
         response = json.loads(done.stdout)

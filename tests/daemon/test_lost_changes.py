@@ -12,9 +12,9 @@ import pytest
 
 from lfs10d.simulator.pty import PtyLine
 from tests.support.brokers import Mosquitto
-from tests.support.sites import SPARSE, Run, Site, View, eventually, good, tell
+from tests.support.sites import QUICK, SPARSE, Run, Site, View, eventually, good, tell
 
-pytestmark = [pytest.mark.needs("mosquitto"), pytest.mark.long(90)]
+pytestmark = pytest.mark.needs("mosquitto")
 
 B = "lfs10d/line0"
 
@@ -72,6 +72,7 @@ def test_a_sensor_that_was_moved_is_found_kept_and_told(
     site: Site, view: View, mosquitto: Mosquitto, asked: Callable[..., None]
 ) -> None:
     site.line((1, 2))
+    site.pace = QUICK
     site.write(poll=SPARSE)
     run = started(site, view)
     view.wait("device/slave-2/state", good)
@@ -96,6 +97,7 @@ def test_a_sensor_that_was_moved_is_found_kept_and_told(
     assert [sample["quality"] for sample in view.samples("slave-2")[:3]] == ["good"] * 3
 
 
+@pytest.mark.long(11)
 def test_the_rate_of_the_line_is_found_again(
     site: Site, view: View, mosquitto: Mosquitto, asked: Callable[..., None]
 ) -> None:
@@ -115,10 +117,12 @@ def test_the_rate_of_the_line_is_found_again(
     assert "now: 9600" in (site.folder / "state" / "changes.yaml").read_text()
 
 
+@pytest.mark.long(12)
 def test_measuring_waits_for_no_broker_and_the_sensor_is_found_when_one_comes(
     site: Site, view: View, mosquitto: Mosquitto, asked: Callable[..., None]
 ) -> None:
     served = site.line((1, 2))
+    site.pace = QUICK
     site.write()
     run = started(site, view)
     view.wait("device/slave-2/state", good)
@@ -136,6 +140,7 @@ def test_measuring_waits_for_no_broker_and_the_sensor_is_found_when_one_comes(
     view.wait_samples("slave-2", 3, good)
 
 
+@pytest.mark.long(15)
 def test_who_answers_at_an_id_that_was_another_s_is_not_measured_under_a_guessed_name(
     site: Site, view: View, mosquitto: Mosquitto
 ) -> None:

@@ -20,9 +20,7 @@ from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from tests.support import forked
 from tests.support.brokers import Mosquitto
-from tests.support.sites import SPARSE, Site, View, eventually, good, tell
-
-pytestmark = pytest.mark.long(150)
+from tests.support.sites import QUICK, SPARSE, Site, View, eventually, good, tell
 
 BASE = "lfs10d/line0"
 
@@ -68,8 +66,10 @@ def published(view: View, mosquitto: Mosquitto, name: str, payload: dict[str, An
 
 
 @pytest.mark.needs("mosquitto_pub")
+@pytest.mark.long(12)
 def test_a_sensor_gets_another_id_by_either_way(site: Site, mosquitto: Mosquitto, view: View) -> None:
     served = site.line((1, 2))
+    site.pace = QUICK
     site.write(poll=SPARSE)
     run = site.run()
     view.wait("device/slave-2/state", good)
@@ -108,6 +108,7 @@ def test_the_intent_is_on_the_disk_before_the_first_byte_of_the_write(
     site: Site, mosquitto: Mosquitto, view: View
 ) -> None:
     site.line((1, 2))
+    site.pace = QUICK
     site.write(poll=SPARSE)
     trace = site.folder / "trace"
     run = site.run()
@@ -142,6 +143,7 @@ def test_the_intent_is_on_the_disk_before_the_first_byte_of_the_write(
     assert journal[0] < renamed[0] < min(n for n in folder if n > renamed[0]) < written
 
 
+@pytest.mark.long(12)
 def test_at_sigterm_a_change_ends_is_answered_and_settled_at_the_next_start(
     site: Site, mosquitto: Mosquitto, view: View
 ) -> None:
@@ -231,6 +233,7 @@ class Victim:
         self.view.wait_samples("slave-2", 3, good)
 
 
+@pytest.mark.long(45)
 def test_daemons_killed_at_any_moment_find_every_sensor_again(mosquitto: Mosquitto, tmp_path: Path) -> None:
     changes = ("device/readdress", "device/readdress", "line/baudrate", "line/adopt")
     victims: list[Victim] = []
@@ -278,10 +281,11 @@ def test_the_line_and_its_sensors_change_their_rate_by_either_way(site: Site, mo
     assert rates(served) == [19200, 19200]
 
 
+@pytest.mark.long(18)
 def test_newcomers_are_adopted_by_either_way(site: Site, mosquitto: Mosquitto, view: View) -> None:
-    # A sensor that the machine lets answer late once is asked patiently from then on, which takes 2.5 times as long.
-    served = site.line((2,), realtime=True)
+    served = site.line((2,))
     # A change waits so that the others keep nine tenths of their polls: the rarer these are, the sooner it is over.
+    site.pace = QUICK
     site.write(slaves=[2], poll={"interval": "1s"})
     site.run()
     view.wait("device/slave-2/state", good)

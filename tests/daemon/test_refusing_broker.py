@@ -10,9 +10,7 @@ import pytest
 
 from tests.support.answering_brokers import Capricious
 from tests.support.brokers import Mosquitto
-from tests.support.sites import Site, View, eventually, good
-
-pytestmark = pytest.mark.long(120)
+from tests.support.sites import QUICK, Site, View, eventually, good
 
 HISTORY_WITHIN = 40.0
 """Seconds in which the backlog of these tests is out: it begins 10 s after a connect, also after a second and third."""
@@ -31,6 +29,7 @@ def whole(view: View, device: str, newest: int) -> bool:
     ("version", "limit"),
     [("5", "message_size_limit 2000"), ("5", "max_packet_size 2000"), ("3.1.1", "max_packet_size 2000")],
 )
+@pytest.mark.long(50)
 def test_no_history_is_lost_at_a_broker_that_takes_only_small_messages(
     site: Site, mosquitto: Mosquitto, version: str, limit: str
 ) -> None:
@@ -41,6 +40,8 @@ def test_no_history_is_lost_at_a_broker_that_takes_only_small_messages(
     mosquitto.stop()
     mosquitto.configuration += [limit]
     site.line()
+    if version == "5":  # a connection that a batch ends within 10 s is a short one, after which the next begins later
+        site.pace = QUICK
     site.write(poll={"interval": "100ms"}, mqtt={"version": version})
     run = site.run()
     run.says("connection refused")
@@ -66,6 +67,7 @@ def test_samples_that_may_not_go_live_go_as_history_and_what_is_allowed_goes_on(
     mosquitto.start()
     view = View(mosquitto.subscribe())
     site.line()
+    site.pace = QUICK
     site.write()
     run = site.run()
     view.wait_samples("slave-2", 5)
@@ -86,6 +88,7 @@ def capricious() -> Iterator[Capricious]:
 def test_a_reason_that_mqtt_does_not_know_is_a_refusal_and_ends_nothing(site: Site, capricious: Capricious) -> None:
     capricious.answers["device/slave-1/telemetry"] = b"\x40\x03{mid}\xc5"
     site.line()
+    site.pace = QUICK
     site.write(mqtt={"port": capricious.port})
     run = site.run()
     run.says("refuses lfs10d/line0/device/slave-1/telemetry: reason code 0xC5")
@@ -107,6 +110,7 @@ def test_a_broker_that_throws_us_out_for_one_topic_is_understood(
     """Also where it publishes our will each time, as it does when another client takes our id away."""
     capricious.answers["info"] = said
     site.line()
+    site.pace = QUICK
     site.write(mqtt={"port": capricious.port})
     run = site.run()
     eventually(lambda: len(capricious.taken("device/slave-1/telemetry")) > 5, "telemetry", within=HISTORY_WITHIN)

@@ -16,7 +16,7 @@ from tests.support import forked
 from tests.support.brokers import Mosquitto
 from tests.support.sites import Site, View, eventually, good, tell
 
-pytestmark = [pytest.mark.needs("mosquitto_pub"), pytest.mark.long(55)]
+pytestmark = pytest.mark.needs("mosquitto_pub")
 
 BASE = "lfs10d/line0"
 
@@ -133,7 +133,7 @@ def test_a_cancelled_scan_tells_what_it_found(site: Site, mosquitto: Mosquitto, 
     site.write()
     site.run()
     view.wait("device/slave-2/state", good)
-    send(mosquitto, "line/scan", baudrates=[19200], id="s")
+    send(mosquitto, "line/scan", baudrates=[19200], share=90, id="s")
     eventually(lambda: any(each["found"] == 2 for each in events(view, "scan_progress")), "both are found")
     assert answer(view, mosquitto, "line/cancel")["data"] == {"cancelled": ["scan"]}
     done = response(view, "line/scan")
@@ -148,7 +148,7 @@ def test_a_scan_whose_port_is_lost_fails_with_what_it_found(site: Site, mosquitt
     site.write()
     site.run()
     view.wait("device/slave-2/state", good)
-    send(mosquitto, "line/scan", baudrates=[19200])
+    send(mosquitto, "line/scan", baudrates=[19200], share=90)
     eventually(lambda: any(each["found"] == 2 for each in events(view, "scan_progress")), "both are found")
     served.stop()
     done = response(view, "line/scan")
@@ -163,7 +163,7 @@ def test_two_sensors_with_one_id_are_reported(site: Site, mosquitto: Mosquitto, 
     site.write()
     site.run()
     view.wait("device/slave-2/state", good)
-    done = answer(view, mosquitto, "line/scan", ids=[7], baudrates=[19200], add=True)
+    done = answer(view, mosquitto, "line/scan", ids=[7], baudrates=[19200], share=90, add=True)
     (found,) = done["data"]["found"]
     assert (found["id"], found["duplicate"], found["known"]) == (7, True, False)
     assert done["data"]["added"] == []

@@ -15,8 +15,6 @@ import pytest
 from lfs10d.simulator.faults import FaultKind
 from tests.support.sites import Run, Site, View, eventually, good
 
-pytestmark = pytest.mark.long(30)
-
 START = "from lfs10d.__main__ import main; main()"
 
 LINE_WEDGES = f"""
@@ -122,6 +120,7 @@ def test_a_reload_is_announced_with_its_time_and_ended_even_if_the_file_is_broke
     assert "READY=1" in told[begun:]
 
 
+@pytest.mark.long(10)
 def test_nothing_that_is_merely_absent_or_idle_ever_starves_the_watchdog(site: Site, tmp_path: Path) -> None:
     site.line((1, 2))
     idle = tmp_path / "idle.yaml"

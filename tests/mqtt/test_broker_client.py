@@ -21,8 +21,6 @@ from tests.support.broker_clients import PATIENCE, Witness, connecting, settings
 from tests.support.brokers import Mosquitto
 from tests.support.old_brokers import Answer, OldBroker
 
-pytestmark = pytest.mark.long(20)
-
 Serving: TypeAlias = Callable[[Answer], AbstractAsyncContextManager[int]]
 
 
@@ -168,6 +166,7 @@ def test_a_quiet_connection_is_kept_by_pings(mosquitto: Mosquitto) -> None:
 
 
 @pytest.mark.parametrize("refused_by", [b"\x20\x02\x00\x01", b"\x20\x03\x00\x84\x00", b"", None])
+@pytest.mark.long(11)
 def test_a_broker_that_refuses_5_is_spoken_to_in_3_1_1_with_one_warning(
     old_broker: OldBroker, refused_by: bytes | None, caplog: pytest.LogCaptureFixture
 ) -> None:

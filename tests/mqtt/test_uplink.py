@@ -19,8 +19,6 @@ from tests.support.brokers import Mosquitto
 from tests.support.old_brokers import OldBroker
 from tests.support.uplinks import B, Site, online, running, sample, seqs, until
 
-pytestmark = pytest.mark.long(40)
-
 # Coming
 
 
@@ -168,6 +166,7 @@ def test_another_client_with_our_id_is_not_fought(mosquitto: Mosquitto, caplog: 
 # The broker goes and comes
 
 
+@pytest.mark.long(16)
 def test_nothing_is_lost_when_the_broker_is_killed_and_comes_back(mosquitto: Mosquitto) -> None:
     """Away for more than three seconds, without persistence; the subscriber is back before the backlog is opened."""
 
@@ -248,7 +247,7 @@ def test_while_a_backlog_on_disk_leaves_in_order_live_samples_stay_live(mosquitt
 
     async def scenario() -> None:
         listener = mosquitto.subscribe(f"{B}/#")
-        site = Site(mosquitto.port, store=Store(tmp_path, boot="k0000001", limits=limits))
+        site = Site(mosquitto.port, store=Store(tmp_path, boot="k0000001", limits=limits), history_wait=1.0)
         async with running(site) as uplink:
             await until(lambda: uplink.backlog.depth == spool, "the store is opened")
             await until(lambda: bool(listener.on(f"{B}/device/b/history")), "the past is open", within=20)

@@ -5,9 +5,6 @@ from __future__ import annotations
 import asyncio
 import json
 
-import pytest
-
-from lfs10d.outbox import backlog
 from lfs10d.telemetry import publication
 from tests.support.brokers import Listener, Mosquitto
 from tests.support.delaying_proxy import delaying
@@ -28,11 +25,8 @@ def seqs(listener: Listener, device: str, leaf: str) -> set[int]:
     return found
 
 
-def test_at_200_ms_and_ten_under_way_every_device_goes_live_and_all_samples_arrive(
-    mosquitto: Mosquitto, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_at_200_ms_and_ten_under_way_every_device_goes_live_and_all_samples_arrive(mosquitto: Mosquitto) -> None:
     """Ten messages each 200 ms are 50 a second: fewer than 32 samples and 32 states."""
-    monkeypatch.setattr(backlog, "HISTORY_AFTER", 1.5)  # 10 s in the contract; the test need not wait for them
     mosquitto.stop()
     mosquitto.configuration.append(f"max_inflight_messages {RECEIVE_MAXIMUM}")
     mosquitto.start()
@@ -40,7 +34,7 @@ def test_at_200_ms_and_ten_under_way_every_device_goes_live_and_all_samples_arri
     async def scenario() -> None:
         listener = mosquitto.subscribe(f"{B}/#")
         async with delaying(mosquitto.port, ROUND_TRIP) as port:
-            site = Site(port)
+            site = Site(port, history_wait=1.5)  # 10 s in the contract; the test need not wait for them
             async with running(site) as uplink:
                 await online(listener)
                 loop = asyncio.get_running_loop()

@@ -29,7 +29,7 @@ def test_a_refused_topic_is_reported_once_stops_nothing_and_is_tried_again_at_re
 
     async def scenario() -> None:
         listener = mosquitto.subscribe(f"{B}/#")
-        site = Site(mosquitto.port)
+        site = Site(mosquitto.port, history_wait=1.0)
         async with running(site) as uplink:
             await online(listener)
             uplink.publish(sample(seq, device) for seq in (1, 2, 3) for device in "ab")

@@ -102,6 +102,17 @@ def test_where_the_broker_is_too_slow_half_the_memory_is_the_most_that_waits_the
     assert seqs(outbox.next(4.0)) == [1, 2, 3, 4, 5, 6]
 
 
+def test_the_past_may_be_opened_earlier() -> None:
+    outbox, store = Outbox(history_wait=2.0), MemoryStore()
+    connect(outbox, 10.0)
+    outbox.add(sample(1), 0.0)
+    outbox.age(11.0)
+    assert not store.page(outbox, 11.0)
+    assert outbox.next(11.9) is None
+    assert outbox.due() == 12.0
+    assert seqs(outbox.next(12.0)) == [1]
+
+
 # The clock
 
 

@@ -99,4 +99,7 @@ The page (`web`)
     `page_acts`          states of the page that a person or the browser brings about
     `chromium`           Debian's chromium, driven by playwright
     `live_pages`         everything: a simulated line, mosquitto, the daemon, the page's server and chromium
+
+All tests
+    `sharing`            which worker runs which tests
 """

@@ -3,7 +3,7 @@
 `start` and `run` are for `python -m lfs10d ...` what `subprocess.Popen` and `subprocess.run` are: a process of its own,
 with the arguments, variables, folder and files that are given; it begins where `lfs10d/__main__.py` does. What is not
 the same: `/proc/PID/cmdline`, and the interpreter has read its own variables (`PYTHON...`, the locale) before. Where
-those differ from ours, or the start itself is the subject, take `subprocess`.
+those differ from ours, or the start itself is the subject, take `subprocess`. A daemon may be given another `pace`.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 import array
 import atexit
 import contextlib
+import dataclasses
 import gc
 import importlib
 import json
@@ -24,10 +25,12 @@ import sys
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import IO, Protocol
+from typing import IO, Any, Protocol
 
 from lfs10d import __main__ as program
+from lfs10d.daemon.pace import Pace
 from lfs10d.system import startup
 
 ROOT = Path(__file__).parents[2]
@@ -139,12 +142,14 @@ def start(
     stderr: int,
     env: Mapping[str, str] | None = None,
     cwd: Path | None = None,
+    pace: Pace | None = None,
 ) -> Forked:
     """Start lfs10d with these arguments; the files are descriptors."""
     order = {
         "arguments": list(arguments),
         "env": dict(os.environ if env is None else env),
         "cwd": str(cwd or Path.cwd()),
+        "pace": None if pace is None else dataclasses.asdict(pace),
     }
     with Path(os.devnull).open("rb") as nothing:
         files = [nothing.fileno() if stdin is None else stdin, stdout, stderr]
@@ -228,7 +233,7 @@ def _reap(running: dict[int, socket.socket]) -> None:
             told.send(STATUS.pack(os.waitstatus_to_exitcode(status)))
 
 
-def _begin(order: dict[str, dict[str, str] | list[str] | str], files: list[int]) -> list[str]:
+def _begin(order: dict[str, Any], files: list[int]) -> list[str]:
     """Be as a process that has just been started; return its arguments."""
     for number, each in enumerate(files):
         os.dup2(each, number)
@@ -236,13 +241,14 @@ def _begin(order: dict[str, dict[str, str] | list[str] | str], files: list[int])
     for each in (signal.SIGCHLD, signal.SIGTERM, signal.SIGHUP):
         signal.signal(each, signal.SIG_DFL)
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    env, arguments, cwd = order["env"], order["arguments"], order["cwd"]
-    assert isinstance(env, dict)
-    assert isinstance(arguments, list)
+    arguments: list[str] = order["arguments"]
     os.environ.clear()
-    os.environ.update(env)
+    os.environ.update(order["env"])
     time.tzset()
-    os.chdir(str(cwd))
+    os.chdir(order["cwd"])
+    if order["pace"] is not None:
+        verb = importlib.import_module("lfs10d.cli.run")
+        vars(verb)["run"] = partial(verb.run, pace=Pace(**order["pace"]))
     sys.stdin = open(0, closefd=False, encoding="utf-8")  # noqa: SIM115 - for the life of the process
     sys.stdout = _written(1)
     sys.stderr = _written(2)

@@ -68,7 +68,10 @@ class Running:
             self.read()
             return words in self.text[since:]
 
-        eventually(said, f"{words!r} in what is printed", within=within)
+        try:
+            eventually(said, f"{words!r} in what is printed", within=within)
+        except AssertionError as error:
+            raise AssertionError(f"{error}:\n{self.text[since:][-4000:]}") from None
 
     def ends(self, number: int | None = None) -> int:
         """Send a signal and return the exit code; it must come within the time of the contract."""

@@ -16,6 +16,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from lfs10d.daemon.pace import USUAL, Pace
 from lfs10d.simulator.builder import LinePlan, build
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
@@ -28,6 +29,8 @@ PATIENCE = 20.0
 """Seconds after which something awaited counts as not happening; no test waits this long when all is well."""
 SPARSE = {"interval": "500ms"}
 """A change waits so that the others keep nine tenths of their polls: the rarer these are, the sooner it is over."""
+QUICK = Pace(history_wait=1.0, change_share=1.0)
+"""Of a daemon whose history and changes are awaited, where it is not the subject how long they may take."""
 ENDS_WITHIN = 2.0
 """Seconds from SIGTERM to the end (contract, section 2)."""
 
@@ -192,6 +195,8 @@ class Site:
     port: int
     """Of the broker."""
     config: dict[str, Any] = field(default_factory=dict)
+    pace: Pace = USUAL
+    """Of the daemons that are forked."""
     lines: list[PtyLine] = field(default_factory=list)
     runs: list[Run] = field(default_factory=list)
 
@@ -212,11 +217,10 @@ class Site:
         shape: Format | None = None,
         echo: bool = False,
         started: bool = True,
-        realtime: bool = False,
     ) -> PtyLine:
-        """Put up a simulated line; with `started`, plugged in; with `realtime`, before other programs if permitted."""
+        """Put up a simulated line; with `started`, plugged in. It goes before other programs where permitted."""
         line = build(LinePlan(slaves, shape or Format(19200), turnaround=0.003, unique=True), keep_log=True)
-        served = PtyLine(line, link=self.tty, echo=echo, realtime=realtime)
+        served = PtyLine(line, link=self.tty, echo=echo, realtime=True)
         self.lines.append(served)
         if started:
             served.start()
@@ -259,7 +263,7 @@ class Site:
         with errors.open("wb") as log:
             process: Process
             if program is None:
-                process = forked.start(verb, stdout=log.fileno(), stderr=log.fileno(), env=variables)
+                process = forked.start(verb, stdout=log.fileno(), stderr=log.fileno(), env=variables, pace=self.pace)
             else:
                 command = [sys.executable, *program, *verb]
                 process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, env=variables)

@@ -11,6 +11,7 @@ from collections.abc import AsyncIterator, Callable
 from lfs10d.mqtt.settings import BrokerSettings
 from lfs10d.mqtt.topics import InboundRequest
 from lfs10d.mqtt.uplink import Uplink
+from lfs10d.outbox.backlog import HISTORY_AFTER
 from lfs10d.outbox.store.store import Store
 from lfs10d.telemetry import publication
 from lfs10d.telemetry.publication import Publication, PublicationKind, Sample
@@ -32,7 +33,9 @@ def sample(seq: int, device: str = "a") -> Publication:
 class Site:
     """A daemon's worth of retained topics around an uplink."""
 
-    def __init__(self, port: int, *, store: Store | None = None, **changes: object) -> None:
+    def __init__(
+        self, port: int, *, store: Store | None = None, history_wait: float = HISTORY_AFTER, **changes: object
+    ) -> None:
         facts: dict[str, object] = {"host": "127.0.0.1", "port": port, "client_id": "gateway", **changes}
         self.settings = BrokerSettings(**facts)  # type: ignore[arg-type]  # the test says which are changed
         self.retained = {f"device/{name}/state": {"device": name} for name in "abc"}
@@ -45,6 +48,7 @@ class Site:
             base=B,
             epoch_ms=lambda: 1_795_298_022_003,
             store=store,
+            history_wait=history_wait,
         )
 
     def burst(self) -> list[Publication]:

@@ -13,9 +13,7 @@ from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from tests.support.brokers import Mosquitto
 from tests.support.shells import BASE, Shell, typed
-from tests.support.sites import Run, Site, eventually, tell
-
-pytestmark = pytest.mark.long(210)
+from tests.support.sites import QUICK, Run, Site, eventually, tell
 
 REPEAT = ("line/adopt", "--repeat")
 FIRST = "Plug in a sensor. Ctrl-C when all are adopted.\n"
@@ -27,6 +25,7 @@ NEXT = "Plug in the next one.\n"
 def mounted(site: Site, **mqtt: Any) -> tuple[PtyLine, Run]:  # noqa: ANN401 - as Site.write
     """Start a line with one sensor at 19200 baud and a daemon that is at the broker."""
     served = site.line((2,))
+    site.pace = QUICK
     site.write(slaves=[2], poll={"interval": "1s"}, mqtt=mqtt)
     run = site.run()
     run.says("connected by MQTT")
@@ -41,6 +40,7 @@ def plug(served: PtyLine, fault: str | None = None, baudrate: int = 9600) -> Sen
     return sensor
 
 
+@pytest.mark.long(16)
 def test_one_sensor_after_the_other_gets_the_next_id_and_a_table_tells_them_in_the_end(
     site: Site, mosquitto: Mosquitto, shell: Shell
 ) -> None:
@@ -75,6 +75,7 @@ def test_named_sensors_are_one_line_of_json_each_and_the_last_one_ends_it(
     assert "No sensor was adopted." in refused.text
 
 
+@pytest.mark.long(28)
 def test_by_3_1_1_too_a_sensor_whose_switch_is_set_is_told_once_and_the_next_one_is_adopted(
     site: Site, mosquitto: Mosquitto, shell: Shell
 ) -> None:
@@ -92,6 +93,7 @@ def test_by_3_1_1_too_a_sensor_whose_switch_is_set_is_told_once_and_the_next_one
     assert len(set(ids)) == len(ids) >= 2, "by 3.1.1 an answer is known by its id alone"
 
 
+@pytest.mark.long(21)
 def test_a_sensor_that_obeys_after_a_power_cycle_is_adopted_then(
     site: Site, mosquitto: Mosquitto, shell: Shell
 ) -> None:
@@ -120,6 +122,7 @@ def test_a_broker_that_goes_away_is_waited_for(site: Site, mosquitto: Mosquitto,
     assert loop.ends(signal.SIGINT) == 0
 
 
+@pytest.mark.long(11)
 def test_a_daemon_that_is_started_again_is_waited_for(site: Site, mosquitto: Mosquitto, shell: Shell) -> None:
     del mosquitto
     served, run = mounted(site)
