@@ -29,7 +29,7 @@ class Wire(Protocol):
 
 
 CHANGE_SHARE = 0.3
-"""The share of the line that a change of a sensor takes, where it can wait (contract, section 5)."""
+"""The share of the line that a change of a sensor takes where it can wait: the others keep 90 % of their polls."""
 
 
 class ProcedureRun:
