@@ -10,7 +10,7 @@ Rules
 3. The state shows the newest sample at most every `state_every`, but a change of quality or error at once, and of
    `errors`: another value that is missing, or another reason. It goes with the first sample whose time that is, so that
    none shows a sample that the next is about to overtake; by itself only where that sample does not come, or is far
-   off, or where one came merely early.
+   off, or where one came merely early. Of samples taken at one moment (`mqtt.hold`) it shows the last.
 4. Before its first sample a device's state has no value and the error `starting` (a disabled one `disabled`), which
    is never in its error topic.
 5. A disabled device has one sample that says so, and then none but those of polls that a request wants; of these
@@ -70,6 +70,7 @@ class DeviceState:
         "_payload",
         "_sample",
         "_sampled",
+        "_state_at",
         "_state_from",
         "_telemetry",
         "_topics",
@@ -94,7 +95,7 @@ class DeviceState:
         self._counters = DeviceCounters(info.response_timeout, info.request_gap)
         self._last_good: float | None = None
         self._state_from = now.mono
-        self._sampled = -inf
+        self._state_at = self._sampled = -inf
         code = FaultCode.STARTING if info.enabled else FaultCode.DISABLED
         self._sample = replace(self._form(0, now.ts(), now), error=code.value)
         self._payload = self._sample.payload(line)
@@ -256,6 +257,8 @@ class DeviceState:
             published.append(self._state(now))
         elif now.mono >= self._state_from - STATE_EARLY:
             published.append(self._state(now, refresh=True))
+        elif now.mono == self._state_at:  # takes the place of the one from this moment, which is not sent yet
+            published.append(retained(self._topics[STATE], self._payload, refresh=True))
         else:
             self.state_due = self._state_from
             early, near = self._state_from - now.mono, self.info.state_every + SAMPLE_LATE
@@ -272,7 +275,7 @@ class DeviceState:
         """Return the newest state as published; `refresh`: quality and error are as before."""
         on_time = abs(now.mono - self._state_from) <= STATE_EARLY
         self._state_from = (self._state_from if on_time else now.mono) + self.info.state_every
-        self.state_due = None
+        self._state_at, self.state_due = now.mono, None
         return retained(self._topics[STATE], self._payload, refresh=refresh)
 
     def _availability(self) -> Publication:

@@ -131,6 +131,19 @@ def test_a_sample_that_is_merely_early_is_shown_when_its_time_has_come(at: float
     assert watched.device.state_due == pytest.approx(due)
 
 
+def test_of_samples_taken_at_one_moment_the_state_shows_the_last() -> None:
+    watched = Watched()
+    watched.poll(0, 1.0)
+    states = []
+    for moment in (1.0, 2.0, 3.0):
+        said = [each for number in range(3) for each in watched.publish(moment, moment + number)]
+        states.append([each for each in said if each.topic.endswith(STATE)][-1])
+        assert watched.device.state_due is None
+    assert [fields(state.payload, "wind_speed", "seq") for state in states] == [(3.0, 4), (4.0, 7), (5.0, 10)]
+    assert all(state.refresh for state in states)
+    assert watched.poll(3.2, 9.0) == ["telemetry"]  # the pace is as with one sample
+
+
 def test_a_fault_is_shown_at_once_while_a_state_waits_for_a_sample() -> None:
     watched = polled_every(1.0)
     watched.poll(1.0, 2.0)
