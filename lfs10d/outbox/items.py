@@ -6,6 +6,7 @@ Topics are under `B`. Two items are never equal, whatever they say: each is one 
 from __future__ import annotations
 
 from dataclasses import replace
+from math import inf
 from typing import TypeAlias
 
 from lfs10d.outbox.history import QueuedSample
@@ -17,9 +18,10 @@ from lfs10d.telemetry.publication import EVENT, Publication, iso_time
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Retained:
-    """The newest version of a retained topic; payload None clears it."""
+    """The newest version of a retained topic, published at `since` (monotonic s); payload None clears it."""
 
     publication: Publication
+    since: float = -inf
 
     @property
     def topic(self) -> str:

@@ -96,7 +96,7 @@ class Outbox:
             self._queues.live.add(LiveSample(publication, QueuedSample(publication.sample, now, shift=shift)))
             self._make_room()
         elif publication.kind is PublicationKind.RETAINED:
-            if (connected or publication.payload is None) and self._queues.retained.add(publication):
+            if (connected or publication.payload is None) and self._queues.retained.add(publication, now):
                 self._displaced(now)
         elif publication.kind is PublicationKind.TRACE:
             if connected:

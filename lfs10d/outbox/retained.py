@@ -38,11 +38,11 @@ class RetainedQueue:
         """The last burst is acknowledged, its `last` too."""
         return self._closing is None
 
-    def add(self, publication: Publication) -> bool:
-        """Take the newest version of a topic; return True if it replaces a refresh that still waited."""
-        replaced = publication.topic in self.refreshes
-        self._wait(Retained(publication))
-        return replaced
+    def add(self, publication: Publication, now: float) -> bool:
+        """Take the newest version of a topic; return True if it replaces a refresh that waited since before `now`."""
+        waiting = self.refreshes.get(publication.topic)
+        self._wait(Retained(publication, now))
+        return waiting is not None and waiting.since < now
 
     def _wait(self, item: Retained) -> None:
         publication, queue = item.publication, self.changes

@@ -29,12 +29,29 @@ def test_what_the_window_carries_is_told_once_where_states_are_replaced_before_t
         outbox.add(refresh(second), float(second))
         item = outbox.next(float(second))
         assert item is not None
-        outbox.add(refresh(second), float(second))
+        outbox.add(refresh(second), second + 0.5)
         outbox.on_ack(item, second + 0.9)
         told.append(outbox.congested(second + 0.9))
     (congested,) = [each for each in told if each is not None]
     assert congested.window == 1
     assert congested.round_trip == pytest.approx(0.9)
+
+
+def test_states_published_at_one_moment_are_no_sign_that_the_window_carries_too_little() -> None:
+    outbox = Outbox()
+    connect(outbox, 0.0, window=1)
+    for second in range(60):
+        outbox.add(sample(second + 1), float(second))
+        item = outbox.next(float(second))
+        assert item is not None
+        for version in range(3):
+            outbox.add(refresh(version), second + 0.5)
+        outbox.on_ack(item, second + 0.6)
+        shown = outbox.next(second + 0.6)
+        assert isinstance(shown, Retained)
+        assert shown.publication == refresh(2)
+        outbox.on_ack(shown, second + 0.7)
+        assert outbox.congested(second + 0.7) is None
 
 
 def test_once_the_window_was_full_refreshes_have_their_turn_until_nothing_waits() -> None:

@@ -45,7 +45,7 @@ def test_changes_messages_and_live_samples_go_before_history_until_the_window_wa
     queues.messages.traces.append(trace())
     queues.live.add(sample)
     queues.messages.messages.append(message)
-    queues.retained.add(publication.retained("line/error", {}))
+    queues.retained.add(publication.retained("line/error", {}), 0.0)
     assert queues
     first = queues.next(0.0, batch=True)
     assert first is not None
@@ -57,9 +57,9 @@ def test_changes_messages_and_live_samples_go_before_history_until_the_window_wa
 
 def test_refreshes_traces_and_what_clears_a_topic_go_last(waiting: Waiting) -> None:
     queues, trace_line = waiting.queues, trace()
-    queues.retained.add(publication.retained("device/gone/state", None))
+    queues.retained.add(publication.retained("device/gone/state", None), 0.0)
     queues.messages.traces.append(trace_line)
-    queues.retained.add(publication.retained("device/a/state", {}, refresh=True))
+    queues.retained.add(publication.retained("device/a/state", {}, refresh=True), 0.0)
     assert queues
     went = [queues.next(0.0, batch=True) for _ in range(3)]
     assert [each.topic for each in went if each is not None] == [
@@ -136,7 +136,7 @@ def test_what_is_refused_waits_in_its_place(waiting: Waiting) -> None:
 
 def test_what_was_under_way_at_a_loss_waits_in_its_place_and_the_burst_is_forgotten(waiting: Waiting) -> None:
     queues = waiting.queues
-    queues.retained.add(publication.retained("line/error", {}))
+    queues.retained.add(publication.retained("line/error", {}), 0.0)
     queues.messages.traces.append(trace())
     queues.lost()
     assert not queues

@@ -28,11 +28,11 @@ def test_nothing_waits_at_first() -> None:
 
 def test_the_newest_version_waits_until_the_one_under_way_is_over() -> None:
     retention = RetainedQueue()
-    retention.add(state(1))
+    retention.add(state(1), 0.0)
     first = retention.next_change(NONE)
     assert first is not None
-    retention.add(state(2))
-    retention.add(state(3))
+    retention.add(state(2), 0.0)
+    retention.add(state(3), 0.0)
     assert retention
     assert retention.next_change(NONE) is None
     retention.over(first)
@@ -89,14 +89,14 @@ def test_a_loss_leaves_only_what_clears_a_topic() -> None:
 def test_a_clearing_is_put_back_unless_a_newer_version_waits() -> None:
     retention = RetainedQueue()
     for topic in ("gone", "back", "again"):
-        retention.add(publication.retained(topic, None))
+        retention.add(publication.retained(topic, None), 0.0)
     gone, back, again = (retention.next_clearing(NONE) for _ in range(3))
     assert gone is not None
     assert back is not None
     assert again is not None
     retention.lost()
-    retention.add(state(2, "back"))
-    retention.add(publication.retained("again", None))
+    retention.add(state(2, "back"), 0.0)
+    retention.add(publication.retained("again", None), 0.0)
     for item in (gone, back, again):
         retention.put_back(item)
     waiting = [each and each.publication.payload for each in (retention.next_change(NONE), retention.next_change(NONE))]
@@ -107,7 +107,7 @@ def test_a_clearing_is_put_back_unless_a_newer_version_waits() -> None:
         None,
     ]
     other = RetainedQueue()
-    other.add(state(1))
+    other.add(state(1), 0.0)
     version = other.next_change(NONE)
     assert version is not None
     other.lost()
@@ -117,14 +117,14 @@ def test_a_clearing_is_put_back_unless_a_newer_version_waits() -> None:
 
 def test_the_newest_of_what_clears_and_what_fills_a_topic_waits() -> None:
     retention = RetainedQueue()
-    retention.add(publication.retained("state", None))
-    retention.add(state(1))
+    retention.add(publication.retained("state", None), 0.0)
+    retention.add(state(1), 0.0)
     assert retention.next_clearing(NONE) is None
-    retention.add(publication.retained("state", None))
+    retention.add(publication.retained("state", None), 0.0)
     assert retention.next_change(NONE) is None
     clearing = retention.next_clearing(NONE)
     assert clearing is not None
-    retention.add(publication.retained("state", None))
+    retention.add(publication.retained("state", None), 0.0)
     assert retention.next_clearing(NONE) is None, "one is under way"
     retention.over(clearing)
     assert retention.next_clearing(NONE) is not None
@@ -136,7 +136,7 @@ def test_what_is_passed_over_waits_in_its_newest_version_until_its_topic_is_trie
     retention.burst([state(1), publication.retained("gone", None)], ONLINE)
     refused = frozenset({"state", "gone", "availability"})
     assert (retention.next_change(refused), retention.next_clearing(refused), bool(retention)) == (None, None, False)
-    retention.add(state(2))
+    retention.add(state(2), 0.0)
     assert retention.next_change(refused) is None
     retention.lifted(frozenset({"state", "other"}))
     version = retention.next_change(frozenset({"gone", "availability"}))
@@ -144,7 +144,7 @@ def test_what_is_passed_over_waits_in_its_newest_version_until_its_topic_is_trie
     assert version.publication == state(2)
     retention.refused(version)
     retention.over(version)
-    retention.add(state(3))
+    retention.add(state(3), 0.0)
     retention.lifted(refused)
     newest = [item and item.publication for item in (retention.next_change(NONE) for _ in range(3))]
     assert newest == [state(3), ONLINE, None]
@@ -156,7 +156,7 @@ def test_what_is_passed_over_waits_in_its_newest_version_until_its_topic_is_trie
 def test_thousands_of_clearings_are_taken_in_linear_time() -> None:
     retention = RetainedQueue()
     for number in range(60_000):
-        retention.add(publication.retained(f"device/{number}/state", None))
+        retention.add(publication.retained(f"device/{number}/state", None), 0.0)
     under_way: list[Retained] = []
     begun = time.process_time()
     while (item := retention.next_clearing(NONE)) is not None:
@@ -172,7 +172,9 @@ def refresh(version: int, topic: str = "state") -> publication.Publication:
 
 def test_refreshes_wait_apart_and_a_newer_one_replaces_in_its_place() -> None:
     retention = RetainedQueue()
-    replaced = [retention.add(refresh(version, topic)) for version, topic in ((1, "a"), (2, "b"), (3, "a"))]
+    replaced = [
+        retention.add(refresh(version, topic), float(version)) for version, topic in ((1, "a"), (2, "b"), (3, "a"))
+    ]
     assert replaced == [False, False, True]
     assert retention.next_change(NONE) is None
     went = [retention.next_refresh(NONE), retention.next_refresh(NONE), retention.next_refresh(NONE)]
@@ -183,10 +185,17 @@ def test_refreshes_wait_apart_and_a_newer_one_replaces_in_its_place() -> None:
     ]
 
 
+def test_a_refresh_replaced_at_the_moment_it_was_published_had_not_waited() -> None:
+    retention = RetainedQueue()
+    retention.add(refresh(1), 5.0)
+    assert not retention.add(refresh(2), 5.0)
+    assert retention.add(refresh(3), 5.1)
+
+
 def test_a_change_takes_the_place_of_a_refresh() -> None:
     retention = RetainedQueue()
-    retention.add(refresh(1))
-    assert retention.add(state(2))
+    retention.add(refresh(1), 0.0)
+    assert retention.add(state(2), 1.0)
     assert retention.next_refresh(NONE) is None
     change = retention.next_change(NONE)
     assert change is not None
@@ -195,8 +204,8 @@ def test_a_change_takes_the_place_of_a_refresh() -> None:
 
 def test_a_refresh_of_a_topic_whose_change_waits_goes_as_the_change() -> None:
     retention = RetainedQueue()
-    retention.add(state(1))
-    assert not retention.add(refresh(2))
+    retention.add(state(1), 0.0)
+    assert not retention.add(refresh(2), 1.0)
     change = retention.next_change(NONE)
     assert change is not None
     assert change.publication == refresh(2)
@@ -206,8 +215,8 @@ def test_a_refresh_of_a_topic_whose_change_waits_goes_as_the_change() -> None:
 def test_the_last_of_a_burst_follows_the_refreshes_in_it_and_waits_for_no_other() -> None:
     """With the figures apart, `online` and every sample waited 10 s after each connect."""
     retention = RetainedQueue()
-    retention.add(refresh(1))
-    retention.add(publication.retained("state", None))
+    retention.add(refresh(1), 0.0)
+    retention.add(publication.retained("state", None), 0.0)
     retention.burst([refresh(2), refresh(1, "stats"), publication.retained("gone", None)], ONLINE)
     went = [retention.next_change(NONE), retention.next_change(NONE)]
     assert [each and each.topic for each in went] == ["state", "stats"]
@@ -222,7 +231,7 @@ def test_the_last_of_a_burst_follows_the_refreshes_in_it_and_waits_for_no_other(
 
 def test_a_loss_forgets_refreshes() -> None:
     retention = RetainedQueue()
-    retention.add(refresh(1))
+    retention.add(refresh(1), 0.0)
     assert retention
     retention.lost()
     assert not retention
