@@ -20,7 +20,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import settings
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from bench.broker import free_port
 from tests.support import sharing
@@ -67,8 +68,14 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items[:] = sharing.ordered(items)
 
 
+@given(st.none())
+def first_example(_: None) -> None:
+    """Have Hypothesis register its random generator: it looks for who refers to it, and finds nobody who is frozen."""
+
+
 def pytest_collection_finish() -> None:
     """Let the collector of garbage pass over the thousands of tests that stay to the end."""
+    first_example()
     gc.freeze()
 
 
