@@ -61,37 +61,6 @@ def registers_of(kind: RegisterType, word_order: WordOrder, byte_order: ByteOrde
     return struct.unpack(f">{len(wire) // 2}H", wire)
 
 
-def float_bits(number: float) -> int:
-    return int.from_bytes(struct.pack(">f", number), "big")
-
-
-def nearest_shortest(bits: int) -> float:
-    """Find the shortest decimal of a positive normal float32 by exact fractions: every length, both neighbours."""
-    exponent, mantissa = (bits >> 23) - 127 - 23, bits & 0x7FFFFF | 0x800000
-    exact = mantissa * Fraction(2) ** exponent
-    above = exact + Fraction(2) ** exponent / 2
-    narrow = bits & 0x7FFFFF == 0 and bits >> 23 > 1
-    below = exact - Fraction(2) ** exponent / (4 if narrow else 2)
-    even = mantissa % 2 == 0
-    magnitude = len(str(int(exact))) if exact >= 1 else -len(str(int(1 / exact))) + 1
-    for digits in range(1, 10):
-        fits = []
-        for guess in (magnitude - 1, magnitude, magnitude + 1):
-            unit = Fraction(10) ** (guess - digits)
-            fits += [
-                (abs(count * unit - exact), count % 2, count * unit)
-                for count in (exact // unit, exact // unit + 1)
-                if len(str(count)) <= digits
-                and (below < count * unit < above or (even and count * unit in {below, above}))
-            ]
-        if fits:
-            return float(min(fits)[2])  # of two as near the even one
-    raise AssertionError(hex(bits))
-
-
-normal_floats = st.integers(0x0080_0000, 0x7F7F_FFFF)
-
-
 @pytest.mark.parametrize(
     ("registers", "number"),
     [((0x414F, 0xD70A), 12.99), ((0x0000, 0x0000), 0.0), ((0x42C8, 0x0000), 100.0), ((0x3DCC, 0xCCCD), 0.1)],
