@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Final
 
+from docs.generate.payloads import TracePayload
 from lfs10d.command import Command, ok, rejected
 from lfs10d.commands.message import response
 from lfs10d.modbus import diagnosis
@@ -17,7 +18,6 @@ from lfs10d.modbus.timing import LineTiming
 from lfs10d.reading import Exchanged, Fault, FaultCode, PortChanged, Purpose, Reading, UartCounted, UartCounters
 from lfs10d.system.clock import Instant
 from lfs10d.telemetry.info import DaemonInfo, DeviceInfo, LineInfo
-from lfs10d.telemetry.payloads import TracePayload
 from lfs10d.telemetry.publication import Publication, Sample
 from lfs10d.telemetry.station import Station
 

@@ -12,9 +12,11 @@ from pydantic.fields import FieldInfo
 
 from docs.generate import events
 from docs.generate.configuration import kind_of, kinds_within, written
+from docs.generate.contract import OUTBOUND, Outbound
 from docs.generate.examples import EVENT_TS, Story, responses, trace
 from docs.generate.markdown import example, plain, table
 from docs.generate.meanings import ERROR_CODES, FAULT_CODES
+from docs.generate.payloads import Availability
 from docs.generate.uplink import bytes_table
 from docs.generate.wind import wind_examples
 from lfs10d.cli.request_words import KEEPING, PRESENT
@@ -22,8 +24,6 @@ from lfs10d.command import ErrorCode
 from lfs10d.commands.context import Handler
 from lfs10d.commands.handlers.registry import HANDLERS
 from lfs10d.reading import FaultCode
-from lfs10d.telemetry.contract import OUTBOUND, Outbound
-from lfs10d.telemetry.payloads import Availability
 from lfs10d.telemetry.publication import EVENT
 
 SHOWN_BEFORE = {"device/+/telemetry": "device/+/state", "device/+/history": "device/+/state"}

@@ -1,7 +1,7 @@
 """Samples, publications and events as plain values, and their topics under `B`.
 
 `B` is `<base topic>/<line name>`; nothing here knows it. The models of the payloads, for the documentation
-and the tests, are in `lfs10d.telemetry.payloads`: building them costs megabytes that a running daemon need not spend.
+and the tests, are in `docs.generate.payloads`: building them costs megabytes that a running daemon need not spend.
 """
 
 from __future__ import annotations

@@ -8,13 +8,13 @@ from typing import Any, cast
 
 import pytest
 
+from docs.generate.contract import check
 from lfs10d.commands.trace import LONGEST, FrameTrace, TracedDevice
 from lfs10d.modbus.frames import Checksum, Codec, Framing
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Exchanged, FaultCode, Purpose
 from lfs10d.system.clock import Instant
-from lfs10d.telemetry.contract import check
 
 NOW = Instant(100.0, 1_795_298_000.0, "synced")
 RTU = Codec(Framing.RTU)

@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from docs.generate.commands import BAUDRATE, CONFIG, SLAVES, WALK, Step, recorded
+from docs.generate.contract import check
 from lfs10d.commands.handlers.registry import HANDLERS
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
-from lfs10d.telemetry.contract import check
 from tests.support import forked
 from tests.support.brokers import Mosquitto
 from tests.support.sites import QUICK, Site, View, eventually, good, tell

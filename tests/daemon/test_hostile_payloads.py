@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import pytest
 
-from lfs10d.telemetry.contract import check
+from docs.generate.contract import check
 from soak.attestation import Oracle, epoch_of, parsed
 from tests.support.brokers import Mosquitto
 from tests.support.sites import Site, View, eventually, good

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from docs.generate.contract import OUTBOUND
 from lfs10d.commands.handlers.registry import HANDLERS
-from lfs10d.telemetry.contract import OUTBOUND
 from tests.support.brokers import Listener, Mosquitto
 
 pytestmark = pytest.mark.needs("mosquitto", "mosquitto_passwd")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 
-from lfs10d.telemetry.contract import check
+from docs.generate.contract import check
 from tests.support.brokers import Listener, Mosquitto
 from tests.support.operators import BASE, Operator, operator_of, silence
 from tests.support.sites import Site, View, eventually, good, tell

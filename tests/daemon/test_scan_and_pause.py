@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
+from docs.generate.contract import check
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
-from lfs10d.telemetry.contract import check
 from tests.support import forked
 from tests.support.brokers import Mosquitto
 from tests.support.sites import Site, View, eventually, good, tell

@@ -13,6 +13,7 @@ import pytest
 from docs.generate import commands
 from docs.generate.commands import WALK, recorded
 from docs.generate.configuration import parts
+from docs.generate.contract import OUTBOUND, check
 from docs.generate.examples import HEARD, SENT
 from docs.generate.markdown import WIDTH, example, plain
 from docs.generate.mqtt import _meanings, examples
@@ -25,7 +26,6 @@ from lfs10d.config.models import Config
 from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.request import ReadRegisters
 from lfs10d.schema.fields import FieldKind
-from lfs10d.telemetry.contract import OUTBOUND, check
 
 ROOT = Path(__file__).parents[2]
 CONFIGURATION = (ROOT / "docs" / "configuration.md").read_text(encoding="utf-8")

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from docs.generate.contract import OUTBOUND
 from docs.generate.dashboard import PANELS, WIDTH, Panel, page, placed
-from lfs10d.telemetry.contract import OUTBOUND
 
 ROOT = Path(__file__).parents[2]
 FILES = ROOT / "config" / "integrations"

@@ -14,10 +14,10 @@ from typing import Any, Final
 
 import pytest
 
+from docs.generate.contract import OUTBOUND
+from docs.generate.wind_payloads import RecordPayload
 from lfs10d.reading import FaultCode
-from lfs10d.telemetry.contract import OUTBOUND
 from lfs10d.telemetry.publication import Sample
-from lfs10d.telemetry.wind.payloads import RecordPayload
 from tests.support.samples import SAMPLE
 
 FILES = Path(__file__).parents[2] / "config" / "integrations"

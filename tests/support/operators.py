@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Any
 
+from docs.generate.contract import check
 from lfs10d.simulator.line import SimulatedLine
-from lfs10d.telemetry.contract import check
 from tests.support.brokers import Heard, Listener, Mosquitto
 from tests.support.sites import Run, Site, eventually
 

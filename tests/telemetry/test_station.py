@@ -8,9 +8,9 @@ from typing import cast
 
 import pytest
 
+from docs.generate.contract import outbound
 from lfs10d.reading import Exchanged, FaultCode, PortChanged, Purpose, UartCounted, UartCounters
 from lfs10d.system.clock import Instant
-from lfs10d.telemetry.contract import outbound
 from lfs10d.telemetry.publication import BacklogStats, Payload
 from lfs10d.telemetry.station import Station
 from tests.support.stations import (

@@ -10,10 +10,10 @@ from typing import cast
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from docs.generate.contract import check
 from lfs10d.reading import Exchanged, Fault, FaultCode, PortChanged, Purpose, Reading
 from lfs10d.system.clock import Instant
 from lfs10d.system.clock_step import ClockState
-from lfs10d.telemetry.contract import check
 from lfs10d.telemetry.info import DeviceInfo
 from lfs10d.telemetry.publication import Payload, Publication
 from lfs10d.telemetry.station import Station

@@ -13,15 +13,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from docs.generate import contract
+from docs.generate.payloads import SamplePayload
 from lfs10d.outbox.store.database import APPLICATION_ID, SCHEMA, WIDE_SCHEMA, number
 from lfs10d.outbox.store.row import DamagedError
 from lfs10d.outbox.store.sample_file import SampleFile
 from lfs10d.reading import Fault, FaultCode, Reading, Value
 from lfs10d.system.clock import Instant
-from lfs10d.telemetry import contract
 from lfs10d.telemetry.device_state import DeviceState
 from lfs10d.telemetry.info import DeviceInfo
-from lfs10d.telemetry.payloads import SamplePayload
 from lfs10d.telemetry.publication import TELEMETRY, Sample
 from tests.support.rows import BOOT, ROOMY, START, entries, sample
 

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lfs10d.telemetry.contract import check
+from docs.generate.contract import check
 from lfs10d.telemetry.info import DeviceInfo, WindInfo
 from tests.support.naive_wind import Good, Naive
 from tests.support.winds import ANEMOMETER, MIDNIGHT, SONIC, TEN_MINUTES, VANE, Weather, reading, silence, weather

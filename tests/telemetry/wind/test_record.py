@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.telemetry.contract import check
+from docs.generate.contract import check
 from lfs10d.telemetry.wind.record import (
     DIRECTION_NAMES,
     EVEN_WITHIN,

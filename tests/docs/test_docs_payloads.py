@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from lfs10d.telemetry.payloads import Event, LineStats, Response, SamplePayload
+from docs.generate.payloads import Event, LineStats, Response, SamplePayload
 from tests.support.samples import SAMPLE
 
 GOOD: dict[str, Any] = SAMPLE.payload("line0")

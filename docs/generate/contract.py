@@ -1,6 +1,6 @@
 """The table of published topics: every topic under `B`, the model of its payload, and when it is published.
 
-For `docs/mqtt.md` and for the tests; like `lfs10d.telemetry.payloads` it is not imported by the running daemon.
+For `docs/mqtt.md` and for the tests.
 """
 
 from __future__ import annotations
@@ -10,9 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, TypeAdapter
 
-from lfs10d.system.dataclass import dataclass
-from lfs10d.telemetry import publication
-from lfs10d.telemetry.payloads import (
+from docs.generate.payloads import (
     Availability,
     DeviceConfig,
     DeviceEntry,
@@ -27,7 +25,9 @@ from lfs10d.telemetry.payloads import (
     SamplePayload,
     TracePayload,
 )
-from lfs10d.telemetry.wind.payloads import RecordPayload, WindPayload
+from docs.generate.wind_payloads import RecordPayload, WindPayload
+from lfs10d.system.dataclass import dataclass
+from lfs10d.telemetry import publication
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 """Models of outbound payloads, for `docs/mqtt.md` and for the tests.
 
 The daemon builds plain dictionaries and never validates what it sends: these models say what it promises.
-`lfs10d.telemetry.contract` assigns them to topics.
+`docs.generate.contract` assigns them to topics.
 """
 
 from __future__ import annotations

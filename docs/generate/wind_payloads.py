@@ -1,4 +1,4 @@
-"""Models of the topics `wind` and `record`, for `docs/mqtt.md` and for the tests, as `lfs10d.telemetry.payloads` is."""
+"""Models of the topics `wind` and `record`, for `docs/mqtt.md` and for the tests, as `docs.generate.payloads` is."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from lfs10d.telemetry.payloads import Clock, Milliseconds, Payload, Version
+from docs.generate.payloads import Clock, Milliseconds, Payload, Version
 
 Speed = Annotated[float | None, Field(ge=0)]
 Share = Annotated[float, Field(ge=0, le=1)]

@@ -7,9 +7,9 @@ import json
 import pytest
 from pydantic import ValidationError
 
+from docs.generate.contract import OUTBOUND, check, outbound
+from docs.generate.payloads import DroppedPayload, Event, NoError
 from lfs10d.telemetry import publication
-from lfs10d.telemetry.contract import OUTBOUND, check, outbound
-from lfs10d.telemetry.payloads import DroppedPayload, Event, NoError
 
 FINE = '{"v":1,"active":false,"code":null,"last_code":null,"cleared":null}'
 
