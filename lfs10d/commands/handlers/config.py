@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Annotated
 
 from pydantic import Field
 
 from lfs10d.command import Command, Result, ok, rejected
-from lfs10d.commands.admission import CommandSpec
-from lfs10d.commands.context import Context, Handler
+from lfs10d.commands.context import Context
 from lfs10d.commands.handlers.config_edit import altered, apply_edit, known_device, refuse
 from lfs10d.commands.message import NoParameters, Parameters
 from lfs10d.config import changes
@@ -106,10 +104,3 @@ def _why_no_change(device: str, key: str, change: changes.DeviceChange) -> str:
 
 def _fact(device: str) -> str:
     return f"the slave id of {device} was verified on the line; device/readdress changes it"
-
-
-HANDLERS: Mapping[str, Handler] = {
-    "config/get": Handler(CommandSpec("always"), get),
-    "config/reload": Handler(CommandSpec("polling"), reload),
-    "config/reset": Handler(CommandSpec("polling", WhichChange), reset),
-}

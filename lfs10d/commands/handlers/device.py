@@ -10,8 +10,7 @@ from typing import Annotated, Any, TypeAlias
 from pydantic import Field
 
 from lfs10d.command import Command, ErrorCode, Result, failed, ok
-from lfs10d.commands.admission import CommandSpec
-from lfs10d.commands.context import Context, Handler
+from lfs10d.commands.context import Context
 from lfs10d.commands.handlers.config_edit import apply_edit, as_json, known_device, refuse, unknown_device
 from lfs10d.commands.message import Parameters
 from lfs10d.config.changes import OPTIONS, Changes, Place
@@ -206,11 +205,3 @@ async def read(parameters: OneDevice, context: Context, _: Command) -> Result:
     facts = {} if fault.exception_code is None else {"exception_code": fault.exception_code}
     code: ErrorCode = "timeout" if fault.code is FaultCode.TIMEOUT else "line_error"
     return failed(code, f"{device}: {fault.message}", data=result.sample, **facts)
-
-
-HANDLERS: Mapping[str, Handler] = {
-    "device/add": Handler(CommandSpec("polling", NewDevice), add),
-    "device/remove": Handler(CommandSpec("polling", OneDevice), remove),
-    "device/options": Handler(CommandSpec("polling", Options), options),
-    "device/read": Handler(CommandSpec("polling", OneDevice), read),
-}

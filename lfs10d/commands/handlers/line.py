@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Annotated
 
 from pydantic import Field
 
 from lfs10d.command import Command, Result, ok
-from lfs10d.commands.admission import CommandSpec
-from lfs10d.commands.context import Context, Handler
+from lfs10d.commands.context import Context
 from lfs10d.commands.message import NoParameters, Parameters
 from lfs10d.schema.fields import Duration
 
@@ -42,10 +40,3 @@ async def pause(parameters: HowLong, context: Context, _: Command) -> Result:
 async def cancel(_: NoParameters, context: Context, __: Command) -> Result:
     """End the scan, trace and pause that are under way."""
     return ok({"cancelled": list(context.line.cancel())})
-
-
-HANDLERS: Mapping[str, Handler] = {
-    "line/trace": Handler(CommandSpec("sensors", HowLong), trace),
-    "line/pause": Handler(CommandSpec("sensors", HowLong), pause),
-    "line/cancel": Handler(CommandSpec("sensors"), cancel),
-}

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Annotated
 
 from pydantic import Field
 
 from lfs10d.command import Command, Result
-from lfs10d.commands.admission import CommandSpec
-from lfs10d.commands.context import Context, Handler
+from lfs10d.commands.context import Context
 from lfs10d.commands.handlers import device
 from lfs10d.commands.message import Parameters
 from lfs10d.commands.pause import FREED
 from lfs10d.reconfiguration.adopt_request import AdoptRequest
 from lfs10d.schema.fields import Choice, FilePath, Flag, Name, Text, Whole
-
-REMEMBERED_FOR = 86_400.0
-"""Seconds for which the response to a physical change is kept for repeats of the request."""
-
 
 DRY_RUN = "Only check whether it can be done; nothing is written."
 
@@ -77,10 +71,3 @@ async def adopt(parameters: AdoptParameters, context: Context, command: Command)
     await device.profile_of(wanted.profile, context.config.now)
     request = AdoptRequest(wanted.name, wanted.label, wanted.factory, wanted.to, wanted.profile)
     return await context.reconfiguration.adopt(request, command)
-
-
-HANDLERS: Mapping[str, Handler] = {
-    "device/readdress": Handler(CommandSpec("sensors", ReaddressParameters, REMEMBERED_FOR), readdress),
-    "line/adopt": Handler(CommandSpec("sensors", AdoptParameters, REMEMBERED_FOR), adopt),
-    "line/baudrate": Handler(CommandSpec("sensors", BaudrateParameters, REMEMBERED_FOR), baudrate),
-}

@@ -11,14 +11,13 @@ Rules
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
 from lfs10d.command import Command, ErrorCode, Result, failed, ok, rejected
-from lfs10d.commands.admission import CommandSpec
-from lfs10d.commands.context import Context, Handler
+from lfs10d.commands.context import Context
 from lfs10d.commands.handlers.config_edit import known_device, refuse
 from lfs10d.commands.message import Parameters
 from lfs10d.config.effective import Effective
@@ -183,9 +182,3 @@ def _why(access: Access) -> tuple[ErrorCode, str]:
             return "line_error", "it cannot be learned whether the adapter returns our own bytes; set line.echo"
     silent = fault is not None and fault.code in (FaultCode.TIMEOUT, FaultCode.LATE)
     return "timeout" if silent else "line_error", said
-
-
-HANDLERS: Mapping[str, Handler] = {
-    "register/read": Handler(CommandSpec("registers", SomeRegisters), read),
-    "register/write": Handler(CommandSpec("registers", OneRegister), write),
-}

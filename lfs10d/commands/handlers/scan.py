@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
-from lfs10d.command import Command, Result, failed, ok
-from lfs10d.commands.admission import CommandSpec
-from lfs10d.commands.context import Context, Handler
+from lfs10d.command import Command, RefusedError, Result, failed, ok
+from lfs10d.commands.context import Context
 from lfs10d.commands.handlers import device
 from lfs10d.commands.message import Parameters
 from lfs10d.line.jobs.scan_ids import LAST_ID, ids_of
@@ -127,10 +125,10 @@ async def _add(done: Scan, context: Context, command: Command) -> dict[str, list
         own = now.loaded.profiles
         word = next((word for word, known in own.items() if known.name == profile.name), profile.name)
         wanted = device.NewDevice(slave=finding.slave, profile=word)
-        answer = await device.HANDLERS["device/add"].perform(wanted, context, command)
+        try:
+            answer = await device.add(wanted, context, command)
+        except RefusedError as error:
+            answer = error.result
         entry = {"id": finding.slave, "error": answer.error()} if answer.code else answer.data
         (refused if answer.code else added).append(entry)  # type: ignore[arg-type]  # device/add answers with an object
     return {"added": added, "not_added": refused}
-
-
-HANDLERS: Mapping[str, Handler] = {"line/scan": Handler(CommandSpec("sensors", WhomToFind), scan)}
