@@ -81,7 +81,7 @@ class Verbs(click.Group):
 @click.command(
     cls=Verbs,
     name="lfs10d",
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
     epilog=EXAMPLES,
 )
 @click.version_option(__version__, prog_name="lfs10d", message="%(prog)s %(version)s")
@@ -100,7 +100,6 @@ def config_option(function: Callable[..., Any], text: str = "The configuration f
         envvar="LFS10D_CONFIG",
         show_envvar=True,
         default=SERVICE_FILE,
-        show_default=True,
         metavar="FILE",
         type=click.Path(path_type=Path, readable=False),  # whether it can be read is reported in our words
         help=text,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from math import inf
 from typing import Any
 
@@ -65,6 +65,10 @@ class DurationType(click.ParamType):  # type: ignore[type-arg]  # generic in new
 
 # How the characters on the line look
 
+FRAMING = click.option("--framing", type=click.Choice(["rtu", "ascii"]), default="rtu", help="How bytes become frames.")
+STOPBITS = click.option("--stopbits", type=click.Choice(["1", "2"]), default="1", help="Stop bits per character.")
+PARITY = click.option("--parity", type=click.Choice([*PARITIES]), default="none", help="Parity bit.")
+
 
 @dataclass(frozen=True, slots=True)
 class LineOptions:
@@ -124,18 +128,16 @@ def baudrate_of(text: str) -> int:
     return int(text)
 
 
-def _choice(name: str, choices: Collection[str], default: str | None, text: str) -> Callable[..., Any]:
-    return click.option(name, type=click.Choice(list(choices)), default=default, show_default=True, help=text)
-
-
 def line_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options of the line to a command that has the argument `port`; `take` returns them as one value."""
     for option in (
         click.option("--timeout", type=DurationType("200ms or 1s", *TIMEOUTS), help="How long to wait for each reply."),
-        _choice("--framing", ("rtu", "ascii"), "rtu", "How bytes become frames."),
-        _choice("--stopbits", ("1", "2"), "1", "Stop bits per character."),
-        _choice("--databits", ("8", "7"), None, "Data bits per character.  [default: 8; 7 with ascii]"),
-        _choice("--parity", PARITIES, "none", "Parity bit."),
+        FRAMING,
+        STOPBITS,
+        click.option(
+            "--databits", type=click.Choice(["8", "7"]), help="Data bits per character.  [default: 8; 7 with ascii]"
+        ),
+        PARITY,
     ):
         function = option(function)
     return function

@@ -63,14 +63,11 @@ def _rate(context: click.Context, parameter: click.Parameter, value: str) -> int
     "--profile",
     "profile_name",
     default="lfs10",
-    show_default=True,
     metavar="NAME|FILE",
     shell_complete=profile_names,
     help="Kind of device.",
 )
-@click.option(
-    "--baudrate", callback=_rate, default="9600", show_default=True, metavar="RATE", help="The sensor's rate."
-)
+@click.option("--baudrate", callback=_rate, default="9600", metavar="RATE", help="The sensor's rate.")
 @click.option(
     "--checksum", type=click.Choice(["crc", "sum"]), default=None, help="Check of the rtu frames, if not the profile's."
 )
@@ -79,7 +76,6 @@ def _rate(context: click.Context, parameter: click.Parameter, value: str) -> int
     "--interval",
     type=DurationType("250ms or 1s", least=SHORTEST_INTERVAL),
     default="1s",
-    show_default=True,
     help="Time between two readings with --watch.",
 )
 @line_options

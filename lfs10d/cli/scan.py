@@ -63,7 +63,6 @@ def given(name: str) -> bool:
     "--ids",
     callback=id_list,
     default="1-255",
-    show_default=True,
     metavar="IDS",
     help="Slave ids to ask, such as 1-20,255.",
 )
@@ -72,7 +71,6 @@ def given(name: str) -> bool:
     "rates",
     callback=_rates,
     default="9600,19200",
-    show_default=True,
     metavar="RATES",
     help="Rates to try.",
 )
@@ -83,9 +81,7 @@ def given(name: str) -> bool:
     metavar="NAME|FILE",
     help="Also recognise devices of this profile, and try its rates.",
 )
-@click.option(
-    "--checksum", type=click.Choice(["crc", "sum"]), default="crc", show_default=True, help="Check of the rtu frames."
-)
+@click.option("--checksum", type=click.Choice(["crc", "sum"]), default="crc", help="Check of the rtu frames.")
 @click.option(
     "--write",
     type=click.Path(path_type=Path, dir_okay=False),

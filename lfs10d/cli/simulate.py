@@ -13,7 +13,7 @@ from typing import Any
 import click
 
 from lfs10d.cli import json_option
-from lfs10d.cli.options import DurationType, id_list, profile_names
+from lfs10d.cli.options import FRAMING, PARITY, STOPBITS, DurationType, id_list, profile_names
 from lfs10d.profiles.library import load_profile
 from lfs10d.schema.quantities import BAUDRATES
 from lfs10d.simulator.blueprint import LFS10, blueprint_of
@@ -86,23 +86,11 @@ class SimulateOptions:
 
 @click.command("simulate", epilog=EXAMPLES)
 @click.option("--link", type=click.Path(path_type=Path), metavar="PATH", help="A lasting name for the terminal.")
-@click.option("--slaves", callback=id_list, default="1-8", show_default=True, metavar="IDS", help="Slave ids.")
-@click.option(
-    "--baudrate",
-    type=click.Choice([str(rate) for rate in BAUDRATES]),
-    default="9600",
-    show_default=True,
-    help="Bits per second.",
-)
-@click.option(
-    "--parity", type=click.Choice(["none", "even", "odd"]), default="none", show_default=True, help="Parity bit."
-)
-@click.option(
-    "--stopbits", type=click.Choice(["1", "2"]), default="1", show_default=True, help="Stop bits per character."
-)
-@click.option(
-    "--framing", type=click.Choice(["rtu", "ascii"]), default="rtu", show_default=True, help="How bytes become frames."
-)
+@click.option("--slaves", callback=id_list, default="1-8", metavar="IDS", help="Slave ids.")
+@click.option("--baudrate", type=click.Choice([*map(str, BAUDRATES)]), default="9600", help="Bits per second.")
+@PARITY
+@STOPBITS
+@FRAMING
 @click.option("--faults", type=click.Path(path_type=Path), metavar="FILE", help="A faults file (YAML).")
 @click.option(
     "--profile",
@@ -110,31 +98,18 @@ class SimulateOptions:
     shell_complete=profile_names,
     help="A profile's name or file, in place of lfs10.",
 )
-@click.option(
-    "--turnaround",
-    type=DURATION,
-    default="5ms",
-    show_default=True,
-    help="Time from a request to its answer.",
-)
-@click.option(
-    "--jitter",
-    type=DURATION,
-    default="0ms",
-    show_default=True,
-    help="Longest random time added to that.",
-)
+@click.option("--turnaround", type=DURATION, default="5ms", help="Time from a request to its answer.")
+@click.option("--jitter", type=DURATION, default="0ms", help="Longest random time added to that.")
 @click.option("--latency", type=DURATION, default=None, help="Interval at which the adapter delivers bytes.")
 @click.option("--echo", is_flag=True, help="The adapter returns the master's own bytes.")
 @click.option(
     "--values",
     type=click.Choice(["wind", "unique"]),
     default="wind",
-    show_default=True,
     help="Wind that changes slowly, or each value once.",
 )
 @click.option("--wind", type=click.Path(path_type=Path), metavar="FILE", help="A recording (CSV) to play.")
-@click.option("--seed", type=int, default=1, show_default=True, help="Seed of wind and faults.")
+@click.option("--seed", type=int, default=1, help="Seed of wind and faults.")
 @click.option("--interval", type=DURATION, default=None, help="Print the counts at this interval.")
 @json_option
 def command(**values: Any) -> None:  # noqa: ANN401  # seventeen options; `SimulateOptions` names and types them

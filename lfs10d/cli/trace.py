@@ -57,7 +57,6 @@ Examples:
     "duration",
     type=DurationType("30s or 2m", 0.1, LONGEST),
     default=duration_text(USUAL),
-    show_default=True,
     help=f"How long, at most {duration_text(LONGEST)}.",
 )
 @login_options

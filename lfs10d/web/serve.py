@@ -66,7 +66,6 @@ class ListenAddress(click.ParamType):  # type: ignore[type-arg]  # generic in ne
     "--listen",
     type=ListenAddress(),
     default="127.0.0.1:8073",
-    show_default=True,
     help="Address and port to listen on; an address that others can reach needs a token.",
 )
 @click.option(

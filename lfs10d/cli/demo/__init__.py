@@ -21,7 +21,6 @@ Examples:
     "--broker",
     type=click.Choice(["auto", "mosquitto", "amqtt"]),
     default="auto",
-    show_default=True,
     help="auto: mosquitto where it is installed, else amqtt.",
 )
 def command(duration: float | None, broker: str) -> int:
