@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import json
-import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 
 import click
 
 from lfs10d.cli import json_option
 from lfs10d.cli.options import profile_names
-from lfs10d.cli.render.profile_tables import Table, explain
-from lfs10d.cli.render.table import columns
+from lfs10d.cli.render import table
+from lfs10d.cli.render.profile_tables import explain
 from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.profiles.profile import Profile
 
@@ -37,7 +36,7 @@ def command(context: click.Context, *, as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps([_entry(profile) for profile in known], indent=2))
     else:
-        _draw([_overview(known)])
+        table.show([_overview(known)])
 
 
 @command.command("show", short_help="Explain a profile: a built-in one, or a YAML file.", epilog=EXAMPLES)
@@ -49,7 +48,7 @@ def show(name: str, *, as_json: bool) -> None:
     if as_json:
         click.echo(json.dumps(profile.model_dump(mode="json", by_alias=True), indent=2))
     else:
-        _draw(explain(profile))
+        table.show(explain(profile))
     for doubt in profile.doubts():
         click.echo(f"lfs10d: warning: {doubt}", err=True)
 
@@ -65,12 +64,12 @@ def _entry(profile: Profile) -> dict[str, object]:
     }
 
 
-def _overview(known: Iterable[Profile]) -> Table:
+def _overview(known: Iterable[Profile]) -> table.Table:
     rows = tuple(
         (profile.name, profile.title, ", ".join(profile.value_names), ", ".join(profile.framings), seen(profile))
         for profile in known
     )
-    return Table("", ("name", "device", "values", "framings", "not verified"), rows)
+    return table.Table("", ("name", "device", "values", "framings", "not verified"), rows)
 
 
 def seen(profile: Profile) -> str:
@@ -80,46 +79,3 @@ def seen(profile: Profile) -> str:
     if len(unverified) == len(profile.values):
         unverified = ["all values"]
     return ", ".join([*unverified, *(name for name, fact in places.items() if fact is not None and fact.unverified)])
-
-
-def _draw(tables: list[Table]) -> None:
-    if sys.stdout.isatty():
-        _draw_on_terminal(tables)
-    else:
-        click.echo("\n\n".join("\n".join(_lines(table)) for table in tables))
-
-
-def _lines(table: Table) -> Iterator[str]:
-    if table.title:
-        yield table.title
-    heads, *rows = (table.heads, *table.rows) if table.heads else table.rows
-    indent = "  " if table.title else ""
-    for line in columns(heads, rows):
-        yield indent + line
-
-
-def _draw_on_terminal(tables: list[Table]) -> None:
-    # Only a terminal needs rich; importing it takes longer than the rest of the verb.
-    from rich import box  # noqa: PLC0415 - for a terminal only
-    from rich.console import Console  # noqa: PLC0415 - for a terminal only
-    from rich.table import Table as Drawing  # noqa: PLC0415 - for a terminal only
-    from rich.text import Text  # noqa: PLC0415 - for a terminal only
-
-    console = Console()
-    for number, table in enumerate(tables):
-        if number:
-            console.print()
-        drawing = Drawing(
-            title=Text(table.title, style="bold") if table.title else None,
-            title_justify="left",
-            box=box.SIMPLE_HEAD if table.heads else None,
-            pad_edge=False,
-            show_header=bool(table.heads),
-        )
-        name, *others = table.heads or ("", "")
-        drawing.add_column(name, style="cyan", no_wrap=True)
-        for head in others:
-            drawing.add_column(head, no_wrap=head.startswith("register"))
-        for row in table.rows:
-            drawing.add_row(*(Text(cell) for cell in row))
-        console.print(drawing)

@@ -20,11 +20,6 @@ class Change:
     old: Any
     new: Any
 
-    @property
-    def section(self) -> str:
-        """The first part of the key: `line`, `slaves`, `mqtt` ..."""
-        return self.key.partition(".")[0]
-
 
 @dataclass(frozen=True, slots=True)
 class Difference:
@@ -49,9 +44,6 @@ class Difference:
     def sections(self) -> frozenset[str]:
         """Sections with a key that takes effect."""
         return frozenset(key.partition(".")[0] for key in self.applied)
-
-    def __bool__(self) -> bool:
-        return bool(self.applied or self.restart_required)
 
 
 def difference(old: Config, new: Config) -> Difference:

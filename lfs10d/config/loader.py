@@ -60,19 +60,14 @@ class LoadedConfig:
 
     def password(self) -> Secret | None:
         """Read the broker's password anew; None if there is none. Raises ConfigError if it cannot be read."""
-        file = self.config.mqtt.password_file
-        if file is not None:
-            try:
-                return password_in(Path(file))
-            except UnreadableError as error:
-                problem = self.document.problem(("mqtt", "password_file"), str(error))
-                raise ConfigError((problem,)) from None
-        if self.credential is None:
-            return None
+        named = self.config.mqtt.password_file
+        file = self.credential if named is None else Path(named)
         try:
-            return password_in(self.credential)
+            return None if file is None else password_in(file)
         except UnreadableError as error:
-            raise ConfigError((Problem(str(self.credential), 1, 1, "", str(error)),)) from None
+            key = ("mqtt", "password_file")
+            at = Problem(str(file), 1, 1, "", str(error)) if named is None else self.document.problem(key, str(error))
+            raise ConfigError((at,)) from None
 
 
 def load(

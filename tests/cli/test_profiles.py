@@ -11,8 +11,8 @@ import pytest
 from click import unstyle
 from click.testing import CliRunner
 
-from lfs10d.cli import profiles as verb
 from lfs10d.cli.profiles import command
+from lfs10d.cli.render import table
 from lfs10d.cli.render.profile_tables import explain
 from lfs10d.errors import ConfigError
 from lfs10d.profiles.library import builtin_names, load_profile, parse_profile
@@ -164,7 +164,7 @@ def test_a_terminal_gets_drawn_tables_of_the_same_words(
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
-    verb._draw(explain(load_profile("lfs10", relative_to=Path())))
+    table.show(explain(load_profile("lfs10", relative_to=Path())))
     drawn = unstyle(capsys.readouterr().out)
     assert "LFS10 wind speed sensor (profile lfs10)" in drawn
     assert "float32, high word first" in drawn

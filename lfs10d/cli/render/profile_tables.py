@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TypeAlias
 
+from lfs10d.cli.render.table import Row, Table
 from lfs10d.modbus.frames import EXCEPTION_NAMES
 from lfs10d.profiles.blocks import Block
 from lfs10d.profiles.decimals import span
@@ -13,22 +13,10 @@ from lfs10d.profiles.profile import Profile
 from lfs10d.profiles.settings import Setting
 from lfs10d.profiles.values import Value
 from lfs10d.schema.quantities import duration_text
-from lfs10d.system.dataclass import dataclass
-
-Row: TypeAlias = tuple[str, ...]
 
 READ_FUNCTIONS = {1: "coil ", 2: "discrete input ", 3: "", 4: "input "}
 """Function 03 reads holding registers, the usual ones; 04 reads input registers, 01 and 02 bits."""
 WRITE_FUNCTIONS = {6: "06 (one register)", 16: "16 (several registers)"}
-
-
-@dataclass(frozen=True, slots=True)
-class Table:
-    """A titled table of text; `heads` is empty where the first column names the row."""
-
-    title: str
-    heads: Row
-    rows: tuple[Row, ...]
 
 
 def explain(profile: Profile) -> list[Table]:

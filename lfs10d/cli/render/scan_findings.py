@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import json
 import os
-import sys
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lfs10d.cli import print_lines
 from lfs10d.cli.calibrated import NONE, Calibrations
 from lfs10d.cli.options import LineOptions
-from lfs10d.cli.render.table import columns
+from lfs10d.cli.render import table
 from lfs10d.config.models import SlaveConfig
 from lfs10d.modbus.frames import EXCEPTION_NAMES, Framing
 from lfs10d.profiles.profile import Profile
@@ -24,7 +22,7 @@ from lfs10d.system.dataclass import dataclass
 if TYPE_CHECKING:  # as in `lfs10d.commands.context`
     from lfs10d.line.jobs.identification import FoundDevice
 
-HEAD = ("id", "baud", "answers in", "what it is", "remark")
+HEAD = ("id", "baud", "answers in", "what it is", table.REMARK)
 RIGHT = (0, 1, 2)
 
 DEFAULT_PROFILE = "lfs10"
@@ -41,26 +39,9 @@ def row(finding: FoundDevice, calibrated: Mapping[str, Value | None] = NOTHING) 
     return str(finding.slave), str(finding.baudrate), answers_in, what(finding, calibrated), "; ".join(remarks(finding))
 
 
-def show(rows: list[tuple[str, ...]]) -> None:
+def show(rows: Iterable[tuple[str, ...]]) -> None:
     """Print what was found."""
-    if not sys.stdout.isatty():
-        print_lines(columns(HEAD, rows, right=RIGHT))
-        return
-    # Only a terminal needs rich; importing it takes longer than the rest of the verb.
-    from rich import box  # noqa: PLC0415 - for a terminal only
-    from rich.console import Console  # noqa: PLC0415 - for a terminal only
-    from rich.table import Table  # noqa: PLC0415 - for a terminal only
-    from rich.text import Text  # noqa: PLC0415 - for a terminal only
-
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for index, head in enumerate(HEAD):
-        right = index in RIGHT
-        table.add_column(head, justify="right" if right else "left", no_wrap=right, style="cyan" if not index else None)
-    for row in rows:
-        *cells, remark = (Text(cell) for cell in row)
-        remark.stylize("yellow")
-        table.add_row(*cells, remark)
-    Console().print(table)
+    table.show([table.Table("", HEAD, tuple(rows), RIGHT)])
 
 
 def what(finding: FoundDevice, calibrated: Mapping[str, Value | None] = NOTHING) -> str:
