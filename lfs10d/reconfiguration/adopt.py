@@ -12,7 +12,6 @@ from lfs10d.command import ErrorCode, Result, failed, ok, rejected
 from lfs10d.config.effective import Effective
 from lfs10d.config.models import LineConfig, SlaveConfig, default_device_name
 from lfs10d.errors import StateError
-from lfs10d.line.jobs.procedure import ProcedureClock
 from lfs10d.line.settings import DEFAULT_PROFILE
 from lfs10d.profiles.profile import Profile
 from lfs10d.reconfiguration.adopt_request import AdoptRequest
@@ -110,12 +109,9 @@ class Adopt:
         if isinstance(wish, Result):
             return await runner.refuse(command, wish)
         slave = SlaveConfig(id=wish.factory, profile=request.profile)
-        clock = ProcedureClock()
         run = runner.new_run()
-        query = runner.query(slave, clock, line_rate=0, profile=profile)
+        query = runner.query(slave, run.clock, profile)
         steps = adopt.adopt(wish, query, runner.wire().echo_known)
-        ids = frozenset({wish.factory, *wish.candidates})
-        run.begin(steps, clock, line_rate=now.config.line.baudrate, excludes=ids)
 
         def intend(write: IdWrite) -> OpenAdopt:
             name = request.name or default_device_name(write.new.slave)
@@ -148,7 +144,9 @@ class Adopt:
                 runner.announce("change_applied", facts)
             return result
 
-        return await runner.perform(run, command, intend, conclude)
+        ids = frozenset({wish.factory, *wish.candidates})
+        rate = now.config.line.baudrate
+        return await runner.perform(run, steps, command, intend, conclude, line_rate=rate, excludes=ids)
 
     def _wish(self, request: AdoptRequest, profile: Profile, now: Effective) -> adopt.AdoptWish | Result:
         """Return the adoption to carry out on the line, or the rejection if it cannot be."""

@@ -54,12 +54,10 @@ class BaudrateChange:
         runner = self._runner
         now = runner.running()
         earlier = frozenset(change.number for change in runner.open)
-        clock = ProcedureClock()
-        sensors = self.sensors([slave.name for slave in now.config.slaves], clock)
-        wish = RateWish(sensors, now.config.line.baudrate, to, power_cycle, dry_run, self._stored(to))
         run = runner.new_run()
+        sensors = self.sensors([slave.name for slave in now.config.slaves], run.clock)
+        wish = RateWish(sensors, now.config.line.baudrate, to, power_cycle, dry_run, self._stored(to))
         steps = change_rate(wish, runner.wire().echo_known)
-        run.begin(steps, clock, line_rate=0, excludes=frozenset(sensor.slave for sensor in sensors), share=1.0)
 
         def intend(_: WriteRates) -> OpenBaudrate:
             moves = tuple(Move(device=each.name, old=each.at(wish.old), new=each.at(to)) for each in sensors)
@@ -83,7 +81,8 @@ class BaudrateChange:
                 log.warning("%s", error)
             return result
 
-        return await runner.perform(run, command, intend, conclude)
+        slaves = frozenset(sensor.slave for sensor in sensors)
+        return await runner.perform(run, steps, command, intend, conclude, line_rate=0, excludes=slaves, share=1.0)
 
     # -- open changes of the rate
 
@@ -130,9 +129,7 @@ class BaudrateChange:
         """Return the sensors of these names that are configured, each with its query."""
         slaves = (self._runner.running().slave(name) for name in names)
         return tuple(
-            RateSensor(slave.name, slave.id, self._runner.query(slave, clock, line_rate=0))
-            for slave in slaves
-            if slave is not None
+            RateSensor(slave.name, slave.id, self._runner.query(slave, clock)) for slave in slaves if slave is not None
         )
 
     async def _save(

@@ -8,7 +8,7 @@ from functools import partial
 from math import inf
 from typing import Any
 
-from lfs10d.line.jobs.procedure import Finished, ProcedureClock, Steps
+from lfs10d.line.jobs.procedure import Steps
 from lfs10d.reading import Purpose
 from lfs10d.reconfiguration import baudrate_answers
 from lfs10d.reconfiguration.baudrate import BaudrateChange
@@ -56,11 +56,9 @@ class BaudrateRecovery:
     async def _await_power(self, change: OpenBaudrate, pending: list[str], run: ProcedureRun) -> None:
         """Follow sensors that have stored the new rate until each comes up there."""
         runner, old, to = self._runner, change.facts.old, change.facts.to
-        clock = ProcedureClock()
-        sensors = self._changes.sensors(pending, clock)
+        sensors = self._changes.sensors(pending, run.clock)
         steps = await_power(sensors, old, to, longest_pause=runner.running().config.poll.probe_interval_max)
-        run.begin(steps, clock, line_rate=0, share=1.0, purpose=Purpose.PROBE)
-        while not isinstance(awaited := await run.next_await(), Finished):
+        async for awaited in run.carry_out(steps, line_rate=0, share=1.0, purpose=Purpose.PROBE):
             if isinstance(awaited, CameUp):
                 if runner.running().config.line.baudrate != to:
                     await self._changes.save_rate(old, to)
@@ -68,9 +66,8 @@ class BaudrateRecovery:
                 await runner.journalled(partial(runner.journal.set_pending, change.number, tuple(pending)))
             elif isinstance(awaited, Twins):
                 self._changes.announce_twins(awaited.name, sensors)
-            run.resume()
-        if awaited.result is not None:
-            await _settle(runner, self._changes, change, awaited.result)
+        if run.result is not None:
+            await _settle(runner, self._changes, change, run.result)
 
 
 class _Undo:
@@ -82,8 +79,7 @@ class _Undo:
         self._change = change
         self._run = run
         self._old, self._to = change.facts.old, change.facts.to
-        self._clock = ProcedureClock()
-        self._sensors = changes.sensors([move.device for move in change.moves], self._clock)
+        self._sensors = changes.sensors([move.device for move in change.moves], run.clock)
         self._where: dict[str, int | None] = {}
         """The rate at which each sensor was found last, None where it was not."""
         self._report: BaudrateReport | None = None
@@ -104,7 +100,7 @@ class _Undo:
                 await self._settle(BaudrateReport(BaudrateEnding.MOVED, self._where))
                 return
             if may_finish:
-                give_up_at = self._clock.now + ROLL_BACK
+                give_up_at = self._run.clock.now + ROLL_BACK
             report = self._report = await self._put_back(found)
             if report is None:
                 return
@@ -147,17 +143,14 @@ class _Undo:
 
     async def _result_of(self, steps: Steps, **settings: Any) -> Any:  # noqa: ANN401 - a procedure's
         """Run a procedure after the one before it; return its result, None where the port was lost."""
-        self._run.resume()
-        self._run.begin(steps, self._clock, line_rate=0, **settings)
-        while not isinstance(awaited := await self._run.next_await(), Finished):
+        async for awaited in self._run.carry_out(steps, line_rate=0, **settings):
             if isinstance(awaited, Twins) and awaited.name not in self._twins:
                 self._twins.add(awaited.name)
                 self._changes.announce_twins(awaited.name, self._sensors)
             elif isinstance(awaited, StillLost) and self._report is not None:
                 result = baudrate_answers.result(self._old, self._to, self._report)
                 self._change = await self._runner.keep(self._change, result)
-            self._run.resume()
-        return awaited.result
+        return self._run.result
 
     async def _settle(self, report: BaudrateReport) -> None:
         await _settle(self._runner, self._changes, self._change, report)

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
 from collections.abc import Callable, Iterable
+from functools import partial
 
 from lfs10d.config.effective import Effective
 from lfs10d.line.device import Device
-from lfs10d.line.jobs.procedure import Finished, ProcedureClock
 from lfs10d.reading import Purpose
 from lfs10d.reconfiguration.procedure_run import ProcedureRun
 from lfs10d.reconfiguration.procedures.find_baudrate import find_other_rates, message
-from lfs10d.system.tasks import BackgroundTasks
+from lfs10d.reconfiguration.searches import Searches
 
 log = logging.getLogger(__name__)
 
@@ -32,40 +31,31 @@ class BaudrateWatch:
         report: Callable[[str | None], None],
     ) -> None:
         self._running = running
-        self._new_run = new_run
         self._devices = devices
         self._report = report
-        self._tasks = BackgroundTasks()
         self._reported: str | None = None
-        self._task: tuple[int, ProcedureRun, asyncio.Task[None]] | None = None
+        self._searches: Searches[int] = Searches(new_run)
 
     def begin(self) -> None:
         """Watch from now on, at the line's rate as it is; the port is open."""
         rate = self._running().config.line.baudrate
-        if self._task is not None and self._task[0] == rate and not self._task[2].done():
+        if rate in self._searches:
             return
         self.stop()
-        run = self._new_run()
-        self._task = rate, run, self._tasks.start("rate watch", self._watch(rate, run))
+        self._searches.begin(rate, "rate watch", partial(self._watch, rate))
         self._report_change(None)
 
     def stop(self) -> None:
         """Watch no more."""
-        if self._task is not None:
-            _, run, task = self._task
-            run.stop()
-            task.cancel()
-            self._task = None
+        self._searches.end_all()
 
     async def _watch(self, rate: int, run: ProcedureRun) -> None:
-        clock = ProcedureClock()
-        run.begin(find_other_rates(self._devices, clock, rate), clock, line_rate=rate, share=1.0, purpose=Purpose.PROBE)
-        while not isinstance(found := await run.next_await(), Finished):
+        steps = find_other_rates(self._devices, run.clock, rate)
+        async for found in run.carry_out(steps, line_rate=rate, share=1.0, purpose=Purpose.PROBE):
             if isinstance(found, dict):
                 now = self._running()
                 polled = sum(slave.enabled for slave in now.config.slaves)
                 self._report_change(message(found, rate, polled, filed=now.file_values.baudrate) if found else None)
-            run.resume()
 
     def _report_change(self, text: str | None) -> None:
         if text != self._reported:

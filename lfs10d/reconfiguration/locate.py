@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -10,13 +9,12 @@ from functools import partial
 
 from lfs10d.config.changes import Changes, Place, Rate
 from lfs10d.config.effective import Effective
-from lfs10d.line.jobs.procedure import Finished, ProcedureClock
 from lfs10d.reading import Purpose
 from lfs10d.reconfiguration.journal import Endpoint
 from lfs10d.reconfiguration.procedure_run import ProcedureRun
 from lfs10d.reconfiguration.procedures.locate import locate
 from lfs10d.reconfiguration.runner import ChangeRunner
-from lfs10d.system.tasks import BackgroundTasks
+from lfs10d.reconfiguration.searches import Searches
 
 log = logging.getLogger(__name__)
 
@@ -29,8 +27,7 @@ class Locator:
         self._repoll = repoll
         self._answered_nowhere: dict[str, tuple[Place, ...]] = {}
         """Places of devices that answered at none of them."""
-        self._tasks = BackgroundTasks()
-        self._searches: dict[str, tuple[tuple[Place, ...], ProcedureRun, asyncio.Task[None]]] = {}
+        self._searches: Searches[tuple[str, tuple[Place, ...]]] = Searches(runner.new_run)
 
     def contested(self) -> dict[str, tuple[Place, ...]]:
         """Return the devices with several possible places; without ids at which another device was verified."""
@@ -58,11 +55,11 @@ class Locator:
         turn = in_turn(
             {name: places for name, places in contested.items() if self._answered_nowhere.get(name) != places}
         )
-        for name, (places, _, _) in tuple(self._searches.items()):
-            if contested.get(name) != places:
-                self._end(name)
+        self._searches.end_all(but=contested.items())
         for name, places in contested.items():
-            if name in self._searches or (name not in turn and self._answered_nowhere.get(name) != places):
+            if (name, places) in self._searches:
+                continue
+            if name not in turn and self._answered_nowhere.get(name) != places:
                 continue
             now = self._runner.running()
             slave = now.slave(name)
@@ -70,23 +67,11 @@ class Locator:
                 # It has no id register: the file's place is kept.
                 self._answered_nowhere[name] = places
                 continue
-            run = self._runner.new_run()
-            task = self._tasks.start(f"locate {name}", self._locate(name, places, run), partial(self._over, name))
-            self._searches[name] = places, run, task
+            self._searches.begin((name, places), f"locate {name}", partial(self._locate, name, places))
 
     def stop(self) -> None:
         """Query no more."""
-        for name in tuple(self._searches):
-            self._end(name)
-
-    def _end(self, name: str) -> None:
-        _, run, task = self._searches.pop(name)
-        run.stop()
-        task.cancel()
-
-    def _over(self, name: str, task: asyncio.Task[None]) -> None:
-        if name in self._searches and self._searches[name][-1] is task:
-            del self._searches[name]
+        self._searches.end_all()
 
     async def _locate(self, name: str, places: tuple[Place, ...], run: ProcedureRun) -> None:
         runner = self._runner
@@ -99,21 +84,19 @@ class Locator:
             [Endpoint(slave=place.id, baudrate=place.baudrate or rate) for place in each]
             for each in (now.places[name], places)
         )
-        clock = ProcedureClock()
-        query = runner.query(slave, clock, line_rate=0)
+        query = runner.query(slave, run.clock)
         purpose = Purpose.PROBE if self._answered_nowhere.get(name) == places else Purpose.CHANGE
         steps = locate(endpoints, query, longest_pause=now.config.poll.probe_interval_max)
-        run.begin(steps, clock, line_rate=rate, purpose=purpose)
-        while not isinstance(awaited := await run.next_await(), Finished):
+        async for _ in run.carry_out(steps, line_rate=rate, purpose=purpose):
             if self._answered_nowhere.get(name) != places:
                 self._answered_nowhere[name] = places
                 self._announce(name, known, None)
                 self._repoll()
                 self.begin()
-            run.resume()
         run.resume()
-        if isinstance(awaited.result, Endpoint):
-            await self._found(name, known, awaited.result)
+        if isinstance(run.result, Endpoint):
+            self._searches.let_end((name, places))  # another configuration must not end this task
+            await self._found(name, known, run.result)
 
     async def _found(self, name: str, known: list[Endpoint], endpoint: Endpoint) -> None:
         def edit(now: Effective) -> Changes:
@@ -127,7 +110,6 @@ class Locator:
                 )
             return changes
 
-        self._searches.pop(name, None)  # found: another configuration must not end this task
         await self._runner.learn(edit)
         self._announce(name, known, endpoint)
         self._repoll()

@@ -9,7 +9,6 @@ from lfs10d.command import Result, failed, rejected
 from lfs10d.config.effective import Effective
 from lfs10d.config.models import SlaveConfig
 from lfs10d.errors import StateError
-from lfs10d.line.jobs.procedure import ProcedureClock
 from lfs10d.reconfiguration import readdress_answers
 from lfs10d.reconfiguration.journal import CommandRecord, Endpoint, Move, OpenReaddress, ResultRecord
 from lfs10d.reconfiguration.procedures.readdress import (
@@ -71,10 +70,8 @@ class Readdress:
         profile, rate = now.loaded.profiles[slave.profile], now.config.line.baudrate
         rates = tuple(profile.baudrate.codes) if profile.baudrate else ()
         wish = ReaddressWish(Endpoint(slave=slave.id, baudrate=rate), to, rates, dry_run)
-        clock = ProcedureClock()
         run = runner.new_run()
-        steps = readdress(wish, runner.query(slave, clock), runner.wire().echo_known)
-        run.begin(steps, clock, line_rate=rate, excludes=frozenset({slave.id, to}))
+        steps = readdress(wish, runner.query(slave, run.clock), runner.wire().echo_known)
 
         def intend(write: IdWrite) -> OpenReaddress:
             move = Move(device=slave.name, old=write.old, new=write.new, register_before=write.register_before)
@@ -99,7 +96,8 @@ class Readdress:
                 runner.announce_duplicate(slave.name, to, slave.id)
             return result
 
-        return await runner.perform(run, command, intend, conclude)
+        slaves = frozenset({slave.id, to})
+        return await runner.perform(run, steps, command, intend, conclude, line_rate=rate, excludes=slaves)
 
     async def _save(
         self,

@@ -8,7 +8,6 @@ from functools import partial
 
 from lfs10d.command import Result
 from lfs10d.errors import ConfigError, StateError
-from lfs10d.line.jobs.procedure import Finished, ProcedureClock
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Purpose
 from lfs10d.reconfiguration import adopt, readdress_answers
@@ -19,7 +18,7 @@ from lfs10d.reconfiguration.procedure_run import ProcedureRun
 from lfs10d.reconfiguration.procedures.follow import follow
 from lfs10d.reconfiguration.procedures.readdress import ReaddressEnding, ReaddressReport, ReaddressWish
 from lfs10d.reconfiguration.runner import ChangeRunner
-from lfs10d.system.tasks import BackgroundTasks
+from lfs10d.reconfiguration.searches import Searches
 from lfs10d.telemetry import command_log
 
 log = logging.getLogger(__name__)
@@ -34,8 +33,7 @@ class Recovery:
     def __init__(self, runner: ChangeRunner, baudrate: BaudrateRecovery) -> None:
         self._runner = runner
         self._baudrate = baudrate
-        self._tasks = BackgroundTasks()
-        self._followed: dict[int, tuple[ProcedureRun, asyncio.Task[None]]] = {}
+        self._searches: Searches[int] = Searches(runner.new_run)
 
     def begin(self) -> None:
         """Search for the sensors of every open change, unless that is under way or the present command uses their ids.
@@ -48,27 +46,16 @@ class Recovery:
         for change in self._runner.open:
             if change.kind == "baudrate" and change.number != newest:
                 continue  # it ends with the newest
-            if change.number not in self._followed and not change.slaves & busy:
-                run = self._runner.new_run()
-                task = self._tasks.start(
-                    f"follow {change.number}", self._follow(change, run), partial(self._forget, change.number)
-                )
-                self._followed[change.number] = run, task
-
-    def _forget(self, number: int, task: asyncio.Task[None]) -> None:
-        if self._followed.get(number, (None, None))[1] is task:
-            del self._followed[number]
+            if change.number not in self._searches and not change.slaves & busy:
+                self._searches.begin(change.number, f"follow {change.number}", partial(self._follow, change))
 
     def leave(self, changes: frozenset[int]) -> None:
         """Stop searching for the sensors of these changes: a new command writes to them."""
-        for number in changes & set(self._followed):
-            run, task = self._followed.pop(number)
-            run.stop()
-            task.cancel()
+        self._searches.end(changes)
 
     def stop(self) -> None:
         """Send no new frame."""
-        self.leave(frozenset(self._followed))
+        self._searches.end_all()
 
     async def _follow(self, change: OpenChange, run: ProcedureRun) -> None:
         try:
@@ -79,7 +66,6 @@ class Recovery:
         except (StateError, ConfigError) as error:
             log.warning("%s", error)
             await asyncio.sleep(RETRY_AFTER)
-            self._followed.pop(change.number, None)  # else it would count as followed
             asyncio.get_running_loop().call_soon(self.begin)
         finally:
             run.resume()
@@ -94,28 +80,26 @@ class Recovery:
             return
         profile = await runner.profile(slave.profile)
         now = runner.running()
-        clock = ProcedureClock()
         here = Endpoint(slave=move.old.slave, baudrate=move.new.baudrate)
         steps = follow(
             here,
             move.new,
-            runner.query(slave, clock, line_rate=0, profile=profile),
+            runner.query(slave, run.clock, profile),
             longest_pause=now.config.poll.probe_interval_max,
             before=None if here == move.old else move.old,
             newcomer=change.kind == "adopt",
         )
-        run.begin(steps, clock, line_rate=now.config.line.baudrate, share=1.0, purpose=Purpose.PROBE)
         ending: ReaddressEnding | None = None
-        while not isinstance(awaited := await run.next_await(), Finished):
+        rate = now.config.line.baudrate
+        async for awaited in run.carry_out(steps, line_rate=rate, share=1.0, purpose=Purpose.PROBE):
             if isinstance(awaited, ReaddressReport):
                 if awaited.ending is not ending and awaited.ending in (ReaddressEnding.BOTH, ReaddressEnding.GARBAGE):
                     runner.announce_duplicate(move.device, move.new.slave, move.old.slave)
                 ending = awaited.ending
                 if not change.answered:
                     change = await runner.keep(change, _result(move, awaited, profile))
-            run.resume()
-        if awaited.result is not None:
-            await self._found(change, move, awaited.result, profile)
+        if run.result is not None:
+            await self._found(change, move, run.result, profile)
 
     async def _found(
         self, change: OpenReaddress | OpenAdopt, move: Move, report: ReaddressReport, profile: Profile

@@ -19,7 +19,7 @@ from lfs10d.config.changes import Changes, Place, Values
 from lfs10d.config.effective import Edit, Effective
 from lfs10d.config.models import SlaveConfig
 from lfs10d.errors import StateError
-from lfs10d.line.jobs.procedure import Finished, ProcedureClock
+from lfs10d.line.jobs.procedure import ProcedureClock, Steps
 from lfs10d.line.settings import device_specs
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
@@ -129,26 +129,22 @@ class ChangeRunner:
         folder = now.file.path.parent.absolute()
         return await run_in_thread(partial(load_profile, reference, relative_to=folder), "profile")
 
-    def query(
-        self, slave: SlaveConfig, clock: ProcedureClock, line_rate: int | None = None, profile: Profile | None = None
-    ) -> IdentityQuery:
-        """Return the query of a device; with a `line_rate` that no line has (0), each request sets its rate.
-
-        `profile` is a new sensor's; a configured device has its own.
-        """
+    def query(self, slave: SlaveConfig, clock: ProcedureClock, profile: Profile | None = None) -> IdentityQuery:
+        """Return the query of a device. `profile` is a new sensor's; a configured device has its own."""
         now = self.running()
         profiles = now.loaded.profiles if profile is None else {slave.profile: profile}
         alone = now.config.model_copy(update={"slaves": (slave,)})
         (spec,) = device_specs(alone, profiles)
-        rate = now.config.line.baudrate if line_rate is None else line_rate
-        return IdentityQuery(spec.profile, spec.codec, self.wire().pending, clock, line_rate=rate)
+        return IdentityQuery(spec.profile, spec.codec, self.wire().pending, clock)
 
     async def perform(
         self,
         run: ProcedureRun,
+        steps: Steps,
         command: CommandRecord,
         intend: Callable[[Any], C],
         conclude: Callable[[Any, C | None], Coroutine[Any, Any, Result]],
+        **settings: Any,  # noqa: ANN401 - those of Procedure
     ) -> Result:
         """Run a procedure to its end, its intent journalled before it writes; return the result of `conclude`.
 
@@ -157,14 +153,12 @@ class ChangeRunner:
         change: C | None = None
         self.underway = command
         try:
-            while not isinstance(awaited := await run.next_await(), Finished):
-                why = None
+            async for intent in run.carry_out(steps, **settings):
                 try:
-                    change = await self.journalled(partial(intend, awaited))
+                    change = await self.journalled(partial(intend, intent))
                 except StateError as error:
-                    why = str(error)
-                run.resume(why)
-            concluded = asyncio.ensure_future(conclude(awaited.result, change))
+                    run.answer = str(error)
+            concluded = asyncio.ensure_future(conclude(run.result, change))
         except asyncio.CancelledError:
             run.stop()
             self.underway = None

@@ -30,6 +30,7 @@ LFS10 = load_profile("lfs10", relative_to=Path())
 EXCHANGE = 0.03
 """What an answered question takes, in s."""
 RATE_CODES = {1: 9600, 2: 19200}
+LINE_RATE = 9600
 
 
 @dataclass
@@ -77,7 +78,6 @@ class Pretence:
     sensors: list[Mimic] = field(default_factory=list)
     clock: ProcedureClock = field(default_factory=ProcedureClock)
     pending: PendingRequests = field(default_factory=PendingRequests)
-    line_rate: int = 9600
     asked: list[Ask] = field(default_factory=list)
     awaited: list[object] = field(default_factory=list)
     answer: object = None
@@ -97,7 +97,7 @@ class Pretence:
 
     def query(self, profile: Profile = LFS10) -> IdentityQuery:
         """Return what asks sensors of this profile."""
-        return IdentityQuery(profile, CODEC, self.pending, self.clock, line_rate=self.line_rate)
+        return IdentityQuery(profile, CODEC, self.pending, self.clock)
 
     @property
     def requests(self) -> list[Request]:
@@ -142,7 +142,7 @@ class Pretence:
     def outcome(self, ask: Ask) -> Outcome:
         """Put a question on the line and return what came of it."""
         self.asked.append(ask)
-        slave, rate = ask.request.slave, ask.baudrate or self.line_rate
+        slave, rate = ask.request.slave, ask.baudrate or LINE_RATE
         there = [each for each in self.sensors if (each.slave, each.baudrate) == (slave, rate) and not each.silent]
         if (slave, rate) in self.noise:
             return self.settle(ask, outcome_of(ask.request, FaultCode.CRC))

@@ -70,11 +70,9 @@ SILENCE = IdentityReply()
 
 
 class IdentityQuery:
-    """Reads devices of one profile. `line_rate` is the line's own; `clock` is that of the procedure this is for."""
+    """Reads devices of one profile. `clock` is that of the procedure this is for."""
 
-    def __init__(
-        self, profile: Profile, codec: Codec, pending: PendingRequests, clock: ProcedureClock, *, line_rate: int
-    ) -> None:
+    def __init__(self, profile: Profile, codec: Codec, pending: PendingRequests, clock: ProcedureClock) -> None:
         if profile.slave_id is None:
             raise ValueError(f"profile {profile.name} defines no register of the slave id")
         self.profile = profile
@@ -85,7 +83,6 @@ class IdentityQuery:
         self._pending = pending
         self._answered: dict[int, float] = {}
         """When each slave answered last, in s."""
-        self.line_rate = line_rate
 
     def read_register(
         self, endpoint: Endpoint, timeout: float | None = None, *, register: int | None = None
@@ -107,7 +104,7 @@ class IdentityQuery:
             return self
         known = register.model_copy(update={"codes": {**register.codes, baudrate: code}})
         profile = self.profile.model_copy(update={"baudrate": known})
-        return IdentityQuery(profile, self.codec, self._pending, self.clock, line_rate=self.line_rate)
+        return IdentityQuery(profile, self.codec, self._pending, self.clock)
 
     def read_values(
         self, endpoint: Endpoint, timeout: float | None = None, *, block: Block | None = None
@@ -173,11 +170,10 @@ class IdentityQuery:
         return ReadRegisters(endpoint.slave, block.address, block.count, block.function)
 
     def _ask(self, request: ReadRegisters, endpoint: Endpoint, timeout: float | None) -> Ask:
-        baudrate = None if endpoint.baudrate == self.line_rate else endpoint.baudrate
         waits = self.timeout if timeout is None else timeout
         if endpoint.slave in self._pending.tardy:
             waits = max(waits, PATIENT)
-        return Ask(request, self.codec, waits, None, baudrate, request_gap=self.profile.request_gap)
+        return Ask(request, self.codec, waits, None, endpoint.baudrate, request_gap=self.profile.request_gap)
 
     def _allowed(
         self, request: ReadRegisters, endpoint: Endpoint, timeout: float | None

@@ -223,8 +223,7 @@ def free(endpoint: Endpoint, query: IdentityQuery) -> Generator[Step, Any, bool]
 def write(endpoint: Endpoint, register: int, value: int, query: IdentityQuery) -> Generator[Step, Any, int | None]:
     """Write once; return the code of an exception, if one came."""
     request = WriteRegister(endpoint.slave, register, value, query.profile.write_function)
-    baudrate = None if endpoint.baudrate == query.line_rate else endpoint.baudrate
-    asked = Ask(request, query.codec, WRITE_TIMEOUT, None, baudrate, request_gap=query.profile.request_gap)
+    asked = Ask(request, query.codec, WRITE_TIMEOUT, None, endpoint.baudrate, request_gap=query.profile.request_gap)
     fault = (yield from query.put(asked)).fault
     if fault is not None and fault.code is FaultCode.EXCEPTION:
         return fault.exception_code

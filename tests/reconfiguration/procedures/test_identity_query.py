@@ -53,10 +53,10 @@ def test_a_profile_without_a_register_of_the_id_cannot_be_asked(pretence: Preten
 def test_who_answers_says_its_id(pretence: Pretence) -> None:
     pretence.sensor(3)
     assert pretence.carry_out(pretence.query().read_register(HERE)) == IdentityReply(answers=True, register=3)
-    assert pretence.asked == [Ask(WHO, RTU, QUICK)]
+    assert pretence.asked == [Ask(WHO, RTU, QUICK, None, 9600)]
 
 
-def test_at_another_rate_than_the_lines_the_question_says_so(pretence: Pretence) -> None:
+def test_at_another_rate_the_question_says_so(pretence: Pretence) -> None:
     pretence.sensor(3, baudrate=19200)
     assert pretence.carry_out(pretence.query().read_register(ELSEWHERE, 0.7)).answers
     assert pretence.asked == [Ask(WHO, RTU, 0.7, None, 19200)]
@@ -258,7 +258,7 @@ def test_so_is_one_whose_answer_came_while_another_was_asked(
 def test_listening_asks_a_silent_place_behind_the_exchange_before(pretence: Pretence) -> None:
     silent = Endpoint(slave=9, baudrate=9600)
     assert pretence.carry_out(pretence.query().listen(silent, 0.3, 3)) == (IdentityReply(), False)
-    assert pretence.asked == [Ask(ReadRegisters(9, 1, 2), RTU, 0.3, at_once=True)]
+    assert pretence.asked == [Ask(ReadRegisters(9, 1, 2), RTU, 0.3, None, 9600, at_once=True)]
 
 
 def test_a_second_block_of_values_can_be_asked(pretence: Pretence) -> None:
