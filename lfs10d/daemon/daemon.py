@@ -15,7 +15,6 @@ from lfs10d.config.loader import LoadedConfig
 from lfs10d.daemon import signals
 from lfs10d.daemon.apply import ConfigChanges
 from lfs10d.daemon.boot import Boot
-from lfs10d.daemon.build import build
 from lfs10d.daemon.line_events import LineReport
 from lfs10d.daemon.pace import USUAL, Pace
 from lfs10d.daemon.parts import Parts
@@ -34,7 +33,7 @@ async def run(loaded: LoadedConfig, boot: Boot, state_directory: Path, pace: Pac
     """Run the daemon of one configuration until it is told to end; return the exit code."""
     notifier = Notifier()
     try:
-        parts = build(loaded, boot, state_directory, notifier, pace)
+        parts = Parts(loaded, boot, state_directory, notifier, pace)
         _log_start(parts, boot)
         return await _run(parts)
     finally:
