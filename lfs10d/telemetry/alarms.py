@@ -80,8 +80,6 @@ def _inactive(last_code: FaultCode | None, cleared: int | None) -> dict[str, obj
 class DeviceAlarm:
     """The error of one device; `rise_after` may be changed at any time and holds from the next failure on."""
 
-    __slots__ = ("_cleared", "_last_code", "_lasting", "_run", "active", "rise_after")
-
     def __init__(self, rise_after: int) -> None:
         self.rise_after = rise_after
         self.active = False
@@ -140,8 +138,6 @@ class DeviceAlarm:
 
 class LineAlarm:
     """The error of the line: the most important of the active ones."""
-
-    __slots__ = ("_cleared", "_last_code", "_runs")
 
     def __init__(self) -> None:
         self._runs: dict[FaultCode, _Run] = {}

@@ -64,8 +64,6 @@ class Rates:
 class LineCounters:
     """The figures of the line; `started` is when counting began."""
 
-    __slots__ = ("_gaps", "_least_gap", "_seconds", "_started", "errors", "exchanges", "uart", "unsolicited")
-
     def __init__(self, started: float) -> None:
         self._started = started
         self._seconds: deque[_Second] = deque()
@@ -178,18 +176,6 @@ class LineCounters:
 
 class DeviceCounters:
     """The figures of one device; `response_timeout` in s, None until it is known, `request_gap` in s."""
-
-    __slots__ = (
-        "_last_poll",
-        "_rtts",
-        "errors",
-        "good",
-        "last_good_ts",
-        "partial",
-        "polls",
-        "request_gap",
-        "response_timeout",
-    )
 
     def __init__(self, response_timeout: float | None, request_gap: float = 0.0) -> None:
         self.response_timeout = response_timeout

@@ -60,26 +60,6 @@ SAMPLE_LATE: Final = 0.25
 class DeviceState:
     """One device as the broker knows it; `seq` is its last number used in this boot (0: none)."""
 
-    __slots__ = (
-        "_alarm",
-        "_boot",
-        "_counters",
-        "_gap",
-        "_last_good",
-        "_line",
-        "_payload",
-        "_sample",
-        "_sampled",
-        "_state_at",
-        "_state_from",
-        "_telemetry",
-        "_topics",
-        "info",
-        "online",
-        "seq",
-        "state_due",
-    )
-
     def __init__(self, info: DeviceInfo, *, line: str, boot: str, seq: int, now: Instant) -> None:
         self.info = info
         self.seq = seq

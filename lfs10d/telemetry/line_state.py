@@ -25,8 +25,6 @@ Requests: TypeAlias = Literal["ok", "denied"]
 class LineState:
     """The line; `now` is when counting begins. Methods return what their event changes, in order."""
 
-    __slots__ = ("_alarm", "_open", "_port_fault", "_requests", "activity", "counters", "info")
-
     def __init__(self, info: LineInfo, now: Instant) -> None:
         self.info = info
         self.activity = POLLING

@@ -34,8 +34,6 @@ class WindMoment:
 class WindClock:
     """Begins at `now`."""
 
-    __slots__ = ("_shift",)
-
     def __init__(self, now: Instant) -> None:
         self._shift = _shift(now)
 

@@ -72,24 +72,6 @@ SHOWN: Final = ("unit", "mean_2m", "mean_10m", "gust_3s", "gust_10m", "direction
 class DeviceWind:
     """`info.wind` is not None; `seq` is the number of its last record in this boot."""
 
-    __slots__ = (
-        "_added",
-        "_added_until",
-        "_hold",
-        "_late",
-        "_look_at",
-        "_next_at",
-        "_record_at",
-        "_samples",
-        "_settings",
-        "_shown",
-        "_spans",
-        "_wind",
-        "info",
-        "line_boot",
-        "seq",
-    )
-
     def __init__(self, info: DeviceInfo, settings: WindInfo, line_boot: tuple[str, str], seq: int, at: int) -> None:
         self.info = info
         self.seq = seq

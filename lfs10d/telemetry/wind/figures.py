@@ -73,8 +73,6 @@ class WindTotals:
 class MeasuredWind:
     """The wind at a device with these values; `on_values` takes good ones alone."""
 
-    __slots__ = ("_direction", "_factor", "_inputs", "_leading", "_speed", "newest", "values")
-
     def __init__(self, values: WindValues) -> None:
         self.values = values
         self._factor = METRES_PER_SECOND.get(values.unit or "", 1.0)

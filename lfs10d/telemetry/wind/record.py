@@ -32,8 +32,6 @@ class Span:
 class RecordSpans:
     """Spans of `length` ms one after the other, the first of which begins at `begin`."""
 
-    __slots__ = ("begin", "length")
-
     def __init__(self, length: int, begin: int) -> None:
         self.length = length
         self.begin = begin
