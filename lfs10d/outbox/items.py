@@ -17,42 +17,36 @@ from lfs10d.telemetry.publication import EVENT, Publication, iso_time
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Retained:
+class Published:
+    """What goes as it was published."""
+
+    publication: Publication
+
+    @property
+    def topic(self) -> str:
+        """The topic under `B`."""
+        return self.publication.topic
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Retained(Published):
     """The newest version of a retained topic, published at `since` (monotonic s); payload None clears it."""
 
-    publication: Publication
     since: float = -inf
 
-    @property
-    def topic(self) -> str:
-        """The topic under `B`."""
-        return self.publication.topic
-
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Message:
+class Message(Published):
     """A response, an event or a trace; `correlation` is the request's Correlation Data."""
 
-    publication: Publication
     correlation: bytes | None = None
-
-    @property
-    def topic(self) -> str:
-        """The topic under `B`."""
-        return self.publication.topic
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LiveSample:
+class LiveSample(Published):
     """A sample while it is young."""
 
-    publication: Publication
     queued: QueuedSample
-
-    @property
-    def topic(self) -> str:
-        """The topic under `B`."""
-        return self.publication.topic
 
     def at(self, shift: int, clock: ClockState = "synced") -> LiveSample:
         """Return it with the time that the clock tells now, as `QueuedSample.at` does."""

@@ -25,15 +25,8 @@ class MessageQueue:
         """Return whether anything waits that the broker does not refuse."""
         return bool(self.messages or self.traces)
 
-    def next_message(self, refused: AbstractSet[str]) -> Message | None:
-        """Take the next response or event; those on `refused` topics wait apart."""
-        return self._next(self.messages, refused)
-
-    def next_trace(self, refused: AbstractSet[str]) -> Message | None:
-        """Take the next trace; those on `refused` topics are dropped."""
-        return self._next(self.traces, refused)
-
-    def _next(self, queue: deque[Message], refused: AbstractSet[str]) -> Message | None:
+    def take(self, queue: deque[Message], refused: AbstractSet[str]) -> Message | None:
+        """Take the next of `messages` or `traces`; those on `refused` topics are passed over."""
         while queue:
             message = queue.popleft()
             if message.topic not in refused:

@@ -253,19 +253,9 @@ class Outbox:
         return not (self._in_flight or queues.retained or queues.messages.messages or queues.live.waiting)
 
     @property
-    def under_way(self) -> tuple[OutboxItem, ...]:
-        """What is under way, in the order in which it was taken."""
-        return tuple(self._in_flight)
-
-    @property
     def depth(self) -> int:
         """Samples that wait or are under way, those in the store included."""
         return self._in_memory() + self.backlog.spool.depth
-
-    @property
-    def dropped(self) -> int:
-        """Samples that were lost since the start, declared or not."""
-        return self.backlog.losses.total
 
     @property
     def stats(self) -> BacklogStats:
@@ -277,7 +267,7 @@ class Outbox:
             waiting = chain(under_way, self.backlog.waiting(), islice(live, 1))
             first = min(waiting, key=lambda queued: queued.since, default=None)
             oldest_ts = first.sample.ts if first else None
-        return BacklogStats(self.depth, oldest_ts, self.dropped)
+        return BacklogStats(self.depth, oldest_ts, self.backlog.losses.total)
 
     def _in_memory(self) -> int:
         """Return how many samples are in memory alone."""

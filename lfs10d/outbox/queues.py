@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from collections.abc import Set as AbstractSet
+from functools import partial
 
 from lfs10d.outbox.backlog import Backlog
 from lfs10d.outbox.items import HistoryBatch, LiveSample, LossNotice, Message, OutboxItem, Retained
@@ -43,12 +44,12 @@ class Queues:
         self._burst_until: float | None = None
         self._classes: dict[int, Callable[[AbstractSet[str]], OutboxItem | None]] = {
             CHANGES: self.retained.next_change,
-            MESSAGES: self.messages.next_message,
+            MESSAGES: partial(self.messages.take, self.messages.messages),
             LIVE: self._next_live,
             HISTORY: self._next_history,
-            REFRESHES: self.retained.next_refresh,
-            TRACES: self.messages.next_trace,
-            CLEARINGS: self.retained.next_clearing,
+            REFRESHES: partial(self.retained.take, self.retained.refreshes),
+            TRACES: partial(self.messages.take, self.messages.traces),
+            CLEARINGS: partial(self.retained.take, self.retained.clearings),
         }
         self._turns = Turns(len(self._classes))
         self._now = 0.0
@@ -92,22 +93,17 @@ class Queues:
 
     def _waiting(self, *, batch: bool) -> list[int]:
         """Return the classes that hold something, in order; no history unless `batch`."""
-        retained, messages, waiting = self.retained, self.messages, []
-        if retained.changes or retained.last is not None:
-            waiting.append(CHANGES)
-        if messages.messages:
-            waiting.append(MESSAGES)
-        if self.live.waiting:
-            waiting.append(LIVE)
-        if batch and self.backlog.waits:
-            waiting.append(HISTORY)
-        if retained.refreshes:
-            waiting.append(REFRESHES)
-        if messages.traces:
-            waiting.append(TRACES)
-        if retained.clearings:
-            waiting.append(CLEARINGS)
-        return waiting
+        retained, messages = self.retained, self.messages
+        holding = (
+            (CHANGES, retained.changes or retained.last),
+            (MESSAGES, messages.messages),
+            (LIVE, self.live.waiting),
+            (HISTORY, batch and self.backlog.waits),
+            (REFRESHES, retained.refreshes),
+            (TRACES, messages.traces),
+            (CLEARINGS, retained.clearings),
+        )
+        return [number for number, held in holding if held]
 
     def _keeps_back(self, now: float) -> bool:
         """Return whether nothing but the burst may go now, whose `last` waits."""
@@ -127,9 +123,7 @@ class Queues:
 
     def __bool__(self) -> bool:
         """Return whether anything but the backlog waits."""
-        retained, messages = self.retained, self.messages
-        waiting = self.live.waiting or retained.changes or retained.refreshes or retained.clearings
-        return bool(waiting or retained.last or messages.messages or messages.traces)
+        return bool(self._waiting(batch=False))
 
     def due(self) -> float | None:
         """Return when `next` may have something though nothing happens before; None: not by time alone."""
@@ -174,7 +168,7 @@ class Queues:
         """Let an item wait until its topic is tried again; a sample waits with the backlog."""
         match item:
             case Retained():
-                self.retained.refused(item)
+                self.retained.wait_again(item)
             case Message():
                 self.messages.pass_over(item)
             case LiveSample():

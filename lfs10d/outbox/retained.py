@@ -71,7 +71,7 @@ class RetainedQueue:
 
     def next_change(self, refused: AbstractSet[str]) -> Retained | None:
         """Take the change, or the `last` of the burst, that goes next; topics the broker refuses are passed over."""
-        item = self._take(self.changes, refused)
+        item = self.take(self.changes, refused)
         if item is not None:
             return item
         if self._burst or self.last is None or self.last.topic in self._under_way:
@@ -84,15 +84,8 @@ class RetainedQueue:
         self._under_way.add(last.topic)
         return last
 
-    def next_refresh(self, refused: AbstractSet[str]) -> Retained | None:
-        """Take the refresh that goes next."""
-        return self._take(self.refreshes, refused)
-
-    def next_clearing(self, refused: AbstractSet[str]) -> Retained | None:
-        """Take what clears a topic."""
-        return self._take(self.clearings, refused)
-
-    def _take(self, waiting: dict[str, Retained], refused: AbstractSet[str]) -> Retained | None:
+    def take(self, waiting: dict[str, Retained], refused: AbstractSet[str]) -> Retained | None:
+        """Take what goes next of those `waiting`: `changes`, `refreshes` or `clearings`."""
         for topic in refused:
             if topic in waiting:
                 self._passed_over[topic] = waiting.pop(topic)
@@ -107,13 +100,10 @@ class RetainedQueue:
     def lifted(self, topics: AbstractSet[str]) -> None:
         """Let what was passed over of these topics wait again, unless a newer version does."""
         for topic in topics & self._passed_over.keys():
-            self._wait_unless_newer(self._passed_over.pop(topic))
+            self.wait_again(self._passed_over.pop(topic))
 
-    def refused(self, item: Retained) -> None:
-        """Let what the broker refused wait until its topic is tried again, unless a newer version does."""
-        self._wait_unless_newer(item)
-
-    def _wait_unless_newer(self, item: Retained) -> None:
+    def wait_again(self, item: Retained) -> None:
+        """Let what did not arrive wait, unless a newer version does."""
         if not any(item.topic in queue for queue in (self.changes, self.refreshes, self.clearings)):
             self._wait(item)
 
@@ -139,4 +129,4 @@ class RetainedQueue:
     def put_back(self, item: Retained) -> None:
         """Let a clearing that was under way wait again, unless a newer version does."""
         if item.publication.payload is None:
-            self._wait_unless_newer(item)
+            self.wait_again(item)

@@ -58,7 +58,7 @@ def test_a_refusal_is_reported_once_with_what_becomes_of_it(
             desk.add(sample(seq))
             await desk.turn()
         desk.acknowledge(reason)
-        assert desk.outbox.dropped == (2 if reason == 0x95 else 0)
+        assert desk.outbox.stats.dropped == (2 if reason == 0x95 else 0)
 
     in_virtual_time(scenario())
     assert [each for each in caplog.messages if "refuses" in each] == [f"the broker {words}"]
@@ -101,7 +101,7 @@ def test_a_batch_that_ends_connections_is_sent_in_smaller_parts(caplog: pytest.L
             desk.acknowledge()
         told = [json.loads(payload) for topic, payload, *_ in desk.wire.sent if topic.endswith("history")]
         assert [[each["seq"] for each in batch] for batch in told] == [[1, 2], [3, 4], [5, 6], [7, 8]]
-        assert desk.outbox.dropped == 0
+        assert desk.outbox.stats.dropped == 0
 
     in_virtual_time(scenario())
     assert caplog.text.count("it is sent in smaller parts") == 2

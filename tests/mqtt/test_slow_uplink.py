@@ -103,7 +103,10 @@ class Uplink:
                 times += [self._polls[0][0], self._event_at]
             if self.acknowledgements:
                 times.append(self.acknowledgements[0][0])
-            if len(self.outbox.under_way) < min(self.window, IN_FLIGHT_MOST) and (due := self.outbox.due()) is not None:
+            if (
+                len(self.outbox._in_flight) < min(self.window, IN_FLIGHT_MOST)
+                and (due := self.outbox.due()) is not None
+            ):
                 times.append(max(due, self.now + 1e-4))
             self.now = max(self.now, min(times))
             if self.now >= end:
@@ -121,7 +124,7 @@ class Uplink:
     def _send(self) -> None:
         while (item := self.outbox.next(self.now)) is not None:
             heapq.heappush(self.acknowledgements, (self.now + self.round_trip, next(self._numbers), item))
-        under_way = self.outbox.under_way
+        under_way = tuple(self.outbox._in_flight)
         assert len(under_way) <= min(self.window, IN_FLIGHT_MOST)
         self.most_under_way = max(self.most_under_way, sum(isinstance(each, HistoryBatch) for each in under_way))
 
@@ -219,7 +222,7 @@ def test_the_backlog_shrinks_where_batches_in_three_quarters_of_the_window_carry
     assert uplink.outbox.depth < max(depth, 36 * devices)
     uplink.run(900.0 * (3600 / 900 if round_trip > 1 else 1), measuring=False)
     assert uplink.missing() == 0
-    assert uplink.outbox.dropped == 0
+    assert uplink.outbox.stats.dropped == 0
     assert not uplink.twice
 
 

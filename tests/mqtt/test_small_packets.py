@@ -94,8 +94,8 @@ def test_with_packets_of_1200_bytes_the_backlog_shrinks_though_live_samples_find
         for _ in range(300):
             await asyncio.sleep(1.0)
         assert outbox.depth == 0
-        assert outbox.dropped == 0
-        assert len(outbox.under_way) <= IN_FLIGHT_MOST
+        assert outbox.stats.dropped == 0
+        assert len(outbox._in_flight) <= IN_FLIGHT_MOST
         assert link.largest <= PACKET
         full = [samples for size, samples in link.batches if size > PACKET * 0.7]
         assert full

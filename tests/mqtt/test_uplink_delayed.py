@@ -43,7 +43,7 @@ def test_at_200_ms_and_ten_under_way_every_device_goes_live_and_all_samples_arri
                     device, seq = DEVICES[number % len(DEVICES)], 1 + number // len(DEVICES)
                     state = publication.retained(f"device/{device}/state", {"seq": seq}, refresh=True)
                     uplink.publish([sample(seq, device), state])
-                    assert len(uplink._outbox.under_way) <= RECEIVE_MAXIMUM
+                    assert len(uplink._outbox._in_flight) <= RECEIVE_MAXIMUM
                     await asyncio.sleep(max(0.0, begun + number / len(DEVICES) - loop.time()))
                 await until(lambda: uplink.backlog.depth == 0, "everything is acknowledged", within=30.0)
                 assert uplink.backlog.dropped == 0

@@ -83,7 +83,7 @@ def test_what_the_store_cannot_take_waits_in_memory_and_is_tried_again_five_seco
     for seq in range(1, 5):
         outbox.add(sample(seq), 0.0)
     assert store.spill(outbox, 4.0)
-    assert (outbox.depth, outbox.dropped) == (3, 1)
+    assert (outbox.depth, outbox.stats.dropped) == (3, 1)
     assert not store.spill(outbox, 8.9)
     store.broken = False
     assert store.spill(outbox, 9.0)

@@ -81,11 +81,11 @@ class PastLaws(RuleBasedStateMachine):
         self.losses_at.append(self.now)
         self.online = False
 
-    @precondition(lambda self: self.online and self.outbox.under_way)
+    @precondition(lambda self: self.online and len(self.outbox._in_flight) > 0)
     @rule(denied=st.booleans())
     def throw_out(self, denied: bool) -> None:  # noqa: FBT001 - drawn by hypothesis
         """End the connection for what is under way, as the broker does."""
-        sent = {item.topic: 100 for item in self.outbox.under_way}
+        sent = {item.topic: 100 for item in self.outbox._in_flight}
         self.outbox.lost(self.now, self.outbox.suspects.ended(sent, certain=denied), denied=denied)
         self.losses_at.append(self.now)
         self.online = False
@@ -133,7 +133,7 @@ class PastLaws(RuleBasedStateMachine):
     @invariant()
     def memory_is_bounded(self) -> None:
         in_memory = self.outbox.depth - self.outbox.backlog.spool.depth
-        assert in_memory <= self.CAPACITY + sum(len(samples_of(each)) for each in self.outbox.under_way)
+        assert in_memory <= self.CAPACITY + sum(len(samples_of(each)) for each in self.outbox._in_flight)
         assert len(self.store.rows) <= self.ROOM + 7
 
     def teardown(self) -> None:
@@ -141,7 +141,7 @@ class PastLaws(RuleBasedStateMachine):
         self.store.broken = False
         if not self.online:
             connect(self.outbox, self.now)
-        for item in self.outbox.under_way:
+        for item in tuple(self.outbox._in_flight):
             self.settle(item)
         self.outbox.reload(self.now)
         self.now += HISTORY_AFTER + DECLARED_EVERY
@@ -165,7 +165,7 @@ class PastLaws(RuleBasedStateMachine):
         count = sum(loss.count for loss in self.declared)
         assert count >= len(self.measured - set(self.delivered))
         if self.life == 1:  # a new life does not know what was acknowledged shortly before
-            assert count == len(self.measured - set(self.delivered)) == self.outbox.dropped
+            assert count == len(self.measured - set(self.delivered)) == self.outbox.stats.dropped
         for times in self.delivered.values():
             for before, after in pairwise(times):
                 # A loss between the two, not longer than 10 s and the time to notice it after the first; or a

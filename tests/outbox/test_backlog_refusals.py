@@ -44,7 +44,7 @@ def test_where_history_is_refused_the_store_keeps_it_and_the_others_go_on() -> N
     connect(outbox, 33.0)
     store.page(outbox, 43.0, most=20)
     assert seqs(outbox.next(43.0)) == [1, 2, 3, 4]
-    assert outbox.dropped == 0
+    assert outbox.stats.dropped == 0
 
 
 def test_a_topic_that_is_tried_again_on_the_same_connection_gets_what_it_missed_once() -> None:

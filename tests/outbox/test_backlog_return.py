@@ -51,7 +51,7 @@ def test_a_loss_in_the_middle_sends_once_more_what_was_acknowledged_lately_and_t
     store.page(outbox, 122.0, most=100)
     again = outbox.next(122.0)
     assert seqs(again) == list(range(1, 15))
-    assert outbox.dropped == 0
+    assert outbox.stats.dropped == 0
 
 
 def test_samples_of_earlier_boots_come_first_and_never_in_one_batch_with_others() -> None:

@@ -22,14 +22,14 @@ def test_the_oldest_goes_first() -> None:
     first, second = event("a"), event("b")
     queue = filled(first, second)
     assert queue
-    assert [queue.next_message(NONE) for _ in range(3)] == [first, second, None]
+    assert [queue.take(queue.messages, NONE) for _ in range(3)] == [first, second, None]
     assert not queue
 
 
 def test_what_is_refused_waits_apart_and_goes_first_once_lifted() -> None:
     first, second, third = event("a"), event("b"), event("c")
     queue = filled(first, second)
-    assert queue.next_message(EVENTS) is None
+    assert queue.take(queue.messages, EVENTS) is None
     assert not queue
     queue.messages.append(third)
     queue.lifted(frozenset({"response/health"}))
@@ -42,11 +42,11 @@ def test_a_refused_trace_is_dropped() -> None:
     queue = MessageQueue()
     kept = trace()
     queue.traces.append(trace())
-    assert queue.next_trace(frozenset({"line/trace"})) is None
+    assert queue.take(queue.traces, frozenset({"line/trace"})) is None
     queue.lifted(frozenset({"line/trace"}))
     assert not queue
     queue.traces.append(kept)
-    assert queue.next_trace(NONE) is kept
+    assert queue.take(queue.traces, NONE) is kept
 
 
 def test_what_was_under_way_goes_first_if_it_is_of_qos_1_and_there_is_room() -> None:

@@ -102,7 +102,7 @@ def test_no_more_than_the_window_is_under_way() -> None:
     assert outbox.next(0.0) is None
     outbox.on_ack(first, 0.0)
     assert seqs(outbox.next(0.0)) == [3]
-    assert [seqs(item) for item in outbox.under_way] == [[2], [3]]
+    assert [seqs(item) for item in outbox._in_flight] == [[2], [3]]
 
 
 # What waits
@@ -140,7 +140,7 @@ def test_what_the_store_could_not_take_waits_in_memory_as_far_as_there_is_room()
     outbox.backlog.history.add(QueuedSample(sample_of(3), 4.0))
     outbox.backlog.history.add(QueuedSample(sample_of(4), 4.0))
     outbox.not_spilled(4.0)
-    assert (outbox.depth, outbox.dropped) == (3, 1)
+    assert (outbox.depth, outbox.stats.dropped) == (3, 1)
 
 
 def sample_of(seq: int) -> Sample:

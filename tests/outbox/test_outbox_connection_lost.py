@@ -27,7 +27,7 @@ def test_what_is_under_way_when_the_connection_is_lost_waits_again_in_order() ->
     take(outbox, 0.0, LiveSample)
     take(outbox, 0.0, LiveSample)
     outbox.lost(0.1)
-    assert outbox.under_way == ()
+    assert tuple(outbox._in_flight) == ()
     connect(outbox, 0.2)
     assert [seqs(outbox.next(0.2)) for _ in range(3)] == [[1], [2], [3]]
 

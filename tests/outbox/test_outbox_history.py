@@ -108,7 +108,7 @@ def test_live_samples_are_dropped_where_there_are_no_older_ones() -> None:
     outbox = Outbox(capacity=2)
     for seq in range(1, 4):
         outbox.add(sample(seq), 0.0)
-    assert (outbox.depth, outbox.dropped) == (2, 1)
+    assert (outbox.depth, outbox.stats.dropped) == (2, 1)
 
 
 def test_what_is_only_repeated_goes_first_and_is_no_loss() -> None:
@@ -121,7 +121,7 @@ def test_what_is_only_repeated_goes_first_and_is_no_loss() -> None:
         outbox.add(sample(seq), 2.0)
     connect(outbox, 10.0)
     assert seqs(outbox.next(20.0)) == [3, 4, 5]
-    assert outbox.dropped == 0
+    assert outbox.stats.dropped == 0
 
 
 def test_a_declaration_that_is_not_acknowledged_is_made_again() -> None:
@@ -140,9 +140,9 @@ def test_what_is_under_way_is_never_dropped() -> None:
     outbox.add(sample(1), 0.0)
     live = take(outbox, 0.0, LiveSample)
     outbox.add(sample(2), 0.0)
-    assert outbox.under_way == (live,)
+    assert tuple(outbox._in_flight) == (live,)
     assert outbox.depth == 1
-    assert outbox.dropped == 1
+    assert outbox.stats.dropped == 1
 
 
 @pytest.mark.parametrize("count", [1, 99, 100, 101, 250])

@@ -82,12 +82,12 @@ class OutboxLaws(RuleBasedStateMachine):
         if isinstance(item, HistoryBatch):
             assert len(queued) <= BATCH_MOST
 
-    @precondition(lambda self: self.outbox.under_way)
+    @precondition(lambda self: len(self.outbox._in_flight) > 0)
     @rule(
         which=st.integers(0, 4), fate=st.sampled_from(["settled", "settled", "settled", "refused", "denied", "unfit"])
     )
     def answer(self, which: int, fate: str) -> None:
-        item = self.outbox.under_way[which % len(self.outbox.under_way)]
+        item = tuple(self.outbox._in_flight)[which % len(self.outbox._in_flight)]
         if fate == "settled":
             self.outbox.on_ack(item, self.now)
             self.delivered |= {(each.sample.device, each.sample.seq) for each in samples_of(item)}
@@ -103,15 +103,15 @@ class OutboxLaws(RuleBasedStateMachine):
     @invariant()
     def bounds_hold(self) -> None:
         assert self.outbox.depth <= self.CAPACITY
-        assert len(self.outbox.under_way) <= self.WINDOW
+        assert len(self.outbox._in_flight) <= self.WINDOW
         # Arrays may be several (contract, section 3: one at least every 2 s, however long the round trip is).
-        assert sum(isinstance(each, LossNotice) for each in self.outbox.under_way) <= 1
+        assert sum(isinstance(each, LossNotice) for each in self.outbox._in_flight) <= 1
 
     def teardown(self) -> None:
         """Drain: then every sample was delivered or declared, and the declared count is right."""
         if not self.online:
             connect(self.outbox, self.now, window=self.WINDOW)
-        for item in self.outbox.under_way:
+        for item in tuple(self.outbox._in_flight):
             self.outbox.on_ack(item, self.now)
             self.delivered |= {(each.sample.device, each.sample.seq) for each in samples_of(item)}
             if isinstance(item, LossNotice):
@@ -134,7 +134,7 @@ class OutboxLaws(RuleBasedStateMachine):
         covered = {(loss.source, seq) for loss in self.declared for seq in range(loss.from_seq, loss.to_seq + 1)}
         measured = {(device, seq) for device, last in self.seqs.items() for seq in range(1, last + 1)}
         assert self.delivered | covered == measured
-        assert sum(loss.count for loss in self.declared) == self.outbox.dropped
+        assert sum(loss.count for loss in self.declared) == self.outbox.stats.dropped
 
 
 OutboxLaws.TestCase.settings = settings(max_examples=60, stateful_step_count=40, deadline=None)

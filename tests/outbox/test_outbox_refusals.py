@@ -32,7 +32,7 @@ def test_a_refused_topic_is_reported_once_and_its_samples_wait_for_history_until
     assert not outbox.refused(second, NOT_AUTHORIZED, 0.0)
     batch = take(outbox, 0.0, HistoryBatch)
     assert seqs(batch) == [1, 2, 3]
-    assert outbox.dropped == 0
+    assert outbox.stats.dropped == 0
     assert outbox.refused(batch, NOT_AUTHORIZED, 0.0)
     assert outbox.next(1.0) is None
     assert outbox.depth == 3
@@ -61,7 +61,7 @@ def test_refused_history_waits_and_the_other_devices_go_on() -> None:
     other = take(outbox, 60.0, HistoryBatch)
     assert other.topic == "device/b/history"
     outbox.on_ack(other, 60.0)
-    assert (outbox.next(61.0), outbox.dropped, outbox.depth) == (None, 0, 2)
+    assert (outbox.next(61.0), outbox.stats.dropped, outbox.depth) == (None, 0, 2)
 
 
 def test_where_all_history_is_refused_nothing_goes_and_nothing_is_due() -> None:
@@ -121,7 +121,7 @@ def test_a_quota_is_asked_again_with_back_off_and_loses_nothing() -> None:
     assert tried == [0, 1, 3, 7, 15, 31, 63, 123, 183]
     assert told == [True, *[False] * 8]
     outbox.on_ack(take(outbox, now, HistoryBatch), now)
-    assert (outbox.depth, outbox.dropped) == (0, 0)
+    assert (outbox.depth, outbox.stats.dropped) == (0, 0)
 
 
 def test_a_live_sample_that_is_refused_goes_as_history_and_the_next_is_tried_live() -> None:

@@ -30,7 +30,7 @@ def test_a_batch_that_ends_two_connections_is_cut_over_connects_until_a_reload()
         batch = take(outbox, now + HISTORY_AFTER, HistoryBatch)
         found.append((len(batch.samples), end(outbox, now + 20, under_way(outbox))))
     assert found == [(4, None), (4, "device/a/history"), (2, "device/a/history")]
-    assert outbox.dropped == 0
+    assert outbox.stats.dropped == 0
     connect(outbox, 400.0)
     assert seqs(outbox.next(410.0)) == [1]
     outbox.reload(411.0)
@@ -67,7 +67,7 @@ def test_a_denied_topic_loses_nothing_whatever_was_under_way_there() -> None:
         assert end(outbox, 10.0 * number, {"device/a/history": 100}, denied=True) == found
         connect(outbox, 10.0 * number + 1)
         outbox.next(10.0 * number + 11)
-    assert (outbox.depth, outbox.dropped) == (2, 0)
+    assert (outbox.depth, outbox.stats.dropped) == (2, 0)
     outbox.lost(40.0)
     outbox.backlog.losses.restore(Loss("b", "k", 1, 1, 1))
     connect(outbox, 41.0)
@@ -158,7 +158,7 @@ def test_a_batch_under_way_is_shortened_and_the_rest_goes_after_it() -> None:
         outbox.add(sample(seq), 0.0)
     batch = take(outbox, 50.0, HistoryBatch)
     shorter = outbox.shorten(batch, 2)
-    assert (seqs(shorter), outbox.under_way, outbox.depth) == ([1, 2], (shorter,), 5)
+    assert (seqs(shorter), tuple(outbox._in_flight), outbox.depth) == ([1, 2], (shorter,), 5)
     outbox.on_ack(shorter, 50.0)
     assert seqs(outbox.next(51.0)) == [3, 4, 5]
 
@@ -177,7 +177,7 @@ def test_a_batch_that_is_too_large_is_cut_until_it_fits() -> None:
         told.append(outbox.unfit(batch))
     assert sizes == [5, 2, 1]
     assert told == [False, False, True]
-    assert outbox.dropped == 1
+    assert outbox.stats.dropped == 1
     take(outbox, 50.0, LossNotice)
 
 
@@ -188,4 +188,4 @@ def test_a_sample_that_is_too_large_is_declared_and_its_topic_reported_once() ->
     assert outbox.unfit(take(outbox, 0.0, LiveSample))
     assert not outbox.unfit(take(outbox, 0.0, LiveSample))
     assert seqs(outbox.next(0.0)) == [3]
-    assert outbox.dropped == 2
+    assert outbox.stats.dropped == 2

@@ -80,17 +80,17 @@ def test_a_loss_leaves_only_what_clears_a_topic() -> None:
     retention = RetainedQueue()
     retention.burst([state(1), publication.retained("gone", None)], ONLINE)
     retention.lost()
-    left = retention.next_clearing(NONE)
+    left = retention.take(retention.clearings, NONE)
     assert left is not None
     assert left.topic == "gone"
-    assert (retention.next_change(NONE), retention.next_clearing(NONE)) == (None, None)
+    assert (retention.next_change(NONE), retention.take(retention.clearings, NONE)) == (None, None)
 
 
 def test_a_clearing_is_put_back_unless_a_newer_version_waits() -> None:
     retention = RetainedQueue()
     for topic in ("gone", "back", "again"):
         retention.add(publication.retained(topic, None), 0.0)
-    gone, back, again = (retention.next_clearing(NONE) for _ in range(3))
+    gone, back, again = (retention.take(retention.clearings, NONE) for _ in range(3))
     assert gone is not None
     assert back is not None
     assert again is not None
@@ -101,7 +101,7 @@ def test_a_clearing_is_put_back_unless_a_newer_version_waits() -> None:
         retention.put_back(item)
     waiting = [each and each.publication.payload for each in (retention.next_change(NONE), retention.next_change(NONE))]
     assert waiting == [{"version": 2}, None]
-    assert [item and item.topic for item in (retention.next_clearing(NONE) for _ in range(3))] == [
+    assert [item and item.topic for item in (retention.take(retention.clearings, NONE) for _ in range(3))] == [
         "again",
         "gone",
         None,
@@ -119,15 +119,15 @@ def test_the_newest_of_what_clears_and_what_fills_a_topic_waits() -> None:
     retention = RetainedQueue()
     retention.add(publication.retained("state", None), 0.0)
     retention.add(state(1), 0.0)
-    assert retention.next_clearing(NONE) is None
+    assert retention.take(retention.clearings, NONE) is None
     retention.add(publication.retained("state", None), 0.0)
     assert retention.next_change(NONE) is None
-    clearing = retention.next_clearing(NONE)
+    clearing = retention.take(retention.clearings, NONE)
     assert clearing is not None
     retention.add(publication.retained("state", None), 0.0)
-    assert retention.next_clearing(NONE) is None, "one is under way"
+    assert retention.take(retention.clearings, NONE) is None, "one is under way"
     retention.over(clearing)
-    assert retention.next_clearing(NONE) is not None
+    assert retention.take(retention.clearings, NONE) is not None
     assert not retention
 
 
@@ -135,14 +135,18 @@ def test_what_is_passed_over_waits_in_its_newest_version_until_its_topic_is_trie
     retention = RetainedQueue()
     retention.burst([state(1), publication.retained("gone", None)], ONLINE)
     refused = frozenset({"state", "gone", "availability"})
-    assert (retention.next_change(refused), retention.next_clearing(refused), bool(retention)) == (None, None, False)
+    assert (retention.next_change(refused), retention.take(retention.clearings, refused), bool(retention)) == (
+        None,
+        None,
+        False,
+    )
     retention.add(state(2), 0.0)
     assert retention.next_change(refused) is None
     retention.lifted(frozenset({"state", "other"}))
     version = retention.next_change(frozenset({"gone", "availability"}))
     assert version is not None
     assert version.publication == state(2)
-    retention.refused(version)
+    retention.wait_again(version)
     retention.over(version)
     retention.add(state(3), 0.0)
     retention.lifted(refused)
@@ -150,7 +154,7 @@ def test_what_is_passed_over_waits_in_its_newest_version_until_its_topic_is_trie
     assert newest == [state(3), ONLINE, None]
     retention.next_change(frozenset({"gone"}))
     retention.lost()
-    assert retention.next_clearing(NONE) is not None
+    assert retention.take(retention.clearings, NONE) is not None
 
 
 def test_thousands_of_clearings_are_taken_in_linear_time() -> None:
@@ -159,7 +163,7 @@ def test_thousands_of_clearings_are_taken_in_linear_time() -> None:
         retention.add(publication.retained(f"device/{number}/state", None), 0.0)
     under_way: list[Retained] = []
     begun = time.process_time()
-    while (item := retention.next_clearing(NONE)) is not None:
+    while (item := retention.take(retention.clearings, NONE)) is not None:
         under_way.append(item)
         if len(under_way) == 20:
             retention.over(under_way.pop(0))
@@ -177,7 +181,11 @@ def test_refreshes_wait_apart_and_a_newer_one_replaces_in_its_place() -> None:
     ]
     assert replaced == [False, False, True]
     assert retention.next_change(NONE) is None
-    went = [retention.next_refresh(NONE), retention.next_refresh(NONE), retention.next_refresh(NONE)]
+    went = [
+        retention.take(retention.refreshes, NONE),
+        retention.take(retention.refreshes, NONE),
+        retention.take(retention.refreshes, NONE),
+    ]
     assert [each and (each.topic, each.publication.payload) for each in went] == [
         ("a", {"version": 3}),
         ("b", {"version": 2}),
@@ -196,7 +204,7 @@ def test_a_change_takes_the_place_of_a_refresh() -> None:
     retention = RetainedQueue()
     retention.add(refresh(1), 0.0)
     assert retention.add(state(2), 1.0)
-    assert retention.next_refresh(NONE) is None
+    assert retention.take(retention.refreshes, NONE) is None
     change = retention.next_change(NONE)
     assert change is not None
     assert change.publication == state(2)
@@ -226,7 +234,7 @@ def test_the_last_of_a_burst_follows_the_refreshes_in_it_and_waits_for_no_other(
     last = retention.next_change(NONE)
     assert last is not None
     assert last.publication == ONLINE
-    assert retention.next_refresh(NONE) is None
+    assert retention.take(retention.refreshes, NONE) is None
 
 
 def test_a_loss_forgets_refreshes() -> None:

@@ -138,7 +138,7 @@ def test_other_limits_and_a_clock_set_right_reach_the_disk_and_the_page(tmp_path
             place.epoch_ms = 10**9
             place.add(3, 3)
             await place.move(4)
-            await until(lambda: place.outbox.dropped == 2, "the eviction")
+            await until(lambda: place.outbox.stats.dropped == 2, "the eviction")
         assert place.on_disk() == [3]
 
     play(scenario())

@@ -63,7 +63,7 @@ def connected(now: float = 0.0, *, capacity: int = 10_000) -> Outbox:
 
 
 def under_way(outbox: Outbox) -> dict[str, int]:
-    return {item.topic: 100 for item in outbox.under_way}
+    return {item.topic: 100 for item in outbox._in_flight}
 
 
 def end(outbox: Outbox, now: float, sent: dict[str, int], *, denied: bool = False) -> str | None:
