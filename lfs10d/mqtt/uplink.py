@@ -139,7 +139,7 @@ class Uplink:
 
     def send_samples(self, *, telemetry: bool) -> None:
         """Take whether samples are sent: `telemetry`, and as `history` what waits; the rest is sent in any case."""
-        self._outbox.telemetry = telemetry
+        self._outbox.send_samples(telemetry=telemetry)
         self._sender.wake()
 
     def limit(self, limits: Limits) -> None:

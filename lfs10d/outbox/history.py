@@ -47,9 +47,6 @@ class QueuedSample:
         return replace(self, sample=right, shift=shift)
 
 
-NONE: Container[str] = frozenset()
-
-
 def _seq(queued: QueuedSample) -> int:
     return queued.sample.seq
 
@@ -100,11 +97,11 @@ class History:
         self.count += len(taken)
         self._repeated += sum(queued.repeated for queued in taken)
 
-    def waits(self, passed_over: Container[str] = NONE) -> bool:
+    def waits(self, passed_over: Container[str] = frozenset()) -> bool:
         """Return whether a sample waits of a source that is not `passed_over`."""
         return any(source not in passed_over for source, _ in self._queues)
 
-    def take(self, most: int, passed_over: Container[str] = NONE) -> tuple[QueuedSample, ...]:
+    def take(self, most: int, passed_over: Container[str] = frozenset()) -> tuple[QueuedSample, ...]:
         """Take up to `most` samples of the key that holds the oldest, in order of seq; () where none waits.
 
         Those of sources that are `passed_over` stay; of samples that are sent each by itself one is taken.

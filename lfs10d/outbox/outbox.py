@@ -69,13 +69,8 @@ class Outbox:
         self._in_flight = InFlight(self.suspects)
         self._last_message: LastMessage | None = None
 
-    @property
-    def telemetry(self) -> bool:
-        """False: samples are not taken, and those of the backlog stay where they are; records go."""
-        return self.backlog.telemetry
-
-    @telemetry.setter
-    def telemetry(self, telemetry: bool) -> None:
+    def send_samples(self, *, telemetry: bool) -> None:
+        """Take whether samples are sent; else none is taken, and those of the backlog stay where they are; records go."""
         if telemetry and not self.backlog.telemetry:
             self.backlog.lifted()
         self.backlog.telemetry = telemetry

@@ -6,8 +6,10 @@ The store works in a thread of its own; nothing here blocks. What the store cann
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 from collections.abc import Awaitable, Callable
+from functools import partial
 
 from lfs10d.outbox.backlog import Backlog
 from lfs10d.outbox.outbox import Outbox
@@ -128,11 +130,9 @@ class Spooler:
                 await self._rest(due)
 
     async def _rest(self, until: float) -> None:
-        try:
+        with contextlib.suppress(TimeoutError):
             async with asyncio.timeout_at(until if until < float("inf") else None):
                 await self._poked.wait()
-        except TimeoutError:
-            pass
 
     def _next(self) -> tuple[float, Callable[[], Awaitable[None]]]:
         """Return what is to be done next, and when; inf: nothing, unless something happens."""
@@ -140,9 +140,9 @@ class Spooler:
         if not self._opened:
             return self._open_at, self._open
         if self._limits is not None:
-            return float("-inf"), self._take_limits
+            return float("-inf"), partial(self._take_limits, self._limits)
         if self._right is not None:
-            return float("-inf"), self._correct
+            return float("-inf"), partial(self._correct, self._right)
         spill, page, release = self._backlog.spill.due(), self._backlog.page_due(), self._backlog.spool.release_due()
         choices: list[tuple[float, Callable[[], Awaitable[None]]]] = [
             (never if page is None else page, self._take_page),
@@ -218,14 +218,11 @@ class Spooler:
         if self._backlog.spill.due() is None:
             self._works()
 
-    async def _take_limits(self) -> None:
-        limits, self._limits = self._limits, None
-        assert limits is not None  # noqa: S101 - or it would not be due
+    async def _take_limits(self, limits: Limits) -> None:
+        self._limits = None
         await self._thread.call(self._store.limit, limits)
 
-    async def _correct(self) -> None:
-        right = self._right
-        assert right is not None  # noqa: S101 - or it would not be due
+    async def _correct(self, right: tuple[int, ClockState]) -> None:
         await self._thread.call(self._store.correct, *right)
         if right == self._right:
             self._right = None

@@ -23,7 +23,7 @@ def test_a_loss_notice_that_cannot_be_sent_waits_again() -> None:
 
 def test_records_are_kept_while_the_broker_is_away_and_each_follows_as_a_message_of_its_own() -> None:
     outbox, store = Outbox(), MemoryStore()
-    outbox.telemetry = False
+    outbox.send_samples(telemetry=False)
     for seq in (1, 2, 3):
         outbox.add(sample(seq), 600.0 * seq)
         outbox.add(recorded(seq), 600.0 * seq)
@@ -47,7 +47,7 @@ def test_while_samples_are_not_wanted_those_of_the_store_stay_and_records_pass_t
     outbox.add(sample(1), 0.0)
     outbox.add(recorded(1), 0.5)
     assert store.spill(outbox, 10.0)
-    outbox.telemetry = False
+    outbox.send_samples(telemetry=False)
     connect(outbox, 20.0)
     store.page(outbox, 31.0)
     batch = outbox.next(31.0)
@@ -56,7 +56,7 @@ def test_while_samples_are_not_wanted_those_of_the_store_stay_and_records_pass_t
     outbox.on_ack(batch, 31.0)
     assert outbox.next(35.0) is None
     assert outbox.due() is None
-    outbox.telemetry = True
+    outbox.send_samples(telemetry=True)
     store.page(outbox, 40.0)
     batch = outbox.next(40.0)
     assert isinstance(batch, HistoryBatch)

@@ -163,12 +163,12 @@ def test_without_telemetry_samples_are_not_taken_and_the_backlog_stays_where_it_
     outbox = Outbox()
     outbox.add(sample(1), 0.0)
     connect(outbox, 50.0)
-    outbox.telemetry = False
+    outbox.send_samples(telemetry=False)
     outbox.add(sample(2), 55.0)
     assert outbox.next(60.0) is None
     assert outbox.due() is None
     assert not outbox.waits
     outbox.add(state(1), 61.0)
     assert take(outbox, 61.0, Retained).topic == "device/a/state"
-    outbox.telemetry = True
+    outbox.send_samples(telemetry=True)
     assert seqs(take(outbox, 62.0, HistoryBatch)) == [1]

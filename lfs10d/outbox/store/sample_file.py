@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from pathlib import Path
 
-from lfs10d.outbox.losses import Loss, joined
+from lfs10d.outbox.losses import Loss, Losses
 from lfs10d.outbox.store import database
 from lfs10d.outbox.store.catalogue import Catalogue
 from lfs10d.outbox.store.database import PAGE, Limits, number, transaction
@@ -38,9 +38,6 @@ BYTES_PER_SAMPLE = 64
 VACUUMED_AT_ONCE = 256
 """Pages given back in one transaction."""
 
-RANGES_MOST = 8
-"""Ranges of losses kept apart per device and boot in one eviction."""
-
 
 @dataclass(frozen=True, slots=True)
 class StoreEntry:
@@ -59,11 +56,6 @@ class StoredRow:
     sample: Sample
     shift: int | None
     repeated: bool
-
-
-def unheard(evicted: tuple[Loss, ...]) -> None:
-    """Ignore samples that are about to be lost."""
-    del evicted
 
 
 class SampleFile:
@@ -111,7 +103,7 @@ class SampleFile:
         mono: int,
         beyond: int = 0,
         delivered: AbstractSet[int] = frozenset(),
-        about: Callable[[tuple[Loss, ...]], None] = unheard,
+        about: Callable[[tuple[Loss, ...]], None] = lambda _: None,
     ) -> tuple[Loss, ...]:
         """Keep samples, evict the oldest where there is no room or they are too old; return what is lost by that.
 
@@ -225,7 +217,7 @@ class SampleFile:
     def _evict(
         self, coming: int, beyond: int, delivered: AbstractSet[int], now: tuple[int | None, int]
     ) -> tuple[Loss, ...]:
-        lost: dict[tuple[str, str], list[Loss]] = {}
+        lost = Losses()
         room = self._limits.pages - coming * BYTES_PER_SAMPLE // PAGE
         while self.rows:
             found = self._db.execute(
@@ -238,10 +230,9 @@ class SampleFile:
             for key, series_id, seq, _ in found:
                 _, series = self._catalogue.find(series_id)
                 if key not in delivered and not series.repeated:
-                    loss = Loss(series.source, series.boot, seq, seq, 1)
-                    lost[loss.key] = joined([*lost.get(loss.key, ()), loss], RANGES_MOST)
+                    lost.restore(Loss(series.source, series.boot, seq, seq, 1))
             self._delete(found[0][0], found[-1][0])
-        return tuple(loss for losses in lost.values() for loss in losses)
+        return tuple(lost.undeclared())
 
     def _too_old(self, found: Sequence[tuple[int, int, int, int]], now: int | None, mono: int) -> int:
         """Return how many of the rows are too old: all up to the last one of which it is certain.

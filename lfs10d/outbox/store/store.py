@@ -108,17 +108,13 @@ class Store:
         """Open the file and try to write to it; return the losses that are to be declared. Raises StoreError."""
         if self._unused:
             return ()
-        self._close()
+        self.close()
         return self._use(lambda file: file.losses)
 
     @property
     def _unused(self) -> bool:
         """There is no file, and there shall be none."""
         return self._file is None and not self.open_for_more and not self.path.exists()
-
-    def close(self) -> None:
-        """Let go of the file."""
-        self._close()
 
     def append(
         self,
@@ -186,7 +182,7 @@ class Store:
                 result = operation(file)
                 self.rows, self.oldest_ts, self.losses = file.rows, file.oldest(), file.losses
             except (DamagedError, ForeignError, sqlite3.Error, OSError) as error:
-                self._close()
+                self.close()
                 reason = _reason_to_put_aside(error)
                 if reason is None:
                     raise StoreError(f"the backlog {self.path}: {_in_words(error)}") from None
@@ -201,7 +197,8 @@ class Store:
             self._file = SampleFile(self.path, boot=self._boot, limits=self._limits, first=self._next)
         return self._file
 
-    def _close(self) -> None:
+    def close(self) -> None:
+        """Let go of the file."""
         file, self._file = self._file, None
         if file is not None:
             self._next = max(self._next, file.next)
