@@ -70,7 +70,7 @@ class Outbox:
         self._last_message: LastMessage | None = None
 
     def send_samples(self, *, telemetry: bool) -> None:
-        """Take whether samples are sent; else none is taken, and those of the backlog stay where they are; records go."""
+        """Take whether samples are sent; else none is taken, and the backlog keeps those that it has; records go."""
         if telemetry and not self.backlog.telemetry:
             self.backlog.lifted()
         self.backlog.telemetry = telemetry

@@ -20,6 +20,7 @@ import sqlite3
 from collections import deque
 from collections.abc import Callable, Collection, Sequence
 from collections.abc import Set as AbstractSet
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -130,7 +131,8 @@ class Store:
 
         def append(file: SampleFile) -> tuple[Loss, ...]:
             before = self._settle_doubt(file)
-            self._doubtful = (file.next, ())
+            doubt = partial(self._doubt, file.next)
+            doubt(())
             evicted = file.append(
                 entries,
                 losses=(*losses, *before),
@@ -138,17 +140,16 @@ class Store:
                 mono=mono,
                 beyond=beyond,
                 delivered=delivered,
-                about=self._doubt,
+                about=doubt,
             )
             self._doubtful = None
             return (*before, *evicted)
 
         return self._use(append)
 
-    def _doubt(self, evicted: tuple[Loss, ...]) -> None:
-        """Note what will have been evicted if the transaction under way has happened though it failed."""
-        if self._doubtful is not None:
-            self._doubtful = (self._doubtful[0], evicted)
+    def _doubt(self, first: int, evicted: tuple[Loss, ...]) -> None:
+        """Note what will have been kept, from id `first` on, and evicted if a transaction that fails has happened."""
+        self._doubtful = first, evicted
 
     def _settle_doubt(self, file: SampleFile) -> tuple[Loss, ...]:
         """Take back samples whose writing failed and happened nevertheless; return what was evicted by that."""
