@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import field
 from typing import Any, Final, TypeGuard
 
-from lfs10d.cli.render.live_state import FRESH, LiveState, ShownDevice
+from lfs10d.cli.render.live_state import FRESH, LiveState, ShownDevice, mapping, named
 from lfs10d.system.dataclass import dataclass
 from lfs10d.web.curve import Curve, Point
 from lfs10d.web.pruned import pruned
@@ -52,12 +52,12 @@ class Side:
 
     live: LiveState
     samples: dict[str, dict[str, Any]] = field(default_factory=dict)
-    faults: dict[str, dict[str, Any]] = field(default_factory=dict)
+    faults: dict[str, Mapping[str, Any]] = field(default_factory=dict)
     extras: dict[tuple[str, str], dict[str, Any]] = field(default_factory=dict)
     """`stats`, `config` and `wind` by device and leaf."""
     profiles: dict[str, str] = field(default_factory=dict)
-    info: dict[str, Any] = field(default_factory=dict)
-    line_error: dict[str, Any] | None = None
+    info: Mapping[str, Any] = field(default_factory=dict)
+    line_error: Mapping[str, Any] | None = None
 
 
 @dataclass(slots=True)
@@ -91,7 +91,7 @@ class LineModel:
         self._status: Side | None = None
         self._status_ts = 0.0
         self._status_place = ""
-        self._broker: dict[str, Any] = {}
+        self._broker: Mapping[str, Any] = {}
         self._heard_at = 0.0
         self._kind = ""
 
@@ -188,22 +188,17 @@ class LineModel:
         side = self._status = Side(LiveState(self.name)) if self._status is None else self._status
         side.live.on_status(status, now=now)
         self._status_ts, self._status_place = ts / 1000, place
-        info, line, broker = status.get("info"), status.get("line"), status.get("broker")
-        side.info = info if isinstance(info, dict) else {}
-        error = line.get("error") if isinstance(line, dict) else None
-        side.line_error = error if isinstance(error, dict) else None
-        self._broker = broker if isinstance(broker, dict) else {}
-        entries = status.get("devices")
-        for entry in entries if isinstance(entries, list) else ():
-            if isinstance(entry, dict) and isinstance(name := entry.get("name"), str):
-                self._on_device_status(side, name, entry)
+        side.info = mapping(status.get("info"))
+        side.line_error = mapping(mapping(status.get("line")).get("error"))
+        self._broker = mapping(status.get("broker"))
+        for name, entry in named(status.get("devices")):
+            self._on_device_status(side, name, entry)
 
     def _on_device_status(self, side: Side, name: str, entry: dict[str, Any]) -> None:
         side.profiles[name] = str(entry.get("profile"))
-        alarm, values = entry.get("alarm"), entry.get("values")
-        side.faults[name] = alarm if isinstance(alarm, dict) else {}
+        side.faults[name] = mapping(entry.get("alarm"))
         fresh = side.samples.get(name, {}).get("seq") != entry.get("seq")
-        side.samples[name] = {**entry, **(values if isinstance(values, dict) else {})}
+        side.samples[name] = {**entry, **mapping(entry.get("values"))}
         if self._kind == "status":
             self.changed.add(name)
             if fresh:
@@ -262,8 +257,7 @@ class LineModel:
     def broker(self, source: Source) -> dict[str, Any]:
         """Return the daemon's connection to the broker, and how many samples wait for it."""
         if source.kind == "broker":
-            store = self._mqtt.live.line.get("store")
-            waiting = store.get("depth") if isinstance(store, dict) else None
+            waiting = mapping(self._mqtt.live.line.get("store")).get("depth")
             return {"connected": True, "waiting": waiting, "place": self.link.place}
         connected = self._broker.get("connected") is True if source.kind == "status" else None
         return {"connected": connected, "waiting": self._broker.get("depth"), "place": self.link.place}

@@ -12,10 +12,9 @@ from dataclasses import field
 from typing import Any, Final
 
 from lfs10d import __version__
-from lfs10d.cli.render.live_state import ShownDevice
+from lfs10d.cli.render.live_state import ShownDevice, mapping, number
 from lfs10d.system.dataclass import dataclass
 from lfs10d.web.line_model import LineModel, Side
-from lfs10d.web.pruned import MOST_NUMBER
 
 OPENMETRICS: Final = "application/openmetrics-text; version=1.0.0; charset=utf-8"
 PROMETHEUS: Final = "text/plain; version=0.0.4; charset=utf-8"
@@ -57,9 +56,9 @@ class Family:
 
     def add(self, value: object, suffix: str = "", **labels: str) -> None:
         """Add a sample, if the value is a finite number; of two with the same labels the first stays."""
-        number = _number(value)
-        if number is not None:
-            self.rows.setdefault((suffix, tuple(labels.items())), float(number))
+        figure = number(value)
+        if figure is not None:
+            self.rows.setdefault((suffix, tuple(labels.items())), float(figure))
 
 
 def openmetrics_wanted(accept: str) -> bool:
@@ -100,7 +99,7 @@ class _Families:
     def quantiles(self, name: str, words: str, figures: object, keys: Mapping[str, str], **labels: str) -> None:
         """Add those of these figures that are there, in seconds by quantile."""
         for quantile, key in keys.items():
-            figure = _number(_mapping(figures).get(key))
+            figure = number(mapping(figures).get(key))
             if figure is not None:
                 per_second = _PER_SECOND[name]
                 self.of(name, "summary", words, "seconds").add(figure / per_second, **labels, quantile=quantile)
@@ -118,7 +117,7 @@ def _add_line(families: _Families, line: LineModel, wall: float) -> None:
         return
     side = line.side(source)
     state = side.live.line
-    load = _number(state.get("load_pct"))
+    load = number(state.get("load_pct"))
     if load is not None:
         words = "Share of time in which the line is in use."
         families.gauge("lfs10d_line_load_ratio", words, load / 100, "ratio", line=key)
@@ -126,14 +125,14 @@ def _add_line(families: _Families, line: LineModel, wall: float) -> None:
     words = "Silence measured before requests; 0 is the least."
     families.quantiles(_GAP, words, state.get("gap_us"), {"0": "min", "0.5": "p50", "0.99": "p99"}, line=key)
     families.gauge("lfs10d_store_samples", "Samples waiting for the broker.", broker["waiting"], line=key)
-    dropped = _mapping(state.get("store")).get("dropped")
+    dropped = mapping(state.get("store")).get("dropped")
     families.counter("lfs10d_store_dropped", "Samples dropped since the daemon's start.", dropped, line=key)
     for device in side.live.devices.values():
         _add_device(families, line, side, device, wall)
 
 
 def _add_exchanges(families: _Families, key: str, state: Mapping[str, Any]) -> None:
-    exchanges = _number(state.get("exchanges"))
+    exchanges = number(state.get("exchanges"))
     errors = {code: count for code, count in _counts(state.get("errors")).items() if code not in _NO_EXCHANGE}
     if exchanges is None:
         return
@@ -153,7 +152,7 @@ def _add_device(families: _Families, line: LineModel, side: Side, device: ShownD
             unit = unit_words(device.units.get(name, ""))
             words = f"{name.replace('_', ' ')} as the device measured it last."
             families.gauge(_gauge(name, unit), words, value, unit, **labels)
-    stats = _mapping(side.extras.get((device.name, "stats")))
+    stats = mapping(side.extras.get((device.name, "stats")))
     families.counter(f"{_DEVICE}_polls", "Polls since the daemon's start.", stats.get("polls"), **labels)
     for code, count in _counts(stats.get("errors")).items():
         words = "Failed polls since the daemon's start, by code."
@@ -204,18 +203,7 @@ def _escaped(words: str) -> str:
     return words.replace("\\", r"\\").replace('"', r"\"").replace("\n", r"\n")
 
 
-def _number(value: object) -> float | None:
-    """Return a value that is a finite number."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return None
-    return value if abs(value) < MOST_NUMBER else None
-
-
-def _mapping(value: object) -> Mapping[str, Any]:
-    return value if isinstance(value, Mapping) else {}
-
-
 def _counts(value: object) -> dict[str, float]:
     """Return counts by code; what is no code is left out, for anybody may publish it."""
-    counts = {str(code): _number(count) for code, count in _mapping(value).items()}
+    counts = {str(code): number(count) for code, count in mapping(value).items()}
     return {code: count for code, count in counts.items() if count is not None and re.fullmatch(r"[a-z_]{1,32}", code)}

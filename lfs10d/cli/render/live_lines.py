@@ -7,7 +7,7 @@ from datetime import tzinfo
 from typing import Any
 
 from lfs10d.cli.local_time import stamp, zone_name
-from lfs10d.cli.render.live_state import LiveState, ShownDevice
+from lfs10d.cli.render.live_state import LiveState, ShownDevice, mapping
 from lfs10d.cli.render.live_table import DataSource, TableRow, header, rows, table
 from lfs10d.telemetry.publication import iso_time
 
@@ -45,11 +45,10 @@ class LiveLines:
 
 def health(status: Mapping[str, Any], zone: tzinfo | None = None) -> Iterator[str]:
     """Yield the daemon's status in words."""
-    line, broker, ts = status.get("line"), status.get("broker"), status.get("ts")
-    live = LiveState(str(line.get("name")) if isinstance(line, dict) else "?")
+    broker, ts = mapping(status.get("broker")), status.get("ts")
+    live = LiveState(str(mapping(status.get("line")).get("name", "?")))
     live.on_status(status, now=0.0)
-    connected = isinstance(broker, dict) and broker.get("connected") is True
-    waiting = broker.get("depth") if isinstance(broker, dict) else None
+    connected, waiting = broker.get("connected") is True, broker.get("depth")
     words = f"broker {'connected' if connected else 'away'}" + (f", {waiting} samples wait" if waiting else "")
     wall = ts / 1000 if isinstance(ts, int) else 0.0
     source = DataSource(f"{words}; times: {zone_name(wall * 1000, zone)}", alive=True)

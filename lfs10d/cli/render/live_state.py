@@ -65,12 +65,12 @@ class ShownDevice:
     @property
     def value(self) -> float | None:
         """The first of its values that is a number; None where it has none now."""
-        return next((value for value in map(_number, self.values.values()) if value is not None), None)
+        return next((value for value in map(number, self.values.values()) if value is not None), None)
 
     @property
     def unit(self) -> str:
         """That value's unit."""
-        return next((self.units.get(name, "") for name, value in self.values.items() if _number(value) is not None), "")
+        return next((self.units.get(name, "") for name, value in self.values.items() if number(value) is not None), "")
 
     def moved(self, now: float) -> float:
         """Return the range of its value in the last seconds."""
@@ -106,7 +106,7 @@ class LiveState:
         """Take a message under B; `payload` is its JSON or its bare word, `old` that it was retained before."""
         match topic.split("/"):
             case ["devices"] if isinstance(payload, list):
-                self._on_devices([entry for entry in payload if isinstance(entry, dict)])
+                self._on_devices(payload)
             case ["line", "state" | "stats"] if isinstance(payload, dict):
                 self.line.update(payload)
             case ["line", "error"] if isinstance(payload, dict):
@@ -114,21 +114,18 @@ class LiveState:
             case ["device", name, leaf]:
                 self._on_device(self._device(name), leaf, payload, old=old, now=now, wall=wall)
 
-    def _on_line_error(self, error: Mapping[str, Any] | None) -> None:
-        """Take the line's error object; None: there is none."""
-        error = {} if error is None else error
+    def _on_line_error(self, error: Mapping[str, Any]) -> None:
+        """Take the line's error object; empty: there is none."""
         self.line_error = _active(error)
         self.line_error_code = str(error.get("code")) if self.line_error is not None else None
         self.line_error_since = _since(error)
 
-    def _on_devices(self, entries: list[dict[str, Any]]) -> None:
+    def _on_devices(self, entries: list[Any]) -> None:
         self.known = True
         self.devices = {}
-        for entry in entries:
-            name = entry.get("name")
-            if isinstance(name, str):
-                self.devices[name] = device = self._device(name)
-                _describe(device, entry, slave=entry.get("id"))
+        for name, entry in named(entries):
+            self.devices[name] = device = self._device(name)
+            _describe(device, entry, slave=entry.get("id"))
 
     def _device(self, name: str) -> ShownDevice:
         return self._by_name.setdefault(name, ShownDevice(name))
@@ -138,7 +135,7 @@ class LiveState:
             self._on_availability(device, payload == "online", now=None if old else now)
         elif isinstance(payload, dict):
             if leaf == "stats":
-                last = _number(payload.get("last_good_ts"))
+                last = number(payload.get("last_good_ts"))
                 if last is not None and (device.good_ts is None or last > device.good_ts):
                     device.good_ts = last
             elif leaf == "error":
@@ -149,7 +146,7 @@ class LiveState:
                 self._on_sample(device, payload, old=old, now=now, wall=wall)
 
     def _on_sample(self, device: ShownDevice, sample: Mapping[str, Any], *, old: bool, now: float, wall: float) -> None:
-        seq, boot, ts = sample.get("seq"), str(sample.get("boot")), _number(sample.get("ts"))
+        seq, boot, ts = sample.get("seq"), str(sample.get("boot")), number(sample.get("ts"))
         if not isinstance(seq, int) or ts is None or (boot == device.boot and seq <= device.seq):
             return  # the state repeats a sample of telemetry, or is no sample
         if not device.enabled and sample.get("error") != "disabled":
@@ -176,34 +173,28 @@ class LiveState:
 
     def on_status(self, status: Mapping[str, Any], *, now: float) -> None:
         """Take the daemon's status as it was written, by the clock of this machine."""
-        ts = _number(status.get("ts")) or 0.0
+        ts = number(status.get("ts")) or 0.0
         self.known = True
         line = status.get("line")
         if isinstance(line, dict):
             self.line = line
-            error = line.get("error")
-            self._on_line_error(error if isinstance(error, dict) else None)
+            self._on_line_error(mapping(line.get("error")))
         self.devices = {}
-        entries = status.get("devices")
-        for entry in entries if isinstance(entries, list) else ():
-            if isinstance(entry, dict) and isinstance(entry.get("name"), str):
-                name = entry["name"]
-                known = name in self._by_name
-                self.devices[name] = device = self._device(name)
-                self._on_device_status(device, entry, ts, now=now if known else None)
+        for name, entry in named(status.get("devices")):
+            known = name in self._by_name
+            self.devices[name] = device = self._device(name)
+            self._on_device_status(device, entry, ts, now=now if known else None)
 
     def _on_device_status(self, device: ShownDevice, entry: Mapping[str, Any], ts: float, *, now: float | None) -> None:
         _describe(device, entry, slave=entry.get("slave"))
         self._on_availability(device, entry.get("online") is True, now=now)
-        values, units, seq = entry.get("values"), entry.get("units"), entry.get("seq")
+        seq = entry.get("seq")
         fresh = seq != device.seq
         device.seq = seq if isinstance(seq, int) else -1
-        _sample(device, entry, values if isinstance(values, dict) else {}, units if isinstance(units, dict) else {})
-        wind = entry.get("wind")
-        _wind(device, wind if isinstance(wind, dict) else {})
-        alarm = entry.get("alarm")
-        _error(device, alarm if isinstance(alarm, dict) else {})
-        age = _number(entry.get("age_s"))
+        _sample(device, entry, mapping(entry.get("values")), mapping(entry.get("units")))
+        _wind(device, mapping(entry.get("wind")))
+        _error(device, mapping(entry.get("alarm")))
+        age = number(entry.get("age_s"))
         device.good_ts = None if age is None else ts - age * 1000
         if fresh and now is not None:
             _trail(device, now)
@@ -220,7 +211,7 @@ class LiveState:
         """Return the first value of a sample or of a device in the status file; None where it has none."""
         given = sample.get("values")
         values = given.items() if isinstance(given, dict) else sample.items()
-        numbers = (_number(value) for name, value in values if name not in RESERVED_NAMES)
+        numbers = (number(value) for name, value in values if name not in RESERVED_NAMES)
         return next((number for number in numbers if number is not None), None)
 
     def mark(self, name: str) -> tuple[str, int]:
@@ -254,12 +245,37 @@ class LiveState:
                 yield device
 
 
+# -- what came over the network may be anything
+
+
+def mapping(value: object) -> Mapping[str, Any]:
+    """Return a value that is an object; an empty one for any other."""
+    return value if isinstance(value, Mapping) else {}
+
+
+def named(entries: object) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the objects of a list that have a name, each with it."""
+    for entry in entries if isinstance(entries, list) else ():
+        if isinstance(entry, dict) and isinstance(name := entry.get("name"), str):
+            yield name, entry
+
+
+def number(value: object) -> float | None:
+    """Return a value that is a finite number; whole ones stay whole."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    try:
+        return value if isfinite(value) else None
+    except OverflowError:
+        return None
+
+
 def _describe(device: ShownDevice, entry: Mapping[str, Any], *, slave: object) -> None:
     device.slave = slave if isinstance(slave, int) else None
     label = entry.get("label")
     device.label = label if isinstance(label, str) else None
     device.enabled = entry.get("enabled") is not False
-    device.interval = _number(entry.get("interval")) or 1.0
+    device.interval = number(entry.get("interval")) or 1.0
 
 
 def _sample(
@@ -268,11 +284,10 @@ def _sample(
     error = sample.get("error")
     device.good = sample.get("quality") in ("good", "partial")  # of a partial one the values that are there are good
     device.error = error if isinstance(error, str) else None
-    device.rtt_ms = _number(sample.get("rtt_ms"))
+    device.rtt_ms = number(sample.get("rtt_ms"))
     device.values = {str(name): value for name, value in values.items() if _is_value(value)}
-    errors = sample.get("errors")
-    named = errors.items() if device.good and isinstance(errors, dict) else ()
-    device.errors = {str(name): code for name, code in named if isinstance(code, str)}
+    errors = mapping(sample.get("errors")) if device.good else {}
+    device.errors = {str(name): code for name, code in errors.items() if isinstance(code, str)}
     device.units = {str(name): unit for name, unit in units.items() if isinstance(unit, str)}
 
 
@@ -283,7 +298,7 @@ def _error(device: ShownDevice, error: Mapping[str, Any]) -> None:
 
 
 def _wind(device: ShownDevice, wind: Mapping[str, Any]) -> None:
-    device.gust, device.mean = _number(wind.get("gust_10m")), _number(wind.get("mean_2m"))
+    device.gust, device.mean = number(wind.get("gust_10m")), number(wind.get("mean_2m"))
 
 
 def _trail(device: ShownDevice, now: float) -> None:
@@ -293,17 +308,7 @@ def _trail(device: ShownDevice, now: float) -> None:
 
 def _is_value(value: object) -> TypeGuard[Value]:
     """Whether something is a finite number, a text or a boolean."""
-    return isinstance(value, bool | str) or _number(value) is not None
-
-
-def _number(value: object) -> float | None:
-    """Return a value that is a finite number; whole ones stay whole."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return None
-    try:
-        return value if isfinite(value) else None
-    except OverflowError:
-        return None
+    return isinstance(value, bool | str) or number(value) is not None
 
 
 def _active(error: Mapping[str, Any]) -> str | None:
@@ -316,4 +321,4 @@ def _active(error: Mapping[str, Any]) -> str | None:
 
 def _since(error: Mapping[str, Any]) -> float | None:
     """Return when an error object's error rose, epoch ms; None where there is no error."""
-    return _number(error.get("since")) if error.get("active") is True else None
+    return number(error.get("since")) if error.get("active") is True else None
