@@ -48,11 +48,6 @@ class CommandSpec:
 
 
 @dataclass(frozen=True, slots=True)
-class Ignored:
-    """The request is ignored: no response is sent."""
-
-
-@dataclass(frozen=True, slots=True)
 class Answered:
     """The result is known already, after `took` s; `clear`: the request was retained and must be cleared.
 
@@ -75,6 +70,14 @@ class _Memory(Generic[W]):
     took: float = 0.0
     forget_at: float = inf
     repeats: list[tuple[Command, W]] = field(default_factory=list)
+
+    def settle(self, result: Result | None, forget_at: float) -> list[tuple[Command, W]]:
+        """Note the result, and return the repeats that waited for it; while it is None they go on waiting."""
+        self.result, self.forget_at = result, forget_at
+        if result is None:
+            return []
+        repeats, self.repeats = self.repeats, []
+        return repeats
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,13 +108,13 @@ class Admission(Generic[W]):
 
     def admit(
         self, name: str, payload: bytes, *, retained: bool, reply_to: W, now: float, correlation: int = 0
-    ) -> Ignored | Answered | Admitted[W] | Waiting:
-        """Judge a request; `reply_to` is kept for `done` if it repeats one that still runs.
+    ) -> Answered | Admitted[W] | Waiting | None:
+        """Judge a request; None: it is ignored. `reply_to` is kept for `done` if it repeats one that still runs.
 
         `correlation` is how many bytes its Correlation Data has.
         """
         if not payload:
-            return Ignored()
+            return None
         flood = not self._within_rate(now)
         if retained:
             command = read(payload)[0] if len(payload) <= LARGEST else Command()
@@ -191,23 +194,15 @@ class Admission(Generic[W]):
 
         Returns the repeats that waited for the result, with their `reply_to`.
         """
-        key = command.key
-        if key is None:
+        if command.key is None:
             return []
-        memory = self._seen.setdefault((name, key), _Memory[W](command.fingerprint))
-        memory.result, memory.forget_at = result, forget_at
-        if result is None:
-            return []
-        repeats, memory.repeats = memory.repeats, []
-        return repeats
+        memory = self._seen.setdefault((name, command.key), _Memory[W](command.fingerprint))
+        return memory.settle(result, forget_at)
 
     def done(self, admitted: Admitted[W], result: Result, now: float) -> list[tuple[Command, W]]:
         """Note the result; return the repeats that wait for it, with their `reply_to`."""
-        memory = admitted.memory
-        memory.result, memory.took = result, now - admitted.since
-        memory.forget_at = now + self.specs[admitted.name].remembered_for
-        repeats, memory.repeats = memory.repeats, []
-        return repeats
+        admitted.memory.took = now - admitted.since
+        return admitted.memory.settle(result, now + self.specs[admitted.name].remembered_for)
 
 
 def _too_large(payload: int, correlation: int) -> str | None:

@@ -95,11 +95,6 @@ class Context:
     reconfiguration: SensorChanges
     publisher: Announcements
 
-    @property
-    def devices(self) -> tuple[str, ...]:
-        """The names of the configured devices, disabled ones too."""
-        return tuple(slave.name for slave in self.config.now.config.slaves)
-
 
 Perform: TypeAlias = "Callable[[Any, Context, Command], Coroutine[Any, Any, Result]]"
 """Takes the parameters in their form, the context, and the command they came with."""

@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import partial
 
 from lfs10d.command import Result, failed, rejected
-from lfs10d.commands.admission import Admitted, Answered, Ignored, Waiting
+from lfs10d.commands.admission import Admitted, Answered, Waiting
 from lfs10d.commands.context import Context, Handler
 from lfs10d.commands.message import LARGEST_CORRELATION
 from lfs10d.commands.responder import ReplyTo, Responder
@@ -52,7 +52,7 @@ class Dispatcher:
             name, request.payload, retained=request.retained, reply_to=reply_to, now=now, correlation=size
         )
         match decision:
-            case Ignored():
+            case None:
                 return
             case Answered(command=command, result=result, took=took):
                 if decision.clear:

@@ -105,20 +105,17 @@ class LiveConfig:
 
     async def _change(self, edit: Edit, save: Callable[[Changes], None]) -> tuple[Effective, Effective]:
         try:
-            return await self._changed(edit, save)
+            async with self._lock:
+                before = self.now
+                changes = await run_in_thread(partial(edit, before), "changes")
+                if changes == before.changes:
+                    return before, before
+                now = await run_in_thread(partial(effective, before.file, changes), "changes")
+                await run_in_thread(partial(save, now.changes), "changes")
+                await self._apply(now, self._login)
+                return before, self.now
         finally:
             self._report()
-
-    async def _changed(self, edit: Edit, save: Callable[[Changes], None]) -> tuple[Effective, Effective]:
-        async with self._lock:
-            before = self.now
-            changes = await run_in_thread(partial(edit, before), "changes")
-            if changes == before.changes:
-                return before, before
-            now = await run_in_thread(partial(effective, before.file, changes), "changes")
-            await run_in_thread(partial(save, now.changes), "changes")
-            await self._apply(now, self._login)
-            return before, self.now
 
     def _save(self, changes: Changes) -> None:
         """Save the changes; raises StateError and reports it."""

@@ -12,7 +12,6 @@ from lfs10d.commands.admission import (
     Admitted,
     Answered,
     CommandSpec,
-    Ignored,
     Waiting,
 )
 from lfs10d.commands.message import Parameters
@@ -45,7 +44,7 @@ class Door:
 
     def tell(
         self, name: str, content: object = None, *, retained: bool = False, reply_to: str = "here"
-    ) -> Ignored | Answered | Admitted[str] | Waiting:
+    ) -> Answered | Admitted[str] | Waiting | None:
         payload = content if isinstance(content, bytes) else json.dumps({} if content is None else content).encode()
         return self.admission.admit(name, payload, retained=retained, reply_to=reply_to, now=self.now)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from lfs10d.command import ErrorCode, RefusedError, Result, rejected
+from lfs10d.command import ErrorCode, RefusedError, rejected
 from lfs10d.commands.context import Context
 from lfs10d.config.diff import difference
 from lfs10d.config.effective import Edit, Effective
@@ -25,17 +25,12 @@ def refuse(code: ErrorCode, message: str, *, param: str | None = None, **facts: 
     return RefusedError(rejected(code, message, param=param, **facts))
 
 
-def unknown_device(device: str, known: tuple[str, ...]) -> Result:
-    """Return the rejection of a name that no device has."""
-    names = ", ".join(known) or "none"
-    return rejected("unknown_device", f"there is no device {device}; configured are: {names}", param="device")
-
-
 def known_device(device: str, now: Effective) -> SlaveConfig:
     """Return a configured device; raises RefusedError if there is none of this name."""
     slave = now.slave(device)
     if slave is None:
-        raise RefusedError(unknown_device(device, tuple(slave.name for slave in now.config.slaves)))
+        names = ", ".join(each.name for each in now.config.slaves) or "none"
+        raise refuse("unknown_device", f"there is no device {device}; configured are: {names}", param="device")
     return slave
 
 

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from lfs10d.command import Command, ErrorCode, Result, failed, ok
 from lfs10d.commands.context import Context
-from lfs10d.commands.handlers.config_edit import apply_edit, as_json, known_device, refuse, unknown_device
+from lfs10d.commands.handlers.config_edit import apply_edit, as_json, known_device, refuse
 from lfs10d.commands.message import Parameters
 from lfs10d.config.changes import OPTIONS, Changes, Place
 from lfs10d.config.defaults import inherited
@@ -191,8 +191,7 @@ async def options(parameters: Options, context: Context, command: Command) -> Re
 async def read(parameters: OneDevice, context: Context, _: Command) -> Result:
     """Poll a device now, in turn with the others."""
     device = parameters.device
-    if device not in context.devices:
-        return unknown_device(device, context.devices)
+    known_device(device, context.config.now)
     conflict = context.config.now.conflicts.get(device)
     if conflict is not None:
         return failed("line_error", f"{device} cannot be polled: {conflict}")

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from lfs10d.command import RefusedError
-from lfs10d.commands.handlers.config_edit import altered, apply_edit, as_json, known_device, refuse, unknown_device
+from lfs10d.commands.handlers.config_edit import altered, apply_edit, as_json, known_device, refuse
 from lfs10d.config.changes import Changes
 from lfs10d.config.effective import Effective
 from tests.support.context import Asked, FakeContext
@@ -51,10 +51,16 @@ def test_an_unknown_name_is_told_with_those_that_are_known(fake: FakeContext) ->
     with pytest.raises(RefusedError) as caught:
         known_device("nobody", fake.holding.now)
     assert str(caught.value) == "there is no device nobody; configured are: mast-top, slave-3"
-    assert caught.value.result == unknown_device("nobody", ("mast-top", "slave-3"))
+    assert (caught.value.result.status, caught.value.result.code) == ("rejected", "unknown_device")
     assert caught.value.result.facts["param"] == "device"
-    assert unknown_device("nobody", ()).message == "there is no device nobody; configured are: none"
     assert known_device("mast-top", fake.holding.now).id == 2
+
+
+def test_where_no_device_is_configured_an_unknown_name_is_told_that(fake: FakeContext) -> None:
+    fake.file.write_text("line: {port: tty}")
+    fake.start()
+    with pytest.raises(RefusedError, match=r"^there is no device nobody; configured are: none$"):
+        known_device("nobody", fake.holding.now)
 
 
 def test_a_device_is_shown_in_s_and_its_learned_time_out_as_auto(fake: FakeContext) -> None:
