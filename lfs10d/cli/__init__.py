@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import importlib.util
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,9 @@ EXIT_FAILED = 1
 EXIT_UNAVAILABLE = 69
 EXIT_CONFIG = 78
 """sysexits.h: EX_UNAVAILABLE, EX_CONFIG."""
+
+ANY_FILE = click.Path(path_type=Path, readable=False)
+"""An option's file; whether it can be read is reported in our words."""
 
 SERVICE_FILE = Path("/etc/lfs10d/lfs10d.yaml")
 """The configuration that the service reads, and every verb that is given no other."""
@@ -52,30 +54,28 @@ Examples:
 """
 
 
-def _module(verb: str) -> str:
-    return PLACES.get(verb, f"{__name__}.{verb}")
-
-
 class Verbs(click.Group):
     """Looks a verb's module up when it is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the verbs in the order of first use."""
         del ctx
-        return [verb for verb in VERBS if importlib.util.find_spec(_module(verb))]
+        return [*VERBS]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import the verb's module and return its command."""
-        if cmd_name not in self.list_commands(ctx):
+        del ctx
+        if cmd_name not in VERBS:
             return None
-        command = importlib.import_module(_module(cmd_name)).command
+        command: click.Command = importlib.import_module(PLACES.get(cmd_name, f"{__name__}.{cmd_name}")).command
         startup.done()
-        return command if isinstance(command, click.Command) else None
+        return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the verbs with their short help, importing none of them."""
+        del ctx
         with formatter.section("Verbs"):
-            formatter.write_dl([(verb, VERBS[verb]) for verb in self.list_commands(ctx)])
+            formatter.write_dl([*VERBS.items()])
 
 
 @click.command(
@@ -101,19 +101,16 @@ def config_option(function: Callable[..., Any], text: str = "The configuration f
         show_envvar=True,
         default=SERVICE_FILE,
         metavar="FILE",
-        type=click.Path(path_type=Path, readable=False),  # whether it can be read is reported in our words
+        type=ANY_FILE,
         help=text,
     )(function)
 
 
-def state_option(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Add `--state-dir DIRECTORY`, passed on as `state_dir: Path | None`, for verbs that read what the daemon keeps."""
-    return click.option(
-        "--state-dir",
-        type=click.Path(path_type=Path, readable=False),  # whether it can be read is reported in our words
-        metavar="DIRECTORY",
-        help="Where the daemon keeps state. Default: as `lfs10d run` has it.",
-    )(function)
+def state_option(
+    function: Callable[..., Any], text: str = "Where the daemon keeps state. Default: as `lfs10d run` has it."
+) -> Callable[..., Any]:
+    """Add `--state-dir DIRECTORY`, passed on as `state_dir: Path | None`; `text` is its help."""
+    return click.option("--state-dir", type=ANY_FILE, metavar="DIRECTORY", help=text)(function)
 
 
 def json_option(function: Callable[..., Any]) -> Callable[..., Any]:

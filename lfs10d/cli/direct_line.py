@@ -19,7 +19,7 @@ from lfs10d.modbus.bus import Bus, LineRules
 from lfs10d.modbus.port import SerialPort
 from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.modbus.realtime import sharpen_timers
-from lfs10d.reading import Event, FaultCode, PortChanged, UartCounters
+from lfs10d.reading import Event, FaultCode, PortChanged
 
 SWITCH_INTERVAL = 1e-4
 """Seconds after which the interpreter switches threads, so that drawing does not delay the line."""
@@ -30,13 +30,13 @@ _Message: TypeAlias = "list[Event] | BaseException"
 
 
 class DirectLine:
-    """Opens the port on entering, frees it on leaving. `uart` has the driver's counts of that time, if it counts."""
+    """Opens the port on entering, frees it on leaving. `framing_errors` of that time, if the driver counts."""
 
     def __init__(self, settings: PortSettings) -> None:
         self.path = settings.path
-        self.uart: UartCounters | None = None
+        self.framing_errors: int | None = None
         self._queue: SimpleQueue[_Message] = SimpleQueue()
-        self._first: UartCounters | None = None
+        self._errors_before: int | None = None
         self._bus = Bus(SerialPort(settings), LineRules(), time.monotonic)
         scheduler = Scheduler(self._bus.line_timing, time.monotonic())
         self._poller = Poller(self._bus, scheduler, self._take, time.monotonic)
@@ -86,13 +86,9 @@ class DirectLine:
         """Queue events of the line thread; called in that thread."""
         now = self._bus.counters()
         if now is not None:
-            first = self._first = self._first or now
-            self.uart = UartCounters(
-                now.framing - first.framing,
-                now.parity - first.parity,
-                now.overrun - first.overrun,
-                now.breaks - first.breaks,
-            )
+            if self._errors_before is None:
+                self._errors_before = now.framing
+            self.framing_errors = now.framing - self._errors_before
         self._queue.put(events)
 
 

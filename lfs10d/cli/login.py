@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import click
 
+from lfs10d.cli import ANY_FILE
 from lfs10d.config.credentials import DENIED, UnreadableError, password_in, service_password
 from lfs10d.config.loader import LoadedConfig, load
 from lfs10d.config.models import Config
@@ -40,7 +41,7 @@ def login_options(function: Callable[..., Any]) -> Callable[..., Any]:
     password = click.option(
         "--password-file",
         metavar="FILE",
-        type=click.Path(path_type=Path, readable=False),  # whether it can be read is told in our words
+        type=ANY_FILE,
         help="File whose first line is the password.",
     )
     return name(password(function))

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from lfs10d.cli import SERVICE_FILE
+from lfs10d.cli.render.table import columns
 from lfs10d.config.loader import load
 from lfs10d.errors import ConfigError
 from lfs10d.modbus.port_lock import PROC, Holder, holder
@@ -73,15 +74,14 @@ def instead(path: str, *, slave: int | None, proc: Path = PROC) -> Iterator[str]
     if daemon is None:
         return
     yield f"The daemon (lfs10d run, process {daemon.pid}) polls this line. Ask it instead:"
-    ways = [
+    if slave is None:
+        same = ("request line/scan", "the same scan, while polling goes on")
+    else:
+        same = (f"request device/read device={device_name(daemon, slave)}", "this sensor, now")
+    others = (
         ("watch", "what every sensor measures now"),
         ("request line/pause for=1m", "the port is yours for a minute"),
-    ]
-    if slave is None:
-        ways.insert(0, ("request line/scan", "the same scan, while polling goes on"))
-    else:
-        ways.insert(0, (f"request device/read device={device_name(daemon, slave)}", "this sensor, now"))
-    commands = [f"lfs10d {way}{daemon.option}" for way, _ in ways]
-    width = max(map(len, commands))
-    for command, (_, meaning) in zip(commands, ways, strict=True):
-        yield f"  {command.ljust(width)}  {meaning}"
+    )
+    first, *rest = [(f"lfs10d {way}{daemon.option}", meaning) for way, meaning in (same, *others)]
+    for line in columns(first, rest):
+        yield f"  {line}"

@@ -25,7 +25,7 @@ from lfs10d.modbus.description import describe
 from lfs10d.modbus.frames import Checksum, Codec
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
-from lfs10d.reading import ALIVE_CODES, Exchanged, Fault, FaultCode, Reading, UartCounters, Value
+from lfs10d.reading import ALIVE_CODES, Exchanged, Fault, FaultCode, Reading, Value
 from lfs10d.system.dataclass import dataclass
 from lfs10d.system.logs import escape
 
@@ -184,7 +184,7 @@ def _on_reading(options: _ReadOptions, attempts: _Attempts, reading: Reading, li
         print_lines(_shown(options, reading))
     if fault is not None and final and not attempts.explained and not options.as_json:
         attempts.explained = True
-        print_lines(_explanation(options, attempts, fault, line.uart), err=True)
+        print_lines(_explanation(options, attempts, fault, line.framing_errors), err=True)
     if options.watch or not final:
         return None
     return EXIT_FAILED if fault is not None else 0
@@ -251,7 +251,7 @@ def _bar(reading: Reading) -> str:
     return click.style(block * min(BAR_MOST, round(speed / BAR_UNIT)), fg="cyan")
 
 
-def _explanation(options: _ReadOptions, attempts: _Attempts, fault: Fault, uart: UartCounters | None) -> Iterator[str]:
+def _explanation(options: _ReadOptions, attempts: _Attempts, fault: Fault, framing: int | None) -> Iterator[str]:
     """Yield the frames sent and received, what they mean and what to check."""
     how = f"{options.baudrate} baud {options.line.character}"
     tries = f"{attempts.failures} attempt{'s' * (attempts.failures > 1)}"
@@ -265,7 +265,6 @@ def _explanation(options: _ReadOptions, attempts: _Attempts, fault: Fault, uart:
         yield f"  {what}  {text.ljust(width)}  {meaning}".rstrip()
     yield ""
     echoed = any(each.sent and each.heard.startswith(each.sent) for each in attempts.exchanges)
-    framing = None if uart is None else uart.framing
     seen = troubleshooting.Symptoms(fault.code, echoed, framing)
     yield from troubleshooting.lines(
         troubleshooting.meaning(seen), (*_rate_advice(options, fault), *troubleshooting.checks(seen))

@@ -9,11 +9,12 @@ import os
 import selectors
 import signal
 import time
+from functools import partial
 from pathlib import Path
 
 import click
 
-from lfs10d.cli import config_option
+from lfs10d.cli import config_option, state_option
 from lfs10d.config.loader import load
 from lfs10d.daemon import boot
 from lfs10d.daemon.daemon import run
@@ -34,12 +35,7 @@ Examples:
 
 @click.command("run", epilog=EXAMPLES)
 @config_option
-@click.option(
-    "--state-dir",
-    type=click.Path(path_type=Path, readable=False),  # whether it can be read is told in our words
-    metavar="DIRECTORY",
-    help="Where to keep state. Default: $STATE_DIRECTORY, else below /var/lib or ~/.local/state.",
-)
+@partial(state_option, text="Where to keep state. Default: $STATE_DIRECTORY, else below /var/lib or ~/.local/state.")
 def command(config: Path, state_dir: Path | None) -> int:
     """Run the daemon: poll the line, publish to the broker, until SIGTERM or Ctrl-C."""
     # Until the daemon handles signals: the files are about to be read anyway, so SIGHUP has nothing to reload.

@@ -224,7 +224,7 @@ def _scan(result: _Result, *, as_json: bool) -> int:
                 while not scan.over:
                     line.events(LOOK_EVERY)
                     drawn.update()
-            result.framing_errors = None if line.uart is None else line.uart.framing
+            result.framing_errors = line.framing_errors
             while not scan.complete and line.events(LOOK_EVERY):
                 pass  # the reason why it did not come to its end is among them
     except KeyboardInterrupt:

@@ -12,7 +12,7 @@ from typing import Final
 
 import click
 
-from lfs10d.cli import SERVICE_FILE, event_loop
+from lfs10d.cli import ANY_FILE, SERVICE_FILE, event_loop
 from lfs10d.cli.login import log_in, login_options
 from lfs10d.config.credentials import UnreadableError, password_in
 from lfs10d.errors import FailedError
@@ -58,10 +58,10 @@ class ListenAddress(click.ParamType):  # type: ignore[type-arg]  # generic in ne
     envvar="LFS10D_CONFIG",
     show_envvar=True,
     metavar="FILE",
-    type=click.Path(path_type=Path, readable=False),
+    type=ANY_FILE,
     help=f"A configuration file; may be given several times.  [default: {SERVICE_FILE}]",
 )
-@click.argument("more", nargs=-1, metavar="[FILE]...", type=click.Path(path_type=Path, readable=False))
+@click.argument("more", nargs=-1, metavar="[FILE]...", type=ANY_FILE)
 @click.option(
     "--listen",
     type=ListenAddress(),
@@ -71,7 +71,7 @@ class ListenAddress(click.ParamType):  # type: ignore[type-arg]  # generic in ne
 @click.option(
     "--token-file",
     metavar="FILE",
-    type=click.Path(path_type=Path, readable=False),
+    type=ANY_FILE,
     help="File with the token for requests. Default: the systemd credential web-token; without, reading only.",
 )
 @click.option(

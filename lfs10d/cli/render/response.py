@@ -66,20 +66,17 @@ def _laid_out(data: object, depth: int) -> Iterator[str]:
     indent = INDENT * depth
     if depth >= DEEPEST or not isinstance(data, dict | list):
         yield f"{indent}{_plain(data)}"
-    elif isinstance(data, dict):
-        for key, value in data.items():
-            if _is_leaf(value):
-                yield f"{indent}{escape(key)}: {_plain(value)}"
-            else:
-                yield f"{indent}{escape(key)}:"
-                yield from _laid_out(value, depth + 1)
+        return
+    if isinstance(data, dict):
+        entries = [(f"{escape(key)}:", value) for key, value in data.items()]
     else:
-        for item in data:
-            if _is_leaf(item):
-                yield f"{indent}- {_plain(item)}"
-            else:
-                yield f"{indent}-"
-                yield from _laid_out(item, depth + 1)
+        entries = [("-", item) for item in data]
+    for head, value in entries:
+        if _is_leaf(value):
+            yield f"{indent}{head} {_plain(value)}"
+        else:
+            yield f"{indent}{head}"
+            yield from _laid_out(value, depth + 1)
 
 
 def _is_leaf(value: object) -> bool:
