@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
+from lfs10d.cli.render.foreign import mapping, named
 from lfs10d.system.dataclass import dataclass
 from lfs10d.system.logs import escape
 
@@ -114,12 +115,11 @@ class AdoptLoop:
 
     def on_health(self, health: object) -> Iterator[AdoptedSensor]:
         """Take the daemon's health; yield the sensors that are polled now without a response that said so."""
-        line, devices = _of(health, "line"), _of(health, "devices")
-        rate = line.get("baudrate") if isinstance(line, Mapping) else None
+        rate, devices = mapping(mapping(health).get("line")).get("baudrate"), mapping(health).get("devices")
         self._baudrate = rate if isinstance(rate, int) else self._baudrate
         if not isinstance(devices, list):
             return
-        now = {str(each["name"]): each.get("slave") for each in devices if isinstance(each, Mapping) and "name" in each}
+        now = {name: each.get("slave") for name, each in named(devices)}
         appeared = set() if self._known is None else now.keys() - self._known
         self._known = frozenset(now)
         for name in sorted(appeared):
@@ -129,8 +129,8 @@ class AdoptLoop:
 
     def on_response(self, response: Mapping[str, Any]) -> AdoptTurn:
         """Take a response to `line/adopt`."""
-        data, error = response.get("data"), response.get("error")
-        code = error.get("code") if isinstance(error, Mapping) else None
+        data, error = response.get("data"), mapping(response.get("error"))
+        code = error.get("code")
         if response.get("status") == "ok" and isinstance(data, Mapping):
             self._lost = False
             return AdoptTurn(self._adopt(str(data.get("device")), data.get("slave")), pause=0.0)
@@ -142,12 +142,12 @@ class AdoptLoop:
             return AdoptTurn()
         if code == "duplicate_id" and not duplicate_seen:
             return AdoptTurn()
-        if code == "address_in_use" and self.uncertain and _of(error, "param") == "from":
+        if code == "address_in_use" and self.uncertain and error.get("param") == "from":
             return AdoptTurn(pause=RECHECK_AFTER)  # its old id is reserved for the sensor that is looked for
         return AdoptTurn(problem=self._report_once(_message(error)), ends=code not in TEMPORARY)
 
-    def _on_failure(self, data: object, code: object, error: object) -> AdoptTurn:
-        device = _of(data, "device")
+    def _on_failure(self, data: object, code: object, error: Mapping[str, Any]) -> AdoptTurn:
+        device = mapping(data).get("device")
         if code in {"not_verified", "power_cycle_needed"} and isinstance(device, str):
             self._awaited.add(device)
         self._lost = self._lost or code == "cancelled"
@@ -167,9 +167,5 @@ class AdoptLoop:
         return problem
 
 
-def _of(value: object, key: str) -> object:
-    return value.get(key) if isinstance(value, Mapping) else None
-
-
-def _message(error: object) -> str:
-    return f"{escape(str(_of(error, 'code')))}: {escape(str(_of(error, 'message')))}"
+def _message(error: Mapping[str, Any]) -> str:
+    return f"{escape(str(error.get('code')))}: {escape(str(error.get('message')))}"

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Final, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
+from lfs10d.cli.render.foreign import named
 from lfs10d.commands.handlers.registry import HANDLERS
 from lfs10d.schema.fields import Choice, Duration, FieldKind, Flag
 from lfs10d.schema.quantities import duration_text
@@ -122,10 +123,10 @@ def named_device(text: str, devices: object) -> str:
     `devices` is the payload of topic `devices`. A name comes before an id; what no device has is returned as it is,
     and the daemon rejects it.
     """
-    entries = [each for each in devices if isinstance(each, dict)] if isinstance(devices, list) else []
-    if any(each.get("name") == text for each in entries) or not is_slave_id(text):
+    entries = dict(named(devices))
+    if text in entries or not is_slave_id(text):
         return text
-    return next((str(each["name"]) for each in entries if each.get("id") == int(text) and "name" in each), text)
+    return next((name for name, each in entries.items() if each.get("id") == int(text)), text)
 
 
 def is_slave_id(text: object) -> bool:

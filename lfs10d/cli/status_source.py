@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from lfs10d.cli.client import parsed
+from lfs10d.cli.render.foreign import mapping
 from lfs10d.system.regular_file import read_regular
 
 LARGEST_STATUS: Final = 2**22
@@ -19,7 +20,6 @@ def read_status(places: Iterable[Path], line: str) -> tuple[Path, dict[str, Any]
     for place in places:
         with contextlib.suppress(OSError):
             status = parsed(read_regular(place, LARGEST_STATUS))
-            written = status.get("line") if isinstance(status, dict) else None
-            if isinstance(written, dict) and written.get("name") == line:
+            if mapping(mapping(status).get("line")).get("name") == line:
                 return place, status
     return None

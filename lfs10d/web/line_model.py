@@ -11,7 +11,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import field
 from typing import Any, Final, TypeGuard
 
-from lfs10d.cli.render.live_state import FRESH, LiveState, ShownDevice, mapping, named
+from lfs10d.cli.render.foreign import mapping, named
+from lfs10d.cli.render.live_state import FRESH, LiveState, ShownDevice
 from lfs10d.system.dataclass import dataclass
 from lfs10d.web.curve import Curve, Point
 from lfs10d.web.pruned import pruned

@@ -12,7 +12,8 @@ from dataclasses import field
 from typing import Any, Final
 
 from lfs10d import __version__
-from lfs10d.cli.render.live_state import ShownDevice, mapping, number
+from lfs10d.cli.render.foreign import mapping, number
+from lfs10d.cli.render.live_state import ShownDevice
 from lfs10d.system.dataclass import dataclass
 from lfs10d.web.line_model import LineModel, Side
 

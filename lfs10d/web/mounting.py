@@ -12,6 +12,7 @@ from lfs10d.cli.adopt_loop import AdoptLoop
 from lfs10d.cli.adopt_repeat import adopt, health
 from lfs10d.cli.client import CommandClient
 from lfs10d.cli.login import Login
+from lfs10d.cli.render.foreign import mapping
 from lfs10d.errors import BrokerError, FailedError
 from lfs10d.web.words import answer
 
@@ -137,8 +138,7 @@ class Mounting:
 
     def _learn(self, response: dict[str, Any], took: float, *, new: bool) -> None:
         """Note what a response without a sensor says; its problem is shown for as long as it lasts."""
-        error = response.get("error")
-        code = error.get("code") if isinstance(error, dict) else None
+        code = mapping(response.get("error")).get("code")
         if code == "timeout" and response.get("status") == "rejected":
             self._problem, self._longest_search = "", max(took, self._longest_search)
             return

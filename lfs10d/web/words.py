@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final
 
+from lfs10d.cli.render.foreign import mapping
+
 _WIRING: Final = "Check power, the plug, and the wires A and B from the last sensor that answers to this one."
 
 MEANINGS: Final[Mapping[str, tuple[str, str]]] = {
@@ -80,8 +82,7 @@ def answer(response: Mapping[str, Any]) -> str:
     """Return the response to a request in words."""
     if response.get("status") == "ok":
         return "Done."
-    error = response.get("error")
-    error = error if isinstance(error, Mapping) else {}
+    error = mapping(response.get("error"))
     code, message = error.get("code"), error.get("message")
     outcome = "Nothing was changed" if response.get("status") == "rejected" else "It failed"
     parts = [

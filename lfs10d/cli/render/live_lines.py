@@ -7,7 +7,8 @@ from datetime import tzinfo
 from typing import Any
 
 from lfs10d.cli.local_time import stamp, zone_name
-from lfs10d.cli.render.live_state import LiveState, ShownDevice, mapping
+from lfs10d.cli.render.foreign import mapping
+from lfs10d.cli.render.live_state import LiveState, ShownDevice
 from lfs10d.cli.render.live_table import DataSource, TableRow, header, rows, table
 from lfs10d.telemetry.publication import iso_time
 

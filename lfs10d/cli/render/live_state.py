@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import field
-from math import isfinite
 from typing import Any, Final, TypeGuard
 
+from lfs10d.cli.render.foreign import mapping, named, number
 from lfs10d.profiles.facts import RESERVED_NAMES
 from lfs10d.reading import FaultCode, Value
 from lfs10d.system.dataclass import dataclass
@@ -243,31 +243,6 @@ class LiveState:
             (farthest, device), second = ranking[0], ranking[1][0] if len(ranking) > 1 else 0.0
             if farthest > 0 and farthest >= STANDS_OUT * second and device.good:
                 yield device
-
-
-# -- what came over the network may be anything
-
-
-def mapping(value: object) -> Mapping[str, Any]:
-    """Return a value that is an object; an empty one for any other."""
-    return value if isinstance(value, Mapping) else {}
-
-
-def named(entries: object) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the objects of a list that have a name, each with it."""
-    for entry in entries if isinstance(entries, list) else ():
-        if isinstance(entry, dict) and isinstance(name := entry.get("name"), str):
-            yield name, entry
-
-
-def number(value: object) -> float | None:
-    """Return a value that is a finite number; whole ones stay whole."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return None
-    try:
-        return value if isfinite(value) else None
-    except OverflowError:
-        return None
 
 
 def _describe(device: ShownDevice, entry: Mapping[str, Any], *, slave: object) -> None:

@@ -8,6 +8,7 @@ from datetime import tzinfo
 from typing import Any
 
 from lfs10d.cli.local_time import stamp
+from lfs10d.cli.render.foreign import mapping
 from lfs10d.profiles.facts import RESERVED_NAMES
 from lfs10d.system.logs import escape
 
@@ -38,8 +39,7 @@ def content_lines(response: Mapping[str, Any], zone: tzinfo | None = None) -> It
 
 
 def _sample(sample: Mapping[str, Any], zone: tzinfo | None) -> str:
-    units, found = sample.get("units"), sample.get("errors")
-    errors = found if isinstance(found, dict) else {}
+    units, errors = sample.get("units"), mapping(sample.get("errors"))
     values = []
     for name, value in sample.items():
         if name in RESERVED_NAMES:
