@@ -8,7 +8,7 @@ from collections.abc import Set as AbstractSet
 from functools import partial
 from typing import Any
 
-from lfs10d.command import ErrorCode, Result, failed, ok, rejected
+from lfs10d.command import Result, failed, ok, rejected
 from lfs10d.config.effective import Effective
 from lfs10d.config.models import LineConfig, SlaveConfig, default_device_name
 from lfs10d.errors import StateError
@@ -26,6 +26,7 @@ from lfs10d.reconfiguration.journal import (
 )
 from lfs10d.reconfiguration.procedures import adopt
 from lfs10d.reconfiguration.procedures.readdress import NOTHING_WRITTEN, IdWrite, ReaddressEnding, ReaddressReport
+from lfs10d.reconfiguration.readdress_answers import unsuccessful
 from lfs10d.reconfiguration.runner import ChangeRunner
 
 log = logging.getLogger(__name__)
@@ -38,58 +39,34 @@ LAST_ID = 247
 CANDIDATES = 8
 """Number of free ids that are tried; if all turn out to be in use, the command is rejected."""
 
-_ERRORS: Mapping[ReaddressEnding, tuple[ErrorCode, str]] = {
-    ReaddressEnding.TAKEN: (
-        "address_in_use",
-        "slave id {to} is in use by a device that is not configured; see line/scan",
-    ),
-    ReaddressEnding.ABSENT: (
-        "timeout",
-        "nothing answers at slave id {old}{refusal}; is the new sensor connected and powered?",
-    ),
+_TEXTS: Mapping[ReaddressEnding, str] = {
+    ReaddressEnding.TAKEN: "slave id {to} is in use by a device that is not configured; see line/scan",
+    ReaddressEnding.ABSENT: "nothing answers at slave id {old}{refusal}; is the new sensor connected and powered?",
     ReaddressEnding.DEAF: (
-        "line_error",
-        "it is not known yet whether the adapter echoes what is sent; try again, or set line.echo to on or off",
+        "it is not known yet whether the adapter echoes what is sent; try again, or set line.echo to on or off"
     ),
-    ReaddressEnding.LOST_BEFORE: ("line_error", "the port was lost; nothing was written"),
-    ReaddressEnding.UNWRITTEN: ("storage_full", "{why}; nothing was written"),
+    ReaddressEnding.LOST_BEFORE: "the port was lost; nothing was written",
+    ReaddressEnding.UNWRITTEN: "{why}; nothing was written",
     ReaddressEnding.UNRECOGNISED: (
-        "not_recognised",
-        (
-            "the device at slave id {old}, at {at} baud, is not recognised as {title}: {why}. Nothing was written. "
-            "If it is another kind of sensor, give its profile; else take it off the line"
-        ),
+        "the device at slave id {old}, at {at} baud, is not recognised as {title}: {why}. Nothing was written. "
+        "If it is another kind of sensor, give its profile; else take it off the line"
     ),
-    ReaddressEnding.TWINS: (
-        "duplicate_id",
-        "two sensors seem to have slave id {old}: {why}; nothing was written. Connect one at a time",
-    ),
-    ReaddressEnding.BOTH: ("duplicate_id", "more than one sensor answers at slave id {old}; connect one at a time"),
+    ReaddressEnding.TWINS: "two sensors seem to have slave id {old}: {why}; nothing was written. Connect one at a time",
+    ReaddressEnding.BOTH: "more than one sensor answers at slave id {old}; connect one at a time",
     ReaddressEnding.GARBAGE: (
-        "duplicate_id",
-        "since the write several sensors answer at once at slave id {to}; take the other one off the line",
+        "since the write several sensors answer at once at slave id {to}; take the other one off the line"
     ),
-    ReaddressEnding.REFUSED: (
-        "refused",
-        "the sensor at {old} refused the write{refusal}; perhaps its {lock} overrules it",
-    ),
+    ReaddressEnding.REFUSED: "the sensor at {old} refused the write{refusal}; perhaps its {lock} overrules it",
     ReaddressEnding.LOCKED: (
-        "dip_switch",
-        (
-            "the sensor stays at slave id {old}: its {lock} overrules the write; set that to 0 and try again. "
-            "Or it needs its power switched off and on first"
-        ),
+        "the sensor stays at slave id {old}: its {lock} overrules the write; set that to 0 and try again. "
+        "Or it needs its power switched off and on first"
     ),
     ReaddressEnding.PENDING: (
-        "power_cycle_needed",
-        (
-            "the sensor stored what was written but is still at slave id {old}: switch its power off and on, and ask "
-            "again if it does not appear. If that does not help, its {lock} overrules the write"
-        ),
+        "the sensor stored what was written but is still at slave id {old}: switch its power off and on, and ask "
+        "again if it does not appear. If that does not help, its {lock} overrules the write"
     ),
     ReaddressEnding.NOWHERE: (
-        "not_verified",
-        "since the write the sensor answers neither at slave id {old} nor at {to}; both are queried until it is found",
+        "since the write the sensor answers neither at slave id {old} nor at {to}; both are queried until it is found"
     ),
 }
 
@@ -260,12 +237,6 @@ def _result(name: str, old: int, to: int, report: ReaddressReport, profile: Prof
     """Return the result of `line/adopt`; `written`: something was written to the sensor."""
     if report.ending is ReaddressEnding.MOVED:
         return ok({"device": name, "slave": to, "from": old})
-    code, text = _ERRORS[report.ending]
-    refusal = "" if report.exception is None else f" (exception {report.exception:02X})"
-    lock = (profile.slave_id and profile.slave_id.locked_by) or "address switch"
-    title = profile.title
-    message = text.format(old=old, to=to, at=report.at, why=report.why, refusal=refusal, lock=lock, title=title)
-    facts: dict[str, Any] = {} if report.exception is None else {"exception_code": report.exception}
-    if not written:
-        return rejected(code, message, param=None, **facts)
-    return failed(code, message, data={"device": name, "from": old, "to": to}, **facts)
+    words = {"old": old, "to": to, "title": profile.title}
+    data = {"device": name, "from": old, "to": to} if written else None
+    return unsuccessful(report, _TEXTS, words, profile, data=data)

@@ -225,24 +225,18 @@ class Journal:
 
     def amend(self, number: int, moves: tuple[Move, ...]) -> None:
         """Record the places at which the sensors of a change are searched for from now on."""
-        self._save(changes=self._with(number, lambda change: change.model_copy(update={"moves": moves})))
+        self._save(changes=self._with(number, lambda _: {"moves": moves}))
 
     def set_pending(self, number: int, pending: tuple[str, ...]) -> None:
         """Record which sensors of a change of the rate need a power cycle."""
-
-        def amended(change: OpenChange) -> OpenChange:
-            return change.model_copy(update={"facts": change.facts.model_copy(update={"pending": pending})})
-
-        self._save(changes=self._with(number, amended))
+        self._save(
+            changes=self._with(number, lambda change: {"facts": change.facts.model_copy(update={"pending": pending})})
+        )
 
     def keep(self, number: int, record: ResultRecord | None) -> None:
         """Record that a change stays open, and the result its command was given."""
-
-        def answered(change: OpenChange) -> OpenChange:
-            asked = None if change.asked is None else change.asked.finished
-            return change.model_copy(update={"answered": True, "asked": asked})
-
-        self._save(changes=self._with(number, answered), answers=self._answers(record))
+        changes = self._with(number, lambda change: {"answered": True, "asked": change.asked and change.asked.finished})
+        self._save(changes=changes, answers=self._answers(record))
 
     def close(self, numbers: frozenset[int], *records: ResultRecord | None) -> None:
         """Record that these changes are finished or undone, and the results that are given with that."""
@@ -266,8 +260,11 @@ class Journal:
         if self._unsaved:
             self._save()
 
-    def _with(self, number: int, amended: Callable[[OpenChange], OpenChange]) -> tuple[OpenChange, ...]:
-        return tuple(amended(change) if change.number == number else change for change in self.open)
+    def _with(self, number: int, update: Callable[[OpenChange], dict[str, object]]) -> tuple[OpenChange, ...]:
+        """Return the open changes, one of them with what `update` returns for it."""
+        return tuple(
+            change.model_copy(update=update(change)) if change.number == number else change for change in self.open
+        )
 
     def _answers(self, *records: ResultRecord | None) -> tuple[ResultRecord, ...]:
         answers = self.answers

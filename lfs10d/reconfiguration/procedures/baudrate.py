@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import field, replace
 from enum import StrEnum
+from itertools import takewhile
 from typing import Any
 
 from lfs10d.line.jobs.job import Hold
@@ -51,15 +52,7 @@ class BaudrateEnding(StrEnum):
     UNVERIFIED = "unverified"
 
 
-UNTOUCHED = frozenset(
-    {
-        BaudrateEnding.ABSENT,
-        BaudrateEnding.DEAF,
-        BaudrateEnding.LOST_BEFORE,
-        BaudrateEnding.UNWRITTEN,
-        BaudrateEnding.FREE,
-    }
-)
+UNTOUCHED = frozenset(takewhile(lambda ending: ending is not BaudrateEnding.MOVED, BaudrateEnding))
 
 
 @dataclass(frozen=True, slots=True)
