@@ -137,10 +137,9 @@ def _read_of(block: Block, slave: int) -> ReadRegisters:
     return ReadRegisters(slave, block.address, block.count, block.function)
 
 
-def _may_lack(block: Block, outcome: Outcome | None) -> bool:
-    """Whether a read was refused because of optional registers."""
-    refused = outcome is not None and outcome.fault is not None and outcome.fault.exception_code == ILLEGAL_ADDRESS
-    return refused and any(value.optional for value in block.values)
+def may_lack(block: Block, exception: int | None) -> bool:
+    """Whether a read was refused, with this exception, because of optional registers."""
+    return exception == ILLEGAL_ADDRESS and any(value.optional for value in block.values)
 
 
 class _Evidence(IntEnum):
@@ -250,7 +249,7 @@ class Identification:
                     missing = read
                 else:
                     return 0, read
-            elif _may_lack(block, outcome):
+            elif outcome is not None and outcome.fault is not None and may_lack(block, outcome.fault.exception_code):
                 missing = missing or _NO_ANSWER
                 left.extend(profile.without_optional(block))
             else:

@@ -29,7 +29,6 @@ from lfs10d.reconfiguration.procedures.readdress import (
     free,
     judge,
     not_ready,
-    present,
     undo_stored_id,
     verify,
     write,
@@ -117,7 +116,7 @@ def _newcomer(wish: AdoptWish, query: IdentityQuery) -> Generator[Step, Any, Ado
     found: list[AdoptReport] = []
     for rate in wish.rates:
         endpoint = Endpoint(slave=wish.factory, baudrate=rate)
-        reply = yield from present(endpoint, query)
+        reply = yield from query.read_patiently(endpoint)
         if reply.silent:
             continue
         ending, why, code = ReaddressEnding.BOTH, "", None

@@ -26,7 +26,7 @@ from lfs10d.line.jobs.job import Hold
 from lfs10d.line.jobs.procedure import Await, LineLostError, Step
 from lfs10d.reconfiguration.journal import Endpoint
 from lfs10d.reconfiguration.procedures.identity_query import PATIENT, IdentityQuery
-from lfs10d.reconfiguration.procedures.readdress import ECHO_READS, TRIES, VERIFY, present, verify, write
+from lfs10d.reconfiguration.procedures.readdress import ECHO_READS, TRIES, VERIFY, verify, write
 from lfs10d.system.dataclass import dataclass
 
 ROLL_BACK = 60.0
@@ -143,7 +143,7 @@ def change_rate(wish: RateWish, echo_known: Callable[[], bool]) -> Generator[Ste
 def _check_before_write(wish: RateWish, echo_known: Callable[[], bool]) -> Generator[Step, Any, BaudrateReport | None]:
     absent = []
     for sensor in wish.sensors:
-        reply = yield from present(sensor.at(wish.old), sensor.query)
+        reply = yield from sensor.query.read_patiently(sensor.at(wish.old))
         if reply.register is None or not (yield from sensor.query.settle(sensor.at(wish.old))):
             absent.append(sensor.name)
     if absent:

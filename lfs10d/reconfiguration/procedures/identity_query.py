@@ -94,6 +94,22 @@ class IdentityQuery:
             return allowed
         return self._reply((yield from self.put(self._ask(identity, endpoint, timeout))))
 
+    @property
+    def patience(self) -> tuple[float | None, ...]:
+        """The time-outs of tries that follow each other, each longer than the one before."""
+        return None, 2 * self.timeout, PATIENT
+
+    def read_patiently(
+        self, endpoint: Endpoint, *, register: int | None = None
+    ) -> Generator[Step, Outcome, IdentityReply]:
+        """Read the id register at a place, or another one, until it answers or was tried with all `patience`."""
+        reply = SILENCE
+        for timeout in self.patience:
+            reply = yield from self.read_register(endpoint, timeout, register=register)
+            if reply.answers:
+                break
+        return reply
+
     def knowing(self, baudrate: int, code: int | None) -> IdentityQuery:
         """Return the same with the content of the rate's register for a rate that the profile has no code for.
 

@@ -9,7 +9,6 @@ from lfs10d.line.jobs.job import Hold
 from lfs10d.line.jobs.procedure import Await, Step
 from lfs10d.reconfiguration.journal import Endpoint
 from lfs10d.reconfiguration.procedures.identity_query import IdentityQuery
-from lfs10d.reconfiguration.procedures.readdress import present
 
 FIRST_PAUSE = 1.0
 """Between the first look and the first probes, in s; doubled after each."""
@@ -18,7 +17,7 @@ FIRST_PAUSE = 1.0
 def locate(places: Sequence[Endpoint], query: IdentityQuery, *, longest_pause: float) -> Generator[Step, Any, Endpoint]:
     """Return the first of `places` at which a device answers; None is awaited once if none does at first."""
     for endpoint in places:
-        if (yield from present(endpoint, query)).answers:
+        if (yield from query.read_patiently(endpoint)).answers:
             return endpoint
     yield Await(None)
     pause = min(FIRST_PAUSE, longest_pause)

@@ -157,7 +157,7 @@ def check_before_write(
     wish: ReaddressWish, query: IdentityQuery, echo_known: Callable[[], bool]
 ) -> Generator[Step, Any, tuple[ReaddressReport | None, IdentityReply]]:
     """Check whether it may be written at all (rule 1); return why not, and what the sensor answered."""
-    before = yield from present(wish.old, query)
+    before = yield from query.read_patiently(wish.old)
     if before.register is None:
         return absent(before), before
     refusal = yield from alone(wish.old, wish.to, query)
@@ -180,7 +180,7 @@ def not_ready(
         yield from query.read_register(old)
     if not echo_known():
         return ReaddressEnding.DEAF
-    again = yield from present(old, query)
+    again = yield from query.read_patiently(old)
     return None if again.answers and (yield from query.settle(old)) else ReaddressEnding.ABSENT
 
 
@@ -199,16 +199,6 @@ def alone(old: Endpoint, to: int, query: IdentityQuery) -> Generator[Step, Any, 
     if not look.answers:
         return ReaddressReport(ReaddressEnding.ABSENT, exception=look.exception)
     return ReaddressReport(ReaddressEnding.TAKEN, at=old.baudrate) if look.taken else None
-
-
-def present(endpoint: Endpoint, query: IdentityQuery) -> Generator[Step, Any, IdentityReply]:
-    """Read the id at a place up to three times, waiting longer each time, until it answers."""
-    reply = SILENCE
-    for timeout in (None, 2 * query.timeout, PATIENT):
-        reply = yield from query.read_register(endpoint, timeout)
-        if reply.answers:
-            break
-    return reply
 
 
 def free(endpoint: Endpoint, query: IdentityQuery) -> Generator[Step, Any, bool]:

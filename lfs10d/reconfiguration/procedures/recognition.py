@@ -24,7 +24,7 @@ from collections.abc import Generator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
-from lfs10d.line.jobs.identification import rate_fits
+from lfs10d.line.jobs.identification import may_lack, rate_fits
 from lfs10d.line.jobs.procedure import Step
 from lfs10d.line.read_plan import ILLEGAL_ADDRESS
 from lfs10d.modbus.outcome import Outcome
@@ -32,7 +32,7 @@ from lfs10d.profiles.blocks import NO_VALUE_NOW, Block
 from lfs10d.profiles.values import Value
 from lfs10d.reading import Fault, FaultCode
 from lfs10d.reconfiguration.journal import Endpoint
-from lfs10d.reconfiguration.procedures.identity_query import PATIENT, QUICK, SILENCE, IdentityQuery, IdentityReply
+from lfs10d.reconfiguration.procedures.identity_query import QUICK, IdentityQuery, IdentityReply
 from lfs10d.system.dataclass import dataclass
 
 READS = 3
@@ -98,19 +98,11 @@ def recognise(
 
 
 def _rate_fits(register: int, endpoint: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, Recognition]:
-    reply = SILENCE
-    for timeout in _timeouts(query):
-        reply = yield from query.read_register(endpoint, timeout, register=register)
-        if reply.answers:
-            break
+    reply = yield from query.read_patiently(endpoint, register=register)
     if rate_fits(query.profile, reply.register, endpoint.baudrate):
         return Recognition(rate_code=reply.register)
     says = "does not answer" if reply.register is None else f"says {reply.register}, which is no rate"
     return Recognition(f"its register 0x{register:04X} {says}")
-
-
-def _timeouts(query: IdentityQuery) -> tuple[float | None, ...]:
-    return (None, 2 * query.timeout, PATIENT)
 
 
 def _all_values_fit(endpoint: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, Recognition]:
@@ -120,7 +112,7 @@ def _all_values_fit(endpoint: Endpoint, query: IdentityQuery) -> Generator[Step,
     while blocks:
         block = blocks.pop(0)
         fit, missing = yield from _values_fit(block, endpoint, query)
-        if missing is not None and _may_lack(block, missing.exception_code):
+        if missing is not None and may_lack(block, missing.exception_code):
             blocks[:0] = query.profile.without_optional(block)
         elif missing is not None and missing.code in NO_VALUE_NOW:
             none = fit
@@ -129,11 +121,6 @@ def _all_values_fit(endpoint: Endpoint, query: IdentityQuery) -> Generator[Step,
         else:
             found = fit
     return found or none
-
-
-def _may_lack(block: Block, exception: int | None) -> bool:
-    """Whether a read was refused because of optional registers."""
-    return exception == ILLEGAL_ADDRESS and any(value.optional for value in block.values)
 
 
 def _values_fit(
@@ -146,7 +133,7 @@ def _values_fit(
     spoilt = answered = 0
     exception: int | None = None
     nothing: Fault | None = None
-    for timeout in _timeouts(query):
+    for timeout in query.patience:
         reply = yield from query.read_values(endpoint, timeout, block=block)
         spoilt += reply.noise
         exception = reply.exception
@@ -181,7 +168,7 @@ def _read_and_listen(endpoint: Endpoint, silent: Endpoint, query: IdentityQuery)
     numbers: list[float] = []
     for window in LISTENING:
         look = yield from _measured(value, block, endpoint, query)
-        while not numbers and isinstance(look, Look) and _may_lack(block, look.exception):
+        while not numbers and isinstance(look, Look) and may_lack(block, look.exception):
             place = blocks.index(block)
             blocks[place : place + 1] = query.profile.without_optional(block)
             if not blocks:
@@ -235,7 +222,7 @@ def _measured(
 ) -> Generator[Step, Outcome, Look | float]:
     """Return the value; a `Look` that ends it where there is none."""
     exception: int | None = None
-    for timeout in _timeouts(query):
+    for timeout in query.patience:
         reply = yield from query.read_values(endpoint, timeout, block=block)
         if reply.noise:
             return Look(twins="answers collide there")

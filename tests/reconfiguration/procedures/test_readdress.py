@@ -22,7 +22,6 @@ from lfs10d.reconfiguration.procedures.readdress import (
     ReaddressWish,
     free,
     judge,
-    present,
     read_both,
     readdress,
     undo_stored_id,
@@ -198,13 +197,6 @@ def test_a_sensor_that_is_gone_after_the_look_at_the_new_id_is_not_written_to(pr
 
 
 # -- the pieces
-
-
-def test_present_asks_three_times_and_longer_each_time(pretence: Pretence) -> None:
-    query = pretence.query()
-    query.timeout = 0.3
-    assert pretence.carry_out(present(OLD, query)) == SILENCE
-    assert [ask.timeout for ask in pretence.asked] == [0.3, 0.6, 1.0]
 
 
 def test_free_asks_for_values_three_times(pretence: Pretence) -> None:

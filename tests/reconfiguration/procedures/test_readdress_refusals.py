@@ -13,7 +13,6 @@ from lfs10d.reconfiguration.procedures.readdress import (
     absent,
     free,
     judge,
-    present,
     read_both,
 )
 from tests.support.sensors import Pretence
@@ -55,7 +54,7 @@ def test_the_register_is_read_again_where_a_gateway_refused_it(pretence: Pretenc
 
 def test_a_gateway_is_no_sensor_that_is_there_and_no_free_place_either(pretence: Pretence) -> None:
     pretence.sensor(3, exception=5)
-    reply = pretence.carry_out(present(OLD, pretence.query()))
+    reply = pretence.carry_out(pretence.query().read_patiently(OLD))
     assert reply == IdentityReply(exception=5)
     assert absent(reply) == ReaddressReport(ReaddressEnding.ABSENT, exception=5)
     assert not pretence.carry_out(free(OLD, pretence.query()))
