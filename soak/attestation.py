@@ -24,7 +24,8 @@ from operator import itemgetter
 from typing import Any
 
 from lfs10d.simulator.burst import MASTER
-from lfs10d.simulator.line import HeardRequest, SensorAnswer
+from lfs10d.simulator.line import HeardRequest
+from lfs10d.simulator.sensor import Reply
 from lfs10d.simulator.wire import SECOND, unseal
 
 ANSWER = 9
@@ -129,7 +130,7 @@ class Oracle:
         self._requests = [request for request in log if request.speaker is MASTER]
         self._begun = [request.begun for request in self._requests]
         self._replies = [(request, answer) for request in log for answer in request.answers if answer.believable]
-        self._answers: dict[float, tuple[HeardRequest, SensorAnswer]] = {}
+        self._answers: dict[float, tuple[HeardRequest, Reply]] = {}
         self._published: set[float] = set()
         for request in log:
             for answer in request.answers:

@@ -182,7 +182,7 @@ class Life:
         begun = self.daemon.clock.now
         self.daemon.go(seconds)
         for sensor in self.line.sensors:
-            sensor.clear_faults()
+            sensor.faults.clear()
             sensor.hung = False  # not by a power cycle: its registers know no 115200 baud
         ended = self.daemon.clock.now
         self.daemon.go(CALM)
@@ -230,8 +230,8 @@ class Life:
     def _judge_silence(self) -> None:
         """Hold every request to the silence before it, as the line heard it."""
         judge = self.line.judge
-        if judge.t15_violations:
-            self._find(f"{judge.t15_violations} requests with a pause above t1.5 inside")
+        if judge.counts["torn"]:
+            self._find(f"{judge.counts['torn']} requests with a pause above t1.5 inside")
         if self.daemon.port.unread:
             self._find(f"{self.daemon.port.unread} requests while bytes lay unread")
         for request in self.line.log:

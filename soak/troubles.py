@@ -8,9 +8,10 @@ from random import Random
 from typing import TypeAlias
 
 from lfs10d.simulator.faults import Window
-from lfs10d.simulator.line_faults import babble, second_master, stray
+from lfs10d.simulator.line_faults import babble, stray
 from lfs10d.simulator.wire import nanoseconds
 from soak.virtual import DaemonInMemory
+from tests.support.second_masters import passing_master
 
 Particulars: TypeAlias = "Mapping[str, float]"
 Begin: TypeAlias = "Callable[[DaemonInMemory, float], None]"
@@ -60,7 +61,8 @@ def _babble(daemon: DaemonInMemory, seconds: float) -> None:
 
 def _second_master(daemon: DaemonInMemory, seconds: float) -> None:
     now = daemon.clock.now
-    second_master(daemon.line, bytes((POLLED, 3, 0, 1, 0, 2)), now + 0.01, 0.37, last=now + seconds)
+    leave = passing_master(daemon.line, bytes((POLLED, 3, 0, 1, 0, 2)), now + 0.01, 0.37)
+    daemon.line.at(now + seconds, lambda _: leave())
 
 
 def _unplugged(daemon: DaemonInMemory, seconds: float) -> None:

@@ -7,9 +7,8 @@ same cannot be told apart.
 
 from __future__ import annotations
 
-from typing import Final, Protocol, TypeAlias
+from typing import Final, Protocol
 
-from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format, misheard
 from lfs10d.system.dataclass import dataclass
 
@@ -17,14 +16,13 @@ MASTER: Final = "master"
 NOISE: Final = "noise"
 SECOND_MASTER: Final = "second master"
 
-Speaker: TypeAlias = "Sensor | str"
-
 
 @dataclass(slots=True, eq=False)
 class Burst:
     """Bytes of one speaker: each byte and when its last bit ends."""
 
-    speaker: Speaker
+    speaker: object
+    """The sensor; else `MASTER`, `SECOND_MASTER` or `NOISE`."""
     start: int
     data: bytearray
     ends: list[int]

@@ -74,8 +74,10 @@ class FaultEntry(WindowEntry):
         None, description="For late, slow_bytes, slow_flash, needs_rest, sleeps, twin, repeated and gateway."
     )
     code: Annotated[int, Whole(1, 255)] | None = Field(None, description="For exception, dip_locked and gateway.")
-    id: Annotated[int, Whole(0, 255)] | None = Field(None, description="For wrong_id.")
-    bytes: Length | None = Field(None, description="For garbage, truncated, leading_noise and trailing_noise.")
+    value: Annotated[int, Whole(0, 255)] | None = Field(None, alias="id", description="For wrong_id.")
+    length: Length | None = Field(
+        None, alias="bytes", description="For garbage, truncated, leading_noise and trailing_noise."
+    )
     answer: Literal["echo", "exception"] = Field("echo", description="For dip_locked: how it answers a write.")
     reads: Literal["old", "new"] = Field("old", description="For dip_locked: what its id register holds then.")
     values: Annotated[tuple[str, ...], Field(strict=False)] = Field(
@@ -85,20 +87,8 @@ class FaultEntry(WindowEntry):
     @property
     def sensor_fault(self) -> SensorFault:
         """The fault as the simulator plays it."""
-        return sensor_fault(
-            self.fault,
-            self.rate,
-            delay=self.delay,
-            first=self.after,
-            last=self.last,
-            every=self.every,
-            code=self.code,
-            value=self.id,
-            length=self.bytes,
-            answer=self.answer,
-            reads=self.reads,
-            values=self.values,
-        )
+        particulars = self.model_dump(exclude={"fault", "rate", "after", "lasts"})
+        return sensor_fault(self.fault, self.rate, first=self.after, last=self.last, **particulars)
 
 
 def _named(item: object) -> object:

@@ -12,6 +12,8 @@ In ASCII only the last holds; a colon begins a frame anew and CR LF ends it.
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import field
 from enum import StrEnum
 from typing import Final
@@ -45,6 +47,16 @@ class JudgeReport(StrEnum):
     """No frame at all, or its check is wrong."""
 
 
+FIGURES: Final[Mapping[str, JudgeReport]] = {
+    "gap_violations": JudgeReport.GAP,
+    "t15_violations": JudgeReport.TORN,
+    "collisions": JudgeReport.COLLISION,
+    "struck": JudgeReport.STRUCK,
+    "malformed": JudgeReport.MALFORMED,
+}
+"""The verdicts of requests that were not heard, as the summary names them."""
+
+
 @dataclass(slots=True)
 class Hearing:
     """A request as far as it has come."""
@@ -64,14 +76,8 @@ class Judge:
     """Hears every byte of the master with its time; counts. All gaps are nanoseconds."""
 
     framing: Framing = "rtu"
-    requests: int = 0
-    heard: int = 0
-    unheard: int = 0
-    gap_violations: int = 0
-    t15_violations: int = 0
-    collisions: int = 0
-    struck: int = 0
-    malformed: int = 0
+    counts: Counter[str] = field(default_factory=Counter)
+    """Requests by their verdict."""
     min_gap: int | None = None
     min_excess: int | None = None
     """The smallest gap less what it had to be; negative is a violation."""
@@ -135,23 +141,14 @@ class Judge:
         torn = hearing.verdict is None and self._complete(self._torn_off + hearing.frame)
         return self._count(hearing, hearing.verdict or (JudgeReport.TORN if torn else JudgeReport.MALFORMED))
 
-    @property
-    def violations(self) -> int:
-        """The number of violations by the master."""
-        return self.gap_violations + self.t15_violations + self.collisions
-
     def summary(self) -> dict[str, object]:
         """Return every count, ready for JSON; gaps in microseconds."""
         edges = [*(f"<{edge}" for edge in EXCESS_EDGES_US), f">={EXCESS_EDGES_US[-1]}"]
         return {
-            "requests": self.requests,
-            "heard": self.heard,
-            "unheard": self.unheard,
-            "gap_violations": self.gap_violations,
-            "t15_violations": self.t15_violations,
-            "collisions": self.collisions,
-            "struck": self.struck,
-            "malformed": self.malformed,
+            "requests": self.counts.total(),
+            "heard": self.counts[JudgeReport.HEARD],
+            "unheard": self.counts.total() - self.counts[JudgeReport.HEARD],
+            **{name: self.counts[verdict] for name, verdict in FIGURES.items()},
             "min_gap_us": None if self.min_gap is None else self.min_gap / 1000,
             "min_excess_us": None if self.min_excess is None else self.min_excess / 1000,
             "excess_us": dict(zip(edges, self.histogram, strict=True)),
@@ -181,12 +178,5 @@ class Judge:
         self._open = None
         self._torn_off = hearing.frame if verdict is JudgeReport.MALFORMED else b""
         hearing.verdict = verdict
-        self.requests += 1
-        self.heard += verdict is JudgeReport.HEARD
-        self.unheard += verdict is not JudgeReport.HEARD
-        self.gap_violations += verdict is JudgeReport.GAP
-        self.t15_violations += verdict is JudgeReport.TORN
-        self.collisions += verdict is JudgeReport.COLLISION
-        self.struck += verdict is JudgeReport.STRUCK
-        self.malformed += verdict is JudgeReport.MALFORMED
+        self.counts[verdict] += 1
         return verdict

@@ -11,43 +11,19 @@ from dataclasses import field
 from heapq import heappop, heappush
 from random import Random
 
-from lfs10d.simulator.burst import MASTER, Burst, Receiver, Speaker, collide
+from lfs10d.simulator.burst import MASTER, Burst, Receiver, collide
 from lfs10d.simulator.judge import Hearing, Judge, JudgeReport
-from lfs10d.simulator.memory import Measured, numbers
 from lfs10d.simulator.sensor import Reply, Sensor
 from lfs10d.simulator.wind import Unique
 from lfs10d.simulator.wire import Format, Framing, nanoseconds, unseal
 from lfs10d.system.dataclass import dataclass
 
 
-@dataclass(frozen=True, slots=True)
-class SensorAnswer:
-    """What a sensor sent in answer to a request."""
-
-    sensor: Sensor
-    measured: Measured
-    """The values in it by name; None where they were broken."""
-    burst: Burst
-    whole: bool
-    second: bool = False
-    """Another answer of the sensor to the same request came before it."""
-
-    @property
-    def values(self) -> tuple[float, ...]:
-        """The measured numbers in it, but for broken ones."""
-        return numbers(self.measured)
-
-    @property
-    def believable(self) -> bool:
-        """Every byte of it came onto the line as a well sensor sends it."""
-        return self.whole and not self.burst.struck
-
-
 @dataclass(slots=True)
 class HeardRequest:
     """One request as it was on the line, and what was sent in answer: the oracle of a test."""
 
-    speaker: Speaker
+    speaker: str
     frame: bytes
     begun: int
     ended: int
@@ -55,7 +31,7 @@ class HeardRequest:
     verdict: JudgeReport
     body: bytes = b""
     """Without the check; empty if it was not heard."""
-    answers: list[SensorAnswer] = field(default_factory=list)
+    answers: list[Reply] = field(default_factory=list)
 
 
 class SimulatedLine:
@@ -160,7 +136,7 @@ class SimulatedLine:
         self.at_nanosecond(end, lambda when: self._settle(hearing, burst, when))
         return end
 
-    def speak(self, speaker: Speaker, data: bytes, start: int, shape: Format | None = None, pause: int = 0) -> Burst:
+    def speak(self, speaker: object, data: bytes, start: int, shape: Format | None = None, pause: int = 0) -> Burst:
         """Send bytes of anybody else from `start` on, whatever else is on the line."""
         shape = shape or self.format
         burst = Burst(speaker, start, bytearray(data), shape.ends(start, len(data), pause), shape)
@@ -269,5 +245,5 @@ class SimulatedLine:
 
     def _answer(self, request: HeardRequest, reply: Reply) -> None:
         self.answered += 1
-        answer = self.speak(reply.sensor, reply.data, reply.start, reply.format, reply.pause)
-        request.answers.append(SensorAnswer(reply.sensor, reply.measured, answer, reply.whole, reply.second))
+        reply.burst = self.speak(reply.sensor, reply.data, reply.start, reply.format, reply.pause)
+        request.answers.append(reply)

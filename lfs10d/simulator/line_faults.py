@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Final
 
 from lfs10d.simulator.burst import NOISE, SECOND_MASTER
 from lfs10d.simulator.faults import ALWAYS, Window
 from lfs10d.simulator.judge import JudgeReport
 from lfs10d.simulator.line import HeardRequest, SimulatedLine
-from lfs10d.simulator.wire import SECOND, Check, nanoseconds, seal
+from lfs10d.simulator.wire import SECOND, nanoseconds, seal
 
 BABBLE_PIECE: Final = SECOND // 10
 """Babble is put on the line in pieces of this length, one right behind the other."""
@@ -47,30 +46,20 @@ def stray(
     line.after_each_request(after)
 
 
-def second_master(
-    line: SimulatedLine, body: bytes, first: float, every: float, check: Check = "crc", *, last: float | None = None
-) -> Callable[[], None]:
-    """Let another master send this request from `first` to before `last`, every `every` seconds, without listening.
-
-    Return the function that ends it.
-    """
-    frame = seal(body, line.framing, check)
-    end = None if last is None else nanoseconds(last)
-    gone = False
-
-    def leave() -> None:
-        nonlocal gone
-        gone = True
+def second_master(line: SimulatedLine, body: bytes, first: float, every: float) -> None:
+    """Let another master send this request from `first` on, every `every` seconds, without listening."""
+    frame = seal(body, line.framing)
 
     def ask(now: int) -> None:
-        if gone:
-            return
-        ended = now + line.format.span(len(frame))
-        burst = line.speak(SECOND_MASTER, frame, now)
-        request = HeardRequest(SECOND_MASTER, frame, now, ended, None, JudgeReport.HEARD)
-        line.at_nanosecond(ended, lambda when: line.carry(request, burst, when))
-        if end is None or now + nanoseconds(every) < end:
-            line.at_nanosecond(now + nanoseconds(every), ask)
+        ask_as_second_master(line, frame, now)
+        line.at_nanosecond(now + nanoseconds(every), ask)
 
     line.at(first, ask)
-    return leave
+
+
+def ask_as_second_master(line: SimulatedLine, frame: bytes, now: int) -> None:
+    """Let another master send a frame at `now` (ns), whatever else is on the line."""
+    ended = now + line.format.span(len(frame))
+    burst = line.speak(SECOND_MASTER, frame, now)
+    request = HeardRequest(SECOND_MASTER, frame, now, ended, None, JudgeReport.HEARD)
+    line.at_nanosecond(ended, lambda when: line.carry(request, burst, when))

@@ -17,11 +17,12 @@ echo_losing          new              at once             none
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import field, replace
 from random import Random
 from typing import Final
 
 from lfs10d.simulator.blueprint import LFS10, WRITE_COILS, WRITES, Blueprint
+from lfs10d.simulator.burst import Burst
 from lfs10d.simulator.faults import (
     ActiveFaults,
     FaultKind,
@@ -55,7 +56,7 @@ _FOLLOWED: Final = frozenset({FaultKind.TWIN, FaultKind.REPEATED, FaultKind.GATE
 _NOTHING: Final[ActiveFaults] = {}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Reply:
     """What a sensor sends: bytes, when, in which format; and what it meant by them."""
 
@@ -72,6 +73,8 @@ class Reply:
     """Another answer of this sensor to the same request came before it."""
     following: tuple[Reply, ...] = ()
     """What comes after it, to the same request."""
+    burst: Burst = field(init=False, repr=False, compare=False)
+    """Its bytes on the line, once they are sent."""
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -82,6 +85,11 @@ class Reply:
     def ends(self) -> int:
         """When its last bit is over."""
         return self.format.ends(self.start, len(self.data), self.pause)[-1]
+
+    @property
+    def believable(self) -> bool:
+        """Every byte of it came onto the line as a well sensor sends it."""
+        return self.whole and not self.burst.struck
 
 
 class Sensor:
@@ -127,12 +135,8 @@ class Sensor:
 
     @property
     def blueprint(self) -> Blueprint:
-        """What kind of device it is; another one is obeyed from the next request on, with the registers it has."""
+        """What kind of device it is."""
         return self.memory.blueprint
-
-    @blueprint.setter
-    def blueprint(self, blueprint: Blueprint) -> None:
-        self.memory.blueprint = blueprint
 
     def add_fault(
         self, kind: FaultKind | str, rate: float = 1.0, **particulars: float | str | tuple[str, ...] | None
@@ -141,14 +145,6 @@ class Sensor:
         added = sensor_fault(kind, rate, **particulars)  # type: ignore[arg-type]  # passed on as they are
         self.faults.append(added)
         return added
-
-    def clear_faults(self, kind: FaultKind | str | None = None) -> None:
-        """Remove the faults of one kind, or all."""
-        self.faults = [one for one in self.faults if kind is not None and one.kind != kind]
-
-    def silent_from(self, first: float, last: float | None = None) -> None:
-        """Be dead from that time in seconds on, until `last` if given."""
-        self.add_fault(FaultKind.SILENT, first=first, last=last)
 
     def power_cut(self) -> None:
         """Lose power; a byte under way is completed (`SimulatedLine.power_cut` cuts that too)."""
@@ -165,11 +161,6 @@ class Sensor:
             self.words[register] = self.slave
         if FaultKind.STORES_BUT_IGNORES not in kinds:
             self._take_place()
-
-    def power_cycle(self) -> None:
-        """Lose power and come back."""
-        self.power_cut()
-        self.power_up()
 
     def restore(self, now: int) -> None:
         """Come back from the scheduled power cuts that are over by `now`."""
@@ -239,7 +230,7 @@ class Sensor:
         return replace(reply, following=tuple(following))
 
     def _reply(self, reply: Reply) -> Reply:
-        self._last_answer = reply.format.ends(reply.start, len(reply.data), reply.pause)[-1]
+        self._last_answer = reply.ends
         return reply
 
     def _unfit(self, active: ActiveFaults, ended: int) -> bool:

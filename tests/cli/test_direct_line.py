@@ -19,7 +19,7 @@ def test_a_verb_ends_the_exchange_under_way_before_it_leaves(sensors: PtyLine) -
     spec = DeviceSpec("north", 2, load_profile("lfs10", relative_to=Path()), Codec(Framing.RTU), 1.0)
     with DirectLine(PortSettings(sensors.path)) as line:
         line.poll([spec], PollRules())
-        while sensors.line.judge.requests == 0:  # slave 2 does not exist: this exchange takes 200 ms
+        while sensors.line.judge.counts.total() == 0:  # slave 2 does not exist: this exchange takes 200 ms
             time.sleep(0.001)
     told = list(iter(lambda: line.events(0.1), []))
-    assert sum(isinstance(event, Exchanged) for events in told for event in events) == sensors.line.judge.requests
+    assert sum(isinstance(event, Exchanged) for events in told for event in events) == sensors.line.judge.counts.total()

@@ -75,7 +75,7 @@ class Recorded:
 def ail(line: SimulatedLine, kind: str) -> None:
     """Let two neighbours show it now and then, and nobody anything else."""
     for sensor in line.sensors:
-        sensor.clear_faults()
+        sensor.faults.clear()
         sensor.hung = False
     for slave in (2, 3):
         line.sensor(slave).add_fault(kind, SHARE, **KINDS[kind])
@@ -83,7 +83,7 @@ def ail(line: SimulatedLine, kind: str) -> None:
 
 def heal(line: SimulatedLine) -> None:
     for sensor in line.sensors:
-        sensor.clear_faults()
+        sensor.faults.clear()
         sensor.hung = False
 
 

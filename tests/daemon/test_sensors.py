@@ -38,7 +38,7 @@ def test_a_sensor_that_dies_fails_three_times_then_is_offline_and_reported_once(
     assert view.newest("line/error")["active"] is False
     assert view.newest("device/slave-1/availability") == "online"
 
-    tell(served, lambda line: line.sensor(2).clear_faults())
+    tell(served, lambda line: line.sensor(2).faults.clear())
     cleared = view.wait("device/slave-2/error", lambda error: not failing(error) and error["last_code"])
     view.wait("device/slave-2/availability", "online".__eq__)
 

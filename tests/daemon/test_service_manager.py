@@ -75,7 +75,7 @@ def test_ready_comes_after_the_first_exchange(site: Site) -> None:
     served.line.sensor(1).add_fault(FaultKind.SILENT)
     site.write(slaves=[{"id": 1, "response_timeout": "1500ms"}])
     run = site.run()
-    eventually(lambda: served.line.judge.requests, "a request")
+    eventually(served.line.judge.counts.total, "a request")
     asked = time.monotonic()
     run.ready()
 

@@ -24,6 +24,7 @@ from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.sensor import Sensor
 from tests.support.any_profiles import SETTINGS, a_profile
 from tests.support.scans import BUILTIN, RTU, Scanned
+from tests.support.simulated import violations
 from tests.support.virtual_port import SimulatedPort, VirtualClock, run
 
 SLAVE = 9
@@ -53,7 +54,7 @@ def test_a_device_is_recognised_though_it_lacks_what_is_optional(profile: Profil
     (found,) = scan.found
     assert found.profile is profile
     assert found.id_register == SLAVE
-    assert line.judge.violations == 0
+    assert violations(line.judge) == 0
 
 
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])

@@ -15,6 +15,7 @@ from lfs10d.reading import ALIVE_CODES, FaultCode
 from lfs10d.simulator.line_faults import babble, second_master, stray
 from lfs10d.simulator.sensor import Sensor
 from tests.support.lines import Rig, Rigs
+from tests.support.simulated import power_cycle
 
 LASTS = 40.0
 """Virtual seconds of one scenario."""
@@ -118,8 +119,8 @@ def test_a_sensor_that_hangs_is_offline_until_its_power_is_cycled(rigs: Rigs) ->
     rig.line.sensor(1).add_fault("hangs")
     rig.run(20.0)
     assert not rig.of(1)[-1].online
-    rig.line.sensor(1).clear_faults()
-    rig.line.sensor(1).power_cycle()
+    rig.line.sensor(1).faults.clear()
+    power_cycle(rig.line.sensor(1))
     rig.run(40.0).prove()
     assert rig.good(1, since=37.0)
     assert not rig.codes(2)
@@ -142,7 +143,7 @@ def test_an_adapter_with_or_without_echo(rigs: Rigs, echo: str, *, has_echo: boo
 def test_an_adapter_that_delivers_in_pieces(rigs: Rigs, latency: float, *, echo: bool) -> None:
     rig = rigs(4, interval=0.25, latency=latency, echo=echo).run(30.0).prove()
     assert not any(rig.codes(slave) for slave in (1, 2, 3, 4))
-    assert rig.line.judge.gap_violations == 0
+    assert rig.line.judge.counts["gap"] == 0
     told_once_per_poll(rig, 1, 0.25)
 
 

@@ -63,6 +63,6 @@ def test_a_slave_that_refuses_everything_is_told_from_one_that_answers_late(rigs
     rig.line.sensor(1).add_fault("late", 0.2, delay=0.25)
     rig.run(60.0).prove()
     assert rig.codes(1)[FaultCode.EXCEPTION] > 50
-    rig.line.sensor(1).clear_faults()
+    rig.line.sensor(1).faults.clear()
     rig.run(70.0).prove()
     assert len(rig.good(1, since=63.0)) > 25

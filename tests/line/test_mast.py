@@ -24,6 +24,7 @@ from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.signals import Published
 from tests.support.lines import Rig
+from tests.support.simulated import violations
 from tests.support.virtual_port import SimulatedPort, VirtualClock
 
 HOUR = 3600.0
@@ -185,4 +186,4 @@ def test_the_slow_text_is_read_every_five_minutes_and_has_its_age_in_between(run
 
 def test_one_that_wants_500_ms_of_rest_has_it_and_nobody_is_asked_too_early(run: Rig) -> None:
     assert all(reading.failed_attempts == () for reading in of(run, 6))
-    assert run.line.judge.violations == 0
+    assert violations(run.line.judge) == 0

@@ -62,7 +62,7 @@ def test_a_requested_poll_is_done_once_whatever_the_device_is(rigs: Rigs, state:
         rig.line.sensor(1).add_fault("silent")
         rig.run(41.0)
         assert not rig.of(1)[-1].online
-        rig.line.sensor(1).clear_faults()
+        rig.line.sensor(1).faults.clear()
     elif state != "unheard":
         rig.run(41.0)
     asked = rig.clock.now
@@ -149,7 +149,7 @@ def change(rigs: Rigs, rig: Rig, step: list[tuple[int, float, bool, str]] | str,
             rig.line.sensor(number % 5 + 1).add_fault("silent")
         case "heal":
             for sensor in rig.line.sensors:
-                sensor.clear_faults()
+                sensor.faults.clear()
         case _:
             for slave in range(1, 6):
                 if f"slave-{slave}" in rig.poller.scheduler.devices:

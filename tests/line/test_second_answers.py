@@ -78,7 +78,7 @@ def test_it_is_over_when_no_second_answer_comes_any_more(rigs: Rigs, kind: str) 
     rig = rigs(1, interval=0.25)
     rig.line.sensor(1).add_fault(kind)
     rig.run(5.0)
-    rig.line.sensor(1).clear_faults()
+    rig.line.sensor(1).faults.clear()
     rig.run(20.0).prove()
     begun, over = told(rig)
     assert begun.fault is not None
@@ -132,7 +132,7 @@ def test_a_gateway_that_always_refuses_is_asked_once_per_poll(rigs: Rigs) -> Non
     rig.run(10.0).prove()
     assert rig.codes(1) == {FaultCode.EXCEPTION: len(rig.of(1))}
     assert len(rig.exchanges) == len(rig.of(1)) >= 35
-    rig.line.sensor(1).clear_faults()
+    rig.line.sensor(1).faults.clear()
     rig.run(15.0).prove()
     assert len(rig.good(1, since=11.5)) > 12
 

@@ -13,6 +13,7 @@ from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from tests.support.lives import Bench
 from tests.support.newcomers import adopted, plugged, writes
+from tests.support.simulated import power_cycle
 from tests.support.volatile_disk import PowerCutError
 
 pytestmark = pytest.mark.long(6)
@@ -33,7 +34,7 @@ def test_a_newcomer_gets_the_next_free_id_and_the_lines_rate(bench: Bench, manne
     slave = life.running.now.slave("slave-3")
     assert slave is not None
     assert (slave.id, slave.label) == (3, "Mast, 10 m")
-    sensor.clear_faults()
+    sensor.faults.clear()
     before = len(life.readings)
     bench.go(life, 10.0)
     assert len([each for each in life.readings[before:] if each.device == "slave-3" and each.values]) >= 8
@@ -90,7 +91,7 @@ def test_a_newcomer_that_wants_a_power_cycle_is_polled_after_it(bench: Bench, ba
     for _ in range(3):
         if adopted(bench, life).code != "power_cycle_needed":
             break
-        sensor.power_cycle()
+        power_cycle(sensor)
         bench.go(life, 60.0)
     assert (sensor.slave, sensor.format.baudrate) == (3, baudrate)
     assert life.place("slave-3") == 3

@@ -68,7 +68,7 @@ def test_one_whose_factory_rate_has_no_code_is_brought_back_to_it_where_it_refus
     life = bench.sensors(names=False)
     vane = renke(bench, WITHOUT_4800)
     bench.go(life, 3.0)
-    vane.blueprint = dataclasses.replace(vane.blueprint, writable={})
+    vane.memory.blueprint = dataclasses.replace(vane.blueprint, writable={})
     answer = adopted(bench, life, profile="renke.yaml", name="vane")
     assert (answer.status, answer.code) == ("failed", "refused")
     assert (vane.slave, vane.format.baudrate, life.physical.open) == (1, 4800, ())

@@ -11,6 +11,7 @@ from lfs10d.reconfiguration.adopt_request import AdoptRequest
 from lfs10d.simulator.line import HeardRequest
 from lfs10d.simulator.sensor import Sensor
 from tests.support.lives import Bench, Life
+from tests.support.simulated import power_cycle
 
 
 def change(bench: Bench, life: Life, to: int = 19200, *, power_cycle: bool = False, dry_run: bool = False) -> Result:
@@ -43,7 +44,7 @@ def test_every_sensor_and_the_port_move(bench: Bench, manner: str | None, echo: 
     assert rates(bench) == [19200] * 3
     assert life.told("baudrate_changed") == [{"from": 9600, "to": 19200}]
     for sensor in bench.line.sensors:
-        sensor.clear_faults()
+        sensor.faults.clear()
     assert life.running.now.config.line.baudrate == 19200
     assert min(fresh(bench, life).values()) >= 8
     bench.cut()
@@ -77,7 +78,7 @@ def test_a_canary_that_wants_a_power_cycle_is_written_back_and_nobody_else_is_to
     assert [sensor.words[4] for sensor in bench.line.sensors] == [1, 1]
     assert not life.physical.open
     for sensor in bench.line.sensors:
-        sensor.power_cycle()
+        power_cycle(sensor)
     assert rates(bench) == [9600, 9600]
     assert min(fresh(bench, life).values()) >= 8
 
@@ -101,8 +102,8 @@ def test_where_a_later_one_fails_the_others_are_moved_back(bench: Bench, fault: 
     assert (answer.status, answer.code) == ("failed", code)
     where: dict[str, Any] = {"s3": 9600, "s4": None if code == "not_verified" else 9600, "s5": 9600}
     assert answer.data == {"where": where}
-    second.clear_faults()
-    second.power_cycle()
+    second.faults.clear()
+    power_cycle(second)
     bench.go(life, 120.0)
     assert rates(bench) == [9600] * 3
     assert not life.physical.open
@@ -118,14 +119,14 @@ def test_with_power_cycle_all_are_written_and_followed_until_they_come_up(bench:
     assert (answer.status, answer.data) == ("ok", {"from": 9600, "to": 19200, "pending": ["s3", "s4"]})
     assert life.running.now.config.line.baudrate == 9600
     assert min(fresh(bench, life).values()) >= 7
-    bench.line.sensor(3).power_cycle()
+    power_cycle(bench.line.sensor(3))
     bench.go(life, 60.0)
     assert life.running.now.config.line.baudrate == 19200
     bench.cut()
     life = bench.begin()
     bench.go(life, 5.0)
     assert life.physical.open
-    bench.line.sensor(4).power_cycle()
+    power_cycle(bench.line.sensor(4))
     bench.go(life, 60.0)
     assert not life.physical.open
     assert min(fresh(bench, life).values()) >= 8
@@ -157,7 +158,7 @@ def test_while_sensors_are_still_to_come_up_nothing_else_is_done_to_them(bench: 
     assert (adopting.status, adopting.code) == ("rejected", "busy")
     assert bench.readdress(life, "s5", 9, id="a2").status == "ok", "it is there already"
     for sensor in bench.line.sensors[:2]:
-        sensor.power_cycle()
+        power_cycle(sensor)
     bench.go(life, 60.0)
     assert not life.physical.open
     assert set(fresh(bench, life)) == {"s3", "s4", "s5"}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.support.lives import Bench, Life
+from tests.support.simulated import power_cycle
 from tests.support.volatile_disk import PowerCutError
 
 SLAVES = tuple(range(3, 11))
@@ -52,17 +53,17 @@ def test_one_that_is_lost_does_not_keep_the_others_from_being_put_back_at_once(
     assert stored(bench) == {lost}
     for sensor in bench.line.sensors:
         if sensor is not straggler:
-            sensor.power_cycle()
+            power_cycle(sensor)
     polled = fresh(bench, life)
     assert {name: count >= 8 for name, count in polled.items()} == {
         f"s{slave}": True for slave in SLAVES if slave != lost
     }
     assert life.physical.open, "it is still looked for"
-    straggler.clear_faults("silent")
+    straggler.faults = [one for one in straggler.faults if one.kind != "silent"]
     bench.go(life, 30.0)
     assert stored(bench) == set()
     assert not life.physical.open
-    straggler.power_cycle()
+    power_cycle(straggler)
     assert min(fresh(bench, life).values()) >= 8
 
 
@@ -108,7 +109,7 @@ def test_where_the_line_s_rate_had_moved_it_moves_back_before_the_last_one_is_fo
     bench.go(life, 15.0)
     assert life.running.now.config.line.baudrate == 9600
     assert {name: count >= 8 for name, count in fresh(bench, life).items()} == {"s3": True, "s4": True}
-    bench.line.sensor(5).clear_faults()
+    bench.line.sensor(5).faults.clear()
     bench.go(life, 60.0)
     assert not life.physical.open
     assert stored(bench) == set()

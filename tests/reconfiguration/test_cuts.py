@@ -15,6 +15,7 @@ from lfs10d.simulator.line import HeardRequest
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from tests.support.lives import Bench, Life
+from tests.support.simulated import power_cycle
 from tests.support.volatile_disk import PowerCutError
 
 pytestmark = pytest.mark.long(15)
@@ -63,8 +64,8 @@ class Case:
         life = bench.begin()
         bench.go(life, 8.0)
         for sensor in bench.line.sensors:
-            sensor.clear_faults()
-            sensor.power_cycle()
+            sensor.faults.clear()
+            power_cycle(sensor)
         until = bench.clock.now + SETTLED_WITHIN
         while bench.clock.now < until and (life.physical.open or bench.clock.now < until - SETTLED_WITHIN + 3):
             bench.turn(life)

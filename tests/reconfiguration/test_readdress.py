@@ -9,6 +9,7 @@ import pytest
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wind import Wind
 from tests.support.lives import Bench
+from tests.support.simulated import power_cycle
 
 
 def calm(bench: Bench) -> None:
@@ -33,7 +34,7 @@ def test_a_sensor_that_obeys_is_moved_and_polled_at_its_new_id(bench: Bench, man
     assert life.place("s3") == 9
     assert life.told("readdressed") == [{"device": "s3", "from": 3, "to": 9}]
     assert not life.physical.reserved()
-    bench.line.sensor(9).clear_faults()
+    bench.line.sensor(9).faults.clear()
     before = len(life.readings)
     bench.go(life, 10.0)
     after = [reading for reading in life.readings[before:] if reading.device == "s3"]
@@ -82,9 +83,9 @@ def test_two_sensors_that_part_are_told_and_do_not_meet_again_at_a_power_cycle(b
     answer = bench.readdress(life, "s3", 9)
     assert (answer.status, answer.code) == ("failed", "duplicate_id")
     assert life.told("duplicate_id") == [{"device": "s3", "slave": 9, "from": 3}]
-    twin.clear_faults()
+    twin.faults.clear()
     for sensor in bench.line.sensors:
-        sensor.power_cycle()
+        power_cycle(sensor)
     bench.go(life, 30.0)
     assert sorted(sensor.slave for sensor in bench.line.sensors) == [3, 4, 9]
     assert not life.physical.open

@@ -10,6 +10,7 @@ from lfs10d.simulator.judge import ROUNDING, Judge, JudgeReport
 from lfs10d.simulator.line import HeardRequest, SimulatedLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import SECOND, Format, seal
+from tests.support.simulated import violations
 
 SLOW, FAST = Format(9600), Format(19200)
 REQUEST = seal(bytes.fromhex("01 03 00 01 00 02"))
@@ -36,7 +37,7 @@ def verdicts(line: SimulatedLine) -> list[str]:
 def test_a_second_request_is_heard_after_t35_and_not_before(pause: int, shape: Format) -> None:
     line = line_with((0, REQUEST), (shape.t35 + pause, REQUEST), shape=shape)
     assert verdicts(line) == ["heard", "heard"]
-    assert line.judge.violations == 0
+    assert violations(line.judge) == 0
     assert line.judge.min_gap == shape.t35 + pause
 
 
@@ -44,7 +45,8 @@ def test_a_second_request_is_heard_after_t35_and_not_before(pause: int, shape: F
 def test_a_request_that_begins_too_early_is_not_heard(missing: int) -> None:
     line = line_with((0, REQUEST), (SLOW.t35 - missing, REQUEST))
     assert verdicts(line) == ["heard", "gap"]
-    assert (line.judge.gap_violations, line.judge.heard, line.judge.unheard) == (1, 1, 1)
+    assert line.judge.counts == {"gap": 1, "heard": 1}
+    assert line.judge.summary()["unheard"] == 1
     assert line.judge.min_excess == -missing
     assert len(line.log[1].answers) == 0
 
@@ -91,13 +93,13 @@ def test_a_pause_up_to_t15_inside_is_allowed(cut: int, pause: int) -> None:
 def test_a_longer_pause_tears_the_request(cut: int, more: int) -> None:
     line = line_with((0, REQUEST[:cut]), (SLOW.t15 + more, REQUEST[cut:]))
     assert verdicts(line) == ["torn"]
-    assert line.judge.t15_violations == 1
+    assert line.judge.counts["torn"] == 1
 
 
 def test_a_request_torn_by_more_than_a_gap_is_torn_all_the_same() -> None:
     line = line_with((0, REQUEST[:5]), (50_000_000, REQUEST[5:]))
     assert verdicts(line) == ["malformed", "torn"]
-    assert line.judge.t15_violations == 1
+    assert line.judge.counts["torn"] == 1
 
 
 def test_torn_and_never_ended_is_torn() -> None:
@@ -107,13 +109,13 @@ def test_torn_and_never_ended_is_torn() -> None:
 def test_a_torn_request_that_never_ends_is_over_when_the_next_begins() -> None:
     line = line_with((0, REQUEST[:3]), (SLOW.t35, REQUEST))
     assert verdicts(line)[-1] == "heard"
-    assert line.judge.malformed == 1
+    assert line.judge.counts["malformed"] == 1
 
 
 def test_a_frame_with_a_wrong_check_is_malformed() -> None:
     line = line_with((0, REQUEST[:-1] + b"\x00"), (SECOND, REQUEST))
     assert verdicts(line) == ["malformed", "heard"]
-    assert line.judge.violations == 0
+    assert violations(line.judge) == 0
 
 
 def test_a_request_written_behind_another_under_way_comes_too_early() -> None:
@@ -122,7 +124,7 @@ def test_a_request_written_behind_another_under_way_comes_too_early() -> None:
     end = line.transmit(REQUEST, SECOND + 1_000_000, SLOW)
     line.advance(end + SECOND)
     assert verdicts(line) == ["gap"]
-    assert line.judge.gap_violations == 1
+    assert line.judge.counts["gap"] == 1
 
 
 def test_a_request_in_two_writes_without_a_pause_is_one() -> None:
@@ -140,7 +142,7 @@ def test_writing_while_another_speaks_is_a_collision() -> None:
     line.transmit(REQUEST, SECOND + 2_000_000, SLOW)
     line.advance(2 * SECOND)
     assert verdicts(line) == ["collision"]
-    assert line.judge.collisions == 1
+    assert line.judge.counts["collision"] == 1
 
 
 @pytest.mark.parametrize("begins", [-500_000, 3_000_000])
@@ -150,7 +152,7 @@ def test_a_request_into_which_another_begins_to_speak_is_struck_without_guilt(be
     line.transmit(REQUEST, SECOND, SLOW)
     line.advance(2 * SECOND)
     assert verdicts(line) == ["struck"]
-    assert (line.judge.struck, line.judge.violations) == (1, 0)
+    assert (line.judge.counts["struck"], violations(line.judge)) == (1, 0)
 
 
 def test_ascii_frames_may_follow_at_once_and_pause_inside() -> None:
@@ -179,7 +181,7 @@ def test_what_is_settled_is_settled_once() -> None:
     assert judge.settle(hearing, struck=False) is JudgeReport.HEARD
     assert judge.settle(hearing, struck=False) is None
     assert judge.expire(hearing, SECOND) is None
-    assert judge.requests == 1
+    assert judge.counts.total() == 1
 
 
 def test_a_piece_after_a_gap_begins_another_request() -> None:

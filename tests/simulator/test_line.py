@@ -35,7 +35,7 @@ def test_without_a_log_nothing_is_kept() -> None:
     line.transmit(bytes.fromhex("01030001000295cb"), 10**9, line.format)
     line.advance(2 * 10**9)
     assert line.log == []
-    assert (line.judge.malformed, line.answered) == (1, 1)
+    assert (line.judge.counts["malformed"], line.answered) == (1, 1)
 
 
 def test_a_sensor_keeps_a_source_of_its_own() -> None:
@@ -128,7 +128,7 @@ def test_an_id_of_another_check_is_not_heard(bench: Maker) -> None:
     line = bench(Sensor(1))
     line.port.write(bytes.fromhex("010300010002") + b"\x00\x07")  # a right sum, but the sensor wants a CRC
     assert line.listen(0.1) == b""
-    assert line.line.judge.heard == 1
+    assert line.line.judge.counts["heard"] == 1
 
 
 def test_a_late_handover_moves_the_end_of_the_last_byte() -> None:
@@ -140,7 +140,7 @@ def test_a_late_handover_moves_the_end_of_the_last_byte() -> None:
     line.transmit(request, 42_000_000, line.format)
     line.advance(90_000_000)
     assert line.log[1].gap == 2_000_000
-    assert line.judge.gap_violations == 1
+    assert line.judge.counts["gap"] == 1
 
 
 def test_bytes_of_a_master_wholly_within_babble_are_lost() -> None:
@@ -148,7 +148,7 @@ def test_bytes_of_a_master_wholly_within_babble_are_lost() -> None:
     line.speak("noise", bytes(40), 0)
     line.transmit(bytes.fromhex("01030001000295cb"), 5_000_000, line.format)
     line.advance(10**9)
-    assert line.judge.collisions == 1
+    assert line.judge.counts["collision"] == 1
     assert line.answered == 0
 
 
@@ -158,7 +158,7 @@ def test_a_master_that_changes_its_rate_under_its_bytes_spoils_them() -> None:
     line.transmit(bytes.fromhex("01030001000295cb"), 0, line.format)
     line.strike(4_000_000)
     line.advance(10**9)
-    assert line.judge.struck == 1
+    assert line.judge.counts["struck"] == 1
 
 
 def test_only_heard_requests_reach_the_troubles() -> None:

@@ -69,7 +69,7 @@ def test_a_master_on_the_terminal_is_answered(line: SimulatedLine) -> None:
     with PtyLine(line) as port, opened(port.path) as descriptor:
         os.write(descriptor, REQUEST)
         assert read(descriptor, 7) == ANSWER
-    assert line.judge.heard == 1
+    assert line.judge.counts["heard"] == 1
 
 
 def test_an_answer_takes_as_long_as_on_a_wire(line: SimulatedLine) -> None:
@@ -95,7 +95,7 @@ def test_what_comes_while_nobody_listens_is_lost(line: SimulatedLine) -> None:
     with PtyLine(line) as port:
         with opened(port.path) as descriptor:
             os.write(descriptor, REQUEST)
-            assert until(lambda: line.judge.heard == 1)
+            assert until(lambda: line.judge.counts["heard"] == 1)
         assert until(lambda: not port.present and line.now > line.log[0].answers[0].burst.ends[-1])
         with opened(port.path) as descriptor:
             assert read(descriptor, 1, patience=0.05) == b""
@@ -105,7 +105,7 @@ def test_a_master_at_another_rate_is_noise(line: SimulatedLine) -> None:
     with PtyLine(line) as port, opened(port.path, termios.B19200) as descriptor:
         os.write(descriptor, REQUEST)
         assert read(descriptor, 1, patience=0.1) == b""
-        assert until(lambda: line.judge.heard == 1)
+        assert until(lambda: line.judge.counts["heard"] == 1)
     assert line.answered == 0
 
 

@@ -6,8 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from lfs10d.simulator.line import SensorAnswer
-from lfs10d.simulator.sensor import Sensor
+from lfs10d.simulator.sensor import Reply, Sensor
 from lfs10d.simulator.wire import Format, nanoseconds
 from tests.support.queued_sensor import QueuedSensor
 from tests.support.simulated import Bench
@@ -17,14 +16,14 @@ WRITE_ID = bytes((1, 6, 0, 5, 0, 1))
 READ = bytes((1, 3, 0, 1, 0, 2))
 
 
-def answers(bench: Maker, kind: str, **particulars: float) -> list[SensorAnswer]:
+def answers(bench: Maker, kind: str, **particulars: float) -> list[Reply]:
     line = bench(Sensor(1))
     line.line.sensor(1).add_fault(kind, **particulars)
     line.read(1, wait=0.4)
     return line.line.log[0].answers
 
 
-def apart(first: SensorAnswer, second: SensorAnswer) -> int:
+def apart(first: Reply, second: Reply) -> int:
     return second.burst.start - first.burst.ends[-1]
 
 

@@ -12,6 +12,7 @@ from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.signals import Signal
 from lfs10d.simulator.wire import Format
 from tests.support.sensor_values import ID, RATE, Maker, wind_in
+from tests.support.simulated import power_cycle
 
 
 def test_a_well_sensor_sends_the_value_that_the_log_tells(bench: Maker) -> None:
@@ -70,7 +71,7 @@ def test_a_request_of_another_length_is_ignored(bench: Maker) -> None:
 
 def test_silence_begins_and_ends_when_told(bench: Maker) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).silent_from(2.0, 3.0)
+    line.line.sensor(1).add_fault("silent", first=2.0, last=3.0)
     heard = []
     for seconds in (1.0, 2.0, 2.5, 3.0):
         line.reach(seconds)
@@ -82,9 +83,9 @@ def test_a_healed_sensor_keeps_its_other_faults() -> None:
     sensor = Sensor(1)
     sensor.add_fault("silent")
     kept = sensor.add_fault("noisy", 0.5)
-    sensor.clear_faults("silent")
+    sensor.faults = [one for one in sensor.faults if one.kind != "silent"]
     assert sensor.faults == [kept]
-    sensor.clear_faults()
+    sensor.faults.clear()
     assert sensor.faults == []
 
 
@@ -104,7 +105,7 @@ def test_one_that_hangs_is_silent_after_an_exception_until_the_next_power_cycle(
     assert line.id_of(1) == 1
     assert line.read(1, 3, 1) == bytes.fromhex("01 83 02")
     assert line.id_of(1) is None
-    sensor.power_cycle()
+    power_cycle(sensor)
     assert line.id_of(1) == 1
 
 
@@ -187,7 +188,7 @@ def test_other_devices_are_just_data(bench: Maker) -> None:
     assert line.exchange(bytes.fromhex("05 04 00 14 00 02")) == bytes.fromhex("05 04 04 00 00 00 0C")
     assert line.write(5, 30, 8) == bytes.fromhex("05 06 00 1E 00 08")
     assert line.read(5, 30, 1) == bytes.fromhex("05 03 02 00 08")
-    sensor.power_cycle()
+    power_cycle(sensor)
     assert repr(sensor) == "<Sensor 5 at 9600>"
     sensor.add_fault(FaultKind.NAN)
     assert line.read(5, 10, 1) == bytes.fromhex("05 03 02 FF FF")
@@ -202,7 +203,7 @@ def test_one_made_another_kind_refuses_what_that_kind_refuses(bench: Maker) -> N
     sensor = Sensor(1)
     line = bench(sensor)
     assert line.write(1, RATE, 1) == bytes.fromhex("01 06 00 04 00 01")
-    sensor.blueprint = replace(sensor.blueprint, writable={})
+    sensor.memory.blueprint = replace(sensor.blueprint, writable={})
     assert line.write(1, RATE, 1) == bytes.fromhex("01 86 02")
-    sensor.blueprint = replace(sensor.blueprint, functions=frozenset({4}))
+    sensor.memory.blueprint = replace(sensor.blueprint, functions=frozenset({4}))
     assert line.write(1, RATE, 1) == bytes.fromhex("01 86 01")

@@ -7,6 +7,7 @@ import pytest
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from tests.support.sensor_values import ID, RATE, Maker
+from tests.support.simulated import power_cycle
 
 
 def test_a_new_id_is_obeyed_after_an_echo_from_the_old_place(bench: Maker) -> None:
@@ -44,7 +45,7 @@ def test_power_cycle_needing_ones_read_new_and_answer_at_the_old_place(bench: Ma
     line.write(1, ID, 9)
     assert line.id_of(1) == 9
     assert line.id_of(9) is None
-    sensor.power_cycle()
+    power_cycle(sensor)
     assert line.id_of(9) == 9
 
 
@@ -53,7 +54,7 @@ def test_one_that_stores_but_ignores_never_obeys(bench: Maker) -> None:
     sensor = line.line.sensor(1)
     sensor.add_fault("stores_but_ignores")
     line.write(1, ID, 9)
-    sensor.power_cycle()
+    power_cycle(sensor)
     assert line.id_of(1) == 9
     assert line.id_of(9) is None
 
@@ -67,7 +68,7 @@ def test_the_dip_switch_wins_in_every_variant(bench: Maker, reads: str, answer: 
     echo = bytes.fromhex("01 06 00 05 00 09")
     assert line.write(1, ID, 9) == (echo if answer == "echo" else bytes.fromhex("01 86 03"))
     assert line.id_of(1) == (9 if reads == "new" else 1)
-    sensor.power_cycle()
+    power_cycle(sensor)
     assert line.id_of(1) == 1
     line.write(1, RATE, 2)
     assert sensor.format.baudrate == 19200  # the switch sets the id only

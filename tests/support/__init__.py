@@ -23,6 +23,7 @@ One line, without broker and daemon (`line`)
     `schedules`          a scheduler alone, with slaves that are silent
     `identifications`    an identification, and the outcomes that it gets
     `scans`              a scan on a simulated line
+    `second_masters`     a second master that comes and goes
     `register_accesses`  register access on a simulated line
 
 Profiles, configuration and files

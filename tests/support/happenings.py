@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from lfs10d.simulator.line_faults import second_master
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from tests.support.ails import ail
 from tests.support.foreigners import Foreigner
+from tests.support.second_masters import passing_master
+from tests.support.simulated import power_cycle
 
 if TYPE_CHECKING:
     from tests.support.story import Story
@@ -29,12 +30,12 @@ def happen(story: Story, what: str, one: Any, more: Any) -> None:  # noqa: ANN40
         case "master":
             story.leave()
             bench.line.format = Format(story.rate)
-            story.leave = second_master(bench.line, bytes(one), bench.clock.now + 0.01, more)
+            story.leave = passing_master(bench.line, bytes(one), bench.clock.now + 0.01, more)
         case "power":
             story.powered()
-            story.sensors[one % len(story.sensors)].power_cycle()
+            power_cycle(story.sensors[one % len(story.sensors)])
         case "heal":
-            story.sensors[one % len(story.sensors)].clear_faults()
+            story.sensors[one % len(story.sensors)].faults.clear()
         case "wait":
             bench.go(story.life, one)
         case "unplug":

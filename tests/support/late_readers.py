@@ -106,7 +106,7 @@ def _judge(rig: Rig, where: str, count: Count) -> None:
     ours = [request for request in rig.line.log if request.speaker is MASTER]
     seen: set[float] = set()
     count.exchanges += len(ours)
-    count.gaps += 0 if rig.port.adapter.latency else rig.line.judge.gap_violations
+    count.gaps += 0 if rig.port.adapter.latency else rig.line.judge.counts["gap"]
     find = _finder(ours)
     for reading in rig.readings:
         count.readings += 1

@@ -18,8 +18,8 @@ from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Event, Exchanged, FaultCode, PortChanged, Reading
 from lfs10d.simulator.burst import MASTER
-from lfs10d.simulator.line import HeardRequest, SensorAnswer, SimulatedLine
-from lfs10d.simulator.sensor import Sensor
+from lfs10d.simulator.line import HeardRequest, SimulatedLine
+from lfs10d.simulator.sensor import Reply, Sensor
 from lfs10d.simulator.wire import Format
 from tests.support.queued_sensor import QueuedSensor
 from tests.support.virtual_port import SimulatedPort, VirtualClock, run
@@ -109,9 +109,9 @@ class Rig:
             assert reading.values["wind_speed"] not in seen
             seen.add(float(reading.values["wind_speed"]))
         judge = self.line.judge
-        assert judge.t15_violations == 0
+        assert judge.counts["torn"] == 0
         if not self.port.adapter.latency:  # else what an adapter still holds back cannot be known
-            assert judge.gap_violations == 0
+            assert judge.counts["gap"] == 0
         heard = sum(len(exchange.heard) + exchange.unsolicited for exchange in self.exchanges)
         assert self.turns <= 12 * len(self.exchanges) + heard + 20 * self.clock.now + 100  # no busy loop
         return self
@@ -126,7 +126,7 @@ def _nearest(requests: dict[int, HeardRequest], when: float) -> HeardRequest:
     raise AssertionError(f"no request was begun at {when}")
 
 
-def _is_ours(answer: SensorAnswer, request: HeardRequest) -> bool:
+def _is_ours(answer: Reply, request: HeardRequest) -> bool:
     return bool(answer.values) and answer.sensor.slave == request.body[0] and not answer.second
 
 

@@ -283,7 +283,7 @@ def _fall_ill(made: Recording) -> None:
 
     def heal(sensors: SimulatedLine) -> None:
         for sensor in sensors.sensors:
-            sensor.clear_faults()
+            sensor.faults.clear()
 
     tell(line, ail)
     view.wait("device/laser-a/error", lambda error: error["active"])

@@ -21,6 +21,7 @@ from lfs10d.reading import Event, Exchanged, Purpose
 from lfs10d.simulator.blueprint import blueprint_of
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.sensor import Sensor
+from tests.support.simulated import violations
 from tests.support.virtual_port import SimulatedPort, VirtualClock, run
 
 ROOT = Path(__file__).parents[2]
@@ -73,7 +74,7 @@ class Rig:
             assert self.clock.now < LONGEST, "the access does not end"
             self.pass_time(0.05)
         assert self.ended.count(access) == 1
-        assert self.line.judge.violations == 0
+        assert violations(self.line.judge) == 0
         return access
 
     @property

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from lfs10d.simulator.line import SensorAnswer, SimulatedLine
+from lfs10d.simulator.judge import Judge, JudgeReport
+from lfs10d.simulator.line import SimulatedLine
+from lfs10d.simulator.sensor import Reply, Sensor
 from lfs10d.simulator.wire import Framing, seal, unseal
 from tests.support.virtual_port import SimulatedPort, VirtualClock
 
@@ -13,6 +15,17 @@ READ, WRITE = 3, 6
 
 WIND, RATE, ID = 1, 4, 5
 """Registers of an LFS10."""
+
+
+def power_cycle(sensor: Sensor) -> None:
+    """Switch a sensor's power off and on."""
+    sensor.power_cut()
+    sensor.power_up()
+
+
+def violations(judge: Judge) -> int:
+    """Return how often the master spoke too early, paused within a request, or spoke into another."""
+    return sum(judge.counts[verdict] for verdict in (JudgeReport.GAP, JudgeReport.TORN, JudgeReport.COLLISION))
 
 
 @dataclass
@@ -55,6 +68,6 @@ class Bench:
         self.clock.now = max(self.clock.now, seconds)
 
     @property
-    def answer(self) -> SensorAnswer:
+    def answer(self) -> Reply:
         """The last answer that a sensor sent."""
         return self.line.log[-1].answers[-1]

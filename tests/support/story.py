@@ -12,6 +12,7 @@ from tests.support.ails import NO_AIL, Ail, ail, has_a_twin
 from tests.support.foreigners import Foreigner, Stranger
 from tests.support.happenings import happen
 from tests.support.lives import Bench, Life
+from tests.support.simulated import power_cycle
 from tests.support.volatile_disk import PowerCutError
 
 IDS = (3, 4, 5)
@@ -165,8 +166,8 @@ class Story:
         self.leave()
         self.powered()
         for sensor in self.sensors:
-            sensor.clear_faults()
-            sensor.power_cycle()
+            sensor.faults.clear()
+            power_cycle(sensor)
         if self.twin is not None and not self.twin_missed:
             known = {3, self.life.place("s3"), *self.life.physical.reserved()}
             assert self.twin.slave in known, "the twin of s3 is not lost either"

@@ -13,6 +13,7 @@ from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from tests.support.brokers import Mosquitto
 from tests.support.shells import BASE, Shell, typed
+from tests.support.simulated import power_cycle
 from tests.support.sites import QUICK, Run, Site, eventually, tell
 
 REPEAT = ("line/adopt", "--repeat")
@@ -102,7 +103,7 @@ def test_a_sensor_that_obeys_after_a_power_cycle_is_adopted_then(
     sensor = plug(served, "power_cycle", baudrate=19200)
     loop = shell.pipe("request", *REPEAT)
     loop.says("power_cycle_needed: the sensor stored what was written", within=ADOPTED_WITHIN)
-    tell(served, lambda _: sensor.power_cycle())
+    tell(served, lambda _: power_cycle(sensor))
     loop.says(f"slave-3: slave id 3, 19200 baud\n{NEXT}", within=ADOPTED_WITHIN)
     assert loop.ends(signal.SIGINT) == 0
     assert loop.text.count("power_cycle_needed") == 1

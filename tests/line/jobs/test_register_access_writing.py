@@ -138,7 +138,7 @@ def test_nobody_polls_the_slave_between_a_write_and_its_verification() -> None:
     rig.vane.add_fault("slow_flash", delay=1.0)
     rig.do(write(10))
     assert {each.purpose for each in rig.events[begun:] if isinstance(each, Exchanged)} == {Purpose.REQUEST}
-    rig.vane.clear_faults()
+    rig.vane.faults.clear()
     rig.pass_time(1.0)
     assert [each.fault for each in rig.events if isinstance(each, Reading)][-1] is None
 

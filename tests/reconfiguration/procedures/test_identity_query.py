@@ -22,7 +22,6 @@ from lfs10d.reconfiguration.procedures.identity_query import (
     HEARD_WITHIN,
     PATIENT,
     QUICK,
-    SILENCE,
     IdentityReply,
     quiet,
 )
@@ -67,19 +66,6 @@ def test_another_register_can_be_asked(pretence: Pretence) -> None:
     pretence.sensor(3, baudrate=19200)
     assert pretence.carry_out(pretence.query().read_register(ELSEWHERE, register=4)).register == 2
     assert pretence.requests == [ReadRegisters(3, 4, 1)]
-
-
-def test_a_patient_read_asks_three_times_and_longer_each_time(pretence: Pretence) -> None:
-    query = pretence.query()
-    query.timeout = 0.3
-    assert pretence.carry_out(query.read_patiently(HERE)) == SILENCE
-    assert [ask.timeout for ask in pretence.asked] == [0.3, 0.6, 1.0]
-
-
-def test_a_patient_read_is_over_with_the_first_answer(pretence: Pretence) -> None:
-    pretence.sensor(3)
-    assert pretence.carry_out(pretence.query().read_patiently(HERE, register=4)).register == 1
-    assert [ask.timeout for ask in pretence.asked] == [QUICK]
 
 
 def test_values_say_nothing_of_the_id(pretence: Pretence) -> None:
