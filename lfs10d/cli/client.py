@@ -92,7 +92,8 @@ class CommandClient(Acknowledgements):
         self._link = BrokerClient(login.settings, self)
         self._pending: tuple[str, frozenset[str]] | None = None
         """The id of the pending request, and the topics of its response from a daemon that knows no Response Topic."""
-        self._response: dict[str, Any] | None = None
+        self.response: dict[str, Any] | None = None
+        """The response to the last request; None while there is none."""
         self.by_response_topic = False
         """The daemon answers on the Response Topic (MQTT 5.0, section 4.10), so that a request needs no id."""
 
@@ -163,7 +164,7 @@ class CommandClient(Acknowledgements):
         """
         token = str(content.get("id") or content.get("transaction") or secrets.token_hex(6))
         usual = [self.topics.full(self.topics.response(each)) for each in (name, "unknown")]
-        self._pending, self._response = (token, frozenset(usual)), None
+        self._pending, self.response = (token, frozenset(usual)), None
         await self._subscribe([Filter(topic) for topic in usual])
         connection = self._link.connection
         mid = None
@@ -180,7 +181,7 @@ class CommandClient(Acknowledgements):
             raise BrokerError(f"{error}; {name} may or may not have been carried out") from None
         if not self._answered and self.daemon_gone:
             raise BrokerError(f"{self.place}: the daemon went offline before it answered {name}")
-        return self._response
+        return self.response
 
     def send(self, name: str, content: dict[str, Any]) -> None:
         """Send a request without waiting for its response; the request before may still be answered."""
@@ -189,13 +190,8 @@ class CommandClient(Acknowledgements):
             connection.publish(self.topics.full(f"request/{name}"), json.dumps(content).encode())
 
     @property
-    def response(self) -> dict[str, Any] | None:
-        """The response to the last request; None while there is none."""
-        return self._response
-
-    @property
     def _answered(self) -> bool:
-        return self._response is not None
+        return self.response is not None
 
     def _check_acknowledgement(self, reason: int, name: str) -> None:
         if reason == NO_SUBSCRIBERS:
@@ -244,7 +240,7 @@ class CommandClient(Acknowledgements):
             return
         ours = message.topic == self._own and message.correlation in {None, token.encode()}
         if ours or token in (response.get("id"), response.get("transaction")):
-            self._response = response
+            self.response = response
             self.by_response_topic = ours
 
 

@@ -85,7 +85,8 @@ class Watch:
     def __init__(self, login: Login, files: tuple[Path, ...] = ()) -> None:
         self._line = login.config.line.name
         self._files = files
-        self._live = LiveState(self._line)
+        self.live = LiveState(self._line)
+        """The line as MQTT shows it."""
         self._why = ""
         """What was wrong with the broker, or the daemon there, at the beginning."""
         self._heard_at = 0.0
@@ -107,14 +108,9 @@ class Watch:
         )
 
     @property
-    def live(self) -> LiveState:
-        """The line as MQTT shows it."""
-        return self._live
-
-    @property
     def online(self) -> bool:
         """Whether the daemon is at the broker and its devices are known."""
-        return self._client.daemon_online and self._live.known
+        return self._client.daemon_online and self.live.known
 
     async def connect(self) -> None:
         """Connect to the broker and subscribe; raises BrokerError, FailedError."""
@@ -129,13 +125,13 @@ class Watch:
         async with spinning("looking for the daemon ..."):
             try:
                 await self.connect()
-                await self._client.wait_until(lambda: self._live.known, RETAINED_WITHIN)
+                await self._client.wait_until(lambda: self.live.known, RETAINED_WITHIN)
                 await self._client.require_daemon()
                 await asyncio.sleep(SETTLES_WITHIN)
             except (BrokerError, FailedError) as error:
                 self._why = str(error)
         self._read()
-        if self._live.known or self._status is not None:
+        if self.live.known or self._status is not None:
             return
         places = " or ".join(str(path) for path in self._files)
         raise BrokerError(f"{self._why}; and no daemon on this machine has written its status to {places}")
@@ -154,24 +150,24 @@ class Watch:
         """Return the better source: the broker where the daemon is online there, else a file that is being written."""
         client, status = self._client, self._status
         if self.online:
-            return self._live, DataSource(f"live from {client.place}", alive=True)
+            return self.live, DataSource(f"live from {client.place}", alive=True)
         offline = f"{client.place}: the daemon is offline there"
         why = offline if client.connected else client.ended_by or self._why
         if status is not None:
             age = time.time() - status.ts
             if abs(age) <= FRESH:
                 return status.live, DataSource(f"live from {status.path} ({why})", alive=True)
-            if not self._live.known or status.ts > self._heard_at:
+            if not self.live.known or status.ts > self._heard_at:
                 words = f"NOT LIVE: the daemon wrote {status.path} {age_text(max(0.0, age))} ago and no more ({why})"
                 return status.live, DataSource(words, alive=False)
-        return self._live, DataSource(f"NOT LIVE: these are the last values received ({why})", alive=False)
+        return self.live, DataSource(f"NOT LIVE: these are the last values received ({why})", alive=False)
 
     def _arrived(self, message: Incoming) -> None:
         relative = self._client.topics.relative(message.topic)
         if relative is None:
             return
         self._heard_at, payload = time.time(), content(message.payload)
-        self._live.on_message(relative, payload, old=message.retained, now=time.monotonic(), wall=self._heard_at)
+        self.live.on_message(relative, payload, old=message.retained, now=time.monotonic(), wall=self._heard_at)
 
     def _read(self) -> None:
         """Read the status file of our line, if there is one; otherwise the last content stays and grows old."""

@@ -41,10 +41,6 @@ class RequestRecord:
     data: Any = None
     ended: int | None = None
 
-    def shown(self) -> dict[str, Any]:
-        """Return it as JSON has it."""
-        return asdict(self)
-
 
 @dataclass(frozen=True, slots=True)
 class Answer:
@@ -68,7 +64,7 @@ class LineActions:
     def shown(self) -> dict[str, Any]:
         """Return what viewers see of them."""
         return {
-            "requests": [each.shown() for each in self.records],
+            "requests": [asdict(each) for each in self.records],
             "mounting": None if self.mounting is None else self.mounting.shown(),
         }
 

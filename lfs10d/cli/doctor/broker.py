@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import secrets
 import socket
 import ssl
@@ -13,7 +12,7 @@ from collections.abc import AsyncIterator, Callable, Iterator
 from typing import Final
 
 from lfs10d.cli.client import Acknowledgements
-from lfs10d.cli.doctor.finding import Finding, fail, ok, warn
+from lfs10d.cli.doctor.finding import Area, Finding
 from lfs10d.cli.login import Login
 from lfs10d.errors import BrokerError
 from lfs10d.mqtt.broker_client import BrokerClient
@@ -23,6 +22,8 @@ from lfs10d.mqtt.reasons import REFUSED_FROM, reason_in_words
 from lfs10d.mqtt.settings import BrokerSettings
 from lfs10d.mqtt.tls import tls_context
 from lfs10d.telemetry.homeassistant.gateway import config_topic, object_id
+
+BROKER, INTEGRATIONS = Area("broker"), Area("integrations")
 
 REACHED_WITHIN: Final = 5.0
 """s for name, TCP and TLS of one node."""
@@ -61,10 +62,10 @@ class _Trial(Acknowledgements):
         reason = self.settled[mid][0]
         return None if reason < REFUSED_FROM else self.ended_by or reason_in_words(reason)
 
-    async def until(self, condition: Callable[[], bool]) -> bool:
+    async def until(self, condition: Callable[[], bool], within: float = ANSWERED_WITHIN) -> bool:
         """Wait until the condition holds; False where it does not in time, or the connection ends."""
         try:
-            return await self.wait_until(condition, ANSWERED_WITHIN)
+            return await self.wait_until(condition, within)
         except BrokerError:
             return False
 
@@ -74,7 +75,7 @@ async def look(login: Login, messages_a_second: float) -> list[Finding]:
     findings = []
     reached = False
     for node in login.settings.nodes:
-        found = await asyncio.to_thread(_reached, node)
+        found = await asyncio.to_thread(list, reach(node))
         findings += found
         reached = reached or all(each.level != "fail" for each in found)
     if reached:
@@ -82,33 +83,28 @@ async def look(login: Login, messages_a_second: float) -> list[Finding]:
     return findings
 
 
-def _reached(node: BrokerSettings) -> list[Finding]:
-    return list(reach(node))
-
-
 def reach(node: BrokerSettings, now: float | None = None) -> Iterator[Finding]:
     """Yield the findings about reaching one node: name, TCP, TLS with the dates of its certificate. Blocks."""
-    area = "broker"
     try:
         socket.getaddrinfo(node.host, node.port, type=socket.SOCK_STREAM)
     except OSError as error:
-        yield fail(area, f"the name {node.host} is not known ({error.strerror})", "is mqtt.host right? does DNS work?")
+        yield BROKER.fail(f"the name {node.host} is not known ({error.strerror})", "is mqtt.host right? does DNS work?")
         return
     try:
         connection = socket.create_connection((node.host, node.port), REACHED_WITHIN)
     except OSError as error:
         why = (error.strerror or str(error)).lower()
-        yield fail(area, f"{node.place}: {why}", "does the broker run, and listen there? is a firewall between?")
+        yield BROKER.fail(f"{node.place}: {why}", "does the broker run, and listen there? is a firewall between?")
         return
     with connection:
         if node.tls is None:
-            yield ok(area, f"{node.place} accepts connections")
+            yield BROKER.ok(f"{node.place} accepts connections")
             return
         try:
             with tls_context(node.tls).wrap_socket(connection, server_hostname=node.host) as secured:
                 certificate = secured.getpeercert() or {}
         except (OSError, BrokerError) as error:
-            yield fail(area, f"{node.place}: TLS: {_tls_words(error)}", _tls_advice(error))
+            yield BROKER.fail(f"{node.place}: TLS: {_tls_words(error)}", _tls_advice(error))
             return
         yield from _dates(node, certificate, time.time() if now is None else now)
 
@@ -137,14 +133,14 @@ def _tls_advice(error: OSError | BrokerError) -> str:
 def _dates(node: BrokerSettings, certificate: object, now: float) -> Iterator[Finding]:
     until = certificate.get("notAfter") if isinstance(certificate, dict) else None
     if not isinstance(until, str):
-        yield ok("broker", f"{node.place}: TLS")
+        yield BROKER.ok(f"{node.place}: TLS")
         return
     left = ssl.cert_time_to_seconds(until) - now
     day = time.strftime("%Y-%m-%d", time.gmtime(now + left))
     if left < SOON:
-        yield warn("broker", f"{node.place}: its certificate ends on {day}", "renew it before that day")
+        yield BROKER.warn(f"{node.place}: its certificate ends on {day}", "renew it before that day")
     else:
-        yield ok("broker", f"{node.place}: TLS, certificate until {day}")
+        yield BROKER.ok(f"{node.place}: TLS, certificate until {day}")
 
 
 async def _log_in(login: Login, needed: float) -> list[Finding]:
@@ -156,10 +152,10 @@ async def _log_in(login: Login, needed: float) -> list[Finding]:
             accepted = await client.opened(ACCEPTED_WITHIN)
         except BrokerError as error:
             missing = f"; {login.missing_password}" if login.missing_password else ""
-            return [fail("broker", f"{error}{missing}", "check mqtt.username, the password and the broker's log")]
+            return [BROKER.fail(f"{error}{missing}", "check mqtt.username, the password and the broker's log")]
         who = login.settings.username or "no name"
         return [
-            ok("broker", f"logged in as {who} by MQTT {accepted.version}"),
+            BROKER.ok(f"logged in as {who} by MQTT {accepted.version}"),
             *[finding async for finding in _try_out(client, trial, login, accepted, needed)],
         ]
     finally:
@@ -176,13 +172,13 @@ async def _try_out(
         return
     advice = f"the broker's ACL must let this login publish and subscribe below {base}: docs/mqtt-security.md"
     if (refused := await trial.refusal(connection.subscribe([Filter(topic)]))) is not None:
-        yield fail("broker", f"it refuses the subscription to {topic}: {refused}", advice)
+        yield BROKER.fail(f"it refuses the subscription to {topic}: {refused}", advice)
         return
     times = []
     for _ in range(ROUND_TRIPS):
         took = await _round_trip(connection, trial, topic)
         if isinstance(took, str):
-            yield fail("broker", f"below {base}: {took}", advice)
+            yield BROKER.fail(f"below {base}: {took}", advice)
             return
         times.append(took)
     for finding in limits(accepted, statistics.median(times), needed):
@@ -206,14 +202,12 @@ async def _discovery(connection: Connection, trial: _Trial, prefix: str, base: s
     refused = await trial.refusal(connection.subscribe([Filter(own), Filter(birth)]))
     advice = f"the broker's ACL must let this login publish below {prefix}: docs/mqtt-security.md"
     if refused is not None:
-        return warn("integrations", f"it cannot be seen whether {own} was published", advice)
-    with contextlib.suppress(TimeoutError):
-        await asyncio.wait_for(trial.until(lambda: own in trial.topics), RETAINED_WITHIN)
-    if own not in trial.topics:
-        return fail("integrations", f"discovery is on, and nothing is at {own}", f"does the daemon run? {advice}")
+        return INTEGRATIONS.warn(f"it cannot be seen whether {own} was published", advice)
+    if not await trial.until(lambda: own in trial.topics, RETAINED_WITHIN):
+        return INTEGRATIONS.fail(f"discovery is on, and nothing is at {own}", f"does the daemon run? {advice}")
     if birth not in trial.topics:
-        return ok("integrations", f"announced to Home Assistant at {own}; its own birth message is not retained")
-    return ok("integrations", f"announced to Home Assistant at {own}")
+        return INTEGRATIONS.ok(f"announced to Home Assistant at {own}; its own birth message is not retained")
+    return INTEGRATIONS.ok(f"announced to Home Assistant at {own}")
 
 
 def limits(accepted: Accepted, round_trip: float, needed: float) -> Iterator[Finding]:
@@ -224,18 +218,16 @@ def limits(accepted: Accepted, round_trip: float, needed: float) -> Iterator[Fin
         f"{accepted.receive_maximum}: {carried:.0f} messages/s, needed {needed:.1f}"
     )
     if carried < needed:
-        yield warn(
-            "broker",
+        yield BROKER.warn(
             text,
             "samples will go in arrays of history; a nearer broker, a greater Receive Maximum, mqtt.state_every: 10s "
             "or mqtt.telemetry: false",
         )
     else:
-        yield ok("broker", text)
+        yield BROKER.ok(text)
     most = accepted.maximum_packet_size
     if most is not None and most < SMALLEST_PACKET:
-        yield warn(
-            "broker",
+        yield BROKER.warn(
             f"it takes messages of at most {most} bytes",
             "history goes in smaller arrays; better raise its limit (mosquitto: max_packet_size)",
         )

@@ -26,19 +26,23 @@ class Finding:
     advice: str = ""
 
 
-def ok(area: str, text: str) -> Finding:
-    """Return the finding that a thing is as it should be."""
-    return Finding(area, "ok", text)
+@dataclass(frozen=True, slots=True)
+class Area:
+    """One thing that is examined, by its name; makes the findings about it."""
 
+    name: str
 
-def warn(area: str, text: str, advice: str) -> Finding:
-    """Return a finding that may become a fault, or does not stop lfs10d."""
-    return Finding(area, "warn", text, advice)
+    def ok(self, text: str) -> Finding:
+        """Return the finding that it is as it should be."""
+        return Finding(self.name, "ok", text)
 
+    def warn(self, text: str, advice: str) -> Finding:
+        """Return a finding that may become a fault, or does not stop lfs10d."""
+        return Finding(self.name, "warn", text, advice)
 
-def fail(area: str, text: str, advice: str) -> Finding:
-    """Return a fault: no wind speed gets from the sensor to the dashboard, or not all of it."""
-    return Finding(area, "fail", text, advice)
+    def fail(self, text: str, advice: str) -> Finding:
+        """Return a fault: no wind speed gets from the sensor to the dashboard, or not all of it."""
+        return Finding(self.name, "fail", text, advice)
 
 
 def lines(findings: Iterable[Finding]) -> Iterator[str]:

@@ -12,10 +12,12 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Final
 
-from lfs10d.cli.doctor.finding import Finding, fail, ok, warn
+from lfs10d.cli.doctor.finding import Area, Finding
 from lfs10d.cli.doctor.port import Root, there
 from lfs10d.system.clock_step import ClockState
 from lfs10d.system.dataclass import dataclass
+
+CLOCK, DISK, SERVICE = Area("clock"), Area("disk"), Area("service")
 
 SLOW_SYNC: Final = 0.2
 """s for one write with fsync: from here on a change takes noticeably long."""
@@ -54,19 +56,16 @@ class DiskState:
 def clock(state: ClockState, now: float, installed: float) -> Iterator[Finding]:
     """Yield the findings about the wall clock; `now` and `installed` in s since the epoch."""
     if now < installed - CLOCK_SLACK:
-        yield fail(
-            "clock",
+        yield CLOCK.fail(
             f"it says {time.strftime('%Y-%m-%d %H:%M', time.gmtime(now))} UTC, before this version was installed",
             "give the machine the time: timedatectl, a network with NTP, or a real-time clock",
         )
     elif state == "synced":
-        yield ok("clock", "synchronised")
+        yield CLOCK.ok("synchronised")
     elif state == "unsynced":
-        yield warn(
-            "clock", "not synchronised: samples are marked unsynced", "timedatectl; sudo timedatectl set-ntp true"
-        )
+        yield CLOCK.warn("not synchronised: samples are marked unsynced", "timedatectl; sudo timedatectl set-ntp true")
     else:
-        yield warn("clock", "it is not known whether it is synchronised", "install systemd-timesyncd or chrony")
+        yield CLOCK.warn("it is not known whether it is synchronised", "install systemd-timesyncd or chrony")
 
 
 def look_at_disk(folder: Path, wanted: int, root: Root | None = None) -> DiskState:
@@ -133,33 +132,30 @@ def disk(state: DiskState) -> Iterator[Finding]:
     """Yield the findings about the disk."""
     where = str(state.folder)
     if state.refused:
-        yield fail(
-            "disk",
+        yield DISK.fail(
             f"{where} cannot be written: {os.strerror(state.refused).lower()}",
             REFUSED.get(state.refused, "is the disk or SD card failing? dmesg, and journalctl -k -p err"),
         )
     elif state.sync is not None and state.sync >= STUCK_SYNC:
-        yield fail("disk", f"{where}: a write takes {state.sync:.1f} s", "the disk or SD card is failing: replace it")
+        yield DISK.fail(f"{where}: a write takes {state.sync:.1f} s", "the disk or SD card is failing: replace it")
     elif state.sync is not None and state.sync >= SLOW_SYNC:
-        yield warn("disk", f"{where}: a write takes {state.sync:.1f} s", "is the SD card worn out, or the disk busy?")
+        yield DISK.warn(f"{where}: a write takes {state.sync:.1f} s", "is the SD card worn out, or the disk busy?")
     elif state.writable:
         speed = "" if state.sync is None else f", a write takes {state.sync * 1e3:.0f} ms"
-        yield ok("disk", f"{where} can be written{speed}")
+        yield DISK.ok(f"{where} can be written{speed}")
     elif not state.exists:
-        yield ok("disk", f"{where} does not exist yet: the daemon creates it")
+        yield DISK.ok(f"{where} does not exist yet: the daemon creates it")
     else:
-        yield warn(
-            "disk", f"{where} cannot be written by this user", "the service can write there; as root more is examined"
+        yield DISK.warn(
+            f"{where} cannot be written by this user", "the service can write there; as root more is examined"
         )
     if state.free < state.wanted:
-        yield warn(
-            "disk",
+        yield DISK.warn(
             f"{state.free / 1e6:.0f} MB are free, and the backlog may take {state.wanted / 1e6:.0f} MB",
             "make room, or set store.max_size lower",
         )
     if state.written is not None and state.device.startswith("mmcblk") and state.written > MUCH_WRITTEN:
-        yield warn(
-            "disk",
+        yield DISK.warn(
             f"{state.written / 1e9:.0f} GB a day are written to the SD card",
             "which program? sudo iotop -ao; journal in memory: Storage=volatile in journald.conf",
         )
@@ -184,37 +180,36 @@ def unit_state(unit: str) -> dict[str, str] | None:
 def service(unit: str, state: Mapping[str, str] | None) -> Iterator[Finding]:
     """Yield the findings about a unit."""
     if state is None:
-        yield warn(
-            "service", "there is no systemd on this machine", "see docs/installation.md, or start lfs10d run yourself"
+        yield SERVICE.warn(
+            "there is no systemd on this machine", "see docs/installation.md, or start lfs10d run yourself"
         )
         return
     if state.get("LoadState") != "loaded":
-        yield warn("service", f"{unit} is not installed", "sudo lfs10d service install, or the Debian package")
+        yield SERVICE.warn(f"{unit} is not installed", "sudo lfs10d service install, or the Debian package")
         return
     active, result = state.get("ActiveState"), state.get("Result", "")
     if active == "active":
-        yield ok("service", f"{unit} runs (process {state.get('MainPID')})")
+        yield SERVICE.ok(f"{unit} runs (process {state.get('MainPID')})")
     elif state.get("ExecMainStatus") == "78":
-        yield fail("service", f"{unit} has ended: the configuration is wrong", "lfs10d check, then systemctl restart")
+        yield SERVICE.fail(f"{unit} has ended: the configuration is wrong", "lfs10d check, then systemctl restart")
     elif active == "failed" or result not in {"", "success"}:
-        yield fail("service", f"{unit} is {active} ({result})", f"why: journalctl -u {unit} -n 30")
+        yield SERVICE.fail(f"{unit} is {active} ({result})", f"why: journalctl -u {unit} -n 30")
     else:
-        yield fail("service", f"{unit} does not run", f"sudo systemctl start {unit}")
+        yield SERVICE.fail(f"{unit} does not run", f"sudo systemctl start {unit}")
     if state.get("UnitFileState") not in {"enabled", "enabled-runtime"}:
-        yield warn("service", f"{unit} is not started at boot", f"sudo systemctl enable {unit}")
+        yield SERVICE.warn(f"{unit} is not started at boot", f"sudo systemctl enable {unit}")
     restarts = state.get("NRestarts", "0")
     if restarts != "0":
-        yield warn("service", f"{unit} was restarted {restarts} times ({result})", f"why: journalctl -u {unit}")
+        yield SERVICE.warn(f"{unit} was restarted {restarts} times ({result})", f"why: journalctl -u {unit}")
     if state.get("WatchdogUSec", "infinity") in {"0", "infinity"}:
-        yield warn("service", f"{unit} has no watchdog", "take WatchdogSec= from the unit of this version")
+        yield SERVICE.warn(f"{unit} has no watchdog", "take WatchdogSec= from the unit of this version")
 
 
 def daemons(same: tuple[int, ...]) -> Iterator[Finding]:
     """Yield a finding where several daemons run for one configuration or one port; `same` are processes."""
     if len(same) > 1:
         processes = ", ".join(map(str, same))
-        yield fail(
-            "service",
+        yield SERVICE.fail(
             f"{len(same)} daemons run for this line (processes {processes})",
             "end all but one: they disconnect each other at the broker, and only one can have the port",
         )

@@ -9,10 +9,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-from lfs10d.cli.doctor.finding import Finding, fail, ok, warn
+from lfs10d.cli.doctor.finding import Area, Finding
 from lfs10d.cli.port_holder import daemon_behind
 from lfs10d.modbus.port_lock import holder
 from lfs10d.system.dataclass import dataclass
+
+PORT = Area("port")
 
 CH340: Final = "1a86:7523"
 """USB id that brltty takes for a Braille display, up to Debian 12 and Ubuntu 22.04."""
@@ -164,45 +166,40 @@ def judge(state: PortState, *, service: bool) -> Iterator[Finding]:
     """Yield the findings about a port; `service`: a service of the system opens it."""
     if not state.device:
         if state.container:
-            yield fail(
-                "port",
+            yield PORT.fail(
                 f"{state.path} is not in this container",
                 "pass it in (podman, docker: --device): see docs/installation.md",
             )
         else:
-            yield fail("port", f"{state.path} is absent", "is the adapter plugged in? ls -l /dev/serial/by-id")
+            yield PORT.fail(f"{state.path} is absent", "is the adapter plugged in? ls -l /dev/serial/by-id")
         yield from _programs_that_grab(state)
         return
     if not state.is_device:
-        yield fail("port", f"{state.path} is not a device", "name a serial port: ls -l /dev/serial/by-id")
+        yield PORT.fail(f"{state.path} is not a device", "name a serial port: ls -l /dev/serial/by-id")
         return
     kind = " ".join(part for part in (state.driver, state.usb_id) if part)
-    yield ok("port", f"{state.path} is {state.device}" + (f" ({kind})" if kind else ""))
+    yield PORT.ok(f"{state.path} is {state.device}" + (f" ({kind})" if kind else ""))
     if state.lasting and state.path == state.device:
-        yield warn("port", f"{state.path} may be another adapter after a restart", f"set line.port to {state.lasting}")
+        yield PORT.warn(f"{state.path} may be another adapter after a restart", f"set line.port to {state.lasting}")
     if service and not (state.group == SERVICE_GROUP and state.group_may_use):
-        yield warn(
-            "port",
+        yield PORT.warn(
             f"the service has the group {SERVICE_GROUP}, and {state.device} is for group {state.group}",
             f"sudo systemctl edit lfs10d, section [Service]: SupplementaryGroups={state.group}",
         )
     yield from _holder(state)
     if state.console:
-        yield fail(
-            "port",
+        yield PORT.fail(
             f"{state.device}: {state.console}",
             "Raspberry Pi: sudo raspi-config, Interface, Serial Port: no login shell, hardware on; elsewhere: take "
             f"console= from the kernel's command line and sudo systemctl disable --now serial-getty@{_name(state)}",
         )
     if state.mini_uart:
-        yield warn(
-            "port",
+        yield PORT.warn(
             f"{state.device} is the Pi's mini UART: its rate changes with the processor's clock, and it has no parity",
             "use the PL011 (dtoverlay=disable-bt, port /dev/ttyAMA0) or a USB adapter",
         )
     if state.latency_ms is not None and state.latency_ms > SLOW_LATENCY:
-        yield warn(
-            "port",
+        yield PORT.warn(
             f"the adapter holds bytes back for {state.latency_ms} ms",
             "line.low_latency: true, or the udev rule of docs/installation.md (latency_timer)",
         )
@@ -215,24 +212,22 @@ def _name(state: PortState) -> str:
 
 def _holder(state: PortState) -> Iterator[Finding]:
     if state.held_by_daemon:
-        yield ok("port", f"held by the daemon: {state.holder}")
+        yield PORT.ok(f"held by the daemon: {state.holder}")
     elif state.holder:
-        yield fail("port", f"{state.holder} holds {state.path}", "end that program: only one program may use the line")
+        yield PORT.fail(f"{state.holder} holds {state.path}", "end that program: only one program may use the line")
     else:
-        yield ok("port", "no other program holds it")
+        yield PORT.ok("no other program holds it")
 
 
 def _programs_that_grab(state: PortState) -> Iterator[Finding]:
     if "ModemManager" in state.running:
-        yield warn(
-            "port",
+        yield PORT.warn(
             "ModemManager runs: it sends AT commands into new serial ports",
             "without a modem: sudo systemctl disable --now ModemManager",
         )
     if "brltty" in state.running:
-        level = fail if state.usb_id == CH340 or not state.device else warn
+        level = PORT.fail if state.usb_id == CH340 or not state.device else PORT.warn
         yield level(
-            "port",
             f"brltty runs: it takes CH340 adapters ({CH340}) for Braille displays, and the port vanishes",
             "without a Braille display: sudo apt remove brltty, then plug the adapter in again",
         )

@@ -10,10 +10,12 @@ from typing import Final
 
 from lfs10d import __version__
 from lfs10d.cli.advice import advice
-from lfs10d.cli.doctor.finding import Finding, fail, ok, warn
+from lfs10d.cli.doctor.finding import Area, Finding
 from lfs10d.config.loader import LoadedConfig
 from lfs10d.errors import ConfigError
 from lfs10d.line.budget import budget
+
+PROGRAM, CONFIGURATION = Area("program"), Area("configuration")
 
 LIBRARIES: Final = ("pymodbus", "paho-mqtt", "pydantic", "PyYAML")
 OLDEST_PYTHON: Final = (3, 11)
@@ -24,9 +26,9 @@ def versions() -> Iterator[Finding]:
     libraries = ", ".join(f"{name} {_version(name)}" for name in LIBRARIES)
     text = f"lfs10d {__version__}, Python {platform.python_version()}, {libraries}, in {sys.prefix}"
     if sys.version_info[:2] < OLDEST_PYTHON:
-        yield fail("program", text, "lfs10d needs Python 3.11 or newer")
+        yield PROGRAM.fail(text, "lfs10d needs Python 3.11 or newer")
     else:
-        yield ok("program", text)
+        yield PROGRAM.ok(text)
 
 
 def _version(library: str) -> str:
@@ -39,14 +41,14 @@ def _version(library: str) -> str:
 def broken(error: ConfigError) -> Iterator[Finding]:
     """Yield each error of a configuration."""
     for problem in error.problems:
-        yield fail("configuration", str(problem), "correct it, then: lfs10d check")
+        yield CONFIGURATION.fail(str(problem), "correct it, then: lfs10d check")
 
 
 def configuration(loaded: LoadedConfig, host: str) -> Iterator[Finding]:
     """Yield that a configuration is valid, and its warnings."""
     found = budget(loaded.config, loaded.profiles)
     slaves = len(loaded.config.slaves)
-    yield ok("configuration", f"{loaded.path}: valid, {slaves} slaves, load of the line {found.wire_load:.0%}")
+    yield CONFIGURATION.ok(f"{loaded.path}: valid, {slaves} slaves, load of the line {found.wire_load:.0%}")
     for problem in advice(loaded, found, host):
         place = f"{problem.file}:{problem.line}:{problem.column}: {problem.path}"
-        yield warn("configuration", f"{place}: {problem.message.removeprefix('warning: ')}", "see lfs10d check")
+        yield CONFIGURATION.warn(f"{place}: {problem.message.removeprefix('warning: ')}", "see lfs10d check")

@@ -15,7 +15,7 @@ import click
 import lfs10d
 from lfs10d.cli import SERVICE_FILE
 from lfs10d.cli.doctor import broker, host, port, program, sensors
-from lfs10d.cli.doctor.finding import Finding, fail, ok, warn
+from lfs10d.cli.doctor.finding import Area, Finding
 from lfs10d.cli.login import Login, log_in
 from lfs10d.cli.port_holder import config_of
 from lfs10d.cli.watch import Watch
@@ -24,6 +24,8 @@ from lfs10d.config.models import Config
 from lfs10d.daemon.state_directory import service_unit, state_directory, status_places
 from lfs10d.errors import BrokerError, ConfigError, FailedError
 from lfs10d.system import clock
+
+DAEMON, SENSORS = Area("daemon"), Area("sensors")
 
 PROC: Final = Path("/proc")
 
@@ -41,7 +43,7 @@ async def examine(
     findings += program.configuration(loaded, socket.gethostname())
     seen = await asyncio.to_thread(port.look, loaded.config.line.port)
     findings += port.judge(seen, service=service_unit(file) is not None)
-    findings += await asyncio.to_thread(lambda: list(_host(file, loaded, state_dir)))
+    findings += await asyncio.to_thread(list, _host(file, loaded, state_dir))
     try:
         login = log_in(file, "doctor", username=username, password_file=password_file, needed=False)
     except ConfigError as error:
@@ -119,19 +121,19 @@ async def _sensors(file: Path, loaded: LoadedConfig, login: Login, seen: port.Po
     finally:
         await watch.disconnect()
     if source.alive:
-        return [ok("daemon", source.words), *sensors.by_daemon(live, time.time())]
+        return [DAEMON.ok(source.words), *sensors.by_daemon(live, time.time())]
     asked = await _asked(loaded, seen, source.words)
     unit = service_unit(file)
     start = f"lfs10d run -c {file}" if unit is None else f"sudo systemctl start {unit}"
-    return asked if seen.held_by_daemon else [fail("daemon", source.words, f"start it: {start}"), *asked]
+    return asked if seen.held_by_daemon else [DAEMON.fail(source.words, f"start it: {start}"), *asked]
 
 
 async def _asked(loaded: LoadedConfig, seen: port.PortState, silence: str) -> list[Finding]:
     """Return the findings about the sensors where no daemon answers; `silence` is the reason."""
     if seen.held_by_daemon:
-        return [warn("sensors", f"a daemon holds the port and does not reply: {silence}", "see broker, above")]
+        return [SENSORS.warn(f"a daemon holds the port and does not reply: {silence}", "see broker, above")]
     if not seen.is_device or seen.holder:
-        return [fail("sensors", "cannot be read", "see port, above")]
+        return [SENSORS.fail("cannot be read", "see port, above")]
     asked = sum(slave.enabled for slave in loaded.config.slaves)
     click.echo(f"asking {asked} sensors on {loaded.config.line.port}; a silent one takes seconds", err=True)
     return await asyncio.to_thread(sensors.by_asking, loaded)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Final
 
 from lfs10d.cli.direct_line import DirectLine
-from lfs10d.cli.doctor.finding import Finding, fail, ok, warn
+from lfs10d.cli.doctor.finding import Area, Finding
 from lfs10d.cli.local_time import clock_text
 from lfs10d.cli.render.live_state import LiveState, ShownDevice
 from lfs10d.config.loader import LoadedConfig
@@ -18,6 +18,8 @@ from lfs10d.line.device import DeviceSpec, PollRules
 from lfs10d.line.settings import device_specs
 from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.reading import Reading
+
+LINE, SENSOR, SENSORS, PORT = Area("line"), Area("sensor"), Area("sensors"), Area("port")
 
 ATTEMPTS: Final = 3
 """Tries to read a sensor that does not answer."""
@@ -47,33 +49,31 @@ def by_daemon(live: LiveState, wall: float) -> Iterator[Finding]:
     """Yield the findings that the daemon publishes of line and devices; `wall` is now, in s since the epoch."""
     if live.line_error is not None:
         code = live.line_error_code or ""
-        yield fail("line", f"{code}: {live.line_error}{_since(live.line_error_since)}", ADVICE.get(code, OTHERWISE))
+        yield LINE.fail(f"{code}: {live.line_error}{_since(live.line_error_since)}", ADVICE.get(code, OTHERWISE))
     activity = live.line.get("activity")
     if activity not in {None, "polling"}:
-        yield warn(
-            "line", f"it is {activity} now: sensors are not polled as usual", "lfs10d request line/cancel ends it"
-        )
+        yield LINE.warn(f"it is {activity} now: sensors are not polled as usual", "lfs10d request line/cancel ends it")
     silent = [device for device in live.devices.values() if device.enabled and not device.online]
     for device in live.devices.values():
         if device.enabled and (device.error is not None or device in silent):
             yield _bad(device)
         elif device.enabled and live.late(device, wall):
-            yield warn("sensor", f"{device.name}: its last good value is old", "is the line overloaded? lfs10d check")
+            yield SENSOR.warn(f"{device.name}: its last good value is old", "is the line overloaded? lfs10d check")
     well = [device for device in live.devices.values() if device.enabled and device.online and device.error is None]
     if well:
-        yield ok("sensors", f"{len(well)} of {sum(each.enabled for each in live.devices.values())} answer well")
+        yield SENSORS.ok(f"{len(well)} of {sum(each.enabled for each in live.devices.values())} answer well")
     if not live.devices:
-        yield warn("sensors", "none is configured", "lfs10d request line/scan, or line/adopt --repeat for new ones")
+        yield SENSORS.warn("none is configured", "lfs10d request line/scan, or line/adopt --repeat for new ones")
 
 
 def _bad(device: ShownDevice) -> Finding:
     code = device.error or "timeout"
     id_ = "" if device.slave is None else f" (slave id {device.slave})"
     if code == "starting":
-        return warn("sensor", f"{device.name}{id_}: not polled yet", "look again in a minute")
-    level = fail if not device.online else warn
+        return SENSOR.warn(f"{device.name}{id_}: not polled yet", "look again in a minute")
+    level = SENSOR.fail if not device.online else SENSOR.warn
     state = "offline" if not device.online else "online, but bad"
-    return level("sensor", f"{device.name}{id_}: {state}: {code}{_since(device.since)}", ADVICE.get(code, OTHERWISE))
+    return level(f"{device.name}{id_}: {state}: {code}{_since(device.since)}", ADVICE.get(code, OTHERWISE))
 
 
 def _since(ts: float | None) -> str:
@@ -89,14 +89,14 @@ def by_asking(loaded: LoadedConfig) -> list[Finding]:
         if spec.enabled
     ]
     if not specs:
-        return [warn("sensors", "none is configured", f"lfs10d scan {config.line.port}")]
+        return [SENSORS.warn("none is configured", f"lfs10d scan {config.line.port}")]
     try:
         readings = _polled(_settings(config.line, config.line.baudrate), specs)
         found = list(answers(specs, readings, config.line.port))
         if not any(reading.fault is None for reading in readings.values()):
             found += _at_another_rate(config.line, specs)
     except PortError as error:
-        return [fail("port", str(error), "see port, above")]
+        return [PORT.fail(str(error), "see port, above")]
     return found
 
 
@@ -111,8 +111,7 @@ def _at_another_rate(line: LineConfig, specs: Sequence[DeviceSpec]) -> Iterator[
         readings = _polled(_settings(line, rate), specs)
         names = [name for name, reading in readings.items() if reading.fault is None]
         if names:
-            yield fail(
-                "sensors",
+            yield SENSORS.fail(
                 f"{', '.join(names)} answer at {rate} baud, not at {line.baudrate}",
                 f"set line.baudrate to {rate}; then lfs10d request line/baudrate can move them",
             )
@@ -144,12 +143,11 @@ def answers(specs: Sequence[DeviceSpec], readings: Mapping[str, Reading], port: 
             continue
         code = "timeout" if reading is None or reading.fault is None else str(reading.fault.code)
         message = "no answer" if reading is None or reading.fault is None else reading.fault.message
-        yield fail("sensor", f"{spec.name} (slave id {spec.slave}): {code}: {message}", ADVICE.get(code, OTHERWISE))
+        yield SENSOR.fail(f"{spec.name} (slave id {spec.slave}): {code}: {message}", ADVICE.get(code, OTHERWISE))
     if good:
-        yield ok("sensors", f"{len(good)} of {len(specs)} reply well (read now; no daemon runs)")
+        yield SENSORS.ok(f"{len(good)} of {len(specs)} reply well (read now; no daemon runs)")
     else:
-        yield fail(
-            "sensors",
+        yield SENSORS.fail(
             "none answers",
             f"at another rate? lfs10d scan {port}; else A and B swapped, no power, or the wrong adapter",
         )
