@@ -6,9 +6,10 @@ The connection has a client id of its own, no will and no queue, and leaves noth
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import secrets
-from collections.abc import Callable, Iterable
+from collections.abc import AsyncIterator, Callable, Iterable
 from typing import Any, Final
 
 from lfs10d.cli.login import Login
@@ -242,6 +243,17 @@ class CommandClient(Acknowledgements):
         if ours or token in (response.get("id"), response.get("transaction")):
             self.response = response
             self.by_response_topic = ours
+
+
+@contextlib.asynccontextmanager
+async def at_daemon(client: CommandClient) -> AsyncIterator[None]:
+    """Connect to a daemon that is online, until the block ends; raises BrokerError, FailedError."""
+    try:
+        await client.connect()
+        await client.require_daemon()
+        yield
+    finally:
+        await client.disconnect()
 
 
 def parsed(payload: bytes) -> Any:  # noqa: ANN401  # any JSON

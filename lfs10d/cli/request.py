@@ -6,24 +6,24 @@ import asyncio
 import json
 import re
 import secrets
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 from pydantic import ValidationError
 
-from lfs10d.cli import EXIT_FAILED, config_option, event_loop, json_option, print_lines, request_words
+from lfs10d.cli import EXIT_FAILED, config_option, event_loop, json_option, print_lines, request_words, requested_scan
 from lfs10d.cli.adopt_loop import AdoptLoop
 from lfs10d.cli.adopt_repeat import ADOPT, repeat
-from lfs10d.cli.client import RETAINED_WITHIN, CommandClient, parsed
+from lfs10d.cli.client import RETAINED_WITHIN, CommandClient, at_daemon, parsed
 from lfs10d.cli.json_text import json_text
 from lfs10d.cli.login import Login, log_in, login_options
 from lfs10d.cli.options import DurationType
 from lfs10d.cli.render.live_lines import health
 from lfs10d.cli.render.response import content_lines, status_line
 from lfs10d.cli.render.spinner import spinning
-from lfs10d.cli.requested_scan import SCAN, scan
+from lfs10d.cli.requested_scan import SCAN
 from lfs10d.commands.handlers.registry import HANDLERS
 from lfs10d.commands.message import LARGEST, Parameters
 from lfs10d.config.loader import load
@@ -149,19 +149,26 @@ def command(**values: Any) -> int:  # noqa: ANN401  # nine options; `_RequestOpt
     content = options.content
     login = log_in(options.config, "request", username=options.username, password_file=options.password_file)
     if options.name == SCAN:
-        return event_loop.run(scan(login, content, options.time_limit, as_json=options.as_json))
-    response = event_loop.run(_ask(options, login, content))
-    if response is None:
-        message = f"no response to {options.name} within {duration_text(options.time_limit or 0)}"
-        raise FailedError(f"{message}; it may or may not have been carried out")
+        work = requested_scan.scan(login, content, options.time_limit, quiet=options.as_json)
+    else:
+        work = _ask(options, login, content)
+    return show(options.name, event_loop.run(work), as_json=options.as_json)
+
+
+def show(name: str, response: Mapping[str, Any], *, as_json: bool) -> int:
+    """Print the response to a request; return the exit code."""
     done = response.get("status") == "ok"
-    if options.as_json:
+    if as_json:
         click.echo(json_text(response, indent=2))
     else:
         click.echo(status_line(response), err=not done)
         data = response.get("data")
-        is_health = options.name == "health" and isinstance(data, dict)
-        print_lines(health(data or {}) if is_health else content_lines(response))
+        if name == SCAN:
+            requested_scan.show(response)
+        elif name == "health" and isinstance(data, dict):
+            print_lines(health(data))
+        else:
+            print_lines(content_lines(response))
     return 0 if done else EXIT_FAILED
 
 
@@ -224,26 +231,26 @@ class _RequestOptions:
         return content_of(parameters, None if known is None else known.spec.parameters)
 
 
-async def _ask(options: _RequestOptions, login: Login, content: dict[str, Any]) -> dict[str, Any] | None:
+async def _ask(options: _RequestOptions, login: Login, content: dict[str, Any]) -> dict[str, Any]:
     devices: list[object] = []
     by_id = request_words.is_slave_id(content.get("device"))
     filters = [Filter(login.topics.full(DEVICES), qos=0, retain_as_published=False)] if by_id else []
     client = CommandClient(login, filters, lambda message: devices.append(parsed(message.payload)))
     try:
-        async with spinning(f"{options.name} ..."):
-            await client.connect()
-            await client.require_daemon()
+        async with spinning(f"{options.name} ..."), at_daemon(client):
             if by_id:
                 await client.wait_until(lambda: bool(devices), RETAINED_WITHIN)
                 device = request_words.named_device(content["device"], devices[-1] if devices else None)
                 content = {**content, "device": device}
-            return await client.request(options.name, content, options.time_limit)
+            response = await client.request(options.name, content, options.time_limit)
     except asyncio.CancelledError:  # Ctrl-C, SIGTERM
         if client.request_sent:
             click.echo(f"lfs10d: {options.name} was sent; this does not cancel it", err=True)
         raise
-    finally:
-        await client.disconnect()
+    if response is None:
+        message = f"no response to {options.name} within {duration_text(options.time_limit or 0)}"
+        raise FailedError(f"{message}; it may or may not have been carried out")
+    return response
 
 
 # What is typed as the parameters of a request

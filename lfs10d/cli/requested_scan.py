@@ -10,12 +10,12 @@ from typing import Any, Final
 
 import click
 
-from lfs10d.cli import EXIT_FAILED, print_lines
-from lfs10d.cli.client import CommandClient, parsed
-from lfs10d.cli.json_text import json_text
+from lfs10d.cli import print_lines
+from lfs10d.cli.client import CommandClient, at_daemon, parsed
 from lfs10d.cli.login import Login
 from lfs10d.cli.render import scan_findings
-from lfs10d.cli.render.response import content_lines, status_line
+from lfs10d.cli.render.foreign import mapping
+from lfs10d.cli.render.response import content_lines
 from lfs10d.cli.render.scan_progress import progress_view
 from lfs10d.errors import FailedError
 from lfs10d.mqtt.messages import Filter, Incoming
@@ -31,9 +31,9 @@ ENDS_WITHIN: Final = 1.4
 """s for a cancelled scan to end; the verb itself must end within 2 s."""
 
 
-async def scan(login: Login, content: dict[str, Any], patience: float | None, *, as_json: bool) -> int:
-    """Have the daemon scan and show its progress; return the exit code. Cancelling ends the scan, too."""
-    with progress_view(quiet=as_json, title=SCAN, remaining="?") as shown:
+async def scan(login: Login, content: dict[str, Any], patience: float | None, *, quiet: bool) -> dict[str, Any]:
+    """Have the daemon scan and show its progress; return the response. Cancelling ends the scan, too."""
+    with progress_view(quiet=quiet, title=SCAN, remaining="?") as shown:
 
         def arrived(message: Incoming) -> None:
             event = parsed(message.payload)
@@ -44,36 +44,28 @@ async def scan(login: Login, content: dict[str, Any], patience: float | None, *,
 
         client = CommandClient(login, [Filter(login.topics.full(EVENT))], arrived)
         cancelled = False
-        try:
-            await client.connect()
-            await client.require_daemon()
-            response = await client.request(SCAN, content, patience)
-        except asyncio.CancelledError:  # Ctrl-C, SIGTERM
-            if not client.request_sent:
-                raise
-            cancelled = True
-            client.send(CANCEL, {"id": secrets.token_hex(6)})
-            await client.wait_until(lambda: client.response is not None, ENDS_WITHIN)
-            response = client.response
-        finally:
-            await client.disconnect()
+        async with at_daemon(client):
+            try:
+                response = await client.request(SCAN, content, patience)
+            except asyncio.CancelledError:  # Ctrl-C, SIGTERM
+                if not client.request_sent:
+                    raise
+                cancelled = True
+                client.send(CANCEL, {"id": secrets.token_hex(6)})
+                await client.wait_until(lambda: client.response is not None, ENDS_WITHIN)
+                response = client.response
     if response is None:
         if cancelled:
             raise FailedError(f"{CANCEL} was sent, but the daemon has not confirmed the end of the scan yet")
         raise FailedError(f"no response to {SCAN} within {duration_text(patience or 0)}; the scan may be under way")
-    return show(response, as_json=as_json)
+    return response
 
 
-def show(response: Mapping[str, Any], *, as_json: bool) -> int:
-    """Print what a scan found; return the exit code."""
-    done = response.get("status") == "ok"
-    if as_json:
-        click.echo(json_text(response, indent=2))
-        return 0 if done else EXIT_FAILED
-    click.echo(status_line(response), err=not done)
-    data = response.get("data")
-    found = data.get("found") if isinstance(data, dict) else None
-    if isinstance(data, dict) and isinstance(found, list):
+def show(response: Mapping[str, Any]) -> None:
+    """Print what a scan found."""
+    data = mapping(response.get("data"))
+    found = data.get("found")
+    if isinstance(found, list):
         rows = [row(each) for each in found if isinstance(each, dict)]
         if rows:
             scan_findings.show(rows)
@@ -81,7 +73,6 @@ def show(response: Mapping[str, Any], *, as_json: bool) -> int:
             click.echo("No device was found.")
         rest = {key: value for key, value in data.items() if key != "found"}
         print_lines(content_lines({"data": rest}) if rest else ())
-    return 0 if done else EXIT_FAILED
 
 
 def row(entry: Mapping[str, Any]) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, field, replace
 from typing import Any, Final
 
-from lfs10d.cli.client import CommandClient
+from lfs10d.cli.client import CommandClient, at_daemon
 from lfs10d.cli.login import Login
 from lfs10d.cli.request import UNLIMITED, USUAL_TIMEOUT
 from lfs10d.errors import BrokerError, FailedError
@@ -116,16 +116,13 @@ class LineActions:
         content = parameters if parameters.get("id") else {**parameters, "id": secrets.token_hex(6)}
         client = self.client(_own(login))
         try:
-            await client.connect()
-            await client.require_daemon()
-            response = await client.request(name, content, None if name in UNLIMITED else USUAL_TIMEOUT)
+            async with at_daemon(client):
+                response = await client.request(name, content, None if name in UNLIMITED else USUAL_TIMEOUT)
         except (BrokerError, FailedError) as error:
             return self._lost(record, 503, str(error))
         except asyncio.CancelledError:
             self._lost(record, 503, ENDED)
             raise
-        finally:
-            await client.disconnect()
         if response is None:
             words = f"No answer within {USUAL_TIMEOUT:g} s; it may or may not have been carried out."
             return self._lost(record, 504, words)

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from lfs10d.cli.adopt_loop import AdoptLoop
 from lfs10d.cli.adopt_repeat import adopt, health
-from lfs10d.cli.client import CommandClient
+from lfs10d.cli.client import CommandClient, at_daemon
 from lfs10d.cli.login import Login
 from lfs10d.cli.render.foreign import mapping
 from lfs10d.errors import BrokerError, FailedError
@@ -89,9 +89,7 @@ class Mounting:
     async def _run(self) -> None:
         client = self._client(self._login)
         try:
-            async with asyncio.timeout(LONGEST):
-                await client.connect()
-                await client.require_daemon()
+            async with asyncio.timeout(LONGEST), at_daemon(client):
                 await self._adopt(client)
             self._words = "All are adopted."
         except (BrokerError, FailedError) as error:
@@ -101,8 +99,6 @@ class Mounting:
         except asyncio.CancelledError:
             self._words = "Ended."
             raise
-        finally:
-            await client.disconnect()
 
     async def _adopt(self, client: CommandClient) -> None:
         await self._check_health(client)

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.cli.requested_scan import row, show
+from lfs10d.cli.request import show
+from lfs10d.cli.requested_scan import SCAN, row
 
 FOUND = {
     "id": 3,
@@ -69,17 +70,17 @@ def test_whatever_the_broker_brings_is_a_row_that_prints(entry: dict[str, Any]) 
 def test_an_ended_scan_shows_what_it_found_and_why_it_ended(capsys: pytest.CaptureFixture[str]) -> None:
     error = {"code": "cancelled", "message": "the scan was ended after 5 of 9 ids"}
     response = {"request": "line/scan", "status": "failed", "error": error, "data": {"found": [FOUND, "noise"]}}
-    assert show(response, as_json=False) == 1
+    assert show(SCAN, response, as_json=False) == 1
     told = capsys.readouterr()
     assert told.err == "line/scan: failed: cancelled: the scan was ended after 5 of 9 ids\n"
     assert [line.split()[0] for line in told.out.splitlines()] == ["id", "3"]
-    assert show(response, as_json=True) == 1
+    assert show(SCAN, response, as_json=True) == 1
     assert json.loads(capsys.readouterr().out) == response
 
 
 def test_who_was_added_is_told_below_the_table(capsys: pytest.CaptureFixture[str]) -> None:
     data = {"found": [], "added": [{"device": "slave-7"}], "not_added": []}
-    assert show({"request": "line/scan", "status": "ok", "error": None, "data": data}, as_json=False) == 0
+    assert show(SCAN, {"request": "line/scan", "status": "ok", "error": None, "data": data}, as_json=False) == 0
     assert capsys.readouterr().out.splitlines() == [
         "line/scan: ok",
         "No device was found.",
@@ -88,4 +89,4 @@ def test_who_was_added_is_told_below_the_table(capsys: pytest.CaptureFixture[str
         "    device: slave-7",
         "not_added: []",
     ]
-    assert show({"request": "line/scan", "status": "rejected", "error": {}, "data": None}, as_json=False) == 1
+    assert show(SCAN, {"request": "line/scan", "status": "rejected", "error": {}, "data": None}, as_json=False) == 1

@@ -5,7 +5,8 @@ A line is a tuple of pieces, each a text and its style in rich's words ("" is pl
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import textwrap
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import tzinfo
 from typing import Final, TypeAlias
 
@@ -231,37 +232,30 @@ def header(
         words.append(f"{_said(line, 'baudrate')} baud {character}")
     if line.get("activity", "polling") != "polling":
         words.append(_said(line, "activity"))
-    load, polls = (line.get("load_pct"), line.get("polls_per_s")) if pace else (None, None)
-    if load is not None:
+    if pace and line.get("load_pct") is not None:
         words.append(f"load {_said(line, 'load_pct')} %")
-    if polls is not None:
+    if pace and line.get("polls_per_s") is not None:
         words.append(f"{_said(line, 'polls_per_s')} polls/s")
-    lines: list[Line] = [((", ".join(words), "bold"),), ((source.words, "" if source.alive else "bold yellow"),)]
+    lines = [(", ".join(words), "bold"), (source.words, "" if source.alive else "bold yellow")]
     if line.get("open") is False and live.line_error is None:
-        lines.append((("the port is not open", "bold red"),))
+        lines.append(("the port is not open", "bold red"))
     if live.line_error is not None:
         trouble = escape(f"{live.line_error_code}: {live.line_error}")
         if live.line_error_code == live.line_error:
             trouble = in_words(live.line_error)
-        lines.append(((trouble + _since(live.line_error_since, wall, zone), "bold red"),))
-    return [piece for whole in lines for piece in _wrapped(whole, width)]
+        lines.append((trouble + _since(live.line_error_since, wall, zone), "bold red"))
+    return [line for text, style in lines for line in _wrapped(text, style, width)]
 
 
 def _said(line: Mapping[str, object], key: str) -> str:
     return escape(str(line.get(key, "?"))[:LONGEST_WORD])
 
 
-def _wrapped(line: Line, width: int) -> Iterable[Line]:
-    """Yield a line of one piece as several that fit."""
-    ((text, style),) = line
-    current = ""
-    for word in text.split(" "):
-        if current and len(current) + 1 + len(word) > width:
-            yield ((current[:width], style),)
-            current = "  " + word
-        else:
-            current = f"{current} {word}" if current else word
-    yield ((current[:width], style),)
+def _wrapped(text: str, style: str, width: int) -> Iterator[Line]:
+    """Yield a text as lines that fit."""
+    parts = textwrap.wrap(text, max(1, width), subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    for part in parts or [""]:
+        yield ((part[:width], style),)
 
 
 def screen(
@@ -281,7 +275,7 @@ def screen(
     width, height = size
     shown = rows(live, source, now=now, wall=wall, zone=zone)
     above = [*header(live, source, width, wall=wall, zone=zone), ()]
-    below = [line for remark in remarks for line in _wrapped(((remark, ""),), width)]
+    below = [line for remark in remarks for line in _wrapped(remark, "", width)]
     legend = f"> moved just now   + came   - went   times: {zone_name(wall * 1000, zone)}   Ctrl-C ends"
     room = max(1, height - len(above) - 3)
     below = [(), *below] if below and len(shown) + len(below) < room else []
