@@ -1,7 +1,7 @@
 """Files that survive a power cut: write, fsync, rename, fsync of the folder.
 
-`Disk` holds the order of the steps, `Files` are the steps; the tests have `Files` that forget at a power cut what was
-not synced.
+`Disk` holds the order of the steps, `Files` are the steps; the tests have some that forget at a power cut what was not
+synced.
 """
 
 from __future__ import annotations
@@ -9,45 +9,19 @@ from __future__ import annotations
 import contextlib
 import os
 from pathlib import Path
-from typing import Protocol
 
 from lfs10d.system.regular_file import read_regular, write_new
 
 
-class Files(Protocol):
-    """The basic steps on a file system. All raise OSError."""
-
-    def read(self, path: Path) -> bytes:
-        """Return the content."""
-
-    def write(self, path: Path, data: bytes, *, mode: int) -> None:
-        """Write a new file in place of an old one; it does not survive a power cut yet."""
-
-    def sync(self, path: Path) -> None:
-        """Wait until the content is on the disk."""
-
-    def rename(self, source: Path, target: Path) -> None:
-        """Put one file in place of another, in one step."""
-
-    def remove(self, path: Path) -> None:
-        """Remove the name."""
-
-    def sync_folder(self, folder: Path) -> None:
-        """Wait until the folder's names are on the disk."""
-
-    def exists(self, path: Path) -> bool:
-        """Return whether there is such a file."""
-
-
-class SystemFiles:
-    """The steps as system calls."""
+class Files:
+    """The basic steps on a file system, as system calls. All raise OSError."""
 
     def read(self, path: Path) -> bytes:
         """Return the content; raises OSError where it is no regular file, and never waits."""
         return read_regular(path)
 
     def write(self, path: Path, data: bytes, *, mode: int) -> None:
-        """Write a new file in place of an old one."""
+        """Write a new file in place of an old one; it does not survive a power cut yet."""
         write_new(path, data, mode=mode)
 
     def sync(self, path: Path) -> None:
@@ -55,7 +29,7 @@ class SystemFiles:
         self._synced(path, os.O_RDONLY)
 
     def rename(self, source: Path, target: Path) -> None:
-        """Put one file in place of another."""
+        """Put one file in place of another, in one step."""
         source.replace(target)
 
     def remove(self, path: Path) -> None:
@@ -85,7 +59,7 @@ class Disk:
     """
 
     def __init__(self, files: Files | None = None) -> None:
-        self.files: Files = SystemFiles() if files is None else files
+        self.files = Files() if files is None else files
 
     def read(self, path: Path) -> bytes:
         """Return the content of a file."""

@@ -14,7 +14,7 @@ from lfs10d.config.changes import OPTIONS, Changes, DeviceChange, Place, Rate, V
 from lfs10d.config.changes_file import ASIDE, FILE_NAME, ChangesFile, FoundChanges, in_words, understood, written
 from lfs10d.config.models import SlaveConfig
 from lfs10d.errors import ConfigError, StateError
-from lfs10d.system.disk import Disk, SystemFiles
+from lfs10d.system.disk import Disk, Files
 from tests.support.volatile_disk import ForgetfulFiles, PowerCutError
 
 STATE = Path("/state")
@@ -273,7 +273,7 @@ def test_what_cannot_be_read_is_reported_and_not_overwritten(tmp_path: Path) -> 
 def test_whoever_may_read_the_folder_may_read_it(tmp_path: Path) -> None:
     before = os.umask(0o022)
     try:
-        ChangesFile(tmp_path, Disk(SystemFiles())).save(ONE)
+        ChangesFile(tmp_path, Disk(Files())).save(ONE)
     finally:
         os.umask(before)
     assert (tmp_path / FILE_NAME).stat().st_mode & 0o777 == 0o640

@@ -1,4 +1,4 @@
-"""Files in memory that forget at a power cut what was not synced: the double of `disk.SystemFiles` for tests.
+"""Files in memory that forget at a power cut what was not synced: the double of `disk.Files` for tests.
 
 A file system may bring un-synced steps to the disk in any order, some and not others: `power_cut` is told which.
 Every step can be the last: `steps_left` counts down and then the power fails before the step has any effect.
@@ -11,6 +11,8 @@ import os
 from collections.abc import Container
 from dataclasses import dataclass, field
 from pathlib import Path
+
+from lfs10d.system.disk import Files
 
 
 class PowerCutError(BaseException):
@@ -26,7 +28,7 @@ class _Content:
 
 
 @dataclass
-class ForgetfulFiles:
+class ForgetfulFiles(Files):
     """`seen` are the names as programs see them, `kept` those on the disk; `steps` the steps taken.
 
     `full` makes every further write fail with ENOSPC once so many bytes were written.

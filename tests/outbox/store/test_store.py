@@ -14,7 +14,7 @@ import pytest
 
 from lfs10d.outbox.losses import Loss
 from lfs10d.outbox.store.store import ASIDE_MOST, FileSetAside, Store, StoreError
-from lfs10d.system.disk import Disk, SystemFiles
+from lfs10d.system.disk import Disk, Files
 from tests.support.rows import BOOT, ROOMY, START, entries, sample
 from tests.support.stores import NOW, keep, kept, names
 
@@ -130,7 +130,7 @@ def test_a_disk_that_damages_file_after_file_is_given_up(store: Store) -> None:
         store.open()
 
 
-class Stubborn(SystemFiles):
+class Stubborn(Files):
     """Files that cannot be renamed."""
 
     def rename(self, source: Path, target: Path) -> None:
