@@ -12,6 +12,7 @@ import logging
 import time
 from collections import deque
 from collections.abc import Mapping
+from functools import partial
 from typing import Protocol
 
 from lfs10d.config.models import Config, LineConfig
@@ -30,6 +31,7 @@ from lfs10d.modbus.port import SerialPort
 from lfs10d.modbus.realtime import sharpen_timers, take_precedence, yield_precedence
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Event
+from lfs10d.system.threads import ThreadFuture
 
 log = logging.getLogger(__name__)
 
@@ -39,11 +41,9 @@ class LineEvents(Protocol):
 
     def on_events(self, events: list[Event]) -> None:
         """Take the events of an exchange, in order."""
-        ...
 
     def on_failure(self, error: BaseException) -> None:
         """Take the internal error that ended the line's thread."""
-        ...
 
 
 class Line:
@@ -110,17 +110,8 @@ class Line:
 
     async def pause(self) -> None:
         """Close the port until `resume`; return when it is free."""
-        freed: asyncio.Future[None] = self._loop.create_future()
-
-        def settle() -> None:
-            if not freed.done():
-                freed.set_result(None)
-
-        def tell() -> None:
-            with contextlib.suppress(RuntimeError):  # the loop is closed: we are ending
-                self._loop.call_soon_threadsafe(settle)
-
-        self.poller.pause(tell)
+        freed: ThreadFuture[None] = ThreadFuture()
+        self.poller.pause(partial(freed.set_result, None))
         self.wake()
         await freed
 

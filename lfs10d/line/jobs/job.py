@@ -49,15 +49,12 @@ class Account(Protocol):
 
     def allows(self, now: float) -> bool:
         """Whether the line may be used now."""
-        ...
 
     def ready_at(self, now: float) -> float:
         """When the line may be used next; not before `now`."""
-        ...
 
     def spend(self, taken: float, now: float) -> None:
         """Note that `taken` s of the line were used."""
-        ...
 
 
 class Job(Protocol):
@@ -70,29 +67,23 @@ class Job(Protocol):
     @property
     def purpose(self) -> Purpose:
         """The purpose of its exchanges."""
-        ...
 
     @property
     def share(self) -> float:
         """The greatest share of the line."""
-        ...
 
     @property
     def excludes(self) -> frozenset[int]:
         """Slave ids that are its own while it runs."""
-        ...
 
     def ask(self, now: float) -> Ask | Hold | Done:
         """Return the next request, or a decision to wait.
 
         What was decided is not sent yet where the slave must rest first: then the job is asked again after that.
         """
-        ...
 
     def on_outcome(self, outcome: Outcome, now: float) -> Next:
         """Take the outcome of the request."""
-        ...
 
     def cut_off(self, now: float) -> None:
         """Note that the job ends early: the port is lost, or its device is no longer configured."""
-        ...
