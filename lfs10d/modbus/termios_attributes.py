@@ -17,15 +17,8 @@ Attributes: TypeAlias = list[Any]
 
 IFLAG, OFLAG, CFLAG, LFLAG, ISPEED, OSPEED, CC = range(7)
 
-SPEEDS = {
-    1200: termios.B1200,
-    2400: termios.B2400,
-    4800: termios.B4800,
-    9600: termios.B9600,
-    19200: termios.B19200,
-    38400: termios.B38400,
-    57600: termios.B57600,
-    115200: termios.B115200,
+SPEEDS: dict[int, int] = {
+    rate: getattr(termios, f"B{rate}") for rate in (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
 }
 _RATES = {speed: rate for rate, speed in SPEEDS.items()}
 

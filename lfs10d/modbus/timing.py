@@ -24,11 +24,10 @@ _PARITIES = ("none", "even", "odd")
 class LineTiming:
     """The times of one rate and character format; `gap` is the silence that precedes every request.
 
-    `bits` per character include start, parity and stop bits; `character`, `t35` and `gap` are seconds.
+    `character`, its start, parity and stop bits included, `t35` and `gap` are seconds.
     """
 
     baudrate: int
-    bits: int
     character: float
     t35: float
     gap: float
@@ -56,7 +55,6 @@ class LineTiming:
         t35 = FIXED_SILENT_INTERVAL if fixed else SILENT_INTERVAL_CHARACTERS * character
         return cls(
             baudrate=baudrate,
-            bits=bits,
             character=character,
             t35=t35,
             gap=t35 + extra_gap,

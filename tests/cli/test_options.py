@@ -21,7 +21,7 @@ def test_they_are_taken_out_of_a_commands_options() -> None:
     line = take(given)
     assert given == {"other": 1}
     assert line.settings(19200) == PortSettings("/dev/x", 19200)
-    assert line.timing(9600).bits == 10
+    assert line.timing(9600).character == 10 / 9600
 
 
 @pytest.mark.parametrize(

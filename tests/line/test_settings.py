@@ -54,7 +54,7 @@ def test_the_line_is_spoken_on_as_configured(loaded: LoadedConfig) -> None:
     timing = timing_of(loaded.config.line)
 
     assert (rules.extra_gap, rules.broadcast_delay, rules.echo) == (0.005, 0.05, "on")
-    assert timing.bits == 12
+    assert timing.character == 12 / 19200
     assert timing.gap == pytest.approx(3.5 * 12 / 19200 + 0.005)
 
 
@@ -77,8 +77,8 @@ def test_a_device_is_read_with_its_calibration(tmp_path: Path) -> None:
     config = load(file)
     calibrated, plain = device_specs(config.config, config.profiles)
     registers = (0x4120, 0x0000)
-    assert calibrated.profile.decode(calibrated.profile.reads()[0], registers) == {"wind_speed": 12.0}
-    assert plain.profile.decode(plain.profile.reads()[0], registers) == {"wind_speed": 10.0}
+    assert calibrated.profile.reads()[0].decode(registers) == {"wind_speed": 12.0}
+    assert plain.profile.reads()[0].decode(registers) == {"wind_speed": 10.0}
 
 
 @pytest.mark.parametrize(("asked", "polled"), [(0, 2.0), (2, 2.0), (3, 3.0)])
@@ -110,7 +110,7 @@ def test_registers_are_accessed_as_the_device_is_polled_or_as_the_line_usually_s
 def test_a_scan_looks_at_the_lines_own_rate_first_and_at_both_of_an_lfs10(loaded: LoadedConfig) -> None:
     found = scan_plan(loaded, (1, 2), (), share=0.3)
     assert [timing.baudrate for timing in found.timings] == [19200, 9600]
-    assert all(timing.bits == timing_of(loaded.config.line).bits for timing in found.timings)
+    assert all(timing.character * timing.baudrate == pytest.approx(12) for timing in found.timings)
     assert (found.ids, found.line_rate, found.share) == ((1, 2), 19200, 0.3)
     assert found.codec.checksum is Checksum.CRC, "not all devices have the same one"
     assert found.profiles[0].name == "lfs10"
