@@ -34,12 +34,11 @@ class Locator:
         now = self._runner.running()
         contested: dict[str, tuple[Place, ...]] = {}
         for slave in now.config.slaves:
-            places = now.places[slave.name]
-            if len(places) > 1 and slave.name in now.conflicts:
-                contested[slave.name] = tuple(place for place in places if place.id != slave.id)
-            elif len(places) > 1:
-                contested[slave.name] = places
-        return {name: places for name, places in contested.items() if places}
+            places, conflict = now.places[slave.name], slave.name in now.conflicts
+            free = tuple(place for place in places if not (conflict and place.id == slave.id))
+            if len(places) > 1 and free:
+                contested[slave.name] = free
+        return contested
 
     def withheld(self) -> frozenset[str]:
         """Return the devices that must not be polled before they were found."""
@@ -51,15 +50,11 @@ class Locator:
         """Search for every contested device whose turn it is, unless that is under way."""
         if self._runner.ending:
             return
-        contested = self.contested()
-        turn = in_turn(
-            {name: places for name, places in contested.items() if self._answered_nowhere.get(name) != places}
-        )
+        contested, withheld = self.contested(), self.withheld()
+        waiting = withheld - in_turn({name: contested[name] for name in withheld})
         self._searches.end_all(but=contested.items())
         for name, places in contested.items():
-            if (name, places) in self._searches:
-                continue
-            if name not in turn and self._answered_nowhere.get(name) != places:
+            if name in waiting or (name, places) in self._searches:
                 continue
             now = self._runner.running()
             slave = now.slave(name)
