@@ -87,7 +87,7 @@ def _meaning(exchange: Exchanged, device: TracedDevice) -> str | None:
     place = next((at for at, read in enumerate(reads) if read == (head[1], address, count)), None)
     if place is None:
         return None
-    decoded = device.profile.decode(device.profile.reads()[place], registers)
+    decoded = device.profile.reads()[place].decode(registers)
     if isinstance(decoded, Fault):
         return decoded.message
     units = device.profile.units

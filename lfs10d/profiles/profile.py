@@ -19,8 +19,7 @@ from lfs10d.profiles.facts import Facts, Place, Register, Registered, Sentence, 
 from lfs10d.profiles.manual_numbers import hint_for_address
 from lfs10d.profiles.settings import Setting
 from lfs10d.profiles.values import Value
-from lfs10d.reading import Fault, Number
-from lfs10d.reading import Value as Published
+from lfs10d.reading import Number
 from lfs10d.schema.fields import Duration, Hexadecimal, Name, Whole
 
 FramingName: TypeAlias = Literal["rtu", "ascii"]
@@ -301,10 +300,6 @@ class Profile(Facts):
             return self.batched(required) if len(required) < len(block.values) else ()
         alone = self.alone(block.values)
         return alone if len(alone) > 1 else ()
-
-    def decode(self, block: Block, registers: tuple[int, ...]) -> dict[str, Published] | Fault:
-        """Return the values of `block` that are available, or the first fault: `not_finite` or `out_of_range`."""
-        return block.decode(registers)
 
 
 def _words_per_read(data: dict[str, Any]) -> int:

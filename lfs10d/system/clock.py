@@ -25,6 +25,7 @@ MARK = Path("/run/systemd/timesync/synchronized")
 
 QUESTION = ("timedatectl", "show", "--property=NTPSynchronized", "--value")
 """org.freedesktop.timedate1 in words; prints yes or no."""
+ANSWERS: dict[str | None, ClockState] = {"yes": "synced", "no": "unsynced"}
 
 PATIENCE = 2.0
 """Seconds that timedate1 may take: the question starts it."""
@@ -56,13 +57,7 @@ def look(*, mark: Path = MARK, question: Sequence[str] = QUESTION, patience: flo
 
 def judge(answer: str | None) -> ClockState:
     """Take timedate1's answer, None if there was none."""
-    match answer:
-        case "yes":
-            return "synced"
-        case "no":
-            return "unsynced"
-        case _:
-            return "unknown"
+    return ANSWERS.get(answer, "unknown")
 
 
 def _ask(question: Sequence[str], patience: float) -> str | None:

@@ -42,7 +42,7 @@ def polled(profile: Profile, codec: Codec, answers: list[bytes]) -> dict[str, ob
     for block, answer in zip(profile.reads(), answers, strict=True):
         body = codec.unwrap(answer)
         assert body is not None
-        values = profile.decode(block, codec.decode(body))
+        values = block.decode(codec.decode(body))
         assert not isinstance(values, Fault)
         numbers |= values
     return numbers

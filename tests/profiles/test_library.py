@@ -96,7 +96,7 @@ def decoded(profile: Profile, *answers: str) -> dict[str, object]:
     for block, answer in zip(profile.reads(), answers, strict=True):
         content = bytes.fromhex(answer)
         registers = tuple(int.from_bytes(content[at : at + 2], "big") for at in range(0, len(content), 2))
-        values = profile.decode(block, registers)
+        values = block.decode(registers)
         assert not isinstance(values, Fault)
         numbers |= values
     return numbers
@@ -273,7 +273,7 @@ def test_the_wind_vane_of_the_page_is_a_profile_that_a_simulated_vane_plays() ->
     direction, point = blueprint_of(profile).signals
     (block,) = profile.reads()
     registers = direction.words(217.3) + point.words(10)
-    assert profile.decode(block, registers) == {"wind_direction": 217.3, "compass_point": 10}
+    assert block.decode(registers) == {"wind_direction": 217.3, "compass_point": 10}
 
 
 def test_the_page_shows_the_wind_vane_as_it_is() -> None:

@@ -54,8 +54,8 @@ def test_the_reads_are_the_same_objects_every_time(profile_of: Build) -> None:
 def test_a_block_becomes_numbers_or_one_fault(profile_of: Build) -> None:
     profile = profile_of(values=TWO_VALUES)
     (block,) = profile.reads()
-    assert profile.decode(block, (7, 0x0000, 0x4010)) == {"level": 7, "volume": 2.25}
-    fault = profile.decode(block, (7, 0x0000, 0x4120))
+    assert block.decode((7, 0x0000, 0x4010)) == {"level": 7, "volume": 2.25}
+    fault = block.decode((7, 0x0000, 0x4120))
     assert fault == Fault(FaultCode.OUT_OF_RANGE, "volume 10 m3 is outside 0..9 m3")
 
 
@@ -263,8 +263,8 @@ def test_a_calibrated_profile_reads_the_same_and_says_other_numbers(profile_of: 
     calibrated = profile.calibrated({"level": (2, 3), "depth": (1, 1)})
     assert [(read.address, read.count) for read in calibrated.reads()] == [(1, 3)]
     (read,), (plain,) = calibrated.reads(), profile.reads()
-    assert calibrated.decode(read, (7, 0, 0x3FC0)) == {"level": 17, "volume": 1.5}
-    assert profile.decode(plain, (7, 0, 0x3FC0)) == {"level": 7, "volume": 1.5}
+    assert read.decode((7, 0, 0x3FC0)) == {"level": 17, "volume": 1.5}
+    assert plain.decode((7, 0, 0x3FC0)) == {"level": 7, "volume": 1.5}
 
 
 def test_a_calibrated_profile_knows_what_the_maker_says(profile_of: Build) -> None:

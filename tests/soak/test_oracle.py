@@ -50,7 +50,7 @@ def test_the_daemon_believes_the_least_and_the_greatest_value(bits: int) -> None
     profile = load_profile("lfs10", relative_to=Path())
     (block,) = profile.reads()
     (value,) = struct.unpack(">f", bits.to_bytes(4, "big"))
-    decoded = profile.decode(block, struct.unpack(">HH", bits.to_bytes(4, "big")))
+    decoded = block.decode(struct.unpack(">HH", bits.to_bytes(4, "big")))
     assert isinstance(decoded, dict)
     assert decoded["wind_speed"] == pytest.approx(value, rel=1e-7)
 

@@ -241,7 +241,7 @@ class Identification:
             if outcome is None and evidence is _Evidence.OWN_ID and self._found.duplicate:
                 continue  # two such devices, whose values collide
             if outcome is not None and outcome.answer is not None:
-                read = profile.decode(block, outcome.answer)
+                read = block.decode(outcome.answer)
                 if not isinstance(read, Fault):
                     words += block.count
                     values |= read
