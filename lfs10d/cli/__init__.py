@@ -118,6 +118,17 @@ def json_option(function: Callable[..., Any]) -> Callable[..., Any]:
     return click.option("--json", "as_json", is_flag=True, help="Print JSON for programs.")(function)
 
 
+def printing_option(name: str, text: str, lines: Callable[[], Iterable[str]]) -> Callable[..., Any]:
+    """Return a flag that prints these lines in place of what the verb does; `text` is its help."""
+
+    def callback(context: click.Context, _: click.Parameter, wanted: bool) -> None:  # noqa: FBT001  # as click calls it
+        if wanted and not context.resilient_parsing:
+            print_lines(lines())
+            context.exit()
+
+    return click.option(name, is_flag=True, is_eager=True, expose_value=False, callback=callback, help=text)
+
+
 def print_lines(lines: Iterable[str], *, err: bool = False) -> None:
     """Print each line as it comes, on standard error if `err`."""
     for line in lines:

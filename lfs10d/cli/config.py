@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from lfs10d.cli import EXIT_FAILED, config_option, json_option, print_lines, state_option
+from lfs10d.cli import EXIT_FAILED, config_option, json_option, print_lines, printing_option, state_option
 from lfs10d.cli.effective_file import with_changes
 from lfs10d.cli.json_text import json_text
 from lfs10d.cli.render.table import columns
@@ -38,23 +38,14 @@ Examples:
 """
 
 
-def _print_schema(context: click.Context, _: click.Parameter, wanted: bool) -> None:  # noqa: FBT001 - as click calls it
-    if wanted:
-        click.echo(json.dumps(json_schema(), indent=2, ensure_ascii=False))
-        context.exit()
+def _schema() -> list[str]:
+    return [json.dumps(json_schema(), indent=2, ensure_ascii=False)]
 
 
 @click.command("config", epilog=EXAMPLES)
 @config_option
 @click.option("--merged", is_flag=True, help="Print YAML to put into the file.")
-@click.option(
-    "--schema",
-    is_flag=True,
-    is_eager=True,
-    expose_value=False,
-    callback=_print_schema,
-    help="Print the JSON Schema of the file; nothing is read.",
-)
+@printing_option("--schema", "Print the JSON Schema of the file; nothing is read.", _schema)
 @state_option
 @json_option
 def command(config: Path, state_dir: Path | None, *, merged: bool, as_json: bool) -> int:

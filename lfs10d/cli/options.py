@@ -120,11 +120,11 @@ def id_list(context: click.Context, parameter: click.Parameter, value: str) -> t
         raise click.BadParameter(str(error), context, parameter) from error
 
 
-def baudrate_of(text: str) -> int:
-    """Return the rate that a text names; raises click.BadParameter."""
-    text = text.strip()
+def baudrate(context: click.Context, parameter: click.Parameter, value: str) -> int:
+    """Return the rate that a text names: the callback of an option; raises click.BadParameter."""
+    text = value.strip()
     if text not in map(str, BAUDRATES):
-        raise click.BadParameter(f"{text!r} is not one of {', '.join(map(str, BAUDRATES))}")
+        raise click.BadParameter(f"{text!r} is not one of {', '.join(map(str, BAUDRATES))}", context, parameter)
     return int(text)
 
 

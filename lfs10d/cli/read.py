@@ -16,7 +16,7 @@ from lfs10d.cli import EXIT_FAILED, EXIT_UNAVAILABLE, json_option, print_lines
 from lfs10d.cli.calibrated import NONE, Calibrations, calibration_option, calibrations_of
 from lfs10d.cli.direct_line import DirectLine
 from lfs10d.cli.local_time import clock_text, stamp
-from lfs10d.cli.options import PORT, DurationType, LineOptions, SlaveId, baudrate_of, line_options, profile_names, take
+from lfs10d.cli.options import PORT, DurationType, LineOptions, SlaveId, baudrate, line_options, profile_names, take
 from lfs10d.cli.port_holder import instead
 from lfs10d.cli.render import troubleshooting
 from lfs10d.errors import PortBusyError
@@ -51,11 +51,6 @@ Examples:
 """
 
 
-def _rate(context: click.Context, parameter: click.Parameter, value: str) -> int:
-    del context, parameter
-    return baudrate_of(value)
-
-
 @click.command("read", epilog=EXAMPLES)
 @click.argument("port", type=PORT)
 @click.argument("slave", metavar="ID", type=SlaveId())
@@ -67,7 +62,7 @@ def _rate(context: click.Context, parameter: click.Parameter, value: str) -> int
     shell_complete=profile_names,
     help="Kind of device.",
 )
-@click.option("--baudrate", callback=_rate, default="9600", metavar="RATE", help="The sensor's rate.")
+@click.option("--baudrate", callback=baudrate, default="9600", metavar="RATE", help="The sensor's rate.")
 @click.option(
     "--checksum", type=click.Choice(["crc", "sum"]), default=None, help="Check of the rtu frames, if not the profile's."
 )

@@ -13,7 +13,16 @@ from typing import Any
 import click
 from pydantic import ValidationError
 
-from lfs10d.cli import EXIT_FAILED, config_option, event_loop, json_option, print_lines, request_words, requested_scan
+from lfs10d.cli import (
+    EXIT_FAILED,
+    config_option,
+    event_loop,
+    json_option,
+    print_lines,
+    printing_option,
+    request_words,
+    requested_scan,
+)
 from lfs10d.cli.adopt_loop import AdoptLoop
 from lfs10d.cli.adopt_repeat import ADOPT, repeat
 from lfs10d.cli.client import RETAINED_WITHIN, CommandClient, at_daemon, parsed
@@ -103,24 +112,10 @@ class _Command(click.Command):
             formatter.write("\n".join(request_words.help_of(name)) + "\n")
 
 
-def _list(context: click.Context, parameter: click.Parameter, wanted: bool) -> None:  # noqa: FBT001  # as click calls it
-    del parameter
-    if wanted and not context.resilient_parsing:
-        print_lines(request_words.listing())
-        context.exit()
-
-
 @click.command("request", cls=_Command, epilog=EXAMPLES)
 @click.argument("name", callback=_name, shell_complete=_complete)
 @click.argument("parameters", nargs=-1, metavar="[KEY=VALUE]...", shell_complete=_complete_parameter)
-@click.option(
-    "--list",
-    is_flag=True,
-    is_eager=True,
-    expose_value=False,
-    callback=_list,
-    help="Print every request with its parameters.",
-)
+@printing_option("--list", "Print every request with its parameters.", request_words.listing)
 @config_option
 @click.option(
     "--timeout",

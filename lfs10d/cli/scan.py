@@ -15,7 +15,7 @@ import click
 from lfs10d.cli import EXIT_FAILED, EXIT_UNAVAILABLE, json_option, print_lines
 from lfs10d.cli.calibrated import NONE, Calibrations, calibration_option, calibrations_of
 from lfs10d.cli.direct_line import DirectLine
-from lfs10d.cli.options import PORT, LineOptions, baudrate_of, id_list, line_options, take
+from lfs10d.cli.options import PORT, LineOptions, baudrate, id_list, line_options, take
 from lfs10d.cli.port_holder import instead
 from lfs10d.cli.render import scan_findings, troubleshooting
 from lfs10d.cli.render.scan_progress import scan_view
@@ -41,8 +41,7 @@ Examples:
 
 
 def _rates(context: click.Context, parameter: click.Parameter, value: str) -> tuple[int, ...]:
-    del context, parameter
-    return tuple(dict.fromkeys(baudrate_of(part) for part in value.split(",")))
+    return tuple(dict.fromkeys(baudrate(context, parameter, part) for part in value.split(",")))
 
 
 def _new_file(context: click.Context, parameter: click.Parameter, value: Path | None) -> Path | None:

@@ -180,11 +180,12 @@ def _profiles(
 ) -> tuple[dict[str, Profile], list[Problem]]:
     profiles: dict[str, Profile] = {}
     problems: list[Problem] = []
-    failed: set[str] = set()
+    tried: set[str] = set()
     for index, slave in enumerate(config.slaves):
         name, keys = slave.profile, ("slaves", index, "profile")
-        if name in profiles or name in failed or _concerns(keys, wrong):
+        if name in tried or _concerns(keys, wrong):
             continue
+        tried.add(name)
         try:
             if name not in builtin_names():
                 readable(folder / name)
@@ -195,8 +196,6 @@ def _profiles(
             problems.append(document.problem(keys, message))
         except ConfigError as error:
             problems += error.problems
-        if name not in profiles:
-            failed.add(name)
     return profiles, problems
 
 

@@ -16,6 +16,7 @@ import uvicorn
 from starlette.types import ASGIApp
 
 from lfs10d.cli.login import Login
+from lfs10d.config.credentials import reason
 from lfs10d.errors import BrokerError
 from lfs10d.schema.addresses import node_text
 from lfs10d.system.secret import Secret
@@ -110,8 +111,7 @@ def listening(host: str, port: int) -> socket.socket:
         listener.bind(address)
         listener.listen(BACKLOG)
     except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise BrokerError(f"cannot listen on {place}: {reason}; choose another with --listen") from None
+        raise BrokerError(f"cannot listen on {place}: {reason(error)}; choose another with --listen") from None
     listener.setblocking(False)  # noqa: FBT003  # of the library
     return listener
 

@@ -7,7 +7,7 @@ from typing import Any
 import click
 import pytest
 
-from lfs10d.cli.options import DurationType, baudrate_of, take
+from lfs10d.cli.options import DurationType, baudrate, take
 from lfs10d.modbus.port_settings import PortSettings
 
 
@@ -44,10 +44,12 @@ def test_rtu_needs_eight_data_bits() -> None:
 
 
 def test_a_rate_is_one_of_the_known_ones() -> None:
-    assert baudrate_of(" 19200 ") == 19200
+    option = click.Option(["--baudrate"])
+    context = click.Context(click.Command("read"))
+    assert baudrate(context, option, " 19200 ") == 19200
     for text in ("", "9601", "9600.0", "²"):
         with pytest.raises(click.BadParameter, match="is not one of 1200"):
-            baudrate_of(text)
+            baudrate(context, option, text)
 
 
 @pytest.mark.parametrize(("text", "duration"), [("250ms", 0.25), ("2m", 120.0), ("5", 5.0), ("0.5", 0.5), ("0", 0.0)])

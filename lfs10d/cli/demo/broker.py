@@ -38,12 +38,8 @@ class Broker:
 
 def known(wanted: str = "auto") -> tuple[str, ...]:
     """Return the brokers that are installed, the better first; only `wanted` if that is one of them."""
-    found = []
-    if shutil.which("mosquitto", path=_PLACES):
-        found.append("mosquitto")
-    if importlib.util.find_spec("amqtt"):
-        found.append("amqtt")
-    return tuple(name for name in found if wanted in {"auto", name})
+    found = {"mosquitto": shutil.which("mosquitto", path=_PLACES), "amqtt": importlib.util.find_spec("amqtt")}
+    return tuple(name for name, there in found.items() if there and wanted in {"auto", name})
 
 
 async def start_broker(children: Children, wanted: str = "auto") -> Broker:

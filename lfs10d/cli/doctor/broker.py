@@ -14,6 +14,7 @@ from typing import Final
 from lfs10d.cli.client import Acknowledgements
 from lfs10d.cli.doctor.finding import Area, Finding
 from lfs10d.cli.login import Login
+from lfs10d.config.credentials import reason
 from lfs10d.errors import BrokerError
 from lfs10d.mqtt.broker_client import BrokerClient
 from lfs10d.mqtt.connection import Connection
@@ -93,8 +94,9 @@ def reach(node: BrokerSettings, now: float | None = None) -> Iterator[Finding]:
     try:
         connection = socket.create_connection((node.host, node.port), REACHED_WITHIN)
     except OSError as error:
-        why = (error.strerror or str(error)).lower()
-        yield BROKER.fail(f"{node.place}: {why}", "does the broker run, and listen there? is a firewall between?")
+        yield BROKER.fail(
+            f"{node.place}: {reason(error)}", "does the broker run, and listen there? is a firewall between?"
+        )
         return
     with connection:
         if node.tls is None:

@@ -24,26 +24,17 @@ def explain(profile: Profile) -> list[Table]:
     values = [_value(value) for value in profile.values]
     some_have_none = any(value.unavailable for value in profile.values)
     heads = ("name", "registers", "content", "number", "valid", *(["no value"] if some_have_none else []), "")
-    tables = [
+    displayed = [value for value in profile.values if value.precision is not None or value.device_class is not None]
+    displays = tuple((value.name, value.device_class or "", _decimals(value.precision)) for value in displayed)
+    settings = tuple(_setting(setting) for setting in profile.settings)
+    tables = (
         Table(f"{profile.title} (profile {profile.name})", (), tuple(_device(profile))),
         Table("Values in a sample", heads, tuple(row if some_have_none else (*row[:5], row[6]) for row in values)),
-    ]
-    displayed = [value for value in profile.values if value.precision is not None or value.device_class is not None]
-    if displayed:
-        rows = tuple((value.name, value.device_class or "", _decimals(value.precision)) for value in displayed)
-        tables.append(Table("On displays", ("name", "kind", "precision"), rows))
-    if profile.settings:
-        tables.append(
-            Table(
-                "Settings of the device",
-                ("name", "register", "content", "allowed", "writable", ""),
-                tuple(_setting(setting) for setting in profile.settings),
-            )
-        )
-    remarks = tuple(_remarks(profile))
-    if remarks:
-        tables.append(Table("Sources and notes", (), remarks))
-    return tables
+        Table("On displays", ("name", "kind", "precision"), displays),
+        Table("Settings of the device", ("name", "register", "content", "allowed", "writable", ""), settings),
+        Table("Sources and notes", (), tuple(_remarks(profile))),
+    )
+    return [table for table in tables if table.rows]
 
 
 def _device(profile: Profile) -> Iterator[Row]:
