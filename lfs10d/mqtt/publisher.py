@@ -84,11 +84,7 @@ class Publisher:
 
     def set_line_error(self, code: LineFaultCode, message: str | None) -> None:
         """Raise an error of the line, or clear it (None)."""
-        now = self._clock.now()
-        if message is None:
-            self.publish(self._station.line_recovered(code, now))
-        else:
-            self.publish(self._station.line_failed(code, message, now))
+        self.publish(self._station.set_line_error(code, message, self._clock.now()))
 
     def configure(self, line: LineInfo, devices: Iterable[DeviceInfo]) -> None:
         """Publish the changes of the line and its devices."""

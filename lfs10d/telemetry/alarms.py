@@ -86,8 +86,7 @@ class DeviceAlarm:
         """An error of the polls is active."""
         self._run: _Run | None = None
         self._lasting: _Run | None = None
-        self._last_code: FaultCode | None = None
-        self._cleared: int | None = None
+        self._inactive = _inactive(None, None)
 
     def failed(self, fault: Fault, ts: int) -> bool:
         """Count one failed poll; return whether the error became active or changed its code."""
@@ -109,8 +108,7 @@ class DeviceAlarm:
         if run is None or not self.active:
             return False
         self.active = False
-        self._last_code = run.fault.code
-        self._cleared = ts
+        self._inactive = _inactive(run.fault.code, ts)
         return True
 
     def set_lasting(self, fault: Fault | None, ts: int) -> bool:
@@ -119,8 +117,7 @@ class DeviceAlarm:
         if fault is None:
             self._lasting = None
             if before is not None and not self.active:
-                self._last_code = before.fault.code
-                self._cleared = ts
+                self._inactive = _inactive(before.fault.code, ts)
         elif before is None:
             self._lasting = _Run(fault, ts, ts)
         return (before is None) is not (self._lasting is None)
@@ -133,7 +130,7 @@ class DeviceAlarm:
             return run.payload(codes if lasting is None else [*codes, lasting.fault.code.value])
         if lasting is not None:
             return lasting.payload([])
-        return _inactive(self._last_code, self._cleared)
+        return self._inactive
 
 
 class LineAlarm:
@@ -141,8 +138,7 @@ class LineAlarm:
 
     def __init__(self) -> None:
         self._runs: dict[FaultCode, _Run] = {}
-        self._last_code: FaultCode | None = None
-        self._cleared: int | None = None
+        self._inactive = _inactive(None, None)
 
     @property
     def _shown(self) -> _Run | None:
@@ -172,15 +168,14 @@ class LineAlarm:
             self._runs.pop(code, None)
         if shown is self._shown or shown is None:
             return False
-        self._last_code = shown.fault.code
-        self._cleared = ts
+        self._inactive = _inactive(shown.fault.code, ts)
         return True
 
     def payload(self) -> dict[str, object]:
         """Return the error object; `also` lists the other active codes."""
         shown = self._shown
         if shown is None:
-            return _inactive(self._last_code, self._cleared)
+            return self._inactive
         others = [code.value for code in PRECEDENCE if code in self._runs and code != shown.fault.code]
         return shown.payload(others)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import Counter, deque
 from collections.abc import Iterable
 from math import ceil, floor
+from typing import NamedTuple
 
 from lfs10d.reading import PORT_CODES, Exchanged, FaultCode, Purpose, Reading, UartCounters
 from lfs10d.system.dataclass import dataclass
@@ -48,17 +49,12 @@ class _Second:
     longest: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Rates:
+class Rates(NamedTuple):
     """The last half minute: load in per cent, polls per s, longest s between two polls of one device."""
 
     load_pct: float | None
     polls_per_s: float | None
     cycle_s: float | None
-
-    def payload(self) -> dict[str, object]:
-        """Return the three as they are published."""
-        return {"load_pct": self.load_pct, "polls_per_s": self.polls_per_s, "cycle_s": self.cycle_s}
 
 
 class LineCounters:
@@ -133,7 +129,7 @@ class LineCounters:
         return {
             "v": VERSION,
             "ts": ts,
-            **self.rates(now).payload(),
+            **self.rates(now)._asdict(),
             "gap_required_us": scaled(gap_required, 1e6, 1),
             "gap_us": {
                 "min": scaled(self._least_gap, 1e6, 1),
@@ -151,11 +147,7 @@ class LineCounters:
                 "overrun": uart.overrun,
                 "break": uart.breaks,
             },
-            "store": {
-                "depth": backlog.depth,
-                "oldest_ts": backlog.oldest_ts,
-                "dropped": backlog.dropped,
-            },
+            "store": backlog._asdict(),
         }
 
     def _failed(self, code: FaultCode) -> None:

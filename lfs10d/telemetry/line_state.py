@@ -102,7 +102,7 @@ class LineState:
         return {
             "name": self.info.name,
             **self._payload(),
-            **self.counters.rates(now.mono).payload(),
+            **self.counters.rates(now.mono)._asdict(),
             "error": self._alarm.payload(),
         }
 

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import field
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
-from typing import Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 from lfs10d.reading import NOTHING, FaultCode, Value
 from lfs10d.system.clock_step import ClockState
@@ -185,8 +185,7 @@ class Publication:
     refresh: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class BacklogStats:
+class BacklogStats(NamedTuple):
     """What waits for the broker: samples, epoch ms of the oldest (None: none), samples evicted since boot."""
 
     depth: int = 0

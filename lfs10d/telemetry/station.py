@@ -213,13 +213,15 @@ class Station:
         """Take whether the broker permits requests: `denied` if it refused the subscription."""
         return self._watch_clock(now) + self._line.on_requests(requests)
 
-    def line_failed(self, code: LineFaultCode, message: str, now: Instant) -> list[Publication]:
-        """Raise an error of the line that is not the port's: `wrong_rate`, `storage_full`, `duplicate_client`."""
-        return self._watch_clock(now) + self._line.failed(code, message, now.ts())
+    def set_line_error(self, code: LineFaultCode, message: str | None, now: Instant) -> list[Publication]:
+        """Raise an error of the line that is not the port's, or clear it (None).
 
-    def line_recovered(self, code: LineFaultCode, now: Instant) -> list[Publication]:
-        """Clear such an error, if it is active."""
-        return self._watch_clock(now) + self._line.recovered(frozenset({code}), now)
+        They are `wrong_rate`, `storage_full` and `duplicate_client`.
+        """
+        published = self._watch_clock(now)
+        if message is None:
+            return published + self._line.recovered(frozenset({code}), now)
+        return published + self._line.failed(code, message, now.ts())
 
     def snapshot(self, now: Instant) -> dict[str, object]:
         """Return the data of a live view: the line, its error and rates, every device."""

@@ -215,7 +215,7 @@ def test_a_load_of_half_the_time_is_half() -> None:
 def test_within_the_first_second_the_cycle_is_known_and_after_it_the_rates() -> None:
     counters = LineCounters(START)
     counters.polled(reading(START + 0.5), 0.25)
-    assert counters.rates(START + 0.9).payload() == {"load_pct": None, "polls_per_s": None, "cycle_s": 0.25}
+    assert counters.rates(START + 0.9)._asdict() == {"load_pct": None, "polls_per_s": None, "cycle_s": 0.25}
     assert counters.rates(START + 1.0).polls_per_s == 1.0
 
 

@@ -164,11 +164,11 @@ def test_new_facts_about_the_daemon_are_told_once() -> None:
 
 def test_errors_from_elsewhere_are_errors_of_the_line() -> None:
     running = station()
-    assert topics(running.line_failed(FaultCode.STORAGE_FULL, "disk full", instant(1))) == ["line/error"]
-    assert running.line_failed(FaultCode.STORAGE_FULL, "disk full", instant(2)) == []
+    assert topics(running.set_line_error(FaultCode.STORAGE_FULL, "disk full", instant(1))) == ["line/error"]
+    assert running.set_line_error(FaultCode.STORAGE_FULL, "disk full", instant(2)) == []
     assert fields(shown(running, "line/error"), "code", "count") == ("storage_full", 2)
-    assert topics(running.line_recovered(FaultCode.STORAGE_FULL, instant(3))) == ["line/error"]
-    assert running.line_recovered(FaultCode.STORAGE_FULL, instant(4)) == []
+    assert topics(running.set_line_error(FaultCode.STORAGE_FULL, None, instant(3))) == ["line/error"]
+    assert running.set_line_error(FaultCode.STORAGE_FULL, None, instant(4)) == []
 
 
 def test_when_the_clock_is_set_the_start_is_told_by_it() -> None:
@@ -233,7 +233,7 @@ def test_a_snapshot_is_plain_json_with_line_and_devices() -> None:
     running = station()
     running.on_event(PortChanged(0, None), instant(0))
     running.on_event(good("a", 1), instant(1))
-    running.line_failed(FaultCode.STORAGE_FULL, "disk full", instant(2))
+    running.set_line_error(FaultCode.STORAGE_FULL, "disk full", instant(2))
     snapshot = json.loads(json.dumps(running.snapshot(instant(2)), allow_nan=False))
     assert (snapshot["v"], snapshot["info"]["boot"]) == (1, "k3f9a2c7")
     assert (snapshot["line"]["name"], snapshot["line"]["open"], snapshot["line"]["polls_per_s"]) == (

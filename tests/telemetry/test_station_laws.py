@@ -63,8 +63,8 @@ steps = st.one_of(
 WORDS: dict[str, Callable[[Station, Instant], list[Publication]]] = {
     "tick": Station.tick,
     "burst": Station.burst,
-    "full": lambda running, now: running.line_failed(FaultCode.STORAGE_FULL, "disk full", now),
-    "empty": lambda running, now: running.line_recovered(FaultCode.STORAGE_FULL, now),
+    "full": lambda running, now: running.set_line_error(FaultCode.STORAGE_FULL, "disk full", now),
+    "empty": lambda running, now: running.set_line_error(FaultCode.STORAGE_FULL, None, now),
 }
 
 

@@ -35,7 +35,7 @@ class WindClock:
     """Begins at `now`."""
 
     def __init__(self, now: Instant) -> None:
-        self._shift = _shift(now)
+        self._shift = round((now.wall - now.mono) * 1000)
 
     def at(self, reading_at: float, now: Instant) -> int:
         """Return the time of a reading, whose time by the monotonic clock is `reading_at`, as seen at `now`."""
@@ -48,7 +48,3 @@ class WindClock:
         """Return the moment `now`."""
         ts = now.ts()
         return WindMoment(self.at(now.mono, now), ts, now.clock)
-
-
-def _shift(now: Instant) -> int:
-    return round((now.wall - now.mono) * 1000)

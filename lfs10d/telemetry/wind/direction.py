@@ -159,22 +159,12 @@ class DirectionSeries(HeldSeries):
         north, east = sum(cos(angle) * time for angle, time in pairs), sum(sin(angle) * time for angle, time in pairs)
         return Sums(sum(time for _, time in pairs), north, east)
 
-    def _settle(self, held: int) -> None:
+    def _newest(self, held: int) -> Sums:
         angle = radians(self._newest_kept / self._scale)
-        self._open_covered += held
-        self._open_first += cos(angle) * held
-        self._open_second += sin(angle) * held
-
-    def _open(self, until: int) -> Sums:
-        held, angle = until + self._origin - self.newest, radians(self._newest_kept / self._scale)
-        north, east = self._open_first + cos(angle) * held, self._open_second + sin(angle) * held
-        return Sums(self._open_covered + held, north, east)
+        return Sums(held, cos(angle) * held, sin(angle) * held)
 
     def _took(self, at: int, kept: float) -> None:  # noqa: ARG002 - a direction's time is of no further use
         self._open_seen |= 1 << (round(kept / self._scale) % CIRCLE or CIRCLE)
-
-    def _gap(self) -> None:
-        """No direction spoils another."""
 
     def _close(self) -> None:
         self._samples.append(BLOCK - self._open_gaps)
@@ -187,9 +177,3 @@ class DirectionSeries(HeldSeries):
     def _drop(self, blocks: int) -> None:
         super()._drop(blocks)
         del self._samples[:blocks], self._seen[: blocks * SEEN_BYTES]
-
-    def _start(self, kept: float) -> None:
-        """Nothing depends on it."""
-
-    def _scaled_down(self) -> None:
-        """Nothing is in parts of a degree."""

@@ -80,10 +80,8 @@ class HeldSeries:
         "_covered",
         "_first",
         "_newest_kept",
-        "_open_covered",
-        "_open_first",
         "_open_gaps",
-        "_open_second",
+        "_open_sums",
         "_origin",
         "_scale",
         "_second",
@@ -205,9 +203,9 @@ class HeldSeries:
 
         The entry that may hold at their beginning stays.
         """
-        self._covered.append(self._open_covered)
-        self._first.append(self._open_first)
-        self._second.append(self._open_second)
+        self._covered.append(self._open_sums.covered)
+        self._first.append(self._open_sums.first)
+        self._second.append(self._open_sums.second)
         self._close()
         self._empty_open()
         blocks = max(0, bisect_right(self._times, at - self.reach - self._origin) - 1) // BLOCK
@@ -247,27 +245,30 @@ class HeldSeries:
 
     def _empty_open(self) -> None:
         """Begin the newest block."""
-        self._open_covered, self._open_first, self._open_second = 0, 0.0, 0.0
+        self._open_sums = NO_SUMS
         """Its sums, but for its newest value, which holds for an unknown time."""
         self._open_gaps = 0
+
+    def _settle(self, held: int) -> None:
+        """Add the newest value to the sums of the newest block: it holds for `held`."""
+        self._open_sums = self._open_sums.plus(self._newest(held))
+
+    def _open(self, until: int) -> Sums:
+        """Return the sums of the newest block if its newest value holds until then."""
+        return self._open_sums.plus(self._newest(until + self._origin - self.newest))
 
     @abstractmethod
     def _sums(self, values: Sequence[float], held: list[int]) -> Sums:
         """Return the time covered and the integrals of these entries; gaps are among the values."""
 
     @abstractmethod
-    def _settle(self, held: int) -> None:
-        """Add the newest value to the sums of the newest block: it holds for `held`."""
-
-    @abstractmethod
-    def _open(self, until: int) -> Sums:
-        """Return the sums of the newest block if its newest value holds until then."""
+    def _newest(self, held: int) -> Sums:
+        """Return the sums of the newest value if it holds for `held`."""
 
     @abstractmethod
     def _took(self, at: int, kept: float) -> None:
         """Note what else is to be known of the newest value."""
 
-    @abstractmethod
     def _gap(self) -> None:
         """Note that the newest entry is a gap, behind the value measured at `newest`."""
 
@@ -275,10 +276,8 @@ class HeldSeries:
     def _close(self) -> None:
         """Note what else is to be known of the block that is closed."""
 
-    @abstractmethod
     def _start(self, kept: float) -> None:
         """Take the first value of a series that begins, as it is kept."""
 
-    @abstractmethod
     def _scaled_down(self) -> None:
         """From now on values are kept as they are: what was in parts of a unit is to be in units."""

@@ -142,18 +142,10 @@ class SpeedSeries(HeldSeries):
         weighted = list(map(mul, apart, held))
         return Sums(sum(held), sum(weighted), sum(map(mul, weighted, apart)))
 
-    def _settle(self, held: int) -> None:
+    def _newest(self, held: int) -> Sums:
         apart = self._newest_kept - self._zero
         weighted = apart * held
-        self._open_covered += held
-        self._open_first += weighted
-        self._open_second += weighted * apart
-
-    def _open(self, until: int) -> Sums:
-        held = until + self._origin - self.newest
-        apart = self._newest_kept - self._zero
-        weighted = apart * held
-        return Sums(self._open_covered + held, self._open_first + weighted, self._open_second + weighted * apart)
+        return Sums(held, weighted, weighted * apart)
 
     def _took(self, at: int, kept: float) -> None:
         times, oldest, outside = self._times, self._oldest, at - self._origin - GUST_OVER
@@ -277,8 +269,8 @@ class SpeedSeries(HeldSeries):
 
     def _scaled_down(self) -> None:
         self._zero /= SCALE
-        self._open_first /= SCALE
-        self._open_second /= SCALE**2
+        covered, first, second = self._open_sums
+        self._open_sums = Sums(covered, first / SCALE, second / SCALE**2)
         self._open_greatest /= SCALE
         self._open_gust /= SCALE
         self._open_lull /= SCALE
