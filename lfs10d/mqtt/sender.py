@@ -119,13 +119,10 @@ class Sender:
         return self._outbox.suspects.explain(self.under_way)
 
     def _report(self, culprit: Culprit, ended: Disconnect) -> None:
-        topic = self._topics.full(culprit.topic)
-        if self._outbox.passes_over(culprit.topic):
-            log.warning("%s; again with a message of %d bytes to %s under way: nothing is sent there for an hour",
-                        ended.message, culprit.size, topic)  # fmt: skip
-        else:
-            log.warning("%s; again with a message of %d bytes to %s under way: it is sent in smaller parts",
-                        ended.message, culprit.size, topic)  # fmt: skip
+        banned = self._outbox.passes_over(culprit.topic)
+        then = "nothing is sent there for an hour" if banned else "it is sent in smaller parts"
+        log.warning("%s; again with a message of %d bytes to %s under way: %s",
+                    ended.message, culprit.size, self._topics.full(culprit.topic), then)  # fmt: skip
 
     def wake(self) -> None:
         """Send the queue: some at once, the rest soon."""

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import field, replace
 from enum import StrEnum
 
-from lfs10d.config.models import MqttConfig
+from lfs10d.config.models import MqttConfig, TlsConfig
 from lfs10d.schema.addresses import node_text
 from lfs10d.system.dataclass import dataclass
 from lfs10d.system.secret import Secret
@@ -18,15 +18,6 @@ class Version(StrEnum):
 
     V5 = "5"
     V311 = "3.1.1"
-
-
-@dataclass(frozen=True, slots=True)
-class Tls:
-    """The files for TLS; None: the system's authorities, no certificate of our own, the key in `cert`."""
-
-    ca: str | None = None
-    cert: str | None = None
-    key: str | None = None
 
 
 def no_password() -> Secret | None:
@@ -50,7 +41,7 @@ class BrokerSettings:
     version: Version = Version.V5
     username: str | None = None
     password: Callable[[], Secret | None] = field(default=no_password, repr=False)
-    tls: Tls | None = None
+    tls: TlsConfig | None = None
     keepalive: int = 20
     others: tuple[tuple[str, int], ...] = ()
     waits: tuple[float, ...] = ()
@@ -58,7 +49,6 @@ class BrokerSettings:
     @classmethod
     def of(cls, config: MqttConfig, *, client_id: str, password: Callable[[], Secret | None]) -> BrokerSettings:
         """Return the settings of section `mqtt`; a verb that is no daemon gives a client id of its own."""
-        tls = config.tls
         (host, port), *others = config.nodes
         return cls(
             host=host,
@@ -68,7 +58,7 @@ class BrokerSettings:
             version=Version(config.version),
             username=config.username,
             password=password,
-            tls=None if tls is None else Tls(tls.ca, tls.cert, tls.key),
+            tls=config.tls,
             keepalive=math.ceil(config.keepalive),
         )
 

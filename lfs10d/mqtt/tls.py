@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import ssl
 
+from lfs10d.config.models import TlsConfig
 from lfs10d.errors import BrokerError
-from lfs10d.mqtt.settings import Tls
 
 
 class _Socket(ssl.SSLSocket):
@@ -19,7 +19,7 @@ class _Socket(ssl.SSLSocket):
             raise
 
 
-def tls_context(tls: Tls) -> ssl.SSLContext:
+def tls_context(tls: TlsConfig) -> ssl.SSLContext:
     """Return a context for TLS 1.2 or newer that checks certificate and name; raise BrokerError. Reads files."""
     try:
         context = ssl.create_default_context(cafile=tls.ca)

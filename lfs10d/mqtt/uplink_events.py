@@ -20,16 +20,12 @@ class UplinkEvents(Protocol):
 
     def burst(self) -> Iterable[Publication]:
         """Return every retained topic but `availability`, as it is now."""
-        ...
 
     def topics(self) -> AbstractSet[str]:
         """Return the retained topics under `B` that are ours, but for `availability`."""
-        ...
 
     def on_uplink_change(self) -> None:
         """Take that a connect, loss, takeover or subscription changed the properties of the uplink."""
-        ...
 
     def on_announced(self) -> None:
         """Take that the broker has the whole burst after a connect."""
-        ...

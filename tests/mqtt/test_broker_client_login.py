@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from lfs10d.config.models import TlsConfig
 from lfs10d.errors import BrokerError
-from lfs10d.mqtt.settings import BrokerSettings, Tls
+from lfs10d.mqtt.settings import BrokerSettings
 from lfs10d.system.secret import Secret
 from tests.support.broker_clients import PATIENCE, connecting, settings_of
 from tests.support.brokers import Authority, Mosquitto
@@ -81,7 +82,7 @@ def test_tls_with_the_right_authority_connects(mosquitto: Mosquitto, authority: 
     with_tls(mosquitto, authority, "DNS:localhost")
 
     async def scenario() -> None:
-        settings = settings_of(mosquitto.port, host="localhost", tls=Tls(ca=authority.ca))
+        settings = settings_of(mosquitto.port, host="localhost", tls=TlsConfig(ca=authority.ca))
         async with connecting(settings) as (client, witness):
             await client.opened(PATIENCE)
             connection = client.connection
@@ -97,7 +98,7 @@ def test_tls_with_a_certificate_of_our_own_connects(mosquitto: Mosquitto, author
     certificate, key = authority.issue("gate")
 
     async def scenario() -> None:
-        tls = Tls(authority.ca, certificate, key)
+        tls = TlsConfig(ca=authority.ca, cert=certificate, key=key)
         async with connecting(settings_of(mosquitto.port, host="localhost", tls=tls)) as (client, _):
             await client.opened(PATIENCE)
 
@@ -106,14 +107,14 @@ def test_tls_with_a_certificate_of_our_own_connects(mosquitto: Mosquitto, author
 
 def test_an_unknown_authority_is_not_accepted(mosquitto: Mosquitto, authority: Authority) -> None:
     with_tls(mosquitto, authority, "DNS:localhost")
-    told = asyncio.run(refusal(settings_of(mosquitto.port, host="localhost", tls=Tls())))
+    told = asyncio.run(refusal(settings_of(mosquitto.port, host="localhost", tls=TlsConfig())))
     assert "the certificate is not accepted: " in told
     assert "check mqtt.host, mqtt.tls.ca and the clock" in told
 
 
 def test_another_host_name_is_not_accepted(mosquitto: Mosquitto, authority: Authority) -> None:
     with_tls(mosquitto, authority, "DNS:elsewhere.example")
-    told = asyncio.run(refusal(settings_of(mosquitto.port, host="localhost", tls=Tls(ca=authority.ca))))
+    told = asyncio.run(refusal(settings_of(mosquitto.port, host="localhost", tls=TlsConfig(ca=authority.ca))))
     assert "Hostname mismatch" in told
 
 
@@ -129,14 +130,14 @@ def test_tls_1_1_is_not_spoken(unused_port: int, authority: Authority, program: 
             told = "connection refused"
             deadline = time.monotonic() + PATIENCE
             while "connection refused" in told and time.monotonic() < deadline:
-                told = asyncio.run(refusal(settings_of(unused_port, host="localhost", tls=Tls(ca=authority.ca))))
+                told = asyncio.run(refusal(settings_of(unused_port, host="localhost", tls=TlsConfig(ca=authority.ca))))
         finally:
             server.kill()
     assert "no TLS: " in told
 
 
 def test_a_plain_port_spoken_to_by_tls_is_said(mosquitto: Mosquitto) -> None:
-    told = asyncio.run(refusal(settings_of(mosquitto.port, tls=Tls())))
+    told = asyncio.run(refusal(settings_of(mosquitto.port, tls=TlsConfig())))
     assert "check mqtt.port" in told
     assert "TLS" in told
 

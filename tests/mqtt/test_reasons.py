@@ -8,11 +8,12 @@ import ssl
 
 import pytest
 
+from lfs10d.config.models import TlsConfig
 from lfs10d.errors import BrokerError
 from lfs10d.mqtt.reasons import NOT_FOR_A_MESSAGE, DisconnectReason, NoNodeError, failed, gone, reason_in_words
-from lfs10d.mqtt.settings import BrokerSettings, Tls
+from lfs10d.mqtt.settings import BrokerSettings
 
-SETTINGS = BrokerSettings("gate.example", 8883, "me", tls=Tls())
+SETTINGS = BrokerSettings("gate.example", 8883, "me", tls=TlsConfig())
 
 
 def certificate_error() -> ssl.SSLCertVerificationError:

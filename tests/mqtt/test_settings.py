@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from lfs10d.config.models import MqttConfig
-from lfs10d.mqtt.settings import BrokerSettings, Tls, Version, no_password
+from lfs10d.config.models import MqttConfig, TlsConfig
+from lfs10d.mqtt.settings import BrokerSettings, Version, no_password
 from lfs10d.system.secret import Secret
 
 
@@ -19,7 +19,9 @@ def test_the_section_is_taken_over_key_by_key() -> None:
         }
     )
     settings = BrokerSettings.of(config, client_id="me", password=no_password)
-    assert settings == BrokerSettings("gate", 8883, "me", Version.V311, "u", no_password, Tls("/ca", "/c", "/k"), 2)
+    assert settings == BrokerSettings(
+        "gate", 8883, "me", Version.V311, "u", no_password, TlsConfig(ca="/ca", cert="/c", key="/k"), 2
+    )
 
 
 def test_without_tls_there_is_none() -> None:

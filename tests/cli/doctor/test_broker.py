@@ -13,8 +13,9 @@ from bench.broker import free_port
 from lfs10d.cli.doctor.broker import limits, look, reach
 from lfs10d.cli.doctor.finding import Finding
 from lfs10d.cli.login import Login, log_in
+from lfs10d.config.models import TlsConfig
 from lfs10d.mqtt.messages import Accepted
-from lfs10d.mqtt.settings import BrokerSettings, Tls, Version
+from lfs10d.mqtt.settings import BrokerSettings, Version
 from tests.support.brokers import Authority, Mosquitto
 
 pytestmark = pytest.mark.needs("mosquitto")
@@ -88,20 +89,20 @@ def test_a_certificate_that_is_wrong_or_soon_will_be(
     certificate, key = authority.issue("broker", name, days=days)
     mosquitto.listener += [f"certfile {certificate}", f"keyfile {key}"]
     mosquitto.start()
-    (found,) = reach(BrokerSettings("localhost", mosquitto.port, "x", tls=Tls(ca=authority.ca)))
+    (found,) = reach(BrokerSettings("localhost", mosquitto.port, "x", tls=TlsConfig(ca=authority.ca)))
     assert found.level == level
     assert words in found.text
     assert advice in found.advice
 
 
 def test_a_certificate_for_years_and_a_plain_port(mosquitto: Mosquitto, authority: Authority) -> None:
-    (found,) = reach(BrokerSettings("localhost", mosquitto.port, "x", tls=Tls(ca=authority.ca)))
+    (found,) = reach(BrokerSettings("localhost", mosquitto.port, "x", tls=TlsConfig(ca=authority.ca)))
     assert (found.level, "is this the broker's TLS port" in found.advice) == ("fail", True)
     mosquitto.stop()
     certificate, key = authority.issue("broker", "DNS:localhost", days=400)
     mosquitto.listener += [f"certfile {certificate}", f"keyfile {key}"]
     mosquitto.start()
-    (found,) = reach(BrokerSettings("localhost", mosquitto.port, "x", tls=Tls(ca=authority.ca)), time.time())
+    (found,) = reach(BrokerSettings("localhost", mosquitto.port, "x", tls=TlsConfig(ca=authority.ca)), time.time())
     assert (found.level, "certificate until" in found.text) == ("ok", True)
 
 
