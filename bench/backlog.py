@@ -9,8 +9,9 @@ import time
 from functools import cache
 from pathlib import Path
 
+from lfs10d.outbox.history import QueuedSample
 from lfs10d.outbox.store.database import Limits
-from lfs10d.outbox.store.sample_file import SampleFile, StoreEntry
+from lfs10d.outbox.store.sample_file import SampleFile, StoreBatch
 from lfs10d.telemetry.publication import Sample
 
 BOOT = "k0000000"
@@ -38,12 +39,12 @@ def _made(count: int) -> Path:
     file = SampleFile(folder / "backlog.db", boot=BOOT, limits=_LIMITS)
     for start in range(0, each, 10 * TOGETHER):
         entries = [
-            StoreEntry(_sample(device, seq, now - (each - seq) * EVERY_MS), 0)
+            QueuedSample(_sample(device, seq, now - (each - seq) * EVERY_MS), 0.0, shift=0)
             for part in range(start, min(each, start + 10 * TOGETHER), TOGETHER)
             for device in range(1, DEVICES + 1)
             for seq in range(part + 1, min(part + TOGETHER, each) + 1)
         ]
-        file.append(entries, losses=(), now=now, mono=0)
+        file.append(StoreBatch(entries, losses=(), now=now, mono=0))
     file.close()
     return folder / "backlog.db"
 

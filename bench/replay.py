@@ -21,8 +21,9 @@ from paho.mqtt.enums import CallbackAPIVersion, MQTTProtocolVersion
 from bench.broker import Broker
 from lfs10d.mqtt.settings import BrokerSettings
 from lfs10d.mqtt.uplink import Uplink
+from lfs10d.outbox.history import QueuedSample
 from lfs10d.outbox.store.database import Limits
-from lfs10d.outbox.store.sample_file import SampleFile, StoreEntry
+from lfs10d.outbox.store.sample_file import SampleFile, StoreBatch
 from lfs10d.outbox.store.store import Store
 from lfs10d.telemetry import publication
 from lfs10d.telemetry.publication import Publication, PublicationKind, Sample
@@ -48,12 +49,12 @@ def fill(folder: Path, count: int) -> None:
     file = SampleFile(folder / "backlog.db", boot="k0000001", limits=LIMITS)
     for start in range(0, count // DEVICES, BATCH // DEVICES):
         entries = [
-            StoreEntry(sample(device, seq, "k0000001"), 0)
+            QueuedSample(sample(device, seq, "k0000001"), 0.0, shift=0)
             for part in range(start, start + BATCH // DEVICES, 20)
             for device in range(1, DEVICES + 1)
             for seq in range(part + 1, part + 21)
         ]
-        file.append(entries, losses=(), now=0, mono=0)
+        file.append(StoreBatch(entries, losses=(), now=0, mono=0))
     rows = file.rows
     file.close()
     size = (folder / "backlog.db").stat().st_size

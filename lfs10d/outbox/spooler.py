@@ -16,7 +16,7 @@ from lfs10d.outbox.outbox import Outbox
 from lfs10d.outbox.spill import SPILL_EVERY
 from lfs10d.outbox.spool import PAGE_ROWS
 from lfs10d.outbox.store.database import Limits
-from lfs10d.outbox.store.sample_file import StoreEntry
+from lfs10d.outbox.store.sample_file import StoreBatch
 from lfs10d.outbox.store.store import Store, StoreError
 from lfs10d.system.clock_step import ClockState
 from lfs10d.system.tasks import BackgroundTasks
@@ -229,19 +229,16 @@ class Spooler:
 
     async def _spill(self) -> None:
         spool = self._backlog.spool
-        entries = [
-            StoreEntry(queued.sample, queued.shift or 0, queued.repeated) for queued in self._backlog.spill.take()
-        ]
+        batch = StoreBatch(
+            tuple(self._backlog.spill.take()),
+            losses=self._backlog.undeclared(),
+            now=self._epoch_ms(),
+            mono=round(self._now() * 1000),
+            beyond=self._backlog.beyond,
+            delivered=spool.delivered,
+        )
         try:
-            evicted = await self._thread.call(
-                self._store.append,
-                entries,
-                losses=self._backlog.undeclared(),
-                now=self._epoch_ms(),
-                mono=round(self._now() * 1000),
-                beyond=self._backlog.beyond,
-                delivered=spool.delivered,
-            )
+            evicted = await self._thread.call(self._store.append, batch)
         except StoreError:
             self._outbox.not_spilled(self._now())
             raise

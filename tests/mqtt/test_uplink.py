@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 
 from lfs10d.mqtt.settings import Version
+from lfs10d.outbox.history import QueuedSample
 from lfs10d.outbox.store.database import Limits
-from lfs10d.outbox.store.sample_file import StoreEntry
+from lfs10d.outbox.store.sample_file import StoreBatch
 from lfs10d.outbox.store.store import Store
 from lfs10d.telemetry import publication
 from tests.support.brokers import Mosquitto
@@ -242,7 +243,8 @@ def test_while_a_backlog_on_disk_leaves_in_order_live_samples_stay_live(mosquitt
     limits = Limits(size=10**9, age=10**12)
     store = Store(tmp_path, boot="k0000000", limits=limits)
     queued = [sample(seq, "b").sample for seq in range(1, spool + 1)]
-    store.append([StoreEntry(each, 0) for each in queued if each is not None], losses=(), now=0, mono=0)
+    waiting = [QueuedSample(each, 0.0, shift=0) for each in queued if each is not None]
+    store.append(StoreBatch(waiting, losses=(), now=0, mono=0))
     store.close()
 
     async def scenario() -> None:

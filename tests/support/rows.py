@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from lfs10d.outbox.history import QueuedSample
 from lfs10d.outbox.store.database import Limits
-from lfs10d.outbox.store.sample_file import StoreEntry
 from lfs10d.reading import Value
 from lfs10d.system.clock_step import ClockState
 from lfs10d.telemetry.publication import Sample
@@ -44,6 +44,6 @@ def sample(
     )
 
 
-def entries(*samples: Sample, shift: int = START, repeated: bool = False) -> list[StoreEntry]:
+def entries(*samples: Sample, shift: int = START, repeated: bool = False) -> list[QueuedSample]:
     """Return samples as they are handed to the store."""
-    return [StoreEntry(each, shift, repeated) for each in samples]
+    return [QueuedSample(each, 0.0, repeated, shift) for each in samples]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from lfs10d.outbox.losses import Loss
 from lfs10d.outbox.store.database import Limits
-from lfs10d.outbox.store.sample_file import SampleFile
+from lfs10d.outbox.store.sample_file import SampleFile, StoreBatch
 from lfs10d.telemetry.publication import Sample
 from tests.support.rows import BOOT, ROOMY, START, entries
 
@@ -14,7 +14,7 @@ NOW = START + 60_000
 
 
 def keep(file: SampleFile, *samples: Sample, shift: int = START) -> tuple[Loss, ...]:
-    return file.append(entries(*samples, shift=shift), losses=file.losses, now=NOW, mono=NOW - START)
+    return file.append(StoreBatch(entries(*samples, shift=shift), losses=file.losses, now=NOW, mono=NOW - START))
 
 
 def kept(file: SampleFile) -> list[Sample]:

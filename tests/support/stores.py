@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from lfs10d.outbox.losses import Loss
+from lfs10d.outbox.store.sample_file import StoreBatch
 from lfs10d.outbox.store.store import Store
 from lfs10d.telemetry.publication import Sample
 from tests.support.rows import START, entries
@@ -11,7 +12,7 @@ NOW = START + 60_000
 
 
 def keep(store: Store, *samples: Sample) -> tuple[Loss, ...]:
-    return store.append(entries(*samples), losses=(), now=NOW, mono=NOW - START)
+    return store.append(StoreBatch(entries(*samples), losses=(), now=NOW, mono=NOW - START))
 
 
 def kept(store: Store) -> list[int]:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from pathlib import Path
 
+from lfs10d.outbox.history import QueuedSample
 from lfs10d.outbox.losses import Loss, Losses
 from lfs10d.outbox.store import database
 from lfs10d.outbox.store.catalogue import Catalogue
@@ -40,12 +41,19 @@ VACUUMED_AT_ONCE = 256
 
 
 @dataclass(frozen=True, slots=True)
-class StoreEntry:
-    """A sample to be kept; `shift`: wall clock less monotonic clock when it was measured, in ms."""
+class StoreBatch:
+    """Samples to be kept, at least one. `losses` are those to be declared so far, which are kept too.
 
-    sample: Sample
-    shift: int
-    repeated: bool = False
+    `now` is epoch ms, `mono` the monotonic clock in ms. Rows up to id `beyond` are under way to the broker and stay;
+    the going of rows `delivered` is no loss.
+    """
+
+    samples: Sequence[QueuedSample]
+    losses: Sequence[Loss]
+    now: int
+    mono: int
+    beyond: int = 0
+    delivered: AbstractSet[int] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,36 +102,23 @@ class SampleFile:
 
     # In
 
-    def append(
-        self,
-        entries: Sequence[StoreEntry],
-        *,
-        losses: Sequence[Loss],
-        now: int,
-        mono: int,
-        beyond: int = 0,
-        delivered: AbstractSet[int] = frozenset(),
-        about: Callable[[tuple[Loss, ...]], None] = lambda _: None,
-    ) -> tuple[Loss, ...]:
+    def append(self, batch: StoreBatch, about: Callable[[tuple[Loss, ...]], None] = lambda _: None) -> tuple[Loss, ...]:
         """Keep samples, evict the oldest where there is no room or they are too old; return what is lost by that.
 
-        There is at least one entry. `losses` are those to be declared so far; with the new ones they are kept.
-        `now` is epoch ms, `mono` the monotonic clock in ms. Rows up to id `beyond` are under way to the broker and
-        stay; the going of rows `delivered` is no loss. `about` is told what is lost before that is so.
+        `about` is told what is lost before that is so.
         """
-        certain = entries[-1].sample.clock == "synced"
         with transaction(self._db):
-            evicted = self._evict(len(entries), beyond, delivered, (now if certain else None, mono))
-            for entry in entries:
-                self._insert(entry)
-            self._keep_losses((*losses, *evicted))
+            evicted = self._evict(batch)
+            for queued in batch.samples:
+                self._insert(queued)
+            self._keep_losses((*batch.losses, *evicted))
             about(evicted)
-        self.rows += len(entries)
+        self.rows += len(batch.samples)
         return evicted
 
-    def _insert(self, entry: StoreEntry) -> None:
-        sample = entry.sample
-        series_id, series, base = self._catalogue.place(sample, entry.shift, repeated=entry.repeated)
+    def _insert(self, queued: QueuedSample) -> None:
+        sample = queued.sample
+        series_id, series, base = self._catalogue.place(sample, queued.shift or 0, repeated=queued.repeated)
         key, at, rtt = self.next, sample.ts - base, pack_rtt(sample.rtt_ms)
         cells = values_of(sample)
         if not self._wide and (beyond_first_schema(cells) or is_record(sample.source)):
@@ -214,22 +209,22 @@ class SampleFile:
 
     # Evicting
 
-    def _evict(
-        self, coming: int, beyond: int, delivered: AbstractSet[int], now: tuple[int | None, int]
-    ) -> tuple[Loss, ...]:
+    def _evict(self, batch: StoreBatch) -> tuple[Loss, ...]:
         lost = Losses()
-        room = self._limits.pages - coming * BYTES_PER_SAMPLE // PAGE
+        now = batch.now if batch.samples[-1].sample.clock == "synced" else None
+        room = self._limits.pages - len(batch.samples) * BYTES_PER_SAMPLE // PAGE
         while self.rows:
             found = self._db.execute(
-                "SELECT id, series, seq, at FROM sample WHERE id > ? ORDER BY id LIMIT ?", (beyond, EVICTED_AT_ONCE)
+                "SELECT id, series, seq, at FROM sample WHERE id > ? ORDER BY id LIMIT ?",
+                (batch.beyond, EVICTED_AT_ONCE),
             ).fetchall()
             if number(self._db, "PRAGMA page_count") - number(self._db, "PRAGMA freelist_count") <= room:
-                found = found[: self._too_old(found, *now)]
+                found = found[: self._too_old(found, now, batch.mono)]
             if not found:
                 break
             for key, series_id, seq, _ in found:
                 _, series = self._catalogue.find(series_id)
-                if key not in delivered and not series.repeated:
+                if key not in batch.delivered and not series.repeated:
                     lost.restore(Loss(series.source, series.boot, seq, seq, 1))
             self._delete(found[0][0], found[-1][0])
         return tuple(lost.undeclared())

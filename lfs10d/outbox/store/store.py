@@ -19,7 +19,7 @@ import errno
 import sqlite3
 from collections import deque
 from collections.abc import Callable, Collection, Sequence
-from collections.abc import Set as AbstractSet
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -28,7 +28,7 @@ from lfs10d.errors import StateError
 from lfs10d.outbox.losses import Loss
 from lfs10d.outbox.store.database import ForeignError, Limits
 from lfs10d.outbox.store.row import DamagedError
-from lfs10d.outbox.store.sample_file import SampleFile, StoredRow, StoreEntry
+from lfs10d.outbox.store.sample_file import SampleFile, StoreBatch, StoredRow
 from lfs10d.system.clock_step import ClockState
 from lfs10d.system.dataclass import dataclass
 from lfs10d.system.disk import Disk
@@ -117,31 +117,14 @@ class Store:
         """There is no file, and there shall be none."""
         return self._file is None and not self.open_for_more and not self.path.exists()
 
-    def append(
-        self,
-        entries: Sequence[StoreEntry],
-        *,
-        losses: Sequence[Loss],
-        now: int,
-        mono: int,
-        beyond: int = 0,
-        delivered: AbstractSet[int] = frozenset(),
-    ) -> tuple[Loss, ...]:
+    def append(self, batch: StoreBatch) -> tuple[Loss, ...]:
         """Keep samples, as `SampleFile.append` does. Raises StoreError: then they are not kept."""
 
         def append(file: SampleFile) -> tuple[Loss, ...]:
             before = self._settle_doubt(file)
             doubt = partial(self._doubt, file.next)
             doubt(())
-            evicted = file.append(
-                entries,
-                losses=(*losses, *before),
-                now=now,
-                mono=mono,
-                beyond=beyond,
-                delivered=delivered,
-                about=doubt,
-            )
+            evicted = file.append(replace(batch, losses=(*batch.losses, *before)), doubt)
             self._doubtful = None
             return (*before, *evicted)
 

@@ -10,7 +10,7 @@ import pytest
 
 from lfs10d.outbox.losses import Loss
 from lfs10d.outbox.store.database import Limits
-from lfs10d.outbox.store.sample_file import SampleFile, runs
+from lfs10d.outbox.store.sample_file import SampleFile, StoreBatch, runs
 from lfs10d.telemetry.publication import Sample
 from lfs10d.telemetry.wind.record import WindRecord
 from tests.support.outbox_items import record
@@ -136,7 +136,7 @@ def test_a_transaction_that_fails_leaves_no_trace(file: SampleFile, path: Path) 
         raise sqlite3.OperationalError("for the test")
 
     with pytest.raises(sqlite3.OperationalError, match="for the test"):
-        file.append(entries(sample(2)), losses=(), now=NOW, mono=NOW - START, about=fail)
+        file.append(StoreBatch(entries(sample(2)), losses=(), now=NOW, mono=NOW - START), fail)
     other = reopened(file, path)
     assert [each.seq for each in kept(other)] == [1]
     other.close()
@@ -156,8 +156,8 @@ def test_records_come_back_as_they_were_beside_the_samples_of_their_device(file:
 
 def test_a_record_that_is_evicted_is_a_loss_of_records(path: Path) -> None:
     file = SampleFile(path, boot=BOOT, limits=Limits(size=ROOMY.size, age=1000))
-    file.append(entries(record(1, boot=BOOT), shift=0), losses=(), now=NOW, mono=600_000)
-    lost = file.append(entries(sample(2, ts=700_000), shift=0), losses=(), now=NOW, mono=700_000)
+    file.append(StoreBatch(entries(record(1, boot=BOOT), shift=0), losses=(), now=NOW, mono=600_000))
+    lost = file.append(StoreBatch(entries(sample(2, ts=700_000), shift=0), losses=(), now=NOW, mono=700_000))
     assert lost == (Loss("a/record", BOOT, 1, 1, 1),)
     assert file.losses == lost
     file.close()

@@ -17,7 +17,7 @@ from docs.generate import contract
 from docs.generate.payloads import SamplePayload
 from lfs10d.outbox.store.database import APPLICATION_ID, SCHEMA, WIDE_SCHEMA, number
 from lfs10d.outbox.store.row import DamagedError
-from lfs10d.outbox.store.sample_file import SampleFile
+from lfs10d.outbox.store.sample_file import SampleFile, StoreBatch
 from lfs10d.reading import Fault, FaultCode, Reading, Value
 from lfs10d.system.clock import Instant
 from lfs10d.telemetry.device_state import DeviceState
@@ -86,7 +86,7 @@ def test_what_telemetry_says_history_says_later(shared: SampleFile, polls: list[
                 assert list(model.values) == list(NAMES)
                 told.append((each.sample, json.loads(text)))
     first = shared.next
-    shared.append(entries(*(sample for sample, _ in told)), losses=(), now=START, mono=0)
+    shared.append(StoreBatch(entries(*(sample for sample, _ in told)), losses=(), now=START, mono=0))
     history = [row.sample.payload("line0", historical=True) for row in shared.read(first - 1, 99)]
     text = json.dumps(history, allow_nan=False)
     assert contract.check("device/mast/history", text)
@@ -100,12 +100,12 @@ def schema_of(path: Path) -> int:
 
 def test_a_file_says_that_an_earlier_lfs10d_must_leave_it_alone_only_once_it_must(path: Path) -> None:
     file = SampleFile(path, boot=BOOT, limits=ROOMY)
-    file.append(entries(sample(1), sample(2, error="crc")), losses=(), now=START, mono=0)
+    file.append(StoreBatch(entries(sample(1), sample(2, error="crc")), losses=(), now=START, mono=0))
     file.close()
     assert schema_of(path) == SCHEMA
     file = SampleFile(path, boot=BOOT, limits=ROOMY)
-    file.append(entries(sample(3, values={"weather": "rain"})), losses=(), now=START, mono=0)
-    file.append(entries(sample(4, values={"weather": "snow"})), losses=(), now=START, mono=0)
+    file.append(StoreBatch(entries(sample(3, values={"weather": "rain"})), losses=(), now=START, mono=0))
+    file.append(StoreBatch(entries(sample(4, values={"weather": "snow"})), losses=(), now=START, mono=0))
     file.close()
     assert schema_of(path) == WIDE_SCHEMA
     file = SampleFile(path, boot=BOOT, limits=ROOMY)
@@ -120,7 +120,7 @@ def test_what_fails_to_be_kept_does_not_change_the_schema(path: Path) -> None:
         raise sqlite3.OperationalError("disk full")
 
     with pytest.raises(sqlite3.OperationalError):
-        file.append(entries(sample(1, values={"on": True})), losses=(), now=START, mono=0, about=fail)
+        file.append(StoreBatch(entries(sample(1, values={"on": True})), losses=(), now=START, mono=0), fail)
     file.close()
     assert schema_of(path) == SCHEMA
 
@@ -137,7 +137,7 @@ def test_a_partial_sample_takes_no_more_than_a_good_one(tmp_path: Path) -> None:
                 Sample("a", BOOT, seq, START + seq, "synced", values, {}, tuple(values), quality, None, 18.2, errors)
                 for seq in range(start + 1, start + 1001)
             ]
-            file.append(entries(*measured), losses=(), now=START, mono=0)
+            file.append(StoreBatch(entries(*measured), losses=(), now=START, mono=0))
         file.close()
         sizes.append(path.stat().st_size)
     assert sizes[1] <= sizes[0]
@@ -184,7 +184,7 @@ def test_a_file_of_an_earlier_version_is_read_and_gone_on_with(path: Path) -> No
     ]
     assert [row.sample for row in file.read(0, 9)] == told
     more = sample(3, "b", boot="k0000003", values={"wind_speed": 1.5, "direction": "N", "total": 7})
-    file.append(entries(more), losses=(), now=START, mono=0)
+    file.append(StoreBatch(entries(more), losses=(), now=START, mono=0))
     assert [row.sample for row in file.read(0, 9)] == [*told, more]
     file.close()
 
@@ -192,7 +192,7 @@ def test_a_file_of_an_earlier_version_is_read_and_gone_on_with(path: Path) -> No
 @pytest.mark.parametrize("cell", ["X'06'", "'perhaps'", "'[1]'"])
 def test_a_value_that_none_of_ours_ever_said_is_damage(path: Path, cell: str) -> None:
     file = SampleFile(path, boot=BOOT, limits=ROOMY)
-    file.append(entries(sample(1)), losses=(), now=START, mono=0)
+    file.append(StoreBatch(entries(sample(1)), losses=(), now=START, mono=0))
     file.close()
     with closing(sqlite3.connect(path)) as db:
         db.execute(f"UPDATE sample SET value = {cell}")  # noqa: S608 - the test's own

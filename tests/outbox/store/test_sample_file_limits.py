@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from lfs10d.outbox.losses import Loss
-from lfs10d.outbox.store.sample_file import SampleFile
+from lfs10d.outbox.store.sample_file import SampleFile, StoreBatch
 from lfs10d.system.clock_step import ClockState
 from tests.support.rows import BOOT, ROOMY, START, entries, sample
 from tests.support.sample_files import NOW, keep, kept, reopened
@@ -39,7 +39,7 @@ def test_file_and_log_never_take_more_than_the_limit_and_the_oldest_goes_exactly
 def test_what_is_too_old_is_evicted_and_declared(path: Path) -> None:
     file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, age=10_000))
     keep(file, *(sample(seq) for seq in range(1, 1001)))
-    lost = file.append(entries(sample(1001)), losses=(), now=START + 910_500, mono=START + 910_500 - START)
+    lost = file.append(StoreBatch(entries(sample(1001)), losses=(), now=START + 910_500, mono=START + 910_500 - START))
     assert lost == (Loss("a", BOOT, 1, 900, 900),)
     assert file.losses == lost
     assert [each.seq for each in kept(file)] == list(range(901, 1002))
@@ -58,7 +58,9 @@ def test_a_gateway_that_began_400_days_back_loses_nothing_when_its_clock_is_set(
     file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, age=WEEK))
     back = START - 400 * DAY
     keep(file, *(sample(seq, clock=clock, ts=back + 1000 * seq) for seq in range(1, 101)), shift=back)
-    assert file.append(entries(sample(101, clock=after)), losses=(), now=START + 101_000, mono=101_000) == ()
+    assert (
+        file.append(StoreBatch(entries(sample(101, clock=after)), losses=(), now=START + 101_000, mono=101_000)) == ()
+    )
     assert file.rows == 101
     file.close()
 
@@ -67,7 +69,7 @@ def test_a_gateway_that_began_400_days_back_loses_nothing_when_its_clock_is_set(
 def test_within_a_boot_age_is_monotonic_whatever_the_wall_clock_says(path: Path, clock: ClockState) -> None:
     file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, age=10_000))
     keep(file, *(sample(seq, clock=clock) for seq in range(1, 1001)))
-    lost = file.append(entries(sample(1001, clock=clock)), losses=(), now=START - 400 * DAY, mono=910_500)
+    lost = file.append(StoreBatch(entries(sample(1001, clock=clock)), losses=(), now=START - 400 * DAY, mono=910_500))
     assert lost == (Loss("a", BOOT, 1, 900, 900),)
     file.close()
 
@@ -87,7 +89,7 @@ def test_of_an_earlier_boot_the_age_is_known_where_the_clock_was_synchronised_th
 ) -> None:
     file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, age=10_000))
     keep(file, sample(1, boot="k0000001", clock=clock))
-    evicted = file.append(entries(sample(1, clock=now)), losses=(), now=START + 10**9, mono=1000)
+    evicted = file.append(StoreBatch(entries(sample(1, clock=now)), losses=(), now=START + 10**9, mono=1000))
     assert sum(loss.count for loss in evicted) == lost
     file.close()
 
@@ -96,7 +98,7 @@ def test_what_is_older_than_a_sample_that_is_too_old_is_too_old_itself(path: Pat
     """Where the clock is never synchronised, what earlier boots left goes with this boot's own."""
     file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, age=10_000))
     keep(file, sample(1, boot="k0000001", clock="unknown"), sample(1, clock="unknown"))
-    lost = file.append(entries(sample(2, clock="unknown")), losses=(), now=START, mono=50_000)
+    lost = file.append(StoreBatch(entries(sample(2, clock="unknown")), losses=(), now=START, mono=50_000))
     assert lost == (Loss("a", "k0000001", 1, 1, 1), Loss("a", BOOT, 1, 1, 1))
     file.close()
 
@@ -106,12 +108,14 @@ def test_what_is_under_way_stays_and_what_was_delivered_is_no_loss(path: Path) -
     keep(file, *(sample(seq) for seq in range(1, 7)))
     ids = [row.id for row in file.read(0, 6)]
     lost = file.append(
-        entries(sample(7)),
-        losses=(),
-        now=START + 10**6,
-        mono=START + 10**6 - START,
-        beyond=ids[1],
-        delivered=frozenset({ids[3]}),
+        StoreBatch(
+            entries(sample(7)),
+            losses=(),
+            now=START + 10**6,
+            mono=START + 10**6 - START,
+            beyond=ids[1],
+            delivered=frozenset({ids[3]}),
+        )
     )
     assert lost == (Loss("a", BOOT, 3, 3, 1), Loss("a", BOOT, 5, 6, 2))
     assert [each.seq for each in kept(file)] == [1, 2, 7]
@@ -120,8 +124,8 @@ def test_what_is_under_way_stays_and_what_was_delivered_is_no_loss(path: Path) -
 
 def test_what_is_only_repeated_is_no_loss(path: Path) -> None:
     file = SampleFile(path, boot=BOOT, limits=replace(ROOMY, age=1000))
-    file.append(entries(sample(1), repeated=True), losses=(), now=NOW, mono=NOW - START)
-    assert file.append(entries(sample(2)), losses=(), now=START + 10**6, mono=START + 10**6 - START) == ()
+    file.append(StoreBatch(entries(sample(1), repeated=True), losses=(), now=NOW, mono=NOW - START))
+    assert file.append(StoreBatch(entries(sample(2)), losses=(), now=START + 10**6, mono=START + 10**6 - START)) == ()
     assert [each.seq for each in kept(file)] == [2]
     file.close()
 
@@ -129,7 +133,7 @@ def test_what_is_only_repeated_is_no_loss(path: Path) -> None:
 def test_other_limits_hold_from_the_next_sample_on(file: SampleFile) -> None:
     keep(file, *(sample(seq) for seq in range(1, 4)))
     file.limit(replace(ROOMY, age=1000))
-    assert file.append(entries(sample(4)), losses=(), now=START + 10**6, mono=START + 10**6 - START) == (
+    assert file.append(StoreBatch(entries(sample(4)), losses=(), now=START + 10**6, mono=START + 10**6 - START)) == (
         Loss("a", BOOT, 1, 3, 3),
     )
 
@@ -139,7 +143,7 @@ def test_other_limits_hold_from_the_next_sample_on(file: SampleFile) -> None:
 
 def test_losses_are_kept_across_a_restart_until_they_are_declared(file: SampleFile, path: Path) -> None:
     losses = (Loss("a", "k0000001", 1, 5, 5), Loss("b", BOOT, 2, 9, 3))
-    file.append(entries(sample(1)), losses=losses, now=NOW, mono=NOW - START)
+    file.append(StoreBatch(entries(sample(1)), losses=losses, now=NOW, mono=NOW - START))
     other = reopened(file, path)
     assert other.losses == losses
     other.delete([], losses=losses[1:])

@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from lfs10d.outbox.losses import Loss
+from lfs10d.outbox.store.sample_file import StoreBatch
 from lfs10d.outbox.store.store import ASIDE_MOST, FileSetAside, Store, StoreError
 from lfs10d.system.disk import Disk, Files
 from tests.support.rows import BOOT, ROOMY, START, entries, sample
@@ -29,7 +30,7 @@ def test_the_folder_and_the_file_are_made(store: Store) -> None:
 
 def test_what_is_kept_is_there_after_a_restart_and_told(store: Store) -> None:
     loss = Loss("a", BOOT, 1, 1, 1)
-    store.append(entries(sample(2), sample(3)), losses=(loss,), now=NOW, mono=NOW - START)
+    store.append(StoreBatch(entries(sample(2), sample(3)), losses=(loss,), now=NOW, mono=NOW - START))
     store.close()
     assert store.open() == (loss,)
     assert (store.rows, store.oldest_ts) == (2, START + 2000)
@@ -46,7 +47,7 @@ def test_an_empty_file_is_used(store: Store) -> None:
 
 
 def test_the_clock_and_the_limits_reach_the_file(store: Store) -> None:
-    store.append(entries(sample(1, clock="unsynced", ts=5), shift=0), losses=(), now=NOW, mono=NOW - START)
+    store.append(StoreBatch(entries(sample(1, clock="unsynced", ts=5), shift=0), losses=(), now=NOW, mono=NOW - START))
     store.correct(START)
     assert store.read(0, 1)[0].sample.ts == START + 5
     store.limit(replace(ROOMY, age=1))

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from lfs10d.outbox.losses import Loss
-from lfs10d.outbox.store.sample_file import SampleFile
+from lfs10d.outbox.store.sample_file import SampleFile, StoreBatch
 from lfs10d.outbox.store.store import SMALLEST, Store, StoreError
 from tests.support.rows import BOOT, ROOMY, START, entries, sample
 from tests.support.stores import keep, kept, names
@@ -116,10 +116,10 @@ def test_a_commit_that_happened_though_it_failed_is_not_kept_twice(store: Store)
     Failing(store._file, "COMMIT", sqlite3.SQLITE_IOERR, after=True)
     late = START + 10**7
     with pytest.raises(StoreError):
-        store.append(entries(sample(2), sample(3)), losses=(), now=late, mono=late - START)
-    assert store.append(entries(sample(2), sample(3), sample(4)), losses=(), now=START, mono=START - START) == (
-        Loss("a", BOOT, 1, 1, 1),
-    )
+        store.append(StoreBatch(entries(sample(2), sample(3)), losses=(), now=late, mono=late - START))
+    assert store.append(
+        StoreBatch(entries(sample(2), sample(3), sample(4)), losses=(), now=START, mono=START - START)
+    ) == (Loss("a", BOOT, 1, 1, 1),)
     assert store.losses == (Loss("a", BOOT, 1, 1, 1),)
     assert kept(store) == [2, 3, 4]
 
