@@ -18,6 +18,7 @@ from lfs10d.mqtt.messages import Accepted, Events, Filter, Incoming
 from lfs10d.mqtt.orphans import OrphanSearch
 from lfs10d.mqtt.reasons import Disconnect, DisconnectReason
 from lfs10d.mqtt.topics import Topics
+from lfs10d.telemetry.publication import Publication, retained
 
 log = logging.getLogger(__name__)
 
@@ -27,7 +28,7 @@ SECOND_CLIENT = "-retained"
 
 
 class Cleanup:
-    """`owned()` returns the retained topics that are ours; `clear` is given the others.
+    """`owned()` returns the retained topics that are ours; `publish` is given what clears the others.
 
     `connect` begins the second connection, whose client id ends as it is told.
     """
@@ -35,9 +36,9 @@ class Cleanup:
     def __init__(
         self,
         topics: Topics,
+        publish: Callable[[Iterable[Publication]], None],
         *,
         owned: Callable[[], AbstractSet[str]],
-        clear: Callable[[Iterable[str]], None],
         connect: Callable[[Events, str], Connection],
     ) -> None:
         self.wanted = False
@@ -46,7 +47,7 @@ class Cleanup:
         """The broker does not permit a second connection."""
         self._topics = topics
         self._owned = owned
-        self._clear = clear
+        self._publish = publish
         self._connect = connect
         self._first: Connection | None = None
         self._second: _SecondConnection | None = None
@@ -136,7 +137,7 @@ class Cleanup:
     def _clear_some(self, orphans: Iterator[tuple[str, ...]], cleared: int) -> None:
         some = next(orphans, None)
         if some is not None:
-            self._clear(some)
+            self._publish(retained(topic, None) for topic in some)
             asyncio.get_running_loop().call_soon(self._clear_some, orphans, cleared + len(some))
         elif cleared:
             log.info("clearing %d retained topics of devices that are no longer configured", cleared)

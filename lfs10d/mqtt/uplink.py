@@ -116,8 +116,7 @@ class Uplink:
     async def start(self, events: UplinkEvents, *, on_request: OnRequest, on_spool_trouble: OnSpoolTrouble) -> None:
         """Begin to connect; earlier publications wait."""
         self._events, self._on_request = events, on_request
-        connect, clear = self._client.beside, self._clear_orphans
-        self._cleanup = Cleanup(self._topics, owned=events.topics, clear=clear, connect=connect)
+        self._cleanup = Cleanup(self._topics, self.publish, owned=events.topics, connect=self._client.beside)
         if self._store is not None:
             self._spooler = Spooler(
                 self._outbox,
@@ -315,6 +314,3 @@ class Uplink:
     def _clear_if_out(self) -> None:
         if self._cleanup.wanted and self._outbox.retained_out:
             self._cleanup.begin(self._client.connection)
-
-    def _clear_orphans(self, topics: Iterable[str]) -> None:
-        self.publish(telemetry.retained(topic, None) for topic in topics)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from decimal import Decimal
 
 BAUDRATES = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
@@ -31,14 +32,7 @@ def seconds(value: object) -> float:
 
     Raises ValueError (without words) for anything else: negative, not finite, true, text of another form.
     """
-    if isinstance(value, str):
-        match = _DURATION.fullmatch(value)
-        if match is None:
-            raise ValueError
-        return float(Decimal(match[1]) * _SECONDS_PER_UNIT[match[2]])
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= _LARGEST_NUMBER:
-        raise ValueError
-    return float(value) + 0.0  # -0.0 becomes 0.0
+    return float(_number(value, _DURATION, _SECONDS_PER_UNIT)) + 0.0  # -0.0 becomes 0.0
 
 
 _LARGEST_NUMBER = 10**15
@@ -64,15 +58,20 @@ def size(value: object) -> int:
 
     Raises ValueError (without words) for anything else, also if it comes to a fraction of a byte.
     """
+    count = _number(value, _SIZE, _BYTES_PER_UNIT)
+    if isinstance(count, float) or count != int(count):
+        raise ValueError
+    return int(count)
+
+
+def _number(value: object, form: re.Pattern[str], units: Mapping[str, Decimal] | Mapping[str, int]) -> Decimal | float:
+    """Return a non-negative number, or what text of the form comes to; raise ValueError."""
     if isinstance(value, str):
-        match = _SIZE.fullmatch(value)
+        match = form.fullmatch(value)
         if match is None:
             raise ValueError
-        count = Decimal(match[1]) * _BYTES_PER_UNIT[match[2]]
-        if count != count.to_integral_value():
-            raise ValueError
-        return int(count)
-    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= _LARGEST_NUMBER:
+        return Decimal(match[1]) * units[match[2]]
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= _LARGEST_NUMBER:
         raise ValueError
     return value
 

@@ -15,6 +15,7 @@ from lfs10d.mqtt.orphans import AT_ONCE, LONGEST, QUIET
 from lfs10d.mqtt.reasons import SESSION_TAKEN_OVER, Disconnect, DisconnectReason
 from lfs10d.mqtt.settings import Version
 from lfs10d.mqtt.topics import OWNED_LEAVES, Topics
+from lfs10d.telemetry.publication import Publication, retained
 from tests.support.virtual_loop import Loop
 
 FILTERS = [f"b/l/device/+/{leaf}" for leaf in OWNED_LEAVES]
@@ -58,10 +59,12 @@ class Site:
         self.parts: list[list[str]] = []
         self.seconds: list[Wire] = []
         self.first = Wire()
-        self.cleanup = Cleanup(Topics("b/l"), owned=lambda: self.owned, clear=self._clear, connect=self._connect)
+        self.cleanup = Cleanup(Topics("b/l"), self._publish, owned=lambda: self.owned, connect=self._connect)
 
-    def _clear(self, topics: Iterable[str]) -> None:
-        self.parts.append(list(topics))
+    def _publish(self, clearings: Iterable[Publication]) -> None:
+        cleared = list(clearings)
+        assert all(each == retained(each.topic, None) for each in cleared)
+        self.parts.append([each.topic for each in cleared])
 
     def _connect(self, events: Events, suffix: str) -> Connection:
         assert suffix == SECOND_CLIENT
