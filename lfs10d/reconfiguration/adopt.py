@@ -71,103 +71,99 @@ _TEXTS: Mapping[ReaddressEnding, str] = {
 }
 
 
-class Adopt:
-    """New sensors that are given an id and the line's rate."""
+async def perform(runner: ChangeRunner, request: AdoptRequest, command: CommandRecord) -> Result:
+    """Adopt a factory-new sensor; see `lfs10d.reconfiguration.procedures.adopt`."""
+    profile = await runner.profile(request.profile)
+    now = runner.running()
+    wish = _wish(runner, request, profile, now)
+    if isinstance(wish, Result):
+        return await runner.refuse(command, wish)
+    slave = SlaveConfig(id=wish.factory, profile=request.profile)
+    run = runner.new_run()
+    query = runner.query(slave, run.clock, profile)
+    steps = adopt.adopt(wish, query, runner.wire().echo_known)
 
-    def __init__(self, runner: ChangeRunner) -> None:
-        self._runner = runner
+    def intend(write: IdWrite) -> OpenAdopt:
+        name = request.name or default_device_name(write.new.slave)
+        move = Move(device=name, old=write.old, new=write.new, register_before=write.register_before)
+        facts = AdoptFacts(label=request.label, profile=request.profile)
+        return runner.journal.intend(OpenAdopt(moves=(move,), begun=runner.timestamp(), asked=command, facts=facts))
 
-    async def perform(self, request: AdoptRequest, command: CommandRecord) -> Result:
-        """Adopt a factory-new sensor; see `lfs10d.reconfiguration.procedures.adopt`."""
-        runner = self._runner
-        profile = await runner.profile(request.profile)
-        now = runner.running()
-        wish = self._wish(request, profile, now)
-        if isinstance(wish, Result):
-            return await runner.refuse(command, wish)
-        slave = SlaveConfig(id=wish.factory, profile=request.profile)
-        run = runner.new_run()
-        query = runner.query(slave, run.clock, profile)
-        steps = adopt.adopt(wish, query, runner.wire().echo_known)
-
-        def intend(write: IdWrite) -> OpenAdopt:
-            name = request.name or default_device_name(write.new.slave)
-            move = Move(device=name, old=write.old, new=write.new, register_before=write.register_before)
-            facts = AdoptFacts(label=request.label, profile=request.profile)
-            return runner.journal.intend(OpenAdopt(moves=(move,), begun=runner.timestamp(), asked=command, facts=facts))
-
-        async def conclude(report: adopt.AdoptReport | None, change: OpenAdopt | None) -> Result:
-            """Record the outcome on disk; return the result."""
-            report = report or adopt.AdoptReport(ReaddressReport(ReaddressEnding.LOST_BEFORE))
-            ending, to = report.readdress.ending, report.to or 0
-            name = request.name or default_device_name(to)
-            result = _result(name, wish.factory, to, report.readdress, profile, written=change is not None)
-            if ending is ReaddressEnding.TWINS:
-                rate = report.old.baudrate if report.old else None
-                runner.announce("duplicate_id", {"slave": wish.factory, "baudrate": rate})
-            if change is None or ending in NOTHING_WRITTEN:
-                return await runner.refuse(command, result)
-            try:
-                await self._save(name, report, change, runner.record(command, result))
-            except StateError as error:
-                if ending is ReaddressEnding.MOVED:
-                    return failed(
-                        "storage_full", f"the sensor is at slave id {to} now, but that cannot be saved: {error}"
-                    )
-                log.warning("%s", error)
-                return result
+    async def conclude(report: adopt.AdoptReport | None, change: OpenAdopt | None) -> Result:
+        """Record the outcome on disk; return the result."""
+        report = report or adopt.AdoptReport(ReaddressReport(ReaddressEnding.LOST_BEFORE))
+        ending, to = report.readdress.ending, report.to or 0
+        name = request.name or default_device_name(to)
+        result = _result(name, wish.factory, to, report.readdress, profile, written=change is not None)
+        if ending is ReaddressEnding.TWINS:
+            rate = report.old.baudrate if report.old else None
+            runner.announce("duplicate_id", {"slave": wish.factory, "baudrate": rate})
+        if change is None or ending in NOTHING_WRITTEN:
+            return await runner.refuse(command, result)
+        try:
+            await _save(runner, name, report, change, runner.record(command, result))
+        except StateError as error:
             if ending is ReaddressEnding.MOVED:
-                facts = {"request": NAME, "id": command.key, "device": name, "from": None, "to": {"slave": to}}
-                runner.announce("change_applied", facts)
+                return failed("storage_full", f"the sensor is at slave id {to} now, but that cannot be saved: {error}")
+            log.warning("%s", error)
             return result
+        if ending is ReaddressEnding.MOVED:
+            facts = {"request": NAME, "id": command.key, "device": name, "from": None, "to": {"slave": to}}
+            runner.announce("change_applied", facts)
+        return result
 
-        ids = frozenset({wish.factory, *wish.candidates})
-        rate = now.config.line.baudrate
-        return await runner.perform(run, steps, command, intend, conclude, line_rate=rate, excludes=ids)
+    ids = frozenset({wish.factory, *wish.candidates})
+    rate = now.config.line.baudrate
+    return await runner.perform(run, steps, command, intend, conclude, line_rate=rate, excludes=ids)
 
-    def _wish(self, request: AdoptRequest, profile: Profile, now: Effective) -> adopt.AdoptWish | Result:
-        """Return the adoption to carry out on the line, or the rejection if it cannot be."""
-        line_rate = now.config.line.baudrate
-        if profile.factory is None or (unfit := _unfit(profile, now.config.line)) is not None:
-            why = f"profile {profile.name} has no factory settings" if profile.factory is None else unfit
-            return rejected("not_allowed", f"{profile.title}: {why}", param="profile")
-        factory = request.factory or profile.factory.id
-        names = {slave.name for slave in now.config.slaves}
-        taken = self._taken(request.slaves | {factory}, now)
-        if (refusal := _refusal(request, factory, taken, names, now)) is not None:
-            return refusal
-        candidates = _candidates(request, factory, taken, names, profile)
-        if not candidates and request.to is not None:
-            message = f"name: the default {default_device_name(request.to)} is taken; give it another name"
-            return rejected("invalid_param", message, param="name")
-        codes = profile.baudrate.codes if profile.baudrate else ()
-        rates = tuple(dict.fromkeys((line_rate, profile.factory.baudrate, *codes)))
-        return adopt.AdoptWish(factory, candidates, line_rate, rates)
 
-    def _taken(self, own: frozenset[int], now: Effective) -> dict[int, str]:
-        """Return the slave ids that a new sensor cannot have, with the reason; `own` are those of its own command."""
-        taken = {slave.id: f"is that of {slave.name}" for slave in now.config.slaves}
-        for slave in now.config.slaves:
-            taken |= {place.id: f"is that of {slave.name}" for place in now.places[slave.name]}
-        reserved = self._runner.reservations.reserved
-        taken |= {slave_id: why for slave_id, why in reserved.items() if slave_id not in own}
-        for change in self._runner.open:
-            taken |= dict.fromkeys(change.slaves, "is reserved by an open change")
-        return taken
+def _wish(runner: ChangeRunner, request: AdoptRequest, profile: Profile, now: Effective) -> adopt.AdoptWish | Result:
+    """Return the adoption to carry out on the line, or the rejection if it cannot be."""
+    line_rate = now.config.line.baudrate
+    if profile.factory is None or (unfit := _unfit(profile, now.config.line)) is not None:
+        why = f"profile {profile.name} has no factory settings" if profile.factory is None else unfit
+        return rejected("not_allowed", f"{profile.title}: {why}", param="profile")
+    factory = request.factory or profile.factory.id
+    names = {slave.name for slave in now.config.slaves}
+    taken = _taken(runner, request.slaves | {factory}, now)
+    if (refusal := _refusal(request, factory, taken, names, now)) is not None:
+        return refusal
+    candidates = _candidates(request, factory, taken, names, profile)
+    if not candidates and request.to is not None:
+        message = f"name: the default {default_device_name(request.to)} is taken; give it another name"
+        return rejected("invalid_param", message, param="name")
+    codes = profile.baudrate.codes if profile.baudrate else ()
+    rates = tuple(dict.fromkeys((line_rate, profile.factory.baudrate, *codes)))
+    return adopt.AdoptWish(factory, candidates, line_rate, rates)
 
-    async def _save(self, name: str, report: adopt.AdoptReport, change: OpenAdopt, record: ResultRecord | None) -> None:
-        """Record on disk where the sensor is, or that it is still to be found."""
-        runner, readdress = self._runner, report.readdress
-        journal, journalled = runner.journal, runner.journalled
-        if readdress.ending is ReaddressEnding.MOVED:
-            (move,) = change.moves
-            await runner.save_endpoint(name, move.new, added=entry(change))
-        elif readdress.stays_open:
-            if readdress.ending is not ReaddressEnding.NOWHERE and report.at_rate:
-                await journalled(partial(journal.amend, change.number, (_at_rate(change),)))
-            await journalled(partial(journal.keep, change.number, record))
-            return
-        await journalled(partial(journal.close, frozenset({change.number}), record))
+
+def _taken(runner: ChangeRunner, own: frozenset[int], now: Effective) -> dict[int, str]:
+    """Return the slave ids that a new sensor cannot have, with the reason; `own` are those of its own command."""
+    taken = {slave.id: f"is that of {slave.name}" for slave in now.config.slaves}
+    for slave in now.config.slaves:
+        taken |= {place.id: f"is that of {slave.name}" for place in now.places[slave.name]}
+    reserved = runner.reservations.reserved
+    taken |= {slave_id: why for slave_id, why in reserved.items() if slave_id not in own}
+    for change in runner.open:
+        taken |= dict.fromkeys(change.slaves, "is reserved by an open change")
+    return taken
+
+
+async def _save(
+    runner: ChangeRunner, name: str, report: adopt.AdoptReport, change: OpenAdopt, record: ResultRecord | None
+) -> None:
+    """Record on disk where the sensor is, or that it is still to be found."""
+    readdress = report.readdress
+    journal, journalled = runner.journal, runner.journalled
+    if readdress.ending is ReaddressEnding.MOVED:
+        (move,) = change.moves
+        await runner.save_endpoint(name, move.new, added=entry(change))
+    elif readdress.stays_open:
+        if readdress.ending is not ReaddressEnding.NOWHERE and report.at_rate:
+            await journalled(partial(journal.amend, change.number, (_at_rate(change),)))
+        await journalled(partial(journal.keep, change.number, record))
+        return
+    await journalled(partial(journal.close, frozenset({change.number}), record))
 
 
 def _refusal(

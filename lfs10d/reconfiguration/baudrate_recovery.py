@@ -10,8 +10,7 @@ from typing import Any
 
 from lfs10d.line.jobs.procedure import Steps
 from lfs10d.reading import Purpose
-from lfs10d.reconfiguration import baudrate_answers
-from lfs10d.reconfiguration.baudrate import BaudrateChange
+from lfs10d.reconfiguration import baudrate, baudrate_answers
 from lfs10d.reconfiguration.journal import OpenBaudrate
 from lfs10d.reconfiguration.procedure_run import ProcedureRun
 from lfs10d.reconfiguration.procedures.baudrate import (
@@ -35,51 +34,45 @@ from lfs10d.reconfiguration.runner import ChangeRunner
 log = logging.getLogger(__name__)
 
 
-class BaudrateRecovery:
-    """Looks for the sensors of an open change of the rate."""
+def newest(runner: ChangeRunner) -> int:
+    """Return the number of the newest open change of the rate, 0 if there is none: older ones end with it."""
+    return max((change.number for change in baudrate.open_changes(runner)), default=0)
 
-    def __init__(self, runner: ChangeRunner, changes: BaudrateChange) -> None:
-        self._runner = runner
-        self._changes = changes
 
-    def newest(self) -> int:
-        """Return the number of the newest open change of the rate, 0 if there is none: older ones end with it."""
-        return max((change.number for change in self._changes.changes()), default=0)
+async def follow(runner: ChangeRunner, change: OpenBaudrate, run: ProcedureRun) -> None:
+    """Look for the sensors of an open change; finish it, or undo what a crash interrupted."""
+    if change.answered and change.facts.pending is not None:
+        await _await_power(runner, change, list(change.facts.pending), run)
+    else:
+        await _Undo(runner, change, run).carry_out()
 
-    async def follow(self, change: OpenBaudrate, run: ProcedureRun) -> None:
-        """Look for the sensors of an open change; finish it, or undo what a crash interrupted."""
-        if change.answered and change.facts.pending is not None:
-            await self._await_power(change, list(change.facts.pending), run)
-        else:
-            await _Undo(self._runner, self._changes, change, run).carry_out()
 
-    async def _await_power(self, change: OpenBaudrate, pending: list[str], run: ProcedureRun) -> None:
-        """Follow sensors that have stored the new rate until each comes up there."""
-        runner, old, to = self._runner, change.facts.old, change.facts.to
-        sensors = self._changes.sensors(pending, run.clock)
-        steps = await_power(sensors, old, to, longest_pause=runner.running().config.poll.probe_interval_max)
-        async for awaited in run.carry_out(steps, line_rate=0, share=1.0, purpose=Purpose.PROBE):
-            if isinstance(awaited, CameUp):
-                if runner.running().config.line.baudrate != to:
-                    await self._changes.save_rate(old, to)
-                pending.remove(awaited.name)
-                await runner.journalled(partial(runner.journal.set_pending, change.number, tuple(pending)))
-            elif isinstance(awaited, Twins):
-                self._changes.announce_twins(awaited.name, sensors)
-        if run.result is not None:
-            await _settle(runner, self._changes, change, run.result)
+async def _await_power(runner: ChangeRunner, change: OpenBaudrate, pending: list[str], run: ProcedureRun) -> None:
+    """Follow sensors that have stored the new rate until each comes up there."""
+    old, to = change.facts.old, change.facts.to
+    sensors = baudrate.rate_sensors(runner, pending, run.clock)
+    steps = await_power(sensors, old, to, longest_pause=runner.running().config.poll.probe_interval_max)
+    async for awaited in run.carry_out(steps, line_rate=0, share=1.0, purpose=Purpose.PROBE):
+        if isinstance(awaited, CameUp):
+            if runner.running().config.line.baudrate != to:
+                await baudrate.save_rate(runner, old, to)
+            pending.remove(awaited.name)
+            await runner.journalled(partial(runner.journal.set_pending, change.number, tuple(pending)))
+        elif isinstance(awaited, Twins):
+            baudrate.announce_twins(runner, awaited.name, sensors)
+    if run.result is not None:
+        await _settle(runner, change, run.result)
 
 
 class _Undo:
     """Sets sensors back to the old rate: at once if they answer, else when found, within the share of probes."""
 
-    def __init__(self, runner: ChangeRunner, changes: BaudrateChange, change: OpenBaudrate, run: ProcedureRun) -> None:
+    def __init__(self, runner: ChangeRunner, change: OpenBaudrate, run: ProcedureRun) -> None:
         self._runner = runner
-        self._changes = changes
         self._change = change
         self._run = run
         self._old, self._to = change.facts.old, change.facts.to
-        self._sensors = changes.sensors([move.device for move in change.moves], run.clock)
+        self._sensors = baudrate.rate_sensors(runner, [move.device for move in change.moves], run.clock)
         self._where: dict[str, int | None] = {}
         """The rate at which each sensor was found last, None where it was not."""
         self._report: BaudrateReport | None = None
@@ -97,7 +90,7 @@ class _Undo:
             if await self._result_of(looks, share=1.0, excludes=_slaves(found)) is None:
                 return
             if may_finish and all(at == self._to for at in self._where.values()):
-                await self._settle(BaudrateReport(BaudrateEnding.MOVED, self._where))
+                await _settle(self._runner, self._change, BaudrateReport(BaudrateEnding.MOVED, self._where))
                 return
             if may_finish:
                 give_up_at = self._run.clock.now + ROLL_BACK
@@ -105,10 +98,10 @@ class _Undo:
             if report is None:
                 return
             if report.ended is not BaudrateEnding.UNVERIFIED:
-                await self._settle(report)
+                await _settle(self._runner, self._change, report)
                 return
             if self._old in self._where.values() and own != self._old:
-                await self._changes.save_rate(self._to, self._old)  # those that are back are polled
+                await baudrate.save_rate(self._runner, self._to, self._old)  # those that are back are polled
             may_finish = False
             next_found = await self._await_lost(pause, longest, give_up_at)
             if next_found is None:
@@ -146,23 +139,21 @@ class _Undo:
         async for awaited in self._run.carry_out(steps, line_rate=0, **settings):
             if isinstance(awaited, Twins) and awaited.name not in self._twins:
                 self._twins.add(awaited.name)
-                self._changes.announce_twins(awaited.name, self._sensors)
+                baudrate.announce_twins(self._runner, awaited.name, self._sensors)
             elif isinstance(awaited, StillLost) and self._report is not None:
                 result = baudrate_answers.result(self._old, self._to, self._report)
                 self._change = await self._runner.keep(self._change, result)
         return self._run.result
 
-    async def _settle(self, report: BaudrateReport) -> None:
-        await _settle(self._runner, self._changes, self._change, report)
 
-
-async def _settle(runner: ChangeRunner, changes: BaudrateChange, change: OpenBaudrate, report: BaudrateReport) -> None:
+async def _settle(runner: ChangeRunner, change: OpenBaudrate, report: BaudrateReport) -> None:
     """Close a change whose sensors are all found, and the older ones that end with it."""
     old, to = change.facts.old, change.facts.to
     moved = report.ended is BaudrateEnding.MOVED
-    if runner.running().config.line.baudrate != (to if moved else old):
-        await (changes.save_rate(old, to) if moved else changes.save_rate(to, old))
-    older = frozenset(each.number for each in changes.changes() if each.number <= change.number)
+    before, after = (old, to) if moved else (to, old)
+    if runner.running().config.line.baudrate != after:
+        await baudrate.save_rate(runner, before, after)
+    older = frozenset(each.number for each in baudrate.open_changes(runner) if each.number <= change.number)
     await runner.finish(older, change, baudrate_answers.result(old, to, report))
     if not moved:
         message = f"every sensor is at {old} baud: the change to {to} is dropped"

@@ -14,15 +14,11 @@ from lfs10d.command import Command, Result
 from lfs10d.config.models import Config
 from lfs10d.errors import StateError
 from lfs10d.reconfiguration import adopt, baudrate, readdress
-from lfs10d.reconfiguration.adopt import Adopt
 from lfs10d.reconfiguration.adopt_request import AdoptRequest
-from lfs10d.reconfiguration.baudrate import BaudrateChange
-from lfs10d.reconfiguration.baudrate_recovery import BaudrateRecovery
 from lfs10d.reconfiguration.journal import OpenChange
 from lfs10d.reconfiguration.journal_commands import command_record
 from lfs10d.reconfiguration.locate import Locator
 from lfs10d.reconfiguration.procedure_run import ProcedureRun
-from lfs10d.reconfiguration.readdress import Readdress
 from lfs10d.reconfiguration.recovery import Recovery
 from lfs10d.reconfiguration.runner import ChangeRunner
 
@@ -41,10 +37,7 @@ class Reconfiguration:
         self.journal = runner.journal
         self._runner = runner
         self._act = act
-        self._readdress = Readdress(runner)
-        self._baudrate = BaudrateChange(runner)
-        self._adopt = Adopt(runner)
-        self._recovery = Recovery(runner, BaudrateRecovery(runner, self._baudrate))
+        self._recovery = Recovery(runner)
         self._locator = Locator(runner, lambda: repoll(self.polled()))
         trouble = runner.journal.take()
         if trouble is not None:
@@ -100,32 +93,34 @@ class Reconfiguration:
         with self.place(baudrate.NAME):
             self._act(baudrate.ACTIVITY)
             try:
-                if (settled := self._baudrate.settled(to)) is not None:
+                if (settled := baudrate.settled(self._runner, to)) is not None:
                     return await self._runner.refuse(command, settled)
                 self._recovery.leave(frozenset(change.number for change in self.open))
-                return await self._baudrate.perform(to, power_cycle=power_cycle, dry_run=dry_run, command=command)
+                return await baudrate.perform(
+                    self._runner, to, power_cycle=power_cycle, dry_run=dry_run, command=command
+                )
             finally:
                 self._act(None)
 
     async def adopt(self, request: AdoptRequest, call: Command) -> Result:
         """Adopt a factory-new sensor: it gets a free id and the line's rate, and is polled."""
         command = command_record(adopt.NAME, call)
-        if (busy := self.busy or self._baudrate.unsettled()) is not None:
+        if (busy := self.busy or baudrate.unsettled(self._runner)) is not None:
             return await self._runner.refuse(command, busy)
         with self.place(adopt.NAME, request.slaves):
-            return await self._adopt.perform(request, command)
+            return await adopt.perform(self._runner, request, command)
 
     async def readdress(self, device: str, to: int, *, dry_run: bool, call: Command) -> Result:
         """Give a sensor another slave id, verified."""
         command = command_record(readdress.NAME, call)
-        slave = self._readdress.fit(device, to)
+        slave = readdress.fit(self._runner, device, to)
         if isinstance(slave, Result):
             return await self._runner.refuse(command, slave)
-        if (busy := self.busy or self._baudrate.unsettled(device)) is not None:
+        if (busy := self.busy or baudrate.unsettled(self._runner, device)) is not None:
             return await self._runner.refuse(command, busy)
         with self.place(readdress.NAME, frozenset({slave.id, to})):
             self._recovery.leave(self._runner.id_changes_of(device))
-            return await self._readdress.perform(slave, to, command, dry_run=dry_run)
+            return await readdress.perform(self._runner, slave, to, command, dry_run=dry_run)
 
     # -- what else happens
 

@@ -10,8 +10,7 @@ from lfs10d.command import Result
 from lfs10d.errors import ConfigError, StateError
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Purpose
-from lfs10d.reconfiguration import adopt, readdress_answers
-from lfs10d.reconfiguration.baudrate_recovery import BaudrateRecovery
+from lfs10d.reconfiguration import adopt, baudrate_recovery, readdress_answers
 from lfs10d.reconfiguration.journal import Endpoint, Move, OpenAdopt, OpenChange, OpenReaddress
 from lfs10d.reconfiguration.journal_commands import command_of
 from lfs10d.reconfiguration.procedure_run import ProcedureRun
@@ -30,9 +29,8 @@ RETRY_AFTER = 30.0
 class Recovery:
     """Looks for the sensors of open changes, one task for each change."""
 
-    def __init__(self, runner: ChangeRunner, baudrate: BaudrateRecovery) -> None:
+    def __init__(self, runner: ChangeRunner) -> None:
         self._runner = runner
-        self._baudrate = baudrate
         self._searches: Searches[int] = Searches(runner.new_run)
 
     def begin(self) -> None:
@@ -42,7 +40,7 @@ class Recovery:
         """
         if self._runner.ending:
             return
-        newest, busy = self._baudrate.newest(), self._runner.reservations.brought
+        newest, busy = baudrate_recovery.newest(self._runner), self._runner.reservations.brought
         for change in self._runner.open:
             if change.kind == "baudrate" and change.number != newest:
                 continue  # it ends with the newest
@@ -60,7 +58,7 @@ class Recovery:
     async def _follow(self, change: OpenChange, run: ProcedureRun) -> None:
         try:
             if change.kind == "baudrate":
-                await self._baudrate.follow(change, run)
+                await baudrate_recovery.follow(self._runner, change, run)
             else:
                 await self._follow_id(change, run)
         except (StateError, ConfigError) as error:
