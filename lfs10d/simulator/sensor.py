@@ -199,9 +199,6 @@ class Sensor:
         delay = nanoseconds(self.turnaround)
         if self.jitter:
             delay += nanoseconds(self.jitter * self.random.random())
-        if not active:
-            frame = seal(answer, self.framing, self.blueprint.check)
-            return self._reply(Reply(self, ended + delay, frame, shape, 0, measured, whole=True))
         if FaultKind.LATE in active:
             delay += active[FaultKind.LATE].delay
         frame = seal(distorted(answer, active), self.framing, self.blueprint.check)

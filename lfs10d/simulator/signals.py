@@ -5,14 +5,12 @@ from __future__ import annotations
 import struct
 from collections.abc import Mapping
 from decimal import Decimal
-from typing import Final, Literal, TypeAlias
+from typing import Final, TypeAlias
 
+from lfs10d.profiles.register_types import RegisterType
 from lfs10d.profiles.values import Value
 from lfs10d.system.dataclass import dataclass
 
-Type: TypeAlias = Literal[
-    "float32", "float64", "uint16", "int16", "uint32", "int32", "uint64", "int64", "bcd", "string", "bool"
-]
 Published: TypeAlias = int | float | str | bool
 
 READ_COILS: Final = 1
@@ -44,7 +42,7 @@ class Signal:
     """
 
     address: int
-    type: Type = "float32"
+    type: RegisterType = "float32"
     low_word_first: bool = False
     swapped: bool = False
     """The bytes within each register are swapped."""

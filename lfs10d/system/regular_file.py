@@ -23,16 +23,9 @@ def read_regular(path: Path, most: int | None = None) -> bytes:
     """
     # Non-blocking: without that, opening a FIFO waits for a writer, for ever. It means nothing for a regular file.
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
-    with os.fdopen(descriptor, "rb", buffering=0) as file:
+    with os.fdopen(descriptor, "rb") as file:
         _refuse_irregular(descriptor, path)
-        return file.readall() if most is None else _up_to(most, descriptor)
-
-
-def _up_to(most: int, descriptor: int) -> bytes:
-    content = b""
-    while len(content) < most and (more := os.read(descriptor, most - len(content))):
-        content += more
-    return content
+        return file.read(most)
 
 
 def _refuse_irregular(descriptor: int, path: Path) -> None:

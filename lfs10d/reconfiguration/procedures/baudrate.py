@@ -109,11 +109,6 @@ class BaudrateReport:
     exception: int | None = None
     why: str = ""
 
-    @property
-    def restored(self) -> bool:
-        """Every sensor is at the old rate again."""
-        return self.ended is BaudrateEnding.ROLLED_BACK
-
 
 @dataclass(frozen=True, slots=True)
 class WriteRates:
@@ -176,7 +171,7 @@ def _one_by_one(wish: RateWish, where: dict[str, int | None]) -> Generator[Step,
             if wish.touched(n) == (sensor,):
                 return canary
             report = yield from roll_back(wish.touched(n), wish.old, wish.to, where)
-            return canary if report.restored else report
+            return canary if report.ended is BaudrateEnding.ROLLED_BACK else report
         return (yield from roll_back(wish.touched(n), wish.old, wish.to, where))
     return BaudrateReport(BaudrateEnding.MOVED, where)
 
@@ -184,8 +179,9 @@ def _one_by_one(wish: RateWish, where: dict[str, int | None]) -> Generator[Step,
 def _twins(wish: RateWish, last: int, where: dict[str, int | None]) -> Generator[Step, Any, BaudrateReport]:
     """Move all sensors back, because the last one written turned out to be two."""
     report = yield from roll_back(wish.touched(last), wish.old, wish.to, where)
-    names = (wish.sensors[last].name,)
-    return replace(report, ended=BaudrateEnding.TWINS, names=names) if report.restored else report
+    if report.ended is not BaudrateEnding.ROLLED_BACK:
+        return report
+    return replace(report, ended=BaudrateEnding.TWINS, names=(wish.sensors[last].name,))
 
 
 def _all_written(wish: RateWish, where: dict[str, int | None]) -> Generator[Step, Any, BaudrateReport]:
