@@ -23,6 +23,12 @@ ANY_FILE = click.Path(path_type=Path, readable=False)
 SERVICE_FILE = Path("/etc/lfs10d/lfs10d.yaml")
 """The configuration that the service reads, and every verb that is given no other."""
 
+
+def examples(lines: str) -> str:
+    """Return the epilog of a help: these lines, as they are."""
+    return f"\b\nExamples:{lines}"
+
+
 VERBS = {
     "run": "Run the daemon.",
     "check": "Validate the configuration; print the line's time budget.",
@@ -45,13 +51,12 @@ VERBS = {
 PLACES = {"web": "lfs10d.web.serve", "metrics": "lfs10d.web.print_metrics"}
 """Modules of verbs that are built on top of the others."""
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = examples("""
   lfs10d demo                  show it at work, without hardware
   lfs10d scan /dev/ttyUSB0     find the devices on a line
   lfs10d check -c lfs10d.yaml  validate the file and the time budget
   lfs10d run -c lfs10d.yaml    measure and publish
-"""
+""")
 
 
 class Verbs(click.Group):

@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from lfs10d.cli import EXIT_CONFIG, EXIT_UNAVAILABLE, config_option, event_loop, json_option, print_lines
+from lfs10d.cli import EXIT_CONFIG, EXIT_UNAVAILABLE, config_option, event_loop, examples, json_option, print_lines
 from lfs10d.cli.advice import advice
 from lfs10d.cli.doctor.finding import Finding, lines
 from lfs10d.cli.render.table import columns
@@ -21,13 +21,12 @@ from lfs10d.line.budget import Budget, budget
 from lfs10d.schema.quantities import duration_text
 from lfs10d.system.logs import escape
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = examples("""
   lfs10d check                      the file of the service
   lfs10d check -c site.yaml         another one
   lfs10d check -c site.yaml --json  for programs
   lfs10d check --online             also look at port and broker
-"""
+""")
 
 
 @click.command("check", epilog=EXAMPLES)

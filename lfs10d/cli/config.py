@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from lfs10d.cli import EXIT_FAILED, config_option, json_option, print_lines, printing_option, state_option
+from lfs10d.cli import EXIT_FAILED, config_option, examples, json_option, print_lines, printing_option, state_option
 from lfs10d.cli.effective_file import with_changes
 from lfs10d.cli.json_text import json_text
 from lfs10d.cli.render.table import columns
@@ -29,13 +29,12 @@ from lfs10d.schema.quantities import duration_text, size_text
 from lfs10d.schema.yaml12 import render
 from lfs10d.system.logs import escape
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = examples("""
   lfs10d config           every value and its origin
   lfs10d config --merged  YAML to put into the file
   lfs10d config --json    for programs
   lfs10d config --schema  JSON Schema of the file, for editors
-"""
+""")
 
 
 def _schema() -> list[str]:

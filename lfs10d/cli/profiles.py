@@ -8,19 +8,18 @@ from pathlib import Path
 
 import click
 
-from lfs10d.cli import json_option
+from lfs10d.cli import examples, json_option
 from lfs10d.cli.options import profile_names
 from lfs10d.cli.render import table
 from lfs10d.cli.render.profile_tables import explain
 from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.profiles.profile import Profile
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = examples("""
   lfs10d profiles                       the devices that lfs10d knows
   lfs10d profiles show lfs10            one of them, explained
   lfs10d profiles show ./wind-vane.yaml your own
-"""
+""")
 
 
 @click.group("profiles", invoke_without_command=True, epilog=EXAMPLES)

@@ -12,7 +12,7 @@ from typing import Any
 
 import click
 
-from lfs10d.cli import EXIT_FAILED, EXIT_UNAVAILABLE, json_option, print_lines
+from lfs10d.cli import EXIT_FAILED, EXIT_UNAVAILABLE, examples, json_option, print_lines
 from lfs10d.cli.calibrated import NONE, Calibrations, calibration_option, calibrations_of
 from lfs10d.cli.direct_line import DirectLine
 from lfs10d.cli.local_time import clock_text, stamp
@@ -42,13 +42,12 @@ BAR_UNIT = 1.0
 BAR_MOST = 40
 """Longest wind bar in columns; one column is one unit of the value."""
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = examples("""
   lfs10d read /dev/ttyUSB0 3                   the wind sensor with id 3
   lfs10d read /dev/ttyUSB0 3 --watch           every second, until Ctrl-C
   lfs10d read /dev/ttyUSB0 4 --baudrate 19200  another rate
   lfs10d read /dev/ttyUSB0 7 --profile ld-e    another device
-"""
+""")
 
 
 @click.command("read", epilog=EXAMPLES)

@@ -17,6 +17,7 @@ from lfs10d.cli import (
     EXIT_FAILED,
     config_option,
     event_loop,
+    examples,
     json_option,
     print_lines,
     printing_option,
@@ -54,8 +55,7 @@ IDS = ("id", "transaction")
 _HEXADECIMAL = re.compile(r"0x[0-9A-Fa-f]{1,8}")
 _LEADING_ZEROS = re.compile(r"0[0-9]{1,19}")
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = examples("""
   lfs10d request --list                       all requests and parameters
   lfs10d request device/options --help        what one of them takes
   lfs10d request health                       how daemon, line and sensors are
@@ -64,7 +64,7 @@ Examples:
   lfs10d request line/adopt --repeat          adopt one sensor after the other
   lfs10d request config/reload -c site.yaml   another daemon reads its file
   lfs10d request device/read device=2 --json  the response as JSON
-"""
+""")
 
 
 def _name(context: click.Context, parameter: click.Parameter, value: str) -> str:

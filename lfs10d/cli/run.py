@@ -14,7 +14,7 @@ from pathlib import Path
 
 import click
 
-from lfs10d.cli import config_option, state_option
+from lfs10d.cli import config_option, examples, state_option
 from lfs10d.config.loader import load
 from lfs10d.daemon import boot
 from lfs10d.daemon.daemon import run
@@ -26,11 +26,10 @@ from lfs10d.system.secret import leave_no_core
 
 STANDARD_ERROR = 2
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = examples("""
   lfs10d run               the service's file, /etc/lfs10d/lfs10d.yaml
   lfs10d run -c site.yaml  another one
-"""
+""")
 
 
 @click.command("run", epilog=EXAMPLES)

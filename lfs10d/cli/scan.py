@@ -12,7 +12,7 @@ from typing import Any
 
 import click
 
-from lfs10d.cli import EXIT_FAILED, EXIT_UNAVAILABLE, json_option, print_lines
+from lfs10d.cli import EXIT_FAILED, EXIT_UNAVAILABLE, examples, json_option, print_lines
 from lfs10d.cli.calibrated import NONE, Calibrations, calibration_option, calibrations_of
 from lfs10d.cli.direct_line import DirectLine
 from lfs10d.cli.options import PORT, LineOptions, baudrate, id_list, line_options, take
@@ -31,13 +31,12 @@ from lfs10d.system.dataclass import dataclass
 LOOK_EVERY = 0.1
 """Seconds between two updates of the progress."""
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = examples("""
   lfs10d scan /dev/ttyUSB0                    all ids at both rates, a minute
   lfs10d scan /dev/ttyUSB0 --ids 1-20         twenty ids, a few seconds
   lfs10d scan /dev/ttyUSB0 --baudrate 9600    one rate
   lfs10d scan /dev/ttyUSB0 --write site.yaml  keep what was found
-"""
+""")
 
 
 def _rates(context: click.Context, parameter: click.Parameter, value: str) -> tuple[int, ...]:
@@ -218,11 +217,11 @@ def _scan(result: _Result, *, as_json: bool) -> int:
             while not line.events(LOOK_EVERY):
                 pass  # until the port is open
             result.opened = True
-            with scan_view(scan, scan_findings.lasting_name(port), quiet=as_json) as drawn:
+            with scan_view(scan, scan_findings.lasting_name(port), quiet=as_json) as update:
                 line.submit(scan)
                 while not scan.over:
                     line.events(LOOK_EVERY)
-                    drawn.update()
+                    update()
             result.framing_errors = line.framing_errors
             while not scan.complete and line.events(LOOK_EVERY):
                 pass  # the reason why it did not come to its end is among them

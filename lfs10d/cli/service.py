@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from lfs10d import __version__
-from lfs10d.cli import EXIT_FAILED, SERVICE_FILE, print_lines
+from lfs10d.cli import EXIT_FAILED, SERVICE_FILE, examples, print_lines
 from lfs10d.cli.service_files import (
     Installation,
     ServicePlaces,
@@ -22,13 +22,12 @@ from lfs10d.cli.service_files import (
 from lfs10d.config.loader import load
 from lfs10d.errors import ConfigError, FailedError
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = examples("""
   sudo lfs10d service install                  install and start it
   sudo lfs10d service install --instance roof  for /etc/lfs10d/roof.yaml
   lfs10d service print                         print the unit only
   sudo lfs10d service remove                   stop it, remove the units
-"""
+""")
 INSTANCE = re.compile(r"[a-z0-9_-]{1,32}")
 SYSTEM_UNITS = Path("/etc/systemd/system")
 PACKAGED_UNITS = Path("/usr/lib/systemd/system/lfs10d.service")

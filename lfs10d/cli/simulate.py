@@ -12,7 +12,7 @@ from typing import Any
 
 import click
 
-from lfs10d.cli import json_option
+from lfs10d.cli import examples, json_option
 from lfs10d.cli.options import FRAMING, PARITY, STOPBITS, DurationType, id_list, profile_names
 from lfs10d.profiles.library import load_profile
 from lfs10d.schema.quantities import BAUDRATES
@@ -27,8 +27,7 @@ from lfs10d.system.dataclass import dataclass
 
 DURATION = DurationType("5ms, 1s or 2m")
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = examples("""
   lfs10d simulate --link /tmp/line0                       eight sensors
   lfs10d simulate --link /tmp/line0 --slaves 1-4,255      these ids
   lfs10d simulate --link /tmp/line0 --faults faults.yaml  some of them faulty
@@ -43,7 +42,7 @@ A faults file:
     5: [{fault: silent, after: 10s, for: 5s}]
 
 SIGUSR1 switches the power of all sensors off and on.
-"""
+""")
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import click
 
-from lfs10d.cli import EXIT_FAILED, config_option, event_loop, json_option, print_lines
+from lfs10d.cli import EXIT_FAILED, config_option, event_loop, examples, json_option, print_lines
 from lfs10d.cli.client import CommandClient, parsed
 from lfs10d.cli.json_text import json_text
 from lfs10d.cli.local_time import NO_CLOCK, clock_text
@@ -41,13 +41,12 @@ LEAST_WORDS: Final = 20
 HEX_COLUMNS: Final = 26
 """Nine bytes: the answer of a wind sensor."""
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = examples("""
   lfs10d trace                       half a minute of frames
   lfs10d trace --for 2m -c site.yaml two minutes of another daemon's line
   lfs10d trace | grep 'slave 3'      what concerns one slave
   lfs10d trace --json                for programs
-"""
+""")
 
 
 @click.command("trace", epilog=EXAMPLES)

@@ -12,7 +12,7 @@ from typing import Final
 
 import click
 
-from lfs10d.cli import config_option, event_loop, json_option
+from lfs10d.cli import config_option, event_loop, examples, json_option
 from lfs10d.cli.client import RETAINED_WITHIN, CommandClient, content
 from lfs10d.cli.login import Login, log_in, login_options
 from lfs10d.cli.render.live_state import FRESH, LiveState
@@ -33,13 +33,12 @@ SETTLES_WITHIN: Final = 0.2
 CONNECTS_WITHIN: Final = 6.0
 """s to connect before the daemon's status file is shown; connecting goes on meanwhile."""
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = examples("""
   lfs10d watch                  the service's line
   lfs10d watch -c site.yaml     the line of another daemon
   lfs10d watch | grep mast-top  one line for each new value of one sensor
   lfs10d watch --json           the same for programs
-"""
+""")
 
 
 @click.command("watch", epilog=EXAMPLES)

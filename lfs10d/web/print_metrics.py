@@ -7,21 +7,20 @@ from pathlib import Path
 
 import click
 
-from lfs10d.cli import config_option, event_loop
+from lfs10d.cli import config_option, event_loop, examples
 from lfs10d.cli.login import Login, log_in, login_options
 from lfs10d.errors import BrokerError
 from lfs10d.web import metrics
 from lfs10d.web.feed import feeds, settle
 from lfs10d.web.site_model import SiteModel
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = examples("""
   lfs10d metrics                      the service's line
   lfs10d metrics -c site.yaml         the line of another daemon
   lfs10d metrics >lfs10d.prom.new && mv lfs10d.prom.new lfs10d.prom
                                       for node_exporter, which must never see
                                       half a file; called by a timer
-"""
+""")
 
 
 @click.command("metrics", epilog=EXAMPLES)

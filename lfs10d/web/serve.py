@@ -12,7 +12,7 @@ from typing import Final
 
 import click
 
-from lfs10d.cli import ANY_FILE, SERVICE_FILE, event_loop
+from lfs10d.cli import ANY_FILE, SERVICE_FILE, event_loop, examples
 from lfs10d.cli.login import log_in, login_options
 from lfs10d.config.credentials import UnreadableError, password_in
 from lfs10d.errors import FailedError
@@ -25,13 +25,12 @@ SHORT: Final = 16
 """Characters below which a token is worth a warning."""
 NEEDED: Final = ("starlette", "uvicorn")
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = examples("""
   lfs10d web                      the service's line, at http://127.0.0.1:8073
   lfs10d web -c a.yaml -c b.yaml  two lines on one page
   lfs10d web --token-file token --listen 192.168.1.20:8073
                                   for phones in the local network
-"""
+""")
 
 
 class ListenAddress(click.ParamType):  # type: ignore[type-arg]  # generic in newer versions of click alone

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import click
 
-from lfs10d.cli import event_loop
+from lfs10d.cli import event_loop, examples
 from lfs10d.cli.options import DurationType
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = examples("""
   lfs10d demo                        until Ctrl-C
   lfs10d demo --for 10s | cat        ten seconds, as plain lines
   lfs10d demo --broker amqtt         with the broker that comes with Python
-"""
+""")
 
 
 @click.command("demo", epilog=EXAMPLES)

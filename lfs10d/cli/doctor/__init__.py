@@ -8,15 +8,14 @@ from pathlib import Path
 
 import click
 
-from lfs10d.cli import EXIT_FAILED, config_option, event_loop, json_option, print_lines, state_option
+from lfs10d.cli import EXIT_FAILED, config_option, event_loop, examples, json_option, print_lines, state_option
 from lfs10d.cli.login import login_options
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = examples("""
   sudo lfs10d doctor              the service's line, with all that root sees
   lfs10d doctor -c site.yaml      another one
   lfs10d doctor --json            for programs
-"""
+""")
 
 
 @click.command("doctor", epilog=EXAMPLES)

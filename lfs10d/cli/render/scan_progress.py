@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Protocol
 
@@ -105,35 +105,26 @@ def _progress_bar() -> Bar:
 # A scan of our own
 
 
-class ScanView:
-    """Shows how far a scan is, and what it finds."""
-
-    def __init__(self, scan: Scan, shown: ProgressView) -> None:
-        self._scan = scan
-        self._shown = shown
-        self._reported: set[tuple[int, int]] = set()
-
-    def update(self) -> None:
-        """Show what is new."""
-        for finding in self._scan.found:
-            place = finding.slave, finding.baudrate
-            if place not in self._reported:
-                self._reported.add(place)
-                what = scan_findings.what(finding)
-                self._shown.found(f"found {finding.slave} at {finding.baudrate} baud: {what}")
-        progress = self._scan.progress
-        where = f"{progress.baudrate} baud, id {progress.slave:>3}"
-        self._shown.progress(progress.percent, progress.remaining, where)
-
-
 @contextmanager
-def scan_view(scan: Scan, port: str, *, quiet: bool) -> Iterator[ScanView]:
-    """Say what is about to happen and how long it takes, then give what shows the scan; `quiet` as above."""
-    plan = scan.plan
+def scan_view(scan: Scan, port: str, *, quiet: bool) -> Iterator[Callable[[], None]]:
+    """Say what is about to happen and how long it takes, then give what shows all that is new; `quiet` as above."""
+    plan, reported = scan.plan, set[tuple[int, int]]()
+
+    def update() -> None:
+        for finding in scan.found:
+            place = finding.slave, finding.baudrate
+            if place not in reported:
+                reported.add(place)
+                what = scan_findings.what(finding)
+                shown.found(f"found {finding.slave} at {finding.baudrate} baud: {what}")
+        progress = scan.progress
+        where = f"{progress.baudrate} baud, id {progress.slave:>3}"
+        shown.progress(progress.percent, progress.remaining, where)
+
     if not quiet or sys.stderr.isatty():
         rates = " and ".join(str(timing.baudrate) for timing in plan.timings)
         ids = f"id {plan.ids[0]}" if len(plan.ids) == 1 else f"{len(plan.ids)} ids"
         what = f"{ids} at {rates} baud, about {span(plan.expected)}"
         click.echo(f"Scanning {port}: {what}. Nothing is written. Ctrl-C ends it.", err=True)
     with progress_view(quiet=quiet, title="", remaining=span(plan.expected)) as shown:
-        yield ScanView(scan, shown)
+        yield update
