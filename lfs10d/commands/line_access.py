@@ -35,7 +35,10 @@ J = TypeVar("J", bound=Job)
 
 
 class LineAccess:
-    """Used in the thread of the asyncio loop; what it submits runs in the line's."""
+    """Used in the thread of the asyncio loop; what it submits runs in the line's.
+
+    Handlers call what stands before `on_reading`.
+    """
 
     def __init__(self, line: Line, config: LiveConfig, publisher: Publisher, reconfiguration: Reconfiguration) -> None:
         self._line = line
@@ -53,11 +56,11 @@ class LineAccess:
         return self._pause.paused
 
     async def read(self, device: str) -> ReadResult | None:
-        """Poll a device now; None if it was removed or replaced before the poll."""
+        """Poll a configured device now; None if it was removed or replaced before the poll."""
         return await self._reads.read(device)
 
     def trace(self, duration: float) -> None:
-        """Publish every frame for `duration` s from now on."""
+        """Publish every frame for `duration` s from now on, in place of what was set before."""
         loaded = self._config.loaded
         specs = settings.device_specs(loaded.config, loaded.profiles)
         devices = {spec.slave: TracedDevice(spec.name, spec.codec, spec.profile) for spec in specs}
@@ -66,7 +69,10 @@ class LineAccess:
         self._line.hand_over_at_once(until)
 
     async def scan(self, ids: tuple[int, ...], rates: tuple[int, ...], share: float) -> Scan:
-        """Search the line for devices; return the scan that is over. Raises RefusedError where it must wait."""
+        """Search the line for devices, with at most that `share` of its time; return the scan that is over.
+
+        No `rates` are the usual ones. Raises RefusedError while a change of sensors or another scan is under way.
+        """
         if self.paused:
             raise RefusedError(FREED)
         with self._reconfiguration.place("line/scan"):
@@ -75,13 +81,16 @@ class LineAccess:
             return await self._scanner.scan(plan)
 
     async def pause(self, duration: float) -> None:
-        """Free the port for another program for `duration` s; raises RefusedError where that must wait."""
+        """Free the port for `duration` s from now on, in place of what was set before; return when it is free.
+
+        Raises RefusedError while a change of sensors or a scan is under way.
+        """
         if (busy := self._reconfiguration.busy) is not None:
             raise RefusedError(busy)
         await self._pause.pause(duration)
 
     def cancel(self) -> tuple[str, ...]:
-        """End trace, scan and pause; return those that were under way."""
+        """End trace, scan and pause; return those that were under way: `trace`, `scan`, `pause`."""
         tracing = self._trace is not None and asyncio.get_running_loop().time() < self._trace.until
         self._trace = None
         self._line.hand_over_at_once(-inf)
@@ -89,12 +98,12 @@ class LineAccess:
         return tuple(name for name, one in ended.items() if one)
 
     async def ping(self, slave: int, profile: Profile) -> Ping:
-        """Ask one slave id whether a device answers; return the job that is over."""
+        """Ask a slave id that is not polled whether a device answers; return the job that is over."""
         codec = settings.profile_codec(self._config.now.config.line, profile)
         return await self._run(lambda over: Ping(slave, profile, codec, over))
 
     async def access(self, request: RegisterRequest, device: SlaveConfig | None) -> Access:
-        """Read or write registers; return the job that is over."""
+        """Read or write registers of a configured device, or of a slave that is not; return the job that is over."""
         target = settings.access_target(self._config.now.loaded, request.slave, device)
         async with self._accesses[request.slave]:  # one after the other: each reads back what it wrote itself
             return await self._run(partial(self._new_access, target, request))

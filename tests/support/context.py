@@ -82,7 +82,8 @@ class FakeContext:
         """Begin anew, as a daemon does."""
         self.holding = LiveConfig(load(self.file), ChangesFile(STATE, Disk(self.disk)))
         self.holding.start(self)
-        self.context = Context(self.holding, self, self, self)
+        fake: Any = self
+        self.context = Context(self.holding, fake, fake, fake)
 
     def report(self, news: News) -> None:
         """Take what became of changes."""

@@ -11,7 +11,7 @@ from typing import Any, TypeVar, cast
 
 from lfs10d.command import Command, Result
 from lfs10d.commands.admission import Admission
-from lfs10d.commands.context import Announcements, Context, Handler, LineCommands
+from lfs10d.commands.context import Context, Handler
 from lfs10d.commands.dispatcher import Dispatcher
 from lfs10d.commands.handlers.registry import HANDLERS
 from lfs10d.commands.responder import Responder
@@ -143,7 +143,7 @@ class Life:
 
     def context(self) -> Context:
         """Return what the handlers may use."""
-        return Context(self.running, cast("LineCommands", Unpaused()), self.physical, cast("Announcements", None))
+        return Context(self.running, cast("Any", Unpaused()), self.physical, cast("Any", None))
 
     def report(self, news: News) -> None:
         """Take what became of changes."""
