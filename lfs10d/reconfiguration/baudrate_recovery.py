@@ -134,7 +134,7 @@ class _Undo:
         found: tuple[RateSensor, ...] | None = await self._result_of(steps, share=1.0, purpose=Purpose.PROBE)
         return found
 
-    async def _result_of(self, steps: Steps, **settings: Any) -> Any:  # noqa: ANN401 - a procedure's
+    async def _result_of(self, steps: Steps[Any], **settings: Any) -> Any:  # noqa: ANN401 - a procedure's
         """Run a procedure after the one before it; return its result, None where the port was lost."""
         async for awaited in self._run.carry_out(steps, line_rate=0, **settings):
             if isinstance(awaited, Twins) and awaited.name not in self._twins:

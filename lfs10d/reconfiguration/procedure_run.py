@@ -51,7 +51,7 @@ class ProcedureRun:
         self._awaited: asyncio.Queue[object] = asyncio.Queue()
         self._procedure: Procedure | None = None
 
-    async def carry_out(self, steps: Steps, **settings: Any) -> AsyncIterator[object]:  # noqa: ANN401 - Procedure's
+    async def carry_out(self, steps: Steps[Any], **settings: Any) -> AsyncIterator[object]:  # noqa: ANN401 - Procedure's
         """Run a procedure after the one before it; yield each thing that it awaits.
 
         It goes on when the next is asked for. Its slave ids stay its own after its end, until `resume`.

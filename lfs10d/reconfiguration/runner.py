@@ -140,7 +140,7 @@ class ChangeRunner:
     async def perform(
         self,
         run: ProcedureRun,
-        steps: Steps,
+        steps: Steps[Any],
         command: CommandRecord,
         intend: Callable[[Any], C],
         conclude: Callable[[Any, C | None], Coroutine[Any, Any, Result]],

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from math import inf
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 from lfs10d.line.jobs.job import Continue, Done, Hold, Next, Requeue
 from lfs10d.modbus.ask import Ask
@@ -40,8 +40,10 @@ class Finished:
     result: Any
 
 
+R = TypeVar("R")
 Step: TypeAlias = Ask | Hold | Await
-Steps: TypeAlias = "Generator[Step, Any, Any]"
+Steps: TypeAlias = Generator[Step, Any, R]
+"""Steps that return an `R`; each `Ask` is sent its outcome, each `Await` its result."""
 
 
 class ProcedureClock:
@@ -60,7 +62,7 @@ class Procedure:
 
     def __init__(
         self,
-        steps: Steps,
+        steps: Steps[Any],
         clock: ProcedureClock,
         on_await: Callable[[Procedure, object], None],
         *,

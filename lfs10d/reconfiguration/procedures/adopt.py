@@ -14,10 +14,9 @@ Rules
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
-from typing import Any
+from collections.abc import Callable
 
-from lfs10d.line.jobs.procedure import Await, LineLostError, Step
+from lfs10d.line.jobs.procedure import Await, LineLostError, Steps
 from lfs10d.reconfiguration.journal import Endpoint
 from lfs10d.reconfiguration.procedures.baudrate import RateSensor, restore_rate, write_rate
 from lfs10d.reconfiguration.procedures.identity_query import IdentityQuery
@@ -63,7 +62,7 @@ class AdoptReport:
     """The content of its rate register when it was recognised."""
 
 
-def adopt(wish: AdoptWish, query: IdentityQuery, echo_known: Callable[[], bool]) -> Generator[Step, Any, AdoptReport]:
+def adopt(wish: AdoptWish, query: IdentityQuery, echo_known: Callable[[], bool]) -> Steps[AdoptReport]:
     """Adopt one factory-new sensor by the rules above."""
     try:
         looked = yield from _check_before_write(wish, query, echo_known)
@@ -90,9 +89,7 @@ def adopt(wish: AdoptWish, query: IdentityQuery, echo_known: Callable[[], bool])
         return AdoptReport(ReaddressReport(ReaddressEnding.NOWHERE, stays_open=True), old, to)
 
 
-def _check_before_write(
-    wish: AdoptWish, query: IdentityQuery, echo_known: Callable[[], bool]
-) -> Generator[Step, Any, AdoptReport]:
+def _check_before_write(wish: AdoptWish, query: IdentityQuery, echo_known: Callable[[], bool]) -> Steps[AdoptReport]:
     """Find the new sensor and a free id; return `FREE` if it may be written."""
     newcomer = yield from _newcomer(wish, query)
     old = newcomer.old
@@ -111,7 +108,7 @@ def _check_before_write(
     return AdoptReport(newcomer.readdress, old, to, rate_code=newcomer.rate_code)
 
 
-def _newcomer(wish: AdoptWish, query: IdentityQuery) -> Generator[Step, Any, AdoptReport]:
+def _newcomer(wish: AdoptWish, query: IdentityQuery) -> Steps[AdoptReport]:
     """Find the one sensor at the factory id; `FREE` if there is just one, and it is recognised."""
     found: list[AdoptReport] = []
     for rate in wish.rates:
@@ -134,9 +131,7 @@ def _newcomer(wish: AdoptWish, query: IdentityQuery) -> Generator[Step, Any, Ado
     return found[0]
 
 
-def _free_id(
-    wish: AdoptWish, old: Endpoint, query: IdentityQuery
-) -> Generator[Step, Any, tuple[int | None, ReaddressReport | None]]:
+def _free_id(wish: AdoptWish, old: Endpoint, query: IdentityQuery) -> Steps[tuple[int | None, ReaddressReport | None]]:
     """Return the first silent candidate (None if there is none), and why it must not be written.
 
     At the new sensor's own rate the candidate is read while it is checked that the new sensor is alone.
@@ -152,7 +147,7 @@ def _free_id(
     return None, None
 
 
-def _at_line_rate(old: Endpoint, rate: int, query: IdentityQuery) -> Generator[Step, Any, ReaddressReport | None]:
+def _at_line_rate(old: Endpoint, rate: int, query: IdentityQuery) -> Steps[ReaddressReport | None]:
     """Bring the new sensor to the line's rate; return why that failed, None if it did not."""
     sensor = RateSensor("", old.slave, query)
     exception, at, twins = yield from write_rate(sensor, old.baudrate, rate)

@@ -16,14 +16,13 @@ Rules
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, replace
 from enum import StrEnum
 from itertools import takewhile
-from typing import Any
 
 from lfs10d.line.jobs.job import Hold
-from lfs10d.line.jobs.procedure import Await, LineLostError, Step
+from lfs10d.line.jobs.procedure import Await, LineLostError, Steps
 from lfs10d.reconfiguration.journal import Endpoint
 from lfs10d.reconfiguration.procedures.identity_query import PATIENT, IdentityQuery
 from lfs10d.reconfiguration.procedures.readdress import ECHO_READS, TRIES, VERIFY, verify, write
@@ -115,7 +114,7 @@ class WriteRates:
     """The intent to write to the sensors; answered with None once it is on the disk, else with the reason."""
 
 
-def change_rate(wish: RateWish, echo_known: Callable[[], bool]) -> Generator[Step, Any, BaudrateReport]:
+def change_rate(wish: RateWish, echo_known: Callable[[], bool]) -> Steps[BaudrateReport]:
     """Move every sensor to another rate by the rules above."""
     try:
         refusal = yield from _check_before_write(wish, echo_known)
@@ -135,7 +134,7 @@ def change_rate(wish: RateWish, echo_known: Callable[[], bool]) -> Generator[Ste
         return BaudrateReport(BaudrateEnding.UNVERIFIED, dict.fromkeys(where))
 
 
-def _check_before_write(wish: RateWish, echo_known: Callable[[], bool]) -> Generator[Step, Any, BaudrateReport | None]:
+def _check_before_write(wish: RateWish, echo_known: Callable[[], bool]) -> Steps[BaudrateReport | None]:
     absent = []
     for sensor in wish.sensors:
         reply = yield from sensor.query.read_patiently(sensor.at(wish.old))
@@ -153,7 +152,7 @@ def _check_before_write(wish: RateWish, echo_known: Callable[[], bool]) -> Gener
     return BaudrateReport(BaudrateEnding.FREE) if wish.dry_run else None
 
 
-def _one_by_one(wish: RateWish, where: dict[str, int | None]) -> Generator[Step, Any, BaudrateReport]:
+def _one_by_one(wish: RateWish, where: dict[str, int | None]) -> Steps[BaudrateReport]:
     for n, sensor in enumerate(wish.sensors):
         exception, rate, twins = yield from write_rate(sensor, wish.old, wish.to)
         where[sensor.name] = rate
@@ -176,7 +175,7 @@ def _one_by_one(wish: RateWish, where: dict[str, int | None]) -> Generator[Step,
     return BaudrateReport(BaudrateEnding.MOVED, where)
 
 
-def _twins(wish: RateWish, last: int, where: dict[str, int | None]) -> Generator[Step, Any, BaudrateReport]:
+def _twins(wish: RateWish, last: int, where: dict[str, int | None]) -> Steps[BaudrateReport]:
     """Move all sensors back, because the last one written turned out to be two."""
     report = yield from roll_back(wish.touched(last), wish.old, wish.to, where)
     if report.ended is not BaudrateEnding.ROLLED_BACK:
@@ -184,7 +183,7 @@ def _twins(wish: RateWish, last: int, where: dict[str, int | None]) -> Generator
     return replace(report, ended=BaudrateEnding.TWINS, names=(wish.sensors[last].name,))
 
 
-def _all_written(wish: RateWish, where: dict[str, int | None]) -> Generator[Step, Any, BaudrateReport]:
+def _all_written(wish: RateWish, where: dict[str, int | None]) -> Steps[BaudrateReport]:
     for n, sensor in enumerate(wish.sensors):
         exception = yield from write(sensor.at(wish.old), sensor.register, sensor.code(wish.to), sensor.query)
         says, rate = yield from find_rate(sensor, (wish.to, wish.old))
@@ -197,7 +196,7 @@ def _all_written(wish: RateWish, where: dict[str, int | None]) -> Generator[Step
     return BaudrateReport(BaudrateEnding.PENDING if pending else BaudrateEnding.MOVED, where, pending)
 
 
-def write_rate(sensor: RateSensor, old: int, to: int) -> Generator[Step, Any, tuple[int | None, int | None, bool]]:
+def write_rate(sensor: RateSensor, old: int, to: int) -> Steps[tuple[int | None, int | None, bool]]:
     """Write another rate to a sensor; return the code of an exception, and the rate at which it answers then.
 
     The third says that it answers at both: there are two of this slave id.
@@ -209,9 +208,7 @@ def write_rate(sensor: RateSensor, old: int, to: int) -> Generator[Step, Any, tu
     return exception, old if found.old.answers else None, False
 
 
-def find_rate(
-    sensor: RateSensor, rates: Sequence[int], *, tries: int = TRIES
-) -> Generator[Step, Any, tuple[int | None, int | None]]:
+def find_rate(sensor: RateSensor, rates: Sequence[int], *, tries: int = TRIES) -> Steps[tuple[int | None, int | None]]:
     """Look for a sensor at these rates; return the content of its rate register, and the rate it answers at."""
     for _ in range(tries):
         for rate in rates:
@@ -221,7 +218,7 @@ def find_rate(
     return None, None
 
 
-def restore_rate(sensor: RateSensor, rate: int, other: int) -> Generator[Step, Any, int | None]:
+def restore_rate(sensor: RateSensor, rate: int, other: int) -> Steps[int | None]:
     """Bring one sensor to `rate`, and its register; return the rate it answers at, None if it is not found."""
     says, at = yield from find_rate(sensor, (other, rate))  # there first: of two of this id one may have moved
     if at is None or (at == rate and says == sensor.code(rate)):
@@ -234,7 +231,7 @@ def restore_rate(sensor: RateSensor, rate: int, other: int) -> Generator[Step, A
     return rate if (yield from write_back(sensor, rate)) else None
 
 
-def write_back(sensor: RateSensor, rate: int) -> Generator[Step, Any, bool]:
+def write_back(sensor: RateSensor, rate: int) -> Steps[bool]:
     """Write `rate` to a sensor that answers at it; return whether its register has it then."""
     yield from write(sensor.at(rate), sensor.register, sensor.code(rate), sensor.query)
     for _ in range(TRIES):
@@ -246,7 +243,7 @@ def write_back(sensor: RateSensor, rate: int) -> Generator[Step, Any, bool]:
 
 def roll_back(
     sensors: Sequence[RateSensor], rate: int, other: int, where: dict[str, int | None]
-) -> Generator[Step, Any, BaudrateReport]:
+) -> Steps[BaudrateReport]:
     """Bring these sensors to `rate`, for up to `ROLL_BACK`; `where` learns where they are.
 
     All are looked for at the other rate in the end, after `VERIFY`, during which none is polled.
@@ -269,7 +266,7 @@ def roll_back(
     return BaudrateReport(BaudrateEnding.ROLLED_BACK, where)
 
 
-def _left_behind(sensors: Sequence[RateSensor], rate: int) -> Generator[Step, Any, list[RateSensor]]:
+def _left_behind(sensors: Sequence[RateSensor], rate: int) -> Steps[list[RateSensor]]:
     """Return the sensors that still answer at the rate that all others have left: they did not take the last write."""
     yield Hold(sensors[0].query.clock.now + VERIFY)
     left = []

@@ -15,11 +15,8 @@ Rules
 
 from __future__ import annotations
 
-from collections.abc import Generator
-from typing import Any
-
 from lfs10d.line.jobs.job import Hold
-from lfs10d.line.jobs.procedure import Await, Step
+from lfs10d.line.jobs.procedure import Await, Steps
 from lfs10d.reconfiguration.journal import Endpoint
 from lfs10d.reconfiguration.procedures.identity_query import IdentityQuery
 from lfs10d.reconfiguration.procedures.readdress import (
@@ -48,7 +45,7 @@ def follow(
     longest_pause: float,
     before: Endpoint | None = None,
     newcomer: bool = False,
-) -> Generator[Step, Any, ReaddressReport]:
+) -> Steps[ReaddressReport]:
     """Read both places until the sensor is found; each round without it is awaited.
 
     `before` is where it was before it came to `old`: it may be there still. `newcomer`: `old` is a factory's id.
@@ -82,7 +79,7 @@ def _judged(
     query: IdentityQuery,
     *,
     newcomer: bool,
-) -> Generator[Step, Any, ReaddressReport]:
+) -> Steps[ReaddressReport]:
     if newcomer and found.new.answers and not found.spoilt and found.old.register != new.slave:
         return ReaddressReport(ReaddressEnding.MOVED, found.new.register)
     report = yield from undo_stored_id(judge(found, None, None, new.slave), old, new.slave, query)
@@ -91,9 +88,7 @@ def _judged(
     return report
 
 
-def _still_there(
-    before: Endpoint | None, new: Endpoint, query: IdentityQuery
-) -> Generator[Step, Any, ReaddressReport | None]:
+def _still_there(before: Endpoint | None, new: Endpoint, query: IdentityQuery) -> Steps[ReaddressReport | None]:
     """Read the place of before, while the later ones are silent; return that the sensor stays there, None if not."""
     if before is None:
         return None

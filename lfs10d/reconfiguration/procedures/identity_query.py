@@ -14,13 +14,12 @@ Rules
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import field, replace
 from math import inf
 
 from lfs10d.line.jobs.identification import shortest_answer, strangers
 from lfs10d.line.jobs.job import Hold
-from lfs10d.line.jobs.procedure import ProcedureClock, Step
+from lfs10d.line.jobs.procedure import ProcedureClock, Steps
 from lfs10d.modbus.ask import Ask
 from lfs10d.modbus.frames import Codec
 from lfs10d.modbus.outcome import Outcome
@@ -86,7 +85,7 @@ class IdentityQuery:
 
     def read_register(
         self, endpoint: Endpoint, timeout: float | None = None, *, register: int | None = None
-    ) -> Generator[Step, Outcome, IdentityReply]:
+    ) -> Steps[IdentityReply]:
         """Read the id register at a place, or another one."""
         identity = ReadRegisters(endpoint.slave, self.id_register if register is None else register, 1)
         allowed = yield from self._allowed(identity, endpoint, timeout)
@@ -99,9 +98,7 @@ class IdentityQuery:
         """The time-outs of tries that follow each other, each longer than the one before."""
         return None, 2 * self.timeout, PATIENT
 
-    def read_patiently(
-        self, endpoint: Endpoint, *, register: int | None = None
-    ) -> Generator[Step, Outcome, IdentityReply]:
+    def read_patiently(self, endpoint: Endpoint, *, register: int | None = None) -> Steps[IdentityReply]:
         """Read the id register at a place, or another one, until it answers or was tried with all `patience`."""
         reply = SILENCE
         for timeout in self.patience:
@@ -124,7 +121,7 @@ class IdentityQuery:
 
     def read_values(
         self, endpoint: Endpoint, timeout: float | None = None, *, block: Block | None = None
-    ) -> Generator[Step, Outcome, IdentityReply]:
+    ) -> Steps[IdentityReply]:
         """Read the values at a place, whatever they are (the first `block` of the profile, or this one).
 
         A late answer to an older such read counts.
@@ -135,7 +132,7 @@ class IdentityQuery:
         asked = self._ask(self._values_of(endpoint, block), endpoint, timeout)
         return self._reply((yield from self.put(asked)), values=True)
 
-    def put(self, ask: Ask) -> Generator[Step, Outcome, Outcome]:
+    def put(self, ask: Ask) -> Steps[Outcome]:
         """Ask a slave; wait before where a second answer may follow its last one."""
         slave, duplicates = ask.request.slave, self._pending.duplicates
         until = self._answered.get(slave, -inf) + duplicates.watched(slave)
@@ -150,9 +147,7 @@ class IdentityQuery:
         """Whether a second answer came to requests to this slave id: see `lfs10d.modbus.duplicates`."""
         return self._pending.duplicates.known(endpoint.slave)
 
-    def listen(
-        self, silent: Endpoint, timeout: float, before: int
-    ) -> Generator[Step, Outcome, tuple[IdentityReply, bool]]:
+    def listen(self, silent: Endpoint, timeout: float, before: int) -> Steps[tuple[IdentityReply, bool]]:
         """Read a place that is expected to be silent right after another read; return what was received.
 
         The second says that a right frame of slave `before` came which answers no older request to it: another device
@@ -164,7 +159,7 @@ class IdentityQuery:
         extra = before in strangers(outcome, self.codec) - late
         return self._reply(outcome, values=True), extra
 
-    def settle(self, endpoint: Endpoint) -> Generator[Step, Outcome, bool]:
+    def settle(self, endpoint: Endpoint) -> Steps[bool]:
         """Read until no answer to an older request can come from a place; whether that could be reached."""
         for _ in range(8):
             if not self._pending.earlier(endpoint.slave):
@@ -193,7 +188,7 @@ class IdentityQuery:
 
     def _allowed(
         self, request: ReadRegisters, endpoint: Endpoint, timeout: float | None
-    ) -> Generator[Step, Outcome, IdentityReply | None]:
+    ) -> Steps[IdentityReply | None]:
         """Wait, and read what must go before `request`; return the reply that came in place of an answer, if any."""
         other = self._values_of(endpoint)
         barrier = other if self.codec.shapes(other)[0] != self.codec.shapes(request)[0] else None

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from lfs10d.line.jobs.job import Hold
-from lfs10d.line.jobs.procedure import Await, Step
+from lfs10d.line.jobs.procedure import Await, Steps
 from lfs10d.reconfiguration.journal import Endpoint
 from lfs10d.reconfiguration.procedures.identity_query import IdentityQuery
 
@@ -14,7 +13,7 @@ FIRST_PAUSE = 1.0
 """Between the first look and the first probes, in s; doubled after each."""
 
 
-def locate(places: Sequence[Endpoint], query: IdentityQuery, *, longest_pause: float) -> Generator[Step, Any, Endpoint]:
+def locate(places: Sequence[Endpoint], query: IdentityQuery, *, longest_pause: float) -> Steps[Endpoint]:
     """Return the first of `places` at which a device answers; None is awaited once if none does at first."""
     for endpoint in places:
         if (yield from query.read_patiently(endpoint)).answers:

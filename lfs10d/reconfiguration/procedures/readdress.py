@@ -30,14 +30,13 @@ silent            silent, garbage                            not_verified, stays
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from enum import StrEnum
 from itertools import takewhile
-from typing import Any
 
 from lfs10d.line.jobs.job import Hold
-from lfs10d.line.jobs.procedure import Await, LineLostError, Step
+from lfs10d.line.jobs.procedure import Await, LineLostError, Steps
 from lfs10d.modbus.ask import Ask
 from lfs10d.modbus.request import WriteRegister
 from lfs10d.reading import FaultCode
@@ -129,9 +128,7 @@ class ReaddressWish:
         return Endpoint(slave=self.to, baudrate=self.old.baudrate)
 
 
-def readdress(
-    wish: ReaddressWish, query: IdentityQuery, echo_known: Callable[[], bool]
-) -> Generator[Step, Any, ReaddressReport]:
+def readdress(wish: ReaddressWish, query: IdentityQuery, echo_known: Callable[[], bool]) -> Steps[ReaddressReport]:
     """Give a sensor another slave id by the rules above."""
     try:
         refusal, before = yield from check_before_write(wish, query, echo_known)
@@ -155,7 +152,7 @@ def readdress(
 
 def check_before_write(
     wish: ReaddressWish, query: IdentityQuery, echo_known: Callable[[], bool]
-) -> Generator[Step, Any, tuple[ReaddressReport | None, IdentityReply]]:
+) -> Steps[tuple[ReaddressReport | None, IdentityReply]]:
     """Check whether it may be written at all (rule 1); return why not, and what the sensor answered."""
     before = yield from query.read_patiently(wish.old)
     if before.register is None:
@@ -170,9 +167,7 @@ def check_before_write(
     return None if ending is None else ReaddressReport(ending), before
 
 
-def not_ready(
-    old: Endpoint, query: IdentityQuery, echo_known: Callable[[], bool]
-) -> Generator[Step, Any, ReaddressEnding | None]:
+def not_ready(old: Endpoint, query: IdentityQuery, echo_known: Callable[[], bool]) -> Steps[ReaddressEnding | None]:
     """Return why a sensor cannot be written to now: the echo is not known, no answer, or an old request under way."""
     for _ in range(ECHO_READS):
         if echo_known():
@@ -191,7 +186,7 @@ def absent(reply: IdentityReply) -> ReaddressReport:
     return ReaddressReport(ReaddressEnding.ABSENT, exception=reply.exception)
 
 
-def alone(old: Endpoint, to: int, query: IdentityQuery) -> Generator[Step, Any, ReaddressReport | None]:
+def alone(old: Endpoint, to: int, query: IdentityQuery) -> Steps[ReaddressReport | None]:
     """Check that one sensor is at a place and none at the slave id `to`; return the problem, if any."""
     look = yield from look_for_twins(old, Endpoint(slave=to, baudrate=old.baudrate), query)
     if look.twins is not None:
@@ -201,7 +196,7 @@ def alone(old: Endpoint, to: int, query: IdentityQuery) -> Generator[Step, Any, 
     return ReaddressReport(ReaddressEnding.TAKEN, at=old.baudrate) if look.taken else None
 
 
-def free(endpoint: Endpoint, query: IdentityQuery) -> Generator[Step, Any, bool]:
+def free(endpoint: Endpoint, query: IdentityQuery) -> Steps[bool]:
     """Return whether no byte is received in three reads at a place."""
     for timeout in PROBE_TIMEOUTS:
         reply = yield from query.read_values(endpoint, timeout)
@@ -210,7 +205,7 @@ def free(endpoint: Endpoint, query: IdentityQuery) -> Generator[Step, Any, bool]
     return True
 
 
-def write(endpoint: Endpoint, register: int, value: int, query: IdentityQuery) -> Generator[Step, Any, int | None]:
+def write(endpoint: Endpoint, register: int, value: int, query: IdentityQuery) -> Steps[int | None]:
     """Write once; return the code of an exception, if one came."""
     request = WriteRegister(endpoint.slave, register, value, query.profile.write_function)
     asked = Ask(request, query.codec, WRITE_TIMEOUT, None, endpoint.baudrate, request_gap=query.profile.request_gap)
@@ -231,7 +226,7 @@ class ReaddressFinding:
 
 def verify(
     old: Endpoint, new: Endpoint, query: IdentityQuery, look: Sequence[float | None] = PATIENT_LOOK
-) -> Generator[Step, Any, ReaddressFinding]:
+) -> Steps[ReaddressFinding]:
     """Read both places until the new one answers and the old one is silent, for up to `VERIFY`, and once more."""
     until = query.clock.now + VERIFY
     while query.clock.now < until:
@@ -245,7 +240,7 @@ def verify(
 
 def read_both(
     old: Endpoint, new: Endpoint, query: IdentityQuery, look: Sequence[float | None] = QUICK_LOOK
-) -> Generator[Step, Any, ReaddressFinding]:
+) -> Steps[ReaddressFinding]:
     """Read each of two places until it answers or was silent `TRIES` times; `look` has the time-outs at the new one."""
     spoilt = 0
     at_new = SILENCE
@@ -270,9 +265,7 @@ def read_both(
     return ReaddressFinding(at_new, at_old, spoilt >= TRIES)
 
 
-def undo_stored_id(
-    report: ReaddressReport, old: Endpoint, to: int, query: IdentityQuery
-) -> Generator[Step, Any, ReaddressReport]:
+def undo_stored_id(report: ReaddressReport, old: Endpoint, to: int, query: IdentityQuery) -> Steps[ReaddressReport]:
     """Let the one of two sensors that stayed at `old` forget the new id, if it stored that."""
     if report.ending is not ReaddressEnding.BOTH or report.register != to:
         return report

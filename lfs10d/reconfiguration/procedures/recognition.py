@@ -20,14 +20,13 @@ Rules
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
 from lfs10d.line.jobs.identification import may_lack, rate_fits
-from lfs10d.line.jobs.procedure import Step
+from lfs10d.line.jobs.procedure import Steps
 from lfs10d.line.read_plan import ILLEGAL_ADDRESS
-from lfs10d.modbus.outcome import Outcome
 from lfs10d.profiles.blocks import NO_VALUE_NOW, Block
 from lfs10d.profiles.values import Value
 from lfs10d.reading import Fault, FaultCode
@@ -75,9 +74,7 @@ class Look:
     exception: int | None = None
 
 
-def recognise(
-    endpoint: Endpoint, identity: IdentityReply, query: IdentityQuery
-) -> Generator[Step, Outcome, Recognition]:
+def recognise(endpoint: Endpoint, identity: IdentityReply, query: IdentityQuery) -> Steps[Recognition]:
     """Check that a sensor of the profile is at a place where `identity` was the reply of its id register."""
     profile = query.profile
     if identity.exception is not None:
@@ -97,7 +94,7 @@ def recognise(
     return (yield from _rate_fits(profile.baudrate.register, endpoint, query))
 
 
-def _rate_fits(register: int, endpoint: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, Recognition]:
+def _rate_fits(register: int, endpoint: Endpoint, query: IdentityQuery) -> Steps[Recognition]:
     reply = yield from query.read_patiently(endpoint, register=register)
     if rate_fits(query.profile, reply.register, endpoint.baudrate):
         return Recognition(rate_code=reply.register)
@@ -105,7 +102,7 @@ def _rate_fits(register: int, endpoint: Endpoint, query: IdentityQuery) -> Gener
     return Recognition(f"its register 0x{register:04X} {says}")
 
 
-def _all_values_fit(endpoint: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, Recognition]:
+def _all_values_fit(endpoint: Endpoint, query: IdentityQuery) -> Steps[Recognition]:
     """Read every value; some may be absent or without a number now, as long as it has others."""
     found, none = None, Recognition(f"it refuses all its values (exception {ILLEGAL_ADDRESS:02X})")
     blocks = list(query.profile.reads())
@@ -123,9 +120,7 @@ def _all_values_fit(endpoint: Endpoint, query: IdentityQuery) -> Generator[Step,
     return found or none
 
 
-def _values_fit(
-    block: Block, endpoint: Endpoint, query: IdentityQuery
-) -> Generator[Step, Outcome, tuple[Recognition, Fault | None]]:
+def _values_fit(block: Block, endpoint: Endpoint, query: IdentityQuery) -> Steps[tuple[Recognition, Fault | None]]:
     """Read a block of values `READS` times; the first answer that such a device cannot give decides.
 
     The second is why it has no value: it was refused, or says so.
@@ -154,7 +149,7 @@ def _values_fit(
     return Recognition(message), Fault(FaultCode.EXCEPTION, message, exception)
 
 
-def look_for_twins(endpoint: Endpoint, silent: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, Look]:
+def look_for_twins(endpoint: Endpoint, silent: Endpoint, query: IdentityQuery) -> Steps[Look]:
     """Check that one sensor is at a place, not two (rules 2 to 4); `silent` is a slave id without a device."""
     look = yield from _read_and_listen(endpoint, silent, query)
     if look.twins is None and query.answered_twice(endpoint):
@@ -162,7 +157,7 @@ def look_for_twins(endpoint: Endpoint, silent: Endpoint, query: IdentityQuery) -
     return look
 
 
-def _read_and_listen(endpoint: Endpoint, silent: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, Look]:
+def _read_and_listen(endpoint: Endpoint, silent: Endpoint, query: IdentityQuery) -> Steps[Look]:
     blocks = list(query.profile.reads())
     value, block = _number_in(blocks)
     numbers: list[float] = []
@@ -192,7 +187,7 @@ def _number_in(blocks: Sequence[Block]) -> tuple[Value, Block]:
     return next((place for place in places if not place[0].is_text), places[0])
 
 
-def _whose(silent: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, Look]:
+def _whose(silent: Endpoint, query: IdentityQuery) -> Steps[Look]:
     """Check whether bytes received after a read came from the place that was to be silent."""
     for _ in range(READS - 1):
         reply = yield from query.read_values(silent, QUICK)
@@ -203,7 +198,7 @@ def _whose(silent: Endpoint, query: IdentityQuery) -> Generator[Step, Outcome, L
 
 def _take_turns(
     value: Value, block: Block, numbers: list[float], endpoint: Endpoint, query: IdentityQuery
-) -> Generator[Step, Outcome, Look]:
+) -> Steps[Look]:
     """Read more often if the `numbers` so far jump back and forth; check whether that goes on."""
     if jumps(value, numbers) < READS - 1:
         return Look()
@@ -217,9 +212,7 @@ def _take_turns(
     return Look(twins=f"its values jump back and forth between {numbers[0]:g} and {numbers[1]:g} {value.unit}")
 
 
-def _measured(
-    value: Value, block: Block, endpoint: Endpoint, query: IdentityQuery
-) -> Generator[Step, Outcome, Look | float]:
+def _measured(value: Value, block: Block, endpoint: Endpoint, query: IdentityQuery) -> Steps[Look | float]:
     """Return the value; a `Look` that ends it where there is none."""
     exception: int | None = None
     for timeout in query.patience:

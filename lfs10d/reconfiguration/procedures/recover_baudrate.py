@@ -8,12 +8,11 @@ sensor answers at the old rate too there are two of that slave id, and one of th
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from math import inf
-from typing import Any
 
 from lfs10d.line.jobs.job import Hold
-from lfs10d.line.jobs.procedure import Await, Step
+from lfs10d.line.jobs.procedure import Await, Steps
 from lfs10d.reconfiguration.procedures.baudrate import (
     FIRST_PAUSE,
     BaudrateEnding,
@@ -51,7 +50,7 @@ class Twins:
 
 def look_back(
     sensors: Sequence[RateSensor], rate: int, other: int, where: dict[str, int | None], *, own: int
-) -> Generator[Step, Any, dict[str, int | None]]:
+) -> Steps[dict[str, int | None]]:
     """Look once for each sensor after a change of rate that was cut short, at the line's `own` rate first.
 
     One that answers at `rate` and has stored another is written back at once, before it comes up there: none waits
@@ -67,7 +66,7 @@ def look_back(
 
 def put_back(
     sensors: Sequence[RateSensor], rate: int, other: int, where: dict[str, int | None]
-) -> Generator[Step, Any, BaudrateReport]:
+) -> Steps[BaudrateReport]:
     """Bring those of these sensors that were found to `rate`; the report is of all in `where`.
 
     One that answers at the `other` rate too is two sensors: that is awaited, and it counts as being there.
@@ -93,7 +92,7 @@ def await_lost(
     pause: float,
     longest_pause: float,
     give_up_at: float,
-) -> Generator[Step, Any, tuple[RateSensor, ...]]:
+) -> Steps[tuple[RateSensor, ...]]:
     """Return the first of these sensors that can be put back, however long it takes; nothing is written.
 
     They are read after `pause` s, twice that ... up to `longest_pause`, at the line's `own` rate first, but where each
@@ -127,9 +126,7 @@ def _first(own: int, *rates: int) -> tuple[int, ...]:
     return tuple(sorted(rates, key=lambda each: each != own))
 
 
-def await_power(
-    sensors: Sequence[RateSensor], old: int, to: int, *, longest_pause: float
-) -> Generator[Step, Any, BaudrateReport]:
+def await_power(sensors: Sequence[RateSensor], old: int, to: int, *, longest_pause: float) -> Steps[BaudrateReport]:
     """Read sensors that need a power cycle at the new rate until all have come up there; each is awaited.
 
     So is, once, each that is two.
