@@ -22,7 +22,6 @@ from lfs10d.reconfiguration.journal import (
     Move,
     OpenAdopt,
     OpenChange,
-    ResultRecord,
 )
 from lfs10d.reconfiguration.procedures import adopt
 from lfs10d.reconfiguration.procedures.readdress import NOTHING_WRITTEN, IdWrite, ReaddressEnding, ReaddressReport
@@ -101,7 +100,7 @@ async def perform(runner: ChangeRunner, request: AdoptRequest, command: CommandR
         if change is None or ending in NOTHING_WRITTEN:
             return await runner.refuse(command, result)
         try:
-            await _save(runner, name, report, change, runner.record(command, result))
+            await _save(runner, report, change, result)
         except StateError as error:
             if ending is ReaddressEnding.MOVED:
                 return failed("storage_full", f"the sensor is at slave id {to} now, but that cannot be saved: {error}")
@@ -149,15 +148,13 @@ def _taken(runner: ChangeRunner, own: frozenset[int], now: Effective) -> dict[in
     return taken
 
 
-async def _save(
-    runner: ChangeRunner, name: str, report: adopt.AdoptReport, change: OpenAdopt, record: ResultRecord | None
-) -> None:
+async def _save(runner: ChangeRunner, report: adopt.AdoptReport, change: OpenAdopt, result: Result) -> None:
     """Record on disk where the sensor is, or that it is still to be found."""
-    readdress = report.readdress
+    readdress, record = report.readdress, runner.record(change.asked, result)
     journal, journalled = runner.journal, runner.journalled
     if readdress.ending is ReaddressEnding.MOVED:
         (move,) = change.moves
-        await runner.save_endpoint(name, move.new, added=entry(change))
+        await runner.save_endpoint(move.device, move.new, added=entry(change))
     elif readdress.stays_open:
         if readdress.ending is not ReaddressEnding.NOWHERE and report.at_rate:
             await journalled(partial(journal.amend, change.number, (_at_rate(change),)))

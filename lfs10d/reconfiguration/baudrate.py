@@ -14,7 +14,7 @@ from lfs10d.errors import StateError
 from lfs10d.line.jobs.procedure import ProcedureClock
 from lfs10d.profiles.profile import Profile
 from lfs10d.reconfiguration import baudrate_answers
-from lfs10d.reconfiguration.journal import BaudrateFacts, CommandRecord, Move, OpenBaudrate, ResultRecord
+from lfs10d.reconfiguration.journal import BaudrateFacts, CommandRecord, Move, OpenBaudrate
 from lfs10d.reconfiguration.procedures.baudrate import (
     UNTOUCHED,
     BaudrateEnding,
@@ -47,7 +47,6 @@ async def perform(runner: ChangeRunner, to: int, *, power_cycle: bool, dry_run: 
     No open change is followed meanwhile.
     """
     now = runner.running()
-    earlier = frozenset(change.number for change in runner.open)
     run = runner.new_run()
     sensors = rate_sensors(runner, [slave.name for slave in now.config.slaves], run.clock)
     wish = RateWish(sensors, now.config.line.baudrate, to, power_cycle, dry_run, _stored(runner, to))
@@ -68,7 +67,7 @@ async def perform(runner: ChangeRunner, to: int, *, power_cycle: bool, dry_run: 
         for name in report.names if report.ended is BaudrateEnding.TWINS else ():
             announce_twins(runner, name, sensors)
         try:
-            await _save(runner, wish, report, change, earlier, runner.record(command, result))
+            await _save(runner, report, change, result)
         except StateError as error:
             if report.ended is BaudrateEnding.MOVED:
                 return failed("storage_full", f"all sensors are at {to} baud, but that cannot be saved: {error}")
@@ -130,18 +129,14 @@ def rate_sensors(runner: ChangeRunner, names: Iterable[str], clock: ProcedureClo
     return tuple(RateSensor(slave.name, slave.id, runner.query(slave, clock)) for slave in slaves if slave is not None)
 
 
-async def _save(
-    runner: ChangeRunner,
-    wish: RateWish,
-    report: BaudrateReport,
-    change: OpenBaudrate,
-    earlier: frozenset[int],
-    record: ResultRecord | None,
-) -> None:
+async def _save(runner: ChangeRunner, report: BaudrateReport, change: OpenBaudrate, result: Result) -> None:
+    """Record on disk where the sensors are, or that they are still to be found."""
     journal, journalled = runner.journal, runner.journalled
+    record = runner.record(change.asked, result)
+    earlier = frozenset(each.number for each in runner.open) - {change.number}
     pending = report.ended is BaudrateEnding.PENDING
-    if report.ended is BaudrateEnding.MOVED or (pending and wish.to in report.where.values()):
-        await save_rate(runner, wish.old, wish.to)
+    if report.ended is BaudrateEnding.MOVED or (pending and change.facts.to in report.where.values()):
+        await save_rate(runner, change.facts.old, change.facts.to)
     if pending:
         await journalled(partial(journal.close, earlier, None))
         await journalled(partial(journal.set_pending, change.number, report.names))

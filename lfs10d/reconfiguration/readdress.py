@@ -10,7 +10,7 @@ from lfs10d.config.effective import Effective
 from lfs10d.config.models import SlaveConfig
 from lfs10d.errors import StateError
 from lfs10d.reconfiguration import readdress_answers
-from lfs10d.reconfiguration.journal import CommandRecord, Endpoint, Move, OpenReaddress, ResultRecord
+from lfs10d.reconfiguration.journal import CommandRecord, Endpoint, Move, OpenReaddress
 from lfs10d.reconfiguration.procedures.readdress import (
     NOTHING_WRITTEN,
     IdWrite,
@@ -83,7 +83,7 @@ async def perform(
         if change is None or report.ending in NOTHING_WRITTEN:
             return await runner.refuse(command, result)
         try:
-            await _save(runner, slave.name, wish, report, change, runner.record(command, result))
+            await _save(runner, report, change, result)
         except StateError as error:
             if report.ending is ReaddressEnding.MOVED:
                 message = f"{slave.name} answers at slave id {to} now, but that cannot be saved: {error}"
@@ -97,22 +97,16 @@ async def perform(
     return await runner.perform(run, steps, command, intend, conclude, line_rate=rate, excludes=slaves)
 
 
-async def _save(
-    runner: ChangeRunner,
-    device: str,
-    wish: ReaddressWish,
-    report: ReaddressReport,
-    change: OpenReaddress,
-    record: ResultRecord | None,
-) -> None:
+async def _save(runner: ChangeRunner, report: ReaddressReport, change: OpenReaddress, result: Result) -> None:
     """Record on disk where the sensor is, or that it is still to be found."""
+    (move,), record = change.moves, runner.record(change.asked, result)
     if report.ending is ReaddressEnding.MOVED:
-        await runner.save_endpoint(device, wish.new)
-        await runner.close(runner.id_changes_of(device), change, record)
-        runner.announce_readdressed(device, wish.old.slave, wish.new.slave)
+        await runner.save_endpoint(move.device, move.new)
+        await runner.close(runner.id_changes_of(move.device), change, record)
+        runner.announce_readdressed(move.device, move.old.slave, move.new.slave)
     elif report.stays_open:
         if report.ending is ReaddressEnding.PENDING:
-            await runner.close(runner.id_changes_of(device) - {change.number}, change, None)
+            await runner.close(runner.id_changes_of(move.device) - {change.number}, change, None)
         await runner.journalled(partial(runner.journal.keep, change.number, record))
     else:
         await runner.journalled(partial(runner.journal.close, frozenset({change.number}), record))

@@ -50,8 +50,16 @@ def follow(
 
     `before` is where it was before it came to `old`: it may be there still. `newcomer`: `old` is a factory's id.
     """
-    found = yield from verify(old, new, query, QUICK_LOOK)
-    report = yield from _judged(found, before, old, new, query, newcomer=newcomer)
+
+    def judged(found: ReaddressFinding) -> Steps[ReaddressReport]:
+        if newcomer and found.new.answers and not found.spoilt and found.old.register != new.slave:
+            return ReaddressReport(ReaddressEnding.MOVED, found.new.register)
+        report = yield from undo_stored_id(judge(found, None, None, new.slave), old, new.slave, query)
+        if report.ending is ReaddressEnding.NOWHERE:
+            return (yield from _still_there(before, new, query)) or report
+        return report
+
+    report = yield from judged((yield from verify(old, new, query, QUICK_LOOK)))
     pause = min(FIRST_PAUSE, longest_pause)
     while report.ending not in DECIDED:
         yield Await(report)
@@ -66,25 +74,7 @@ def follow(
                 break
             if at_old.silent and (yield from _still_there(before, new, query)):
                 break
-        found = yield from read_both(old, new, query)
-        report = yield from _judged(found, before, old, new, query, newcomer=newcomer)
-    return report
-
-
-def _judged(
-    found: ReaddressFinding,
-    before: Endpoint | None,
-    old: Endpoint,
-    new: Endpoint,
-    query: IdentityQuery,
-    *,
-    newcomer: bool,
-) -> Steps[ReaddressReport]:
-    if newcomer and found.new.answers and not found.spoilt and found.old.register != new.slave:
-        return ReaddressReport(ReaddressEnding.MOVED, found.new.register)
-    report = yield from undo_stored_id(judge(found, None, None, new.slave), old, new.slave, query)
-    if report.ending is ReaddressEnding.NOWHERE:
-        return (yield from _still_there(before, new, query)) or report
+        report = yield from judged((yield from read_both(old, new, query)))
     return report
 
 
