@@ -116,11 +116,10 @@ class Admission(Generic[W]):
         if not payload:
             return None
         flood = not self._within_rate(now)
+        command, problem = read(payload) if len(payload) <= LARGEST else (Command(), None)
         if retained:
-            command = read(payload)[0] if len(payload) <= LARGEST else Command()
             message = "a retained request is never executed; publish it without the retain flag"
             return Answered(command, rejected("retained", message), clear=True, flood=flood)
-        command, problem = read(payload) if len(payload) <= LARGEST else (Command(), None)
         if (excess := _too_large(len(payload), correlation)) is not None:
             return Answered(command, rejected("too_large", excess), flood=flood)
         if flood:

@@ -47,8 +47,8 @@ class LineAccess:
         self._reads = PendingReads(line.read)
         self._trace: FrameTrace | None = None
         self._accesses: defaultdict[int, asyncio.Lock] = defaultdict(asyncio.Lock)
-        self._scanner = Scanner(submit=line.submit, act=publisher.act, announce=publisher.announce)
-        self._pause = LinePause(line, publisher.set_paused)
+        self._scanner = Scanner(line, publisher)
+        self._pause = LinePause(line, publisher)
 
     @property
     def paused(self) -> bool:

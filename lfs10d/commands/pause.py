@@ -3,36 +3,23 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from lfs10d.command import rejected
 
+if TYPE_CHECKING:  # as in `lfs10d.commands.context`
+    from lfs10d.line.line import Line
+    from lfs10d.mqtt.publisher import Publisher
+
 FREED = rejected("line_error", "the port is freed for another program; see line/cancel")
-
-
-class PausableLine(Protocol):
-    """A line whose port can be freed; see `lfs10d.line.line.Line`."""
-
-    async def pause(self) -> None:
-        """Close the port; return when it is free."""
-
-    def resume(self) -> None:
-        """Open the port again."""
-
-
-class SetPaused(Protocol):
-    """Publishes whether the port is freed."""
-
-    def __call__(self, *, paused: bool) -> None:
-        """Publish it."""
 
 
 class LinePause:
     """Frees the port, and opens it again when the time is over."""
 
-    def __init__(self, line: PausableLine, set_paused: SetPaused) -> None:
+    def __init__(self, line: Line, publisher: Publisher) -> None:
         self._line = line
-        self._set_paused = set_paused
+        self._publisher = publisher
         self._timer: asyncio.TimerHandle | None = None
 
     @property
@@ -44,7 +31,7 @@ class LinePause:
         """Free the port for `duration` s from now on, in place of a time set before; return when it is free."""
         if self._timer is not None:
             self._timer.cancel()
-        self._set_paused(paused=True)
+        self._publisher.set_paused(paused=True)
         self._timer = asyncio.get_running_loop().call_later(duration, self.end)
         await self._line.pause()
 
@@ -54,6 +41,6 @@ class LinePause:
             return False
         self._timer.cancel()
         self._timer = None
-        self._set_paused(paused=False)  # first: a port that is still gone must count as an error again
+        self._publisher.set_paused(paused=False)  # first: a port that is still gone must count as an error again
         self._line.resume()
         return True

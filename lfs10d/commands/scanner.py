@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable, Mapping
 from typing import Final
 
-from lfs10d.line.jobs.job import Job
 from lfs10d.line.jobs.scan import Scan
 from lfs10d.line.jobs.scan_plan import ScanPlan
-from lfs10d.telemetry.publication import EventType
+from lfs10d.line.line import Line
+from lfs10d.mqtt.publisher import Publisher
 
 SCANNING: Final = "scanning"
 """The line's activity during a scan."""
@@ -26,22 +25,11 @@ LAST_STEP = 99.0
 
 
 class Scanner:
-    """One scan at a time.
+    """One scan at a time."""
 
-    `submit` has a job done on the line, `act` publishes what the line is busy with (None: polling), `announce` an
-    event.
-    """
-
-    def __init__(
-        self,
-        *,
-        submit: Callable[[Job], None],
-        act: Callable[[str | None], None],
-        announce: Callable[[EventType, Mapping[str, object]], None],
-    ) -> None:
-        self._submit = submit
-        self._act = act
-        self._announce = announce
+    def __init__(self, line: Line, publisher: Publisher) -> None:
+        self._line = line
+        self._publisher = publisher
         self._scan: Scan | None = None
         self._over = asyncio.Event()
         """Set once the scan is over, or cancelled."""
@@ -56,15 +44,15 @@ class Scanner:
 
         scan = Scan(plan, ended)
         self._scan, self._over = scan, over
-        self._act(SCANNING)
+        self._publisher.act(SCANNING)
         try:
-            self._submit(scan)
+            self._line.submit(scan)
             await self._follow(scan, over)
         except asyncio.CancelledError:  # the daemon is ending: what was found is returned all the same
             scan.cancel()
         finally:
             self._scan = None
-            self._act(None)
+            self._publisher.act(None)
         return scan
 
     def cancel(self) -> bool:
@@ -100,11 +88,11 @@ class Scanner:
             "baudrate": progress.baudrate,
             "found": len(scan.found),
         }
-        self._announce("scan_progress", facts)
+        self._publisher.announce("scan_progress", facts)
 
     def _publish_duplicates(self, scan: Scan, published: set[tuple[int, int]]) -> None:
         for finding in scan.found:
             place = finding.slave, finding.baudrate
             if finding.duplicate and place not in published:
                 published.add(place)
-                self._announce("duplicate_id", {"slave": finding.slave, "baudrate": finding.baudrate})
+                self._publisher.announce("duplicate_id", {"slave": finding.slave, "baudrate": finding.baudrate})

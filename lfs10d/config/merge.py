@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeAlias
 
 from lfs10d.config.changes import OPTIONS, Changes, DeviceChange, FileValues, Place, Rate, Values, Verified, value_of
 from lfs10d.system.dataclass import dataclass
@@ -113,8 +113,11 @@ def _entry(entry: Values | None, change: DeviceChange) -> tuple[Values | None, f
 
 # -- one device, three ways
 
+_Settled: TypeAlias = tuple[DeviceChange, list[DroppedChange]]
+"""The remaining changes of one device, and the dropped ones to report."""
 
-def _settle(name: str, file_values: FileValues, change: DeviceChange) -> tuple[DeviceChange, list[DroppedChange]]:
+
+def _settle(name: str, file_values: FileValues, change: DeviceChange) -> _Settled:
     """Return the remaining changes of one device, and the dropped ones to report."""
     entry = file_values.slaves.get(name)
     if change.removed is not None:
@@ -132,9 +135,7 @@ def _settle(name: str, file_values: FileValues, change: DeviceChange) -> tuple[D
     return _kept(name, entry, file_values, change)
 
 
-def _unremoved(
-    name: str, entry: Values, file_values: FileValues, change: DeviceChange
-) -> tuple[DeviceChange, list[DroppedChange]]:
+def _unremoved(name: str, entry: Values, file_values: FileValues, change: DeviceChange) -> _Settled:
     """Undo the removal of a device by request if its entry in the file was edited."""
     kept, lost = _kept(name, entry, file_values, DeviceChange(verified=change.verified))
     if entry != change.added:
@@ -143,9 +144,7 @@ def _unremoved(
     return kept, lost
 
 
-def _adopted(
-    name: str, entry: Values, file_values: FileValues, change: DeviceChange
-) -> tuple[DeviceChange, list[DroppedChange]]:
+def _adopted(name: str, entry: Values, file_values: FileValues, change: DeviceChange) -> _Settled:
     """Treat a device that was added by request as one of the file, if it was put there (rule 4)."""
     added = change.added or _NOTHING
     options = {key: added[key] for key in OPTIONS if key in added}
@@ -157,9 +156,7 @@ def _adopted(
     return kept, lost
 
 
-def _kept(
-    name: str, entry: Values, file_values: FileValues, change: DeviceChange
-) -> tuple[DeviceChange, list[DroppedChange]]:
+def _kept(name: str, entry: Values, file_values: FileValues, change: DeviceChange) -> _Settled:
     """Compare the changes of a device of the file, key by key."""
     options: dict[str, Any] = {}
     lost: list[DroppedChange] = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from typing import Any
 
 from lfs10d.commands.pause import LinePause
 
@@ -13,9 +14,10 @@ class Bench:
     def __init__(self) -> None:
         self.done: list[str | None] = []
         self.opened = asyncio.Event()
-        self.pausing = LinePause(self, self._set_paused)
+        fake: Any = self
+        self.pausing = LinePause(fake, fake)
 
-    def _set_paused(self, *, paused: bool) -> None:
+    def set_paused(self, *, paused: bool) -> None:
         self.done.append("paused" if paused else None)
 
     def resume(self) -> None:

@@ -12,6 +12,7 @@ import pytest
 from lfs10d.commands import scanner
 from lfs10d.commands.scanner import Scanner
 from lfs10d.config.loader import load
+from lfs10d.line.jobs.job import Job
 from lfs10d.line.jobs.scan import Scan
 from lfs10d.line.poller import Poller
 from lfs10d.line.scheduler import Scheduler
@@ -41,12 +42,19 @@ class Bench:
         bus = Bus(self.port, LineRules(), self.clock)
         events: list[Event] = []
         self.poller = Poller(bus, Scheduler(bus.line_timing, 0.0), events.extend, self.clock)
-        self.scanning = Scanner(submit=self.poller.submit, act=self.acts.append, announce=self._announce)
+        fake: Any = self
+        self.scanning = Scanner(fake, fake)
         file = folder / "lfs10d.yaml"
         file.write_text("line: {port: tty}\nslaves: []\nmqtt: {host: localhost}\n")
         self.search = scan_plan(load(file), IDS, (9600,), share=0.9)
 
-    def _announce(self, kind: str, facts: Mapping[str, object]) -> None:
+    def submit(self, job: Job) -> None:
+        self.poller.submit(job)
+
+    def act(self, activity: str | None) -> None:
+        self.acts.append(activity)
+
+    def announce(self, kind: str, facts: Mapping[str, object]) -> None:
         self.told.append({"type": kind, **facts})
 
     def of(self, kind: str) -> list[dict[str, Any]]:
