@@ -26,7 +26,7 @@ from lfs10d.cli.render.response import status_line
 from lfs10d.cli.render.spinner import spinning
 from lfs10d.commands.handlers.line import LONGEST, USUAL
 from lfs10d.errors import BrokerError, FailedError
-from lfs10d.mqtt.messages import Filter, Incoming
+from lfs10d.mqtt.messages import Filter
 from lfs10d.schema.quantities import duration_text
 from lfs10d.system.logs import escape
 from lfs10d.telemetry import publication
@@ -75,12 +75,7 @@ def command(config: Path, duration: float, username: str | None, password_file: 
 async def _trace(login: Login, duration: float, *, as_json: bool) -> int:
     topic = login.topics.full(publication.TRACE)
     frames: deque[Any] = deque()
-
-    def arrived(message: Incoming) -> None:
-        if message.topic == topic:
-            frames.append(parsed(message.payload))
-
-    client = CommandClient(login, [Filter(topic, qos=0)], arrived)
+    client = CommandClient(login, [Filter(topic, qos=0)], lambda message: frames.append(parsed(message.payload)))
     try:
         return await _show(client, frames, duration, as_json=as_json)
     finally:

@@ -134,17 +134,15 @@ def _unusable(tls: TlsConfig) -> Iterator[tuple[KeyPath, str]]:
             yield ("mqtt", "tls", "cert"), message
 
 
-_KEY_USAGE = b"\x06\x03\x55\x1d\x0f"
-_SUBJECT_KEY_IDENTIFIER = b"\x06\x03\x55\x1d\x0e"
-_BASIC_CONSTRAINTS_CRITICAL = b"\x06\x03\x55\x1d\x13\x01\x01\xff"
-"""Extensions of an X.509 certificate as they stand in it: DER of the object identifier, and `critical` where asked."""
-
 _STRICTLY_NEEDED = (
-    (_KEY_USAGE, "key usage"),
-    (_SUBJECT_KEY_IDENTIFIER, "a subject key identifier"),
-    (_BASIC_CONSTRAINTS_CRITICAL, "critical basic constraints"),
+    (b"\x06\x03\x55\x1d\x0f", "key usage"),
+    (b"\x06\x03\x55\x1d\x0e", "a subject key identifier"),
+    (b"\x06\x03\x55\x1d\x13\x01\x01\xff", "critical basic constraints"),
 )
-"""What OpenSSL's X509_V_FLAG_X509_STRICT wants of an authority (RFC 5280, section 4.2.1)."""
+"""What OpenSSL's X509_V_FLAG_X509_STRICT wants of an authority (RFC 5280, section 4.2.1).
+
+Extensions as they stand in a certificate: DER of the object identifier, and `critical` where asked.
+"""
 
 
 def missing_in_authorities(file: str) -> tuple[str, ...]:
