@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import ssl
+from functools import cache
 
 from lfs10d.config.models import TlsConfig
 from lfs10d.errors import BrokerError
 
 
-class _Socket(ssl.SSLSocket):
-    """Is closed when the handshake fails; paho leaves that to chance."""
+@cache
+def _closing_socket() -> type[ssl.SSLSocket]:
+    """Return the class of sockets that are closed when the handshake fails; paho leaves that to chance."""
 
-    def do_handshake(self, block: bool = False) -> None:  # noqa: FBT001, FBT002 - the signature of the library
-        try:
-            super().do_handshake(block)
-        except BaseException:
-            self.close()
-            raise
+    class ClosingSocket(ssl.SSLSocket):
+        def do_handshake(self, block: bool = False) -> None:  # noqa: FBT001, FBT002 - the signature of the library
+            try:
+                super().do_handshake(block)
+            except BaseException:
+                self.close()
+                raise
+
+    return ClosingSocket
 
 
 def tls_context(tls: TlsConfig) -> ssl.SSLContext:
@@ -29,7 +34,7 @@ def tls_context(tls: TlsConfig) -> ssl.SSLContext:
     # made by the command in mosquitto-tls(7) among them: an upgrade of the system must not lose the broker. Chain,
     # name and dates are checked as ever; `lfs10d check` warns of such an authority.
     context.verify_flags &= ~ssl.VERIFY_X509_STRICT
-    context.sslsocket_class = _Socket
+    context.sslsocket_class = _closing_socket()
     context.minimum_version = ssl.TLSVersion.TLSv1_2
     if tls.cert is not None:
         try:

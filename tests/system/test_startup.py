@@ -5,13 +5,14 @@ from __future__ import annotations
 import gc
 import subprocess
 import sys
+from importlib.util import find_spec
 
 import pytest
 
 from lfs10d.system import startup
 from lfs10d.system.startup import NoPlugins
 
-NEVER = ("importlib.metadata", "zipfile", "csv", "rich", "http.client", "email")
+NEVER = ("importlib.metadata", "zipfile", "csv", "rich", "http.client", "email", "_ssl", "_hashlib")
 """Megabytes that no running daemon needs."""
 
 
@@ -23,7 +24,7 @@ def in_a_fresh_interpreter(code: str) -> str:
 def test_the_daemon_is_imported_without_what_it_does_not_need() -> None:
     code = (
         "import sys, lfs10d.cli.exit_status; from lfs10d.system import startup; startup.begin()\n"
-        f"import lfs10d.cli.run; print([name for name in {NEVER!r} if name in sys.modules])"
+        f"import lfs10d.cli.run; print([name for name in {NEVER!r} if sys.modules.get(name)])"
     )
     assert in_a_fresh_interpreter(code) == "[]"
 
@@ -70,3 +71,44 @@ def test_a_client_of_the_web_that_is_there_stays() -> None:
         "import urllib.request; print(urllib.request is there)"
     )
     assert in_a_fresh_interpreter(code) == "True"
+
+
+WITHOUT_TLS = "import sys; from lfs10d.system import startup; startup.begin()\n"
+
+
+def test_tls_is_loaded_by_who_uses_it_and_nobody_else() -> None:
+    code = WITHOUT_TLS + (
+        "import ssl, asyncio, paho.mqtt.client; print('_ssl' in sys.modules, asyncio.base_events.ssl)\n"
+        "print(isinstance(OSError(), ssl.SSLError), issubclass(ssl.SSLWantReadError, OSError), '_ssl' in sys.modules)\n"
+        "context = ssl.create_default_context(); print('_ssl' in sys.modules, type(sys.modules['ssl']).__name__)\n"
+        "print(issubclass(ssl.SSLError, OSError), ssl.SSLWantReadError is sys.modules['ssl'].SSLWantReadError)\n"
+        "print(paho.mqtt.client.ssl.SSLWantReadError is sys.modules['ssl'].SSLWantReadError)"
+    )
+    assert in_a_fresh_interpreter(code).splitlines() == [
+        "False None",
+        "False False False",
+        "True module",
+        "True True",
+        "True",
+    ]
+
+
+def test_tls_that_is_there_stays() -> None:
+    code = (
+        "import ssl; there = ssl\n"
+        + WITHOUT_TLS
+        + "import ssl, asyncio; print(ssl is there, asyncio.base_events.ssl is ssl)"
+    )
+    assert in_a_fresh_interpreter(code) == "True True"
+
+
+@pytest.mark.parametrize("missing", startup._HASHES)
+def test_where_python_has_no_hashes_of_its_own_those_of_openssl_stay(missing: str) -> None:
+    lacking = (
+        "import importlib.util as util; found = util.find_spec\n"
+        f"util.find_spec = lambda name: None if name == {missing!r} else found(name)\n"
+    )
+    code = "import hashlib; print(hashlib.sha256(b'').hexdigest()[:8], hashlib.sha256.__module__)"
+    assert find_spec("_hashlib") is not None
+    assert in_a_fresh_interpreter(lacking + WITHOUT_TLS + code) == "e3b0c442 _hashlib"
+    assert in_a_fresh_interpreter(WITHOUT_TLS + code).startswith("e3b0c442 _sha2")
