@@ -89,6 +89,8 @@ class Bus:
         self._hurried = True
         self._pending: Mapping[int, tuple[Pending, ...]] = {}
         self._exchange: Exchange | None = None
+        self._begun: tuple[bytes, float] | None = None
+        """The plain beginning of an answer, with the time of its read: it is sorted with the rest."""
         self._context: LineContext | None = None
         """The state of the line for the next exchange; None where anything but the echo has changed."""
         self._quiet_since = -inf
@@ -155,7 +157,7 @@ class Bus:
     def close(self) -> None:
         """Close the port; the request under way is abandoned."""
         self.open = False
-        self._exchange = self.asked = None
+        self._exchange = self.asked = self._begun = None
         self.port.close()
 
     def retry(self, now: float) -> None:
@@ -227,9 +229,27 @@ class Bus:
                     return Wait(self._quiet_since + RATE_SETTLE, listen=True)
                 self._change_rate(settings)
             self._exchange = self._begin(self.asked, now)
-        elif heard:
-            self._exchange.received(heard, now)
+        elif (heard or self._begun) and (wait := self._hear(self._exchange, heard, now)) is not None:
+            return wait
         return self._carry_on(self._exchange, now)
+
+    def _hear(self, exchange: Exchange, heard: bytes, now: float) -> Wait | None:
+        """Give the exchange what was read; return how to wait where that is plainly the beginning of its answer."""
+        begun, self._begun = self._begun, None
+        if begun is None:
+            if (listen := exchange.begun(heard, now)) is not None:
+                self._begun = heard, now
+                return self._listen(listen)
+            exchange.received(heard, now)
+        elif heard:
+            exchange.received(heard, now, begun)
+        else:
+            exchange.received(*begun)
+        return None
+
+    def _listen(self, listen: Listen) -> Wait:
+        early = min(AWAKE_BEFORE, self.timing.character) if self._hurried else -UNHURRIED_AFTER
+        return Wait(listen.until, listen=True, not_before=listen.not_before - early, hurried=self._hurried)
 
     def _settings_at(self, baudrate: int) -> PortSettings:
         return self._settings if baudrate == self._settings.baudrate else replace(self._settings, baudrate=baudrate)
@@ -263,9 +283,7 @@ class Bus:
         while True:
             action = exchange.step(now)
             if isinstance(action, Listen):
-                early = min(AWAKE_BEFORE, self.timing.character) if self._hurried else -UNHURRIED_AFTER
-                not_before = action.not_before - early
-                return Wait(action.until, listen=True, not_before=not_before, hurried=self._hurried)
+                return self._listen(action)
             if isinstance(action, Quiet):
                 return Wait(action.until, listen=True, hurried=self._hurried)
             if isinstance(action, Settled):

@@ -167,16 +167,10 @@ class Exchange:
         # Silence that was still running when the line was given to us is no babble.
         self._give_up = max(asked + ask.timeout, quiet_since + self._gap)
         self._hush = ASCII_PAUSE if ask.codec.framing is Framing.ASCII else timing.t35 + line.adapter_latency
-        patience = ask.timeout if ask.patience is None else ask.patience
-        self._patience = min(patience, ask.timeout)
+        self._patience = ask.timeout if ask.patience is None else min(ask.patience, ask.timeout)
         self._began = self._sent_end = quiet_since
         self._measured_gap: float | None = None
         self._outcome: Outcome | None = None
-
-    @property
-    def state(self) -> State:
-        """Its state."""
-        return self._state
 
     @property
     def quiet_since(self) -> float:
@@ -213,8 +207,15 @@ class Exchange:
         self._quiet_since = self._sent_end
         self._reception.sent(begun)
 
-    def received(self, data: bytes, now: float) -> None:
-        """Take what was read at `now`, in any state, in any pieces."""
+    def begun(self, data: bytes, now: float) -> Listen | None:
+        """Return how to listen on if `data` is plainly the beginning of the answer: it may be kept; else None."""
+        if self._state is not State.LISTENING or not self._reception.foreseen(data, now):
+            return None
+        until = now + self._hush
+        return Listen(until, min(self._reception.whole_at, until))
+
+    def received(self, data: bytes, now: float, after: tuple[bytes, float] | None = None) -> None:
+        """Take what was read at `now`, in any state, in any pieces; `after` is what was kept before, and when."""
         if not data:
             return
         self._quiet_since = max(self._quiet_since, now)
@@ -222,7 +223,7 @@ class Exchange:
             return
         if self._state is State.READY:
             self._pass(Happening.HEARD)
-        self._reception.take(data, now)
+        self._reception.take(data, now, after)
 
     def _pass(self, happening: Happening) -> None:
         try:

@@ -9,6 +9,7 @@ from lfs10d.modbus.ask import Ask, LineContext
 from lfs10d.modbus.echo import Echo
 from lfs10d.modbus.frame_search import ExpectedFrame, FoundFrame, FrameSearch
 from lfs10d.modbus.frames import EXCEPTION_FLAG, Framing, Shape
+from lfs10d.modbus.late_answers import find_late_answers
 from lfs10d.modbus.outcome import LateAnswer
 from lfs10d.modbus.pending import Pending
 from lfs10d.modbus.request import BROADCAST, ReadRegisters
@@ -58,7 +59,7 @@ class Reception:
         self._held: list[tuple[bytes, float]] = []
         self._matched = self._missing = self._from = self._sent_at = self._early_end = 0
         self._earliest = -inf
-        self.sent_yet = self._undecided = self._echo_whole = self._owes_another = False
+        self.sent_yet = self._undecided = self._echo_whole = self._owes_another = self._plain = False
         # Echo and answer of a write look the same.
         self._expects_echo = line.echo is Echo.ON or (line.echo is Echo.UNKNOWN and not self._reads)
         self.heard = bytearray()
@@ -80,6 +81,7 @@ class Reception:
         timing = self._line.timing
         self._earliest = begun + timing.transmission(len(self._frame) - EARLY_TOLERANCE)
         self._undecided = self._line.echo is not Echo.OFF
+        self._plain = not (self._undecided or self._older or self._ascii or self._ask.request.slave == BROADCAST)
         self._sent_at = self._early_end = heard_before = self._search.end
         if heard_before:
             self._owes_another = self._foreign(0, heard_before, unanswered=True)
@@ -87,8 +89,21 @@ class Reception:
             self.heard.clear()
         self.sent_yet = True
 
-    def take(self, data: bytes, now: float) -> None:
-        """Sort what was read at `now`."""
+    def foreseen(self, data: bytes, now: float) -> bool:
+        """Return whether `data`, read at `now`, is plainly the beginning of the answer: then it may be sorted later."""
+        shape = self._normal.shape
+        lacking = shape.size - len(data)
+        begins = shape.head.startswith(data) or (data.startswith(shape.head) and lacking > 0)
+        if not (self._plain and begins) or self.heard or self._too_early(len(data), now):
+            return False
+        self.whole_at, self._missing = now + lacking * self._line.timing.character, lacking
+        return True
+
+    def take(self, data: bytes, now: float, after: tuple[bytes, float] | None = None) -> None:
+        """Sort what was read at `now`; `after` is what was foreseen before, and when."""
+        if after is not None:
+            self.heard += after[0]
+            self._search.feed(*after)
         self.heard += data
         if len(self.heard) > 2 * HEARD_KEPT:
             del self.heard[:-HEARD_KEPT]
@@ -161,22 +176,9 @@ class Reception:
 
     def look_elsewhere(self) -> None:
         """Drop the late answers of other slaves too; called once, at the end: they can be many and come seldom."""
-        if not self._pending_by_slave or not self.unsolicited:
-            return
-        rest = self._search.unclaimed(0)
-        for slave, pending in self._pending_by_slave.items():
-            if slave == self._ask.request.slave:
-                continue
-            start = 0
-            for each in pending:
-                shapes = [shape for shape in each.codec.shapes(each.request) if shape.head in rest]
-                candidates = [self._search.seek(ExpectedFrame(each.codec, shape, start)) for shape in shapes]
-                found = min((found for found in candidates if found), key=lambda found: found.begin, default=None)
-                if found is not None and not self._search.claimed(found):
-                    self._search.claim(found)
-                    latency = max(0.0, found.first_at - each.sent_end)
-                    self.late.append(LateAnswer(each.request, latency, each.ours))
-                    start = found.end
+        if self._pending_by_slave and self.unsolicited:
+            others = {slave: each for slave, each in self._pending_by_slave.items() if slave != self._ask.request.slave}
+            self.late += find_late_answers(self._search, others)
 
     def _seek_ours(self) -> None:
         expected_frames = [self._normal, self._exception]
@@ -258,9 +260,7 @@ class Reception:
     @property
     def begun(self) -> bool:
         """Whether bytes came that begin as the answer."""
-        if self.answer is not None or self.spare is not None:
-            return True
-        if self._search.begins(self._normal) or self._search.begins(self._exception):
+        if self.answer or self.spare or self._search.begins(self._normal) or self._search.begins(self._exception):
             return True
         return not self._expects_echo and self._matched >= self._normal.shape.sign and bool(self._held)
 

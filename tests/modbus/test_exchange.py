@@ -164,7 +164,7 @@ def test_a_settled_exchange_stays_settled() -> None:
     exchange.received(b"\xff", 0.04)
     assert exchange.step(0.05) == settled
     assert exchange.quiet_since == 0.04
-    assert exchange.state is State.SETTLED
+    assert exchange._state is State.SETTLED
 
 
 def test_what_follows_the_answer_before_it_is_settled_is_unsolicited() -> None:
@@ -184,7 +184,7 @@ def test_sending_unasked_is_refused_and_changes_nothing(state: State) -> None:
     before = exchange.step(0.001)
     with pytest.raises(MisuseError, match=f"in state {state} cannot be told sent"):
         exchange.sent(0.001, 0.001)
-    assert exchange.state is state
+    assert exchange._state is state
     assert exchange.step(0.001) == before
 
 
@@ -253,4 +253,4 @@ def test_a_write_that_ends_before_it_began_is_a_mistake() -> None:
     exchange.step(0.0)
     with pytest.raises(MisuseError, match=r"^a request cannot have been written before it was begun$"):
         exchange.sent(1.0, 0.9)
-    assert exchange.state is State.READY
+    assert exchange._state is State.READY

@@ -108,17 +108,30 @@ def byte_by_byte(data: bytes, begin: float) -> list[tuple[float, bytes]]:
 
 
 def carry_out(
-    each: Attempt, arrivals: list[tuple[float, bytes]], *, asked: float = 0.0, quiet_since: float = -1.0
+    each: Attempt,
+    arrivals: list[tuple[float, bytes]],
+    *,
+    asked: float = 0.0,
+    quiet_since: float = -1.0,
+    keeps: bool = True,
 ) -> Outcome:
-    """Obey an exchange as the bus does: sleep, read what is there, step."""
+    """Obey an exchange as the bus does: sleep, read what is there, step; it `keeps` a plain beginning for later."""
     exchange = each.exchange(asked=asked, quiet_since=quiet_since)
     waiting = sorted(arrivals, key=lambda arrival: arrival[0])
-    now = asked
+    now, kept = asked, None
     while True:
         there = b"".join(data for at, data in waiting if at <= now)
         waiting = [arrival for arrival in waiting if arrival[0] > now]
-        exchange.received(there, now)
-        match exchange.step(now):
+        begun = exchange.begun(there, now) if keeps and there and kept is None else None
+        if begun is not None:
+            kept = there, now
+        elif kept is not None and not there:
+            exchange.received(*kept)
+            kept = None
+        else:
+            exchange.received(there, now, kept)
+            kept = None
+        match begun or exchange.step(now):
             case Settled(outcome):
                 return outcome
             case Send():
