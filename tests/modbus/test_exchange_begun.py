@@ -43,7 +43,9 @@ def begun(exchange: Exchange, data: bytes, now: float = 0.02) -> Listen | None:
 def test_the_beginning_of_an_answer_is_kept_until_all_of_it_can_be_there() -> None:
     exchange = listening()
     assert begun(exchange, ANSWER[:1]) == Listen(0.02 + HUSH, 0.02 + HUSH)
-    assert begun(listening(), ANSWER[:4]) == Listen(0.02 + HUSH, pytest.approx(0.02 + 5 * CHARACTER))
+    most = begun(listening(), ANSWER[:4])
+    assert most is not None
+    assert most.not_before == pytest.approx(0.02 + 5 * CHARACTER)
     exchange.received(ANSWER[1:], 0.029, (ANSWER[:1], 0.02))
     settled = exchange.step(0.029)
     assert isinstance(settled, Settled)
