@@ -40,11 +40,6 @@ class Difference:
         devices = (f"slaves.{name}" for name in (*self.added, *self.removed))
         return (*(change.key for change in self.changed), *devices)
 
-    @property
-    def sections(self) -> frozenset[str]:
-        """Sections with a key that takes effect."""
-        return frozenset(key.partition(".")[0] for key in self.applied)
-
 
 def difference(old: Config, new: Config) -> Difference:
     """Return the difference from the running configuration `old` to another; both are resolved."""

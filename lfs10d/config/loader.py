@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import socket
 from collections.abc import Iterable, Mapping
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -92,18 +93,14 @@ def load(
     profiles, more = _profiles(document, config, folder, wrong)
     problems += more
     problems += (
-        document.problem(found.path, found.message, key=found.key)
-        for found in contradictions(config, profiles)
-        if not any(_concerns(key, wrong) for key in found.on)
+        document.problem(each.path, each.message, key=each.key)
+        for each in contradictions(config, profiles)
+        if not any(_concerns(key, wrong) for key in each.on)
     )
     config = _anchored(config, folder)
-    if files:
-        found = ((keys, message) for keys, message in unreadable(config.mqtt) if not _concerns(keys, wrong))
-        problems += (document.problem(keys, message) for keys, message in found)
     complete = resolved(config, stem=path.stem, host=socket.gethostname() if host is None else host)
-    problems += (
-        document.problem(keys, message) for keys, message in unfit(config, complete) if not _concerns(keys, wrong)
-    )
+    found = chain(unfit(config, complete), unreadable(config.mqtt) if files else ())
+    problems += (document.problem(keys, message) for keys, message in found if not _concerns(keys, wrong))
     credential = credential_file(environment)
     if files and credential is not None and (config.mqtt.username, config.mqtt.password_file) == (None, None):
         message = f"is missing: the systemd credential {CREDENTIAL} is a password, never sent without a user name"

@@ -89,7 +89,7 @@ def plan(running: ConfigFiles, found: ConfigFiles) -> ReloadPlan:
         restart_required=changes.restart_required,
         line=line,
         realtime=before.config.line.realtime is not target.line.realtime,
-        polling=bool(line or profiles or changes.sections & {"slaves", "poll"})
+        polling=bool(line or profiles or any(key.startswith(("slaves.", "poll.")) for key in changes.applied))
         or before.config.mqtt.hold != target.mqtt.hold,
         broker=bool(login) or _connection(before.config.mqtt) != _connection(target.mqtt),
         publishing=_publishing(before.config.mqtt) != _publishing(target.mqtt) or before.config.wind != target.wind,

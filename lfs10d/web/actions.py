@@ -52,9 +52,9 @@ class Answer:
 
 @dataclass(slots=True)
 class LineActions:
-    """The requests to one line; `login` is asked for at each."""
+    """The requests to one line."""
 
-    login: Callable[[], Login | None]
+    login: Login
     client: Callable[[Login], CommandClient] = CommandClient
     records: deque[RequestRecord] = field(default_factory=lambda: deque(maxlen=RECORDS_KEPT))
     mounting: Mounting | None = None
@@ -84,12 +84,9 @@ class LineActions:
 
     def mount(self, names: list[str]) -> Answer:
         """Begin to adopt one sensor after the other, each with the next of `names` while there are any."""
-        login = self.login()
-        if login is None:
-            return self._problem(404, "line/adopt", "unknown_line", "there is no such line")
         if self.mounting is not None and self.mounting.running:
             return self._problem(409, "line/adopt", "busy", "sensors are being mounted already")
-        self.mounting = Mounting(_own(login), names, client=self.client)
+        self.mounting = Mounting(_own(self.login), names, client=self.client)
         self.mounting.start()
         return Answer(200, {"status": "ok"})
 
@@ -107,14 +104,11 @@ class LineActions:
         await self.stop_mounting()
 
     async def _perform(self, name: str, parameters: dict[str, Any]) -> Answer:
-        login = self.login()
-        if login is None:
-            return self._problem(404, name, "unknown_line", "there is no such line")
         self._count += 1
         record = RequestRecord(self._count, name, pruned(parameters), _now())
         self.records.append(record)
         content = parameters if parameters.get("id") else {**parameters, "id": secrets.token_hex(6)}
-        client = self.client(_own(login))
+        client = self.client(_own(self.login))
         try:
             async with at_daemon(client):
                 response = await client.request(name, content, None if name in UNLIMITED else USUAL_TIMEOUT)

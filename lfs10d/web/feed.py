@@ -58,11 +58,11 @@ class Feed:
     def __init__(self, login: Login, site: SiteModel, *, others: bool) -> None:
         self.login = login
         self._site = site
-        self._base, _, self._own = login.topics.base.rpartition("/")
+        self.base, _, self._own = login.topics.base.rpartition("/")
         self._files: list[tuple[LineModel, tuple[Path, ...]]] = []
         self._others = others
         self._why = ""
-        self._client = self._made(f"{self._base}/+" if others else login.topics.base)
+        self._client = self._made(f"{self.base}/+" if others else login.topics.base)
 
     def _made(self, prefix: str) -> CommandClient:
         filters = [Filter(f"{prefix}/{each}", qos=0, retain_as_published=False) for each in RELATIVE]
@@ -74,11 +74,9 @@ class Feed:
         if line is not None:
             self._files.append((line, status_places(file, line.name, os.environ)))
 
-    def request_login(self, line: LineModel) -> Login | None:
-        """Return how requests to a line are sent; None where it is not one of this feed."""
-        if line.base != self._base or self._site.lines.get(line.key) is not line:
-            return None
-        return replace(self.login, topics=Topics.of(self._base, line.name))
+    def request_login(self, line: LineModel) -> Login:
+        """Return how requests to a line of this feed are sent."""
+        return replace(self.login, topics=Topics.of(self.base, line.name))
 
     @property
     def connected(self) -> bool:
@@ -125,13 +123,13 @@ class Feed:
                 line.on_status(str(found[0]), found[1], now=time.monotonic())
 
     def _lines(self) -> Iterator[LineModel]:
-        return (line for line in self._site.lines.values() if line.base == self._base)
+        return (line for line in self._site.lines.values() if line.base == self.base)
 
     def _line(self, name: str) -> LineModel | None:
-        return self._site.line(self._base, name, self.login.settings.place)
+        return self._site.line(self.base, name, self.login.settings.place)
 
     def _arrived(self, message: Incoming) -> None:
-        relative = message.topic.removeprefix(f"{self._base}/")
+        relative = message.topic.removeprefix(f"{self.base}/")
         name, _, rest = relative.partition("/")
         if len(message.payload) > LARGEST_PAYLOAD or not rest:
             return

@@ -61,12 +61,9 @@ class Viewers:
         if line is None:
             return None
         if key not in self._actions:
-            self._actions[key] = LineActions(lambda: self._login(line))
+            feed = next(feed for feed in self._feeds if feed.base == line.base)
+            self._actions[key] = LineActions(feed.request_login(line))
         return self._actions[key]
-
-    def _login(self, line: LineModel) -> Any:  # noqa: ANN401 - a login, or None
-        logins = (feed.request_login(line) for feed in self._feeds)
-        return next((login for login in logins if login is not None), None)
 
     def _more(self, line: LineModel) -> dict[str, Any]:
         actions = self._actions.get(line.key)

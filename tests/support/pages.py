@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from lfs10d.system.secret import Secret
 from lfs10d.web.actions import Answer, LineActions
@@ -28,7 +28,7 @@ class AnsweringActions(LineActions):
     """Requests to a line whose daemon answers as the test says; `sent` are those that came."""
 
     def __init__(self, answers: Mapping[str, dict[str, Any]]) -> None:
-        super().__init__(login=lambda: None)
+        super().__init__(login=cast("Any", None))
         self.answers = dict(answers)
         self.sent: list[tuple[str, dict[str, Any]]] = []
 

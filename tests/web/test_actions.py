@@ -25,7 +25,7 @@ def daemon() -> Iterator[FakeDaemon]:
 
 @pytest.fixture
 def actions(daemon: FakeDaemon) -> LineActions:
-    return LineActions(login, client=daemon.client)
+    return LineActions(login(), client=daemon.client)
 
 
 def sent(
@@ -118,14 +118,6 @@ def test_the_last_requests_are_kept(daemon: FakeDaemon, actions: LineActions) ->
         daemon.answer(OK)
     numbers = [each["number"] for each in actions.shown()["requests"]]
     assert numbers == list(range(4, RECORDS_KEPT + 4))
-
-
-def test_to_a_line_that_is_gone_nothing_is_sent(daemon: FakeDaemon) -> None:
-    actions = LineActions(lambda: None, client=daemon.client)
-    assert sent(daemon, actions).result().code == 404
-    assert daemon.run(lambda: actions.mount([])).code == 404
-    assert daemon.asked == []
-    assert actions.shown() == {"requests": [], "mounting": None}
 
 
 def test_sensors_are_mounted_by_one_person_at_a_time(daemon: FakeDaemon, actions: LineActions) -> None:

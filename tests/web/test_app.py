@@ -168,6 +168,7 @@ def test_what_is_no_object_of_parameters_is_refused(server: PageServer, body: by
     "names", ['"x"', '["a","a"]', '["UPPER"]', "[7]", '["../x"]', json.dumps([f"n{each}" for each in range(251)])]
 )
 def test_names_that_are_none_are_refused(server: PageServer, names: str) -> None:
+    server.answers("line0", {})
     assert server.post("/api/line0/mounting/start", f'{{"names":{names}}}'.encode()) == 400
 
 
