@@ -178,9 +178,8 @@ def _one_by_one(wish: RateWish, where: dict[str, int | None]) -> Steps[BaudrateR
 def _twins(wish: RateWish, last: int, where: dict[str, int | None]) -> Steps[BaudrateReport]:
     """Move all sensors back, because the last one written turned out to be two."""
     report = yield from roll_back(wish.touched(last), wish.old, wish.to, where)
-    if report.ended is not BaudrateEnding.ROLLED_BACK:
-        return report
-    return replace(report, ended=BaudrateEnding.TWINS, names=(wish.sensors[last].name,))
+    names, back = (wish.sensors[last].name,), report.ended is BaudrateEnding.ROLLED_BACK
+    return replace(report, ended=BaudrateEnding.TWINS, names=names) if back else report
 
 
 def _all_written(wish: RateWish, where: dict[str, int | None]) -> Steps[BaudrateReport]:
