@@ -27,6 +27,7 @@ from lfs10d.simulator.burst import MASTER
 from lfs10d.simulator.line import HeardRequest
 from lfs10d.simulator.sensor import Reply
 from lfs10d.simulator.wire import SECOND, unseal
+from tests.support.faulty_sensors import believable
 
 ANSWER = 9
 """Bytes of an answer with one number."""
@@ -129,7 +130,7 @@ class Oracle:
         self._handed = handed
         self._requests = [request for request in log if request.speaker is MASTER]
         self._begun = [request.begun for request in self._requests]
-        self._replies = [(request, answer) for request in log for answer in request.answers if answer.believable]
+        self._replies = [(request, answer) for request in log for answer in request.answers if believable(answer)]
         self._answers: dict[float, tuple[HeardRequest, Reply]] = {}
         self._published: set[float] = set()
         for request in log:
@@ -166,14 +167,14 @@ class Oracle:
             wrong = "a number published twice"
         elif last is None or last.frame[0] != slave:
             wrong = "a number of a device that was not asked"
-        elif answer is None or request is None or request.speaker is not MASTER or not answer.believable:
+        elif answer is None or request is None or request.speaker is not MASTER or not believable(answer):
             if self._was_handed(last, sample, slave):
                 found.by_construction += 1
             else:
                 wrong = "a number nobody sent so"
         elif answer.sensor.slave != slave:
             wrong = f"the number of slave {answer.sensor.slave}"
-        elif answer.second and any(first.believable for first in request.answers if not first.second):
+        elif answer.second and any(believable(first) for first in request.answers if not first.second):
             wrong = "a second answer to a request"
         elif request is not last and self._displaced(request, last):
             found.by_construction += 1

@@ -25,6 +25,7 @@ from lfs10d.simulator.wire import SECOND, Format
 from soak.attestation import Oracle, Samples, codes, parsed
 from soak.troubles import FAMILY, Fault, mix
 from soak.virtual import EPOCH, DaemonInMemory
+from tests.support.faulty_sensors import add_fault
 from tests.support.queued_sensor import QueuedSensor
 
 DEVICES = (1, 2, 3, 4)
@@ -173,7 +174,7 @@ class Life:
 
     def _alone(self, name: str, fault: Fault) -> None:
         for kind, particulars in (fault.faults or {}).items():
-            self.line.sensor(ILL).add_fault(kind, **particulars)
+            add_fault(self.line.sensor(ILL), kind, **particulars)
         if fault.begin is not None:
             fault.begin(self.daemon, ALONE)
         self._spell(name, fault, ALONE)

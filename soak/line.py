@@ -18,6 +18,7 @@ from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import SECOND, Format
 from soak.attestation import epoch_of
 from soak.oracle import Numbered, Sent, number_of
+from tests.support.faulty_sensors import add_fault, believable
 
 BAUDRATE = 19200
 SLAVES = range(1, 9)
@@ -32,19 +33,19 @@ PATIENCE = 5.0
 
 def ail(line: SimulatedLine) -> None:
     """Give each sensor but the first what ails it, and the line its stray bytes."""
-    line.sensor(2).add_fault(FaultKind.NOISY, 0.03)
-    line.sensor(2).add_fault(FaultKind.GARBAGE, 0.01)
-    line.sensor(3).add_fault(FaultKind.LATE, 0.01, delay=0.6)
-    line.sensor(3).add_fault(FaultKind.LATE, 0.01, delay=0.15)
-    line.sensor(4).add_fault(FaultKind.SILENT, first=20.0, last=26.0, every=60.0)
+    add_fault(line.sensor(2), FaultKind.NOISY, 0.03)
+    add_fault(line.sensor(2), FaultKind.GARBAGE, 0.01)
+    add_fault(line.sensor(3), FaultKind.LATE, 0.01, delay=0.6)
+    add_fault(line.sensor(3), FaultKind.LATE, 0.01, delay=0.15)
+    add_fault(line.sensor(4), FaultKind.SILENT, first=20.0, last=26.0, every=60.0)
     for kind in (FaultKind.NAN, FaultKind.INFINITE, FaultKind.OUT_OF_RANGE, FaultKind.SUBNORMAL):
-        line.sensor(5).add_fault(kind, 0.01)
+        add_fault(line.sensor(5), kind, 0.01)
     for kind in (FaultKind.TRUNCATED, FaultKind.LEADING_NOISE, FaultKind.TRAILING_NOISE):
-        line.sensor(6).add_fault(kind, 0.01)
+        add_fault(line.sensor(6), kind, 0.01)
     for kind in (FaultKind.WRONG_ID, FaultKind.WRONG_FUNCTION, FaultKind.EXCEPTION):
-        line.sensor(7).add_fault(kind, 0.01)
-    line.sensor(8).add_fault(FaultKind.SLOW_BYTES, 0.01)
-    line.sensor(8).add_fault(FaultKind.SILENT, 0.02)
+        add_fault(line.sensor(7), kind, 0.01)
+    add_fault(line.sensor(8), FaultKind.SLOW_BYTES, 0.01)
+    add_fault(line.sensor(8), FaultKind.SILENT, 0.02)
     stray(line, 0.005)
 
 
@@ -136,7 +137,7 @@ def answers_of(
             burst = answer.burst
             end = burst.ends[-1] if burst.ends else burst.start
             in_time = following is None or end <= following
-            believable = request.speaker is MASTER and answer.believable and in_time
+            believed = request.speaker is MASTER and believable(answer) and in_time
             prompt = burst.start - request.ended <= PROMPT
-            sent.append(Sent(number, names[answer.sensor], origin + end / SECOND, believable, prompt))
+            sent.append(Sent(number, names[answer.sensor], origin + end / SECOND, believed, prompt))
     return sent

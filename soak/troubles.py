@@ -11,6 +11,7 @@ from lfs10d.simulator.faults import Window
 from lfs10d.simulator.line_faults import babble, stray
 from lfs10d.simulator.wire import nanoseconds
 from soak.virtual import DaemonInMemory
+from tests.support.faulty_sensors import add_fault
 from tests.support.second_masters import passing_master
 
 Particulars: TypeAlias = "Mapping[str, float]"
@@ -166,7 +167,7 @@ def mix(daemon: DaemonInMemory, random: Random, seconds: float) -> str:
                 particulars["delay"] = random.choice((0.02, 0.1, 0.25, 0.6, 1.3))
             elif kind == "exception":
                 particulars["code"] = random.choice((2, 3, 6))
-            sensor.add_fault(kind, rate, **particulars)
+            add_fault(sensor, kind, rate, **particulars)
             words.append(f"{sensor.slave} {kind} {rate} {particulars}")
     for trouble, share in ((_stray, 0.3), (_babble, 0.1), (_second_master, 0.15), (_unplugged, 0.05), (_away, 0.2)):
         if random.random() < share:

@@ -27,7 +27,6 @@ from lfs10d.simulator.faults import (
     ActiveFaults,
     FaultKind,
     SensorFault,
-    sensor_fault,
 )
 from lfs10d.simulator.frame_faults import SPOIL, distorted, spoilt
 from lfs10d.simulator.memory import (
@@ -86,11 +85,6 @@ class Reply:
         """When its last bit is over."""
         return self.format.ends(self.start, len(self.data), self.pause)[-1]
 
-    @property
-    def believable(self) -> bool:
-        """Every byte of it came onto the line as a well sensor sends it."""
-        return self.whole and not self.burst.struck
-
 
 class Sensor:
     """A device at a slave id, with its registers, faults and power. Switch anything at any time in a test."""
@@ -137,14 +131,6 @@ class Sensor:
     def blueprint(self) -> Blueprint:
         """What kind of device it is."""
         return self.memory.blueprint
-
-    def add_fault(
-        self, kind: FaultKind | str, rate: float = 1.0, **particulars: float | str | tuple[str, ...] | None
-    ) -> SensorFault:
-        """Add a fault with times in seconds (see `faults.sensor_fault`) and return it."""
-        added = sensor_fault(kind, rate, **particulars)  # type: ignore[arg-type]  # passed on as they are
-        self.faults.append(added)
-        return added
 
     def power_cut(self) -> None:
         """Lose power; a byte under way is completed (`SimulatedLine.power_cut` cuts that too)."""

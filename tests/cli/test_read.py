@@ -24,6 +24,7 @@ from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.signals import Signal
 from lfs10d.simulator.wire import Format
+from tests.support.faulty_sensors import add_fault
 from tests.support.verbs import AtTerminal, Lfs10d
 
 
@@ -136,7 +137,7 @@ def test_a_sensor_that_answers_at_the_second_attempt_is_read(lfs10d: Lfs10d, sen
 
 
 def test_garbled_answers_are_shown_in_hex_and_explained(lfs10d: Lfs10d, sensors: PtyLine) -> None:
-    sensors.line.add(Sensor(3)).add_fault("noisy")
+    add_fault(sensors.line.add(Sensor(3)), "noisy")
     done = lfs10d("read", sensors.path, "3")
     assert done.returncode == 1
     assert "A reply of the right length came, but its checksum is wrong." in done.stderr
@@ -145,7 +146,7 @@ def test_garbled_answers_are_shown_in_hex_and_explained(lfs10d: Lfs10d, sensors:
 
 
 def test_a_refusal_is_explained_at_once(lfs10d: Lfs10d, sensors: PtyLine) -> None:
-    sensors.line.add(Sensor(3)).add_fault("exception")
+    add_fault(sensors.line.add(Sensor(3)), "exception")
     done = lfs10d("read", sensors.path, "3")
     assert done.returncode == 1
     assert "after 1 attempt: exception 02 illegal register address" in done.stderr
@@ -153,7 +154,7 @@ def test_a_refusal_is_explained_at_once(lfs10d: Lfs10d, sensors: PtyLine) -> Non
 
 
 def test_a_busy_device_is_asked_again(lfs10d: Lfs10d, sensors: PtyLine) -> None:
-    sensors.line.add(Sensor(3)).add_fault("exception", code=6)
+    add_fault(sensors.line.add(Sensor(3)), "exception", code=6)
     assert "after 3 attempts: exception 06 busy" in lfs10d("read", sensors.path, "3").stderr
 
 

@@ -24,12 +24,13 @@ from lfs10d.simulator.line_faults import stray
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
+from tests.support.faulty_sensors import add_fault
 from tests.support.verbs import AtTerminal, Lfs10d
 
 
 def wild(slave: int) -> Sensor:
     sensor = Sensor(slave)
-    sensor.add_fault("wildcard")
+    add_fault(sensor, "wildcard")
     return sensor
 
 

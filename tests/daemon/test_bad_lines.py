@@ -17,6 +17,7 @@ from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.wire import SECOND, Format
 from soak.attestation import Oracle, epoch_of, parsed
 from soak.troubles import KINDS
+from tests.support.faulty_sensors import add_fault
 from tests.support.queued_sensor import QueuedSensor
 from tests.support.sites import Site, View, eventually, tell
 
@@ -78,7 +79,7 @@ def ail(line: SimulatedLine, kind: str) -> None:
         sensor.faults.clear()
         sensor.hung = False
     for slave in (2, 3):
-        line.sensor(slave).add_fault(kind, SHARE, **KINDS[kind])
+        add_fault(line.sensor(slave), kind, SHARE, **KINDS[kind])
 
 
 def heal(line: SimulatedLine) -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from lfs10d.simulator.faults import FaultKind
 from lfs10d.simulator.line import SimulatedLine
+from tests.support.faulty_sensors import add_fault
 from tests.support.sites import Site, View, eventually, good, tell
 
 
@@ -23,7 +24,7 @@ def test_a_sensor_that_dies_fails_three_times_then_is_offline_and_reported_once(
     view.wait_samples("slave-2", 3)
 
     alive = view.samples("slave-2")[-1]["seq"]
-    tell(served, lambda line: line.sensor(2).add_fault(FaultKind.SILENT))
+    tell(served, lambda line: add_fault(line.sensor(2), FaultKind.SILENT))
     error = view.wait("device/slave-2/error", failing)
     view.wait("device/slave-2/availability", "offline".__eq__)
 
@@ -60,7 +61,7 @@ def test_what_proves_a_sensor_alive_leaves_it_online(
     site.run()
     view.wait_samples("slave-2", 3, good)
 
-    tell(served, lambda line: line.sensor(2).add_fault(kind))
+    tell(served, lambda line: add_fault(line.sensor(2), kind))
     # On a busy machine it may begin with a time-out that is no doing of the sensor; with no other code. That a fault's
     # first code is its own is held in virtual time: tests/family.
     error = view.wait("device/slave-2/error", lambda error: failing(error) and error["code"] == code)
@@ -78,7 +79,7 @@ def test_a_sensor_that_says_it_is_busy_is_neither_failing_nor_offline(site: Site
     site.run()
     view.wait_samples("slave-2", 3, good)
 
-    tell(served, lambda line: line.sensor(2).add_fault(FaultKind.EXCEPTION, code=6))
+    tell(served, lambda line: add_fault(line.sensor(2), FaultKind.EXCEPTION, code=6))
     view.wait_samples("slave-2", 6, lambda one: one["error"] == "exception")
 
     assert not any(failing(each) for each in view.history_of("device/slave-2/error"))

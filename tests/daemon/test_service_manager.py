@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from lfs10d.simulator.faults import FaultKind
+from tests.support.faulty_sensors import add_fault
 from tests.support.sites import Run, Site, View, eventually, good
 
 START = "from lfs10d.__main__ import main; main()"
@@ -72,7 +73,7 @@ def fed(run: Run) -> list[float]:
 
 def test_ready_comes_after_the_first_exchange(site: Site) -> None:
     served = site.line((1,))
-    served.line.sensor(1).add_fault(FaultKind.SILENT)
+    add_fault(served.line.sensor(1), FaultKind.SILENT)
     site.write(slaves=[{"id": 1, "response_timeout": "1500ms"}])
     run = site.run()
     eventually(served.line.judge.counts.total, "a request")

@@ -13,6 +13,7 @@ import pytest
 from lfs10d.simulator.faults import FaultKind
 from lfs10d.simulator.wire import Format
 from tests.support.brokers import Mosquitto
+from tests.support.faulty_sensors import add_fault
 from tests.support.sites import Site, View, eventually, good, tell
 
 NOT_PERMITTED = """
@@ -134,7 +135,7 @@ def test_a_failed_poll_is_asked_again_as_often_as_told(site: Site, view: View) -
     site.run()
     view.wait_samples("slave-1", 3, good)
 
-    tell(served, lambda line: line.sensor(1).add_fault(FaultKind.NOISY))
+    tell(served, lambda line: add_fault(line.sensor(1), FaultKind.NOISY))
     asked = len(served.line.log)
     error = view.wait("device/slave-1/error", lambda error: error["active"])
 

@@ -12,6 +12,7 @@ from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import seal
 from soak.attestation import LOOKS, Attested, Oracle, codes, epoch_of, parsed
+from tests.support.faulty_sensors import add_fault
 from tests.support.virtual_port import SimulatedPort, VirtualClock
 
 EPOCH = 1_700_000_000
@@ -24,7 +25,7 @@ class Wire:
     def __init__(self, **faults: float) -> None:
         self.line = SimulatedLine([Sensor(1), Sensor(2)])
         for kind, rate in faults.items():
-            self.line.sensor(1).add_fault(kind, rate)
+            add_fault(self.line.sensor(1), kind, rate)
         self.clock = VirtualClock()
         self.port = SimulatedPort(self.line, self.clock, PortSettings("/dev/simulated", 9600))
         self.port.open()

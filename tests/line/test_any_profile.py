@@ -21,6 +21,7 @@ from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.telemetry.info import DeviceInfo
 from tests.support.any_profiles import a_profile, certificates
+from tests.support.faulty_sensors import add_fault
 from tests.support.stations import instant, station
 from tests.support.virtual_port import SimulatedPort, VirtualClock, run
 
@@ -34,11 +35,11 @@ def test_what_a_device_says_is_published_and_nothing_else(profile: Profile, data
     names = st.lists(st.sampled_from(profile.value_names), max_size=2, unique=True)
     absent = _with_their_other_halves(profile, [each for each in data.draw(names) if _optional(profile, each)])
     if absent:
-        sensor.add_fault("absent", values=tuple(absent))
+        add_fault(sensor, "absent", values=tuple(absent))
     if empty := [each for each in data.draw(names) if _says_nothing(profile, each)]:
-        sensor.add_fault("unavailable", values=tuple(empty), last=3.5)
+        add_fault(sensor, "unavailable", values=tuple(empty), last=3.5)
     if stuck := data.draw(names):
-        sensor.add_fault("stuck", values=tuple(stuck), first=2.5)
+        add_fault(sensor, "stuck", values=tuple(stuck), first=2.5)
     calibration = data.draw(certificates(profile))
     profile = profile.calibrated(calibration)
     line = SimulatedLine([sensor])

@@ -23,6 +23,7 @@ from lfs10d.simulator.blueprint import blueprint_of
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.sensor import Sensor
 from tests.support.any_profiles import SETTINGS, a_profile
+from tests.support.faulty_sensors import add_fault
 from tests.support.scans import BUILTIN, RTU, Scanned
 from tests.support.simulated import violations
 from tests.support.virtual_port import SimulatedPort, VirtualClock, run
@@ -33,7 +34,7 @@ SLAVE = 9
 def device_of(profile: Profile, absent: list[str]) -> Sensor:
     sensor = Sensor(SLAVE, blueprint=blueprint_of(profile))
     if absent:
-        sensor.add_fault("absent", values=tuple(absent))
+        add_fault(sensor, "absent", values=tuple(absent))
     return sensor
 
 

@@ -14,8 +14,8 @@ from lfs10d.modbus.bus import LineRules
 from lfs10d.reading import ALIVE_CODES, FaultCode
 from lfs10d.simulator.line_faults import babble, second_master, stray
 from lfs10d.simulator.sensor import Sensor
+from tests.support.faulty_sensors import add_fault, power_cycle
 from tests.support.lines import Rig, Rigs
-from tests.support.simulated import power_cycle
 
 LASTS = 40.0
 """Virtual seconds of one scenario."""
@@ -80,7 +80,7 @@ def test_each_fault_of_a_sensor_has_its_code_and_spares_the_others(rigs: Rigs, n
     bad = FAMILY[name]
     rig = rigs(4, interval=0.25, response_timeout=fixed)
     rig.run(2.0)
-    rig.line.sensor(ILL).add_fault(bad.kind, bad.rate, **bad.particulars)
+    add_fault(rig.line.sensor(ILL), bad.kind, bad.rate, **bad.particulars)
     rig.run(LASTS).prove()
     assert rig.codes(ILL, since=3.0).keys() <= bad.codes
     if bad.codes != LATENESS:  # that is learned
@@ -98,7 +98,7 @@ def test_a_fault_in_a_third_of_the_answers_never_yields_a_wrong_value(rigs: Rigs
     bad = FAMILY[name]
     rig = rigs(3, interval=0.0, rules=PollRules(retries=0), in_turn=True)
     for sensor in rig.line.sensors:
-        sensor.add_fault(bad.kind, 0.33, **bad.particulars)
+        add_fault(sensor, bad.kind, 0.33, **bad.particulars)
     rig.run(15.0).prove()
     assert all(rig.good(slave) for slave in (1, 2, 3))
     seen = {code for slave in (1, 2, 3) for code in rig.codes(slave)}
@@ -107,7 +107,7 @@ def test_a_fault_in_a_third_of_the_answers_never_yields_a_wrong_value(rigs: Rigs
 
 def test_a_busy_sensor_stays_online_and_is_no_error_of_the_line(rigs: Rigs) -> None:
     rig = rigs(1, interval=0.25)
-    rig.line.sensor(1).add_fault("exception", code=6)
+    add_fault(rig.line.sensor(1), "exception", code=6)
     rig.run(10.0).prove()
     assert all(reading.fault and reading.fault.busy and reading.online for reading in rig.of(1))
 
@@ -115,8 +115,8 @@ def test_a_busy_sensor_stays_online_and_is_no_error_of_the_line(rigs: Rigs) -> N
 def test_a_sensor_that_hangs_is_offline_until_its_power_is_cycled(rigs: Rigs) -> None:
     rig = rigs(2, interval=0.25)
     rig.run(5.0)
-    rig.line.sensor(1).add_fault("exception")
-    rig.line.sensor(1).add_fault("hangs")
+    add_fault(rig.line.sensor(1), "exception")
+    add_fault(rig.line.sensor(1), "hangs")
     rig.run(20.0)
     assert not rig.of(1)[-1].online
     rig.line.sensor(1).faults.clear()
@@ -237,7 +237,7 @@ def test_any_mix_of_faults_yields_no_wrong_value_and_always_a_code(
     )
     for sensor, kinds in zip(rig.line.sensors, faults, strict=True):
         for kind, rate, delay in kinds:
-            sensor.add_fault(kind, rate, delay=delay if kind == "late" else 0.003)
+            add_fault(sensor, kind, rate, delay=delay if kind == "late" else 0.003)
     rig.run(12.0).prove()
     expected = codes("timeout", "late", "crc", "malformed", "wrong_slave", "wrong_function", "collision") | ALIVE_CODES
     for reading in rig.readings:

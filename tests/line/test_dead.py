@@ -8,6 +8,7 @@ from itertools import pairwise
 import pytest
 
 from lfs10d.reading import Purpose
+from tests.support.faulty_sensors import add_fault
 from tests.support.lines import Rig, Rigs
 
 ALL = range(1, 33)
@@ -26,10 +27,10 @@ def alone() -> Rig:
 def test_8_of_32_dead_leave_the_others_94_percent_of_their_rate(rigs: Rigs, *, shy: bool) -> None:
     rig = rigs(ALL)
     for slave in range(1, 9):
-        rig.line.sensor(slave).add_fault("silent")
+        add_fault(rig.line.sensor(slave), "silent")
     if shy:
         for slave in LIVING:
-            rig.line.sensor(slave).add_fault("shy")
+            add_fault(rig.line.sensor(slave), "shy")
     rig.run(120.0).prove()
     rates = [len(rig.good(slave, since=60.0)) / len(alone().good(slave, since=30.0)) for slave in LIVING]
     assert sum(rates) / len(rates) >= 0.94
@@ -42,7 +43,7 @@ def test_8_of_32_dead_leave_the_others_94_percent_of_their_rate(rigs: Rigs, *, s
 def test_one_dead_slave_is_probed_after_1_2_4_8_and_then_every_15_s(rigs: Rigs) -> None:
     rig = rigs(4, interval=1.0)
     rig.run(3.5)
-    rig.line.sensor(2).add_fault("silent")
+    add_fault(rig.line.sensor(2), "silent")
     rig.run(80.0).prove()
     probes = [reading.at for reading in rig.of(2) if reading.probe]
     waits = [later - earlier for earlier, later in pairwise(probes)]
@@ -65,7 +66,7 @@ def test_after_a_power_cut_of_all_everybody_is_found_within_seconds(rigs: Rigs) 
 def test_what_an_exchange_is_told_of_the_dead_does_not_grow_with_their_number(rigs: Rigs) -> None:
     rig = rigs(range(1, 250), polled=[rigs.spec(slave, 1.0) for slave in range(1, 250)])
     for slave in range(2, 250):
-        rig.line.sensor(slave).add_fault("silent")
+        add_fault(rig.line.sensor(slave), "silent")
     rig.run(700.0).prove()
     pending = rig.poller.scheduler.pending
     assert len(pending.by_slave) == 248

@@ -23,6 +23,7 @@ from lfs10d.simulator.burst import MASTER
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.signals import Published
+from tests.support.faulty_sensors import add_fault
 from tests.support.lines import Rig
 from tests.support.simulated import violations
 from tests.support.virtual_port import SimulatedPort, VirtualClock
@@ -88,10 +89,10 @@ MAST = {
 def mast(*, interval: float = INTERVAL) -> Rig:
     """Return the mast and who polls it."""
     sensors = {slave: Sensor(slave, blueprint=blueprint_of(profile)) for slave, profile in MAST.items()}
-    sensors[7].add_fault("nan", first=600.0, last=1200.0, values=("wind_direction",))
-    sensors[8].add_fault("absent", values=("rain",))
-    sensors[8].add_fault("unavailable", first=1000.0, last=2000.0, values=("humidity",))
-    sensors[6].add_fault("needs_rest", delay=0.5)
+    add_fault(sensors[7], "nan", first=600.0, last=1200.0, values=("wind_direction",))
+    add_fault(sensors[8], "absent", values=("rain",))
+    add_fault(sensors[8], "unavailable", first=1000.0, last=2000.0, values=("humidity",))
+    add_fault(sensors[6], "needs_rest", delay=0.5)
     line = SimulatedLine(sensors.values())
     clock = VirtualClock(0.0)
     port = SimulatedPort(line, clock, PortSettings("/dev/simulated", 9600))

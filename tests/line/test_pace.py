@@ -6,6 +6,7 @@ import pytest
 
 from lfs10d.line.device import PollRules
 from lfs10d.modbus.timing import LineTiming
+from tests.support.faulty_sensors import add_fault
 from tests.support.lines import Rigs
 
 
@@ -27,9 +28,9 @@ def test_two_percent_of_faults_leave_94_percent_of_the_rate(rigs: Rigs, sensors:
     sound = rigs(sensors).run(60.0)
     rig = rigs(sensors)
     for sensor in rig.line.sensors:
-        sensor.add_fault("noisy", 0.01)
-        sensor.add_fault("truncated", 0.005)
-        sensor.add_fault("garbage", 0.005)
+        add_fault(sensor, "noisy", 0.01)
+        add_fault(sensor, "truncated", 0.005)
+        add_fault(sensor, "garbage", 0.005)
     rig.run(60.0).prove()
     good = sum(reading.fault is None for reading in rig.readings)
     assert good >= 0.94 * len(sound.readings)
@@ -65,7 +66,7 @@ def test_each_slave_has_its_own_interval_and_interval_0_takes_the_rest_in_turn(r
 
 def test_retries_go_behind_those_that_were_due(rigs: Rigs) -> None:
     rig = rigs(4, interval=0.12, rules=PollRules(retries=3)).run(5.0)
-    rig.line.sensor(1).add_fault("noisy")
+    add_fault(rig.line.sensor(1), "noisy")
     rig.run(20.0).prove()
     for slave in (2, 3, 4):
         missed = sum(reading.overruns for reading in rig.of(slave))

@@ -9,6 +9,7 @@ import pytest
 from lfs10d.modbus.bus import LineRules
 from lfs10d.modbus.port_settings import PortSettings
 from lfs10d.reading import FaultCode
+from tests.support.faulty_sensors import add_fault
 from tests.support.lines import Rig, Rigs
 
 
@@ -65,7 +66,7 @@ def test_a_port_that_is_absent_at_the_start_is_a_lost_port(rigs: Rigs) -> None:
 def test_an_answer_to_a_request_from_before_the_loss_is_never_believed(rigs: Rigs) -> None:
     rig = rigs(1, response_timeout=0.5)
     rig.run(2.0)
-    rig.line.sensor(1).add_fault("late", delay=0.45)
+    add_fault(rig.line.sensor(1), "late", delay=0.45)
     for n in range(40):
         rig.run(3.0 + n + n * 0.0131)
         rig.port.hang_up()

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from lfs10d.line.device import PollRules
 from lfs10d.line.jobs.poll import Poll
 from lfs10d.reading import Purpose
+from tests.support.faulty_sensors import add_fault
 from tests.support.lines import Rig, Rigs
 
 RULES = PollRules()
@@ -59,7 +60,7 @@ def test_a_requested_poll_is_done_once_whatever_the_device_is(rigs: Rigs, state:
     specs = [rigs.spec(slave, 10.0, enabled=(slave, state) != (1, "disabled")) for slave in (1, 2)]
     rig = rigs(2, polled=specs)
     if state == "offline":
-        rig.line.sensor(1).add_fault("silent")
+        add_fault(rig.line.sensor(1), "silent")
         rig.run(41.0)
         assert not rig.of(1)[-1].online
         rig.line.sensor(1).faults.clear()
@@ -75,7 +76,7 @@ def test_a_requested_poll_is_done_once_whatever_the_device_is(rigs: Rigs, state:
 
 def test_a_requested_poll_waits_for_the_exchange_in_progress_only(rigs: Rigs) -> None:
     rig = rigs(32, interval=0.0)
-    rig.line.sensor(5).add_fault("silent")
+    add_fault(rig.line.sensor(5), "silent")
     waits = []
     for n in range(50):
         rig.run(30.0 + n * 0.4371)  # no probe of 1 s falls into what follows
@@ -93,7 +94,7 @@ def test_a_requested_poll_waits_for_the_exchange_in_progress_only(rigs: Rigs) ->
 def test_a_requested_poll_ends_with_the_port_and_is_told_at_once_while_it_is_lost(rigs: Rigs) -> None:
     specs = [rigs.spec(1, 10.0), rigs.spec(2, 10.0, enabled=False)]
     rig = rigs(2, polled=specs)
-    rig.line.sensor(2).add_fault("silent")
+    add_fault(rig.line.sensor(2), "silent")
     rig.run(5.0)
     requested(rig, 2, 1)
     rig.run(5.1)
@@ -109,7 +110,7 @@ def test_a_requested_poll_ends_with_the_port_and_is_told_at_once_while_it_is_los
 
 def test_a_requested_poll_of_a_device_that_is_removed_in_between_is_dropped(rigs: Rigs) -> None:
     rig = rigs(2, interval=10.0).run(5.0)
-    rig.line.sensor(1).add_fault("silent")
+    add_fault(rig.line.sensor(1), "silent")
     requested(rig, 1, 1)
     rig.run(5.01)
     rig.poller.replace([rigs.spec(2, 10.0)], RULES)
@@ -146,7 +147,7 @@ def change(rigs: Rigs, rig: Rig, step: list[tuple[int, float, bool, str]] | str,
         case "find":
             rig.port.replug()
         case "silence":
-            rig.line.sensor(number % 5 + 1).add_fault("silent")
+            add_fault(rig.line.sensor(number % 5 + 1), "silent")
         case "heal":
             for sensor in rig.line.sensors:
                 sensor.faults.clear()

@@ -14,6 +14,7 @@ from lfs10d.modbus.frames import Codec, Framing
 from lfs10d.modbus.request import ReadRegisters, Request, WriteRegister
 from lfs10d.reading import FaultCode
 from lfs10d.simulator.burst import MASTER
+from tests.support.faulty_sensors import add_fault
 from tests.support.lines import LFS10, Rig, Rigs, a_spec
 
 HEALTHY = (2, 3, 4)
@@ -24,14 +25,14 @@ def a_line(rigs: Rigs, rest: float, *, alone: bool, gap: float = 0.0) -> Rig:
     slaves = (1,) if alone else (1, *HEALTHY)
     polled = [replace(a_spec(slave), request_gap=gap if slave == 1 else 0.0) for slave in slaves]
     rig = rigs(slaves, polled=polled)
-    rig.line.sensor(1).add_fault("needs_rest", delay=rest)
+    add_fault(rig.line.sensor(1), "needs_rest", delay=rest)
     return rig
 
 
 def lose_answers(rig: Rig) -> Rig:
     """Let sensor 1 be silent for a second, three times."""
     for first in (5.5, 40.5, 80.5):
-        rig.line.sensor(1).add_fault("silent", first=first, last=first + 1.0)
+        add_fault(rig.line.sensor(1), "silent", first=first, last=first + 1.0)
     return rig
 
 
@@ -88,7 +89,7 @@ def test_requests_of_every_kind_keep_the_rest_and_others_are_polled_meanwhile(ri
     ends += access(rig, ReadRegisters(1, 0x0001, 2), spec)
     written = access(rig, WriteRegister(1, 0x0004, 1), spec)
     rig.run(9.0)
-    rig.line.sensor(1).add_fault("silent", first=9.0, last=14.0)
+    add_fault(rig.line.sensor(1), "silent", first=9.0, last=14.0)
     rig.run(40.0).prove()
     assert [str(end) for end in (*ends, *written)] == ["done"] * (len(ends) + len(written))
     assert len(written) == 1
@@ -109,7 +110,7 @@ def test_each_read_of_a_poll_has_its_rest_and_devices_flat_out_lose_nothing_by_i
 def test_a_poll_that_a_request_wants_waits_for_the_shortest_interval_of_the_profile(rigs: Rigs) -> None:
     slow = LFS10.model_copy(update={"min_interval": 2.0})
     rig = rigs((1,), polled=[a_spec(1, 5.0, profile=slow)])
-    rig.line.sensor(1).add_fault("needs_rest", delay=1.9)
+    add_fault(rig.line.sensor(1), "needs_rest", delay=1.9)
     rig.run(5.3)
     rig.poller.read("slave-1", 7)
     rig.run(9.9)
@@ -128,7 +129,7 @@ def test_one_that_sleeps_is_woken_and_that_is_no_failure(
     slaves = (1, *HEALTHY)
     polled = [a_spec(slave, interval if slave == 1 else 1.0) for slave in slaves]
     rig = rigs(slaves, polled=polled, rules=PollRules(retries=retries))
-    rig.line.sensor(1).add_fault("sleeps", delay=sleeps)
+    add_fault(rig.line.sensor(1), "sleeps", delay=sleeps)
     rig.run(100.0).prove()
     settled = rig.of(1, since=20.0)
     assert len(settled) >= 80 / interval - 1
@@ -139,7 +140,7 @@ def test_one_that_sleeps_is_woken_and_that_is_no_failure(
 def test_a_healthy_line_is_given_no_rest_and_a_noisy_one_neither(rigs: Rigs) -> None:
     rig = rigs(8, interval=0.0)
     for slave in range(1, 5):
-        rig.line.sensor(slave).add_fault("silent", 0.05)
-        rig.line.sensor(slave).add_fault("noisy", 0.05)
+        add_fault(rig.line.sensor(slave), "silent", 0.05)
+        add_fault(rig.line.sensor(slave), "noisy", 0.05)
     rig.run(120.0).prove()
     assert {reading.request_gap for reading in rig.readings} == {0.0}

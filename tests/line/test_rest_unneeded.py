@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from tests.support.faulty_sensors import add_fault
 from tests.support.lines import Rigs
 
 ILL = 12.0
@@ -19,7 +20,7 @@ def test_after_a_spell_of_noise_or_of_a_twin_no_rest_is_kept(
 ) -> None:
     well = rigs(3, interval=interval, in_turn=True).run(LASTS)
     rig = rigs(3, interval=interval, in_turn=True)
-    rig.line.sensor(1).add_fault(kind, rate, first=2.0, last=ILL)
+    add_fault(rig.line.sensor(1), kind, rate, first=2.0, last=ILL)
     rig.run(LASTS).prove()
     assert not any(reading.gap_learned for slave in (1, 2, 3) for reading in rig.of(slave, since=ILL + 3.0))
     for slave in (2, 3):

@@ -14,6 +14,7 @@ from lfs10d.modbus.pending import PendingRequests
 from lfs10d.modbus.request import ReadRegisters
 from lfs10d.reading import AnsweredTwice, FaultCode
 from lfs10d.simulator.line_faults import second_master
+from tests.support.faulty_sensors import add_fault
 from tests.support.lines import LFS10, Rig, Rigs
 from tests.support.outcomes import ended
 
@@ -32,7 +33,7 @@ def test_a_late_twin_or_a_repeater_is_told_and_yields_no_value(
     rigs: Rigs, kind: str, delay: float, slaves: int, interval: float, turnaround: float
 ) -> None:
     rig = rigs(slaves, turnaround=turnaround, interval=interval)
-    rig.line.sensor(1).add_fault(kind, delay=delay)
+    add_fault(rig.line.sensor(1), kind, delay=delay)
     rig.run(15.0).prove()
     twice = told(rig)[0]
     assert (twice.device, twice.slave) == ("slave-1", 1)
@@ -63,7 +64,7 @@ def test_not_even_the_first_second_answer_is_believed_that_comes_when_the_next_a
     rig = rigs(4, rules=rules, baudrate=115200, jitter=0.003, seed=seed, in_turn=True)
     await_requests(rig, 100)
     for slave in (2, 3):
-        rig.line.sensor(slave).add_fault(kind, 0.3, delay=delay)
+        add_fault(rig.line.sensor(slave), kind, 0.3, delay=delay)
     await_requests(rig, 120)
     rig.prove()
     assert {event.slave for event in told(rig)} <= {2, 3}
@@ -76,7 +77,7 @@ def test_not_even_the_first_second_answer_is_believed_that_comes_when_the_next_a
 @pytest.mark.parametrize("kind", ["twin", "repeated"])
 def test_it_is_over_when_no_second_answer_comes_any_more(rigs: Rigs, kind: str) -> None:
     rig = rigs(1, interval=0.25)
-    rig.line.sensor(1).add_fault(kind)
+    add_fault(rig.line.sensor(1), kind)
     rig.run(5.0)
     rig.line.sensor(1).faults.clear()
     rig.run(20.0).prove()
@@ -99,7 +100,7 @@ def test_a_well_line_is_asked_as_often_as_before_but_once_after_the_first_answer
 
 def test_a_sensor_that_is_late_is_no_second_one(rigs: Rigs) -> None:
     rig = rigs(2, interval=0.25, in_turn=True)
-    rig.line.sensor(1).add_fault("late", 0.2, delay=0.4)
+    add_fault(rig.line.sensor(1), "late", 0.2, delay=0.4)
     rig.run(60.0).prove()
     assert told(rig) == []
 
@@ -111,7 +112,7 @@ def test_what_a_gateways_target_says_after_an_exception_is_never_the_next_answer
     rigs: Rigs, code: int, interval: float, delay: float
 ) -> None:
     rig = rigs(2, interval=interval, in_turn=True)
-    rig.line.sensor(1).add_fault("gateway", 0.1, code=code, delay=delay)
+    add_fault(rig.line.sensor(1), "gateway", 0.1, code=code, delay=delay)
     rig.run(40.0).prove()
     assert rig.codes(1)[FaultCode.EXCEPTION] > 0
     assert rig.codes(1).keys() <= {
@@ -128,7 +129,7 @@ def test_what_a_gateways_target_says_after_an_exception_is_never_the_next_answer
 
 def test_a_gateway_that_always_refuses_is_asked_once_per_poll(rigs: Rigs) -> None:
     rig = rigs(1, interval=0.25)
-    rig.line.sensor(1).add_fault("exception", code=11)
+    add_fault(rig.line.sensor(1), "exception", code=11)
     rig.run(10.0).prove()
     assert rig.codes(1) == {FaultCode.EXCEPTION: len(rig.of(1))}
     assert len(rig.exchanges) == len(rig.of(1)) >= 35
@@ -177,7 +178,7 @@ def test_one_that_appears_on_a_running_line_is_told_whomever_it_meets(
     rigs: Rigs, kind: str, slaves: int, interval: float, turnaround: float, delay: float, told_after: float
 ) -> None:
     rig = rigs(slaves, turnaround=turnaround, interval=interval)
-    rig.line.sensor(1).add_fault(kind, delay=delay, first=5.013)
+    add_fault(rig.line.sensor(1), kind, delay=delay, first=5.013)
     rig.run(15.0).prove()
     twice = told(rig)[0]
     assert (twice.slave, len(told(rig))) == (1, 1)

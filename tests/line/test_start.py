@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from lfs10d.reading import Purpose
+from tests.support.faulty_sensors import add_fault
 from tests.support.lines import Rigs
 
 BAD = (2, 4, 6, 8)
@@ -15,7 +16,7 @@ GOOD = (1, 3, 5, 7)
 def test_four_bad_among_eight_have_failed_three_times_within_eight_seconds(rigs: Rigs, fault: str) -> None:
     rig = rigs(8, interval=1.0)
     for slave in BAD:
-        rig.line.sensor(slave).add_fault(fault)
+        add_fault(rig.line.sensor(slave), fault)
     rig.run(30.0).prove()
     for slave in BAD:
         assert rig.of(slave)[2].at < 8.0
@@ -27,7 +28,7 @@ def test_four_bad_among_eight_have_failed_three_times_within_eight_seconds(rigs:
 def test_one_that_answers_badly_is_polled_as_one_that_answers(rigs: Rigs, fault: str) -> None:
     rig = rigs(8, interval=1.0)
     for slave in BAD:
-        rig.line.sensor(slave).add_fault(fault)
+        add_fault(rig.line.sensor(slave), fault)
     rig.run(60.0).prove()
     for slave in range(1, 9):
         assert len(rig.of(slave, since=10.0)) == pytest.approx(50, abs=1)
@@ -37,7 +38,7 @@ def test_one_that_answers_badly_is_polled_as_one_that_answers(rigs: Rigs, fault:
 def test_of_32_with_half_of_them_silent_each_silent_one_has_failed_within_ten_seconds(rigs: Rigs) -> None:
     rig = rigs(32, interval=1.0)
     for slave in range(17, 33):
-        rig.line.sensor(slave).add_fault("silent")
+        add_fault(rig.line.sensor(slave), "silent")
     rig.run(20.0).prove()
     assert all(rig.of(slave)[0].at < 10.0 for slave in range(1, 33))
     assert all(len(rig.of(slave)) >= 3 for slave in range(1, 33))
@@ -45,7 +46,7 @@ def test_of_32_with_half_of_them_silent_each_silent_one_has_failed_within_ten_se
 
 def test_when_the_port_is_back_the_silent_are_polled_three_times_at_once_again(rigs: Rigs) -> None:
     rig = rigs(4, interval=1.0)
-    rig.line.sensor(2).add_fault("silent")
+    add_fault(rig.line.sensor(2), "silent")
     rig.run(60.0)
     rig.port.unplug()
     rig.run(62.0)

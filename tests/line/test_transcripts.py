@@ -14,6 +14,7 @@ from lfs10d.line.device import PollRules
 from lfs10d.modbus.bus import LineRules
 from lfs10d.reading import Event, Exchanged, PortChanged, Reading
 from lfs10d.simulator.line_faults import babble
+from tests.support.faulty_sensors import add_fault
 from tests.support.lines import Rig, Rigs
 
 FOLDER = Path(__file__).parent / "transcripts"
@@ -25,28 +26,28 @@ def healthy(rigs: Rigs) -> Rig:
 
 def late_answer(rigs: Rigs) -> Rig:
     rig = rigs(2, interval=1.0, response_timeout=0.5, in_turn=True).run(1.9)
-    rig.line.sensor(1).add_fault("late", delay=0.55, last=2.5)
+    add_fault(rig.line.sensor(1), "late", delay=0.55, last=2.5)
     return rig.run(4.3)
 
 
 def broken_answers(rigs: Rigs) -> Rig:
     rig = rigs(2, interval=1.0).run(0.9)
-    rig.line.sensor(1).add_fault("noisy", last=1.03)
-    rig.line.sensor(2).add_fault("truncated", length=4, last=1.6)
+    add_fault(rig.line.sensor(1), "noisy", last=1.03)
+    add_fault(rig.line.sensor(2), "truncated", length=4, last=1.6)
     return rig.run(2.3)
 
 
 def dead(rigs: Rigs) -> Rig:
     rig = rigs(2, interval=1.0, rules=PollRules(retries=0, offline_after=2)).run(0.9)
-    rig.line.sensor(1).add_fault("silent", last=5.0)
+    add_fault(rig.line.sensor(1), "silent", last=5.0)
     return rig.run(7.9)
 
 
 def refusals(rigs: Rigs) -> Rig:
     rig = rigs(1, interval=0.5).run(0.4)
-    rig.line.sensor(1).add_fault("exception", last=0.9)
-    rig.line.sensor(1).add_fault("exception", code=6, first=0.9, last=1.4)
-    rig.line.sensor(1).add_fault("nan", first=1.4, last=1.9)
+    add_fault(rig.line.sensor(1), "exception", last=0.9)
+    add_fault(rig.line.sensor(1), "exception", code=6, first=0.9, last=1.4)
+    add_fault(rig.line.sensor(1), "nan", first=1.4, last=1.9)
     return rig.run(2.4)
 
 

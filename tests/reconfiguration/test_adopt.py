@@ -11,9 +11,9 @@ from lfs10d.reconfiguration.adopt_request import AdoptRequest
 from lfs10d.simulator.blueprint import Blueprint
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
+from tests.support.faulty_sensors import add_fault, power_cycle
 from tests.support.lives import Bench
 from tests.support.newcomers import adopted, plugged, writes
-from tests.support.simulated import power_cycle
 from tests.support.volatile_disk import PowerCutError
 
 pytestmark = pytest.mark.long(6)
@@ -26,7 +26,7 @@ def test_a_newcomer_gets_the_next_free_id_and_the_lines_rate(bench: Bench, manne
     bench.go(life, 3.0)
     sensor = plugged(bench)
     if manner:
-        sensor.add_fault(manner)
+        add_fault(sensor, manner)
     answer = adopted(bench, life, label="Mast, 10 m")
     assert (answer.status, answer.data) == ("ok", {"device": "slave-3", "slave": 3, "from": 1})
     assert (sensor.slave, sensor.format.baudrate) == (3, baudrate)
@@ -87,7 +87,7 @@ def test_a_newcomer_that_wants_a_power_cycle_is_polled_after_it(bench: Bench, ba
     life = bench.sensors(2, baudrate=baudrate)
     bench.go(life, 3.0)
     sensor = plugged(bench)
-    sensor.add_fault("power_cycle")
+    add_fault(sensor, "power_cycle")
     for _ in range(3):
         if adopted(bench, life).code != "power_cycle_needed":
             break

@@ -12,6 +12,7 @@ from lfs10d.reconfiguration.adopt_request import AdoptRequest
 from lfs10d.simulator.blueprint import blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
+from tests.support.faulty_sensors import add_fault
 from tests.support.lives import Bench
 from tests.support.newcomers import adopted, plugged, writes
 
@@ -50,7 +51,7 @@ def test_one_of_another_profile_is_adopted_at_its_factorys_rate(
     life = bench.sensors(names=False, baudrate=line)
     vane = renke(bench, codes)
     if manner:
-        vane.add_fault(manner)
+        add_fault(vane, manner)
     bench.go(life, 3.0)
     answer = adopted(bench, life, profile="renke.yaml", name="vane")
     assert (answer.status, answer.data) == ("ok", {"device": "vane", "slave": 2, "from": 1})

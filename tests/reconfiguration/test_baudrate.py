@@ -10,8 +10,8 @@ from lfs10d.command import Command, Result
 from lfs10d.reconfiguration.adopt_request import AdoptRequest
 from lfs10d.simulator.line import HeardRequest
 from lfs10d.simulator.sensor import Sensor
+from tests.support.faulty_sensors import add_fault, power_cycle
 from tests.support.lives import Bench, Life
-from tests.support.simulated import power_cycle
 
 
 def change(bench: Bench, life: Life, to: int = 19200, *, power_cycle: bool = False, dry_run: bool = False) -> Result:
@@ -38,7 +38,7 @@ def test_every_sensor_and_the_port_move(bench: Bench, manner: str | None, echo: 
     bench.go(life, 5.0)
     for sensor in bench.line.sensors:
         if manner:
-            sensor.add_fault(manner)
+            add_fault(sensor, manner)
     answer = change(bench, life)
     assert (answer.status, answer.data) == ("ok", {"from": 9600, "to": 19200, "pending": []})
     assert rates(bench) == [19200] * 3
@@ -60,7 +60,7 @@ def test_a_dry_run_writes_nothing(bench: Bench) -> None:
 
 def test_nothing_is_written_unless_every_sensor_answers(bench: Bench) -> None:
     life = bench.sensors(3, 4)
-    bench.line.sensor(4).add_fault("silent")
+    add_fault(bench.line.sensor(4), "silent")
     bench.go(life, 3.0)
     answer = change(bench, life)
     assert (answer.status, answer.code) == ("rejected", "timeout")
@@ -71,7 +71,7 @@ def test_nothing_is_written_unless_every_sensor_answers(bench: Bench) -> None:
 def test_a_canary_that_wants_a_power_cycle_is_written_back_and_nobody_else_is_touched(bench: Bench, fault: str) -> None:
     life = bench.sensors(3, 4)
     for sensor in bench.line.sensors:
-        sensor.add_fault(fault)
+        add_fault(sensor, fault)
     bench.go(life, 3.0)
     answer = change(bench, life)
     assert (answer.status, answer.code) == ("failed", "power_cycle_needed")
@@ -93,11 +93,11 @@ def test_where_a_later_one_fails_the_others_are_moved_back(bench: Bench, fault: 
 
         def strike(request: HeardRequest) -> None:
             if request.body[:2] == b"\x04\x06" and not struck:
-                struck.append(second.add_fault("silent"))
+                struck.append(add_fault(second, "silent"))
 
         bench.line.after_each_request(strike)
     else:
-        second.add_fault(fault)
+        add_fault(second, fault)
     answer = change(bench, life)
     assert (answer.status, answer.code) == ("failed", code)
     where: dict[str, Any] = {"s3": 9600, "s4": None if code == "not_verified" else 9600, "s5": 9600}
@@ -113,7 +113,7 @@ def test_where_a_later_one_fails_the_others_are_moved_back(bench: Bench, fault: 
 def test_with_power_cycle_all_are_written_and_followed_until_they_come_up(bench: Bench) -> None:
     life = bench.sensors(3, 4)
     for sensor in bench.line.sensors:
-        sensor.add_fault("power_cycle")
+        add_fault(sensor, "power_cycle")
     bench.go(life, 3.0)
     answer = change(bench, life, power_cycle=True)
     assert (answer.status, answer.data) == ("ok", {"from": 9600, "to": 19200, "pending": ["s3", "s4"]})
@@ -135,7 +135,7 @@ def test_with_power_cycle_all_are_written_and_followed_until_they_come_up(bench:
 def test_two_sensors_of_one_id_of_which_one_moves_are_told_and_moved_back(bench: Bench) -> None:
     life = bench.sensors(3, 4)
     twin = bench.line.add(Sensor(4))
-    twin.add_fault("power_cycle")
+    add_fault(twin, "power_cycle")
     bench.go(life, 3.0)
     answer = change(bench, life)
     assert (answer.status, answer.code) == ("failed", "duplicate_id")
@@ -148,7 +148,7 @@ def test_two_sensors_of_one_id_of_which_one_moves_are_told_and_moved_back(bench:
 def test_while_sensors_are_still_to_come_up_nothing_else_is_done_to_them(bench: Bench) -> None:
     life = bench.sensors(3, 4, 5)
     for sensor in bench.line.sensors[:2]:
-        sensor.add_fault("power_cycle")
+        add_fault(sensor, "power_cycle")
     bench.go(life, 3.0)
     assert change(bench, life, power_cycle=True).data == {"from": 9600, "to": 19200, "pending": ["s3", "s4"]}
     assert life.running.now.config.line.baudrate == 19200, "s5 is there already"
@@ -167,7 +167,7 @@ def test_while_sensors_are_still_to_come_up_nothing_else_is_done_to_them(bench: 
 def test_the_rate_of_now_is_not_called_settled_while_sensors_may_come_up_at_another(bench: Bench) -> None:
     life = bench.sensors(3, 4)
     for sensor in bench.line.sensors:
-        sensor.add_fault("power_cycle")
+        add_fault(sensor, "power_cycle")
     bench.go(life, 3.0)
     assert change(bench, life, power_cycle=True).status == "ok"
     answer = change(bench, life, to=9600)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from tests.support.faulty_sensors import add_fault, power_cycle
 from tests.support.lives import Bench, Life
-from tests.support.simulated import power_cycle
 from tests.support.volatile_disk import PowerCutError
 
 SLAVES = tuple(range(3, 11))
@@ -18,7 +18,7 @@ def cut_short(bench: Bench, how: str, *, sensor_fault: str = "power_cycle", writ
     """Begin a change of eight sensors to 19200 and end the daemon when so many have been written."""
     life = bench.sensors(*SLAVES)
     for sensor in bench.line.sensors:
-        sensor.add_fault(sensor_fault)
+        add_fault(sensor, sensor_fault)
     bench.go(life, 5.0)
     life.request("line/baudrate", id="c1", to=19200, power_cycle=True)
     while sum(sensor.words[4] != CODE_9600 for sensor in bench.line.sensors) < written:
@@ -47,7 +47,7 @@ def test_one_that_is_lost_does_not_keep_the_others_from_being_put_back_at_once(
 ) -> None:
     cut_short(bench, how)
     straggler = bench.line.sensor(lost)
-    straggler.add_fault("silent")
+    add_fault(straggler, "silent")
     life = bench.begin()
     bench.go(life, AT_ONCE)
     assert stored(bench) == {lost}
@@ -69,7 +69,7 @@ def test_one_that_is_lost_does_not_keep_the_others_from_being_put_back_at_once(
 
 def test_of_sensors_that_obeyed_at_once_those_that_answer_are_moved_back_before_one_that_is_lost(bench: Bench) -> None:
     cut_short(bench, "sigterm", sensor_fault="at_once")
-    bench.line.sensor(3).add_fault("silent")
+    add_fault(bench.line.sensor(3), "silent")
     life = bench.begin()
     bench.go(life, 20.0)
     assert stored(bench) == {3}
@@ -78,7 +78,7 @@ def test_of_sensors_that_obeyed_at_once_those_that_answer_are_moved_back_before_
 
 def test_the_request_is_answered_once_though_one_is_never_found(bench: Bench) -> None:
     cut_short(bench, "cut")
-    bench.line.sensor(4).add_fault("silent")
+    add_fault(bench.line.sensor(4), "silent")
     life = bench.begin()
     bench.go(life, 100.0)
     (response,) = bench.responses
@@ -90,7 +90,7 @@ def test_the_request_is_answered_once_though_one_is_never_found(bench: Bench) ->
 
 def test_a_lost_one_is_asked_at_the_line_s_own_rate_first(bench: Bench) -> None:
     cut_short(bench, "sigterm")
-    bench.line.sensor(5).add_fault("silent")
+    add_fault(bench.line.sensor(5), "silent")
     life = bench.begin()
     before = len(bench.line.log)
     bench.go(life, 60.0)
@@ -130,7 +130,7 @@ def moved_but_not_closed(bench: Bench) -> Life:
         except PowerCutError:
             pass
         bench.cut(*bench.files.seen)
-        bench.line.sensor(5).add_fault("silent")
+        add_fault(bench.line.sensor(5), "silent")
         life = bench.begin()
         if life.running.now.config.line.baudrate == 19200 and life.physical.open:
             return life

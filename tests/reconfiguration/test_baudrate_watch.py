@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from lfs10d.reconfiguration.baudrate_watch import BaudrateWatch
 from lfs10d.simulator.wire import Format
+from tests.support.faulty_sensors import add_fault
 from tests.support.lives import Bench, Life
 
 
@@ -66,6 +67,6 @@ def test_sensors_that_are_dead_are_found_nowhere(bench: Bench) -> None:
     life = bench.sensors(3, 4)
     told = looking_out(bench, life)
     for sensor in bench.line.sensors:
-        sensor.add_fault("silent")
+        add_fault(sensor, "silent")
     bench.go(life, 60.0)
     assert told == []

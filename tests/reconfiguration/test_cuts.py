@@ -14,8 +14,8 @@ import pytest
 from lfs10d.simulator.line import HeardRequest
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
+from tests.support.faulty_sensors import add_fault, power_cycle
 from tests.support.lives import Bench, Life
-from tests.support.simulated import power_cycle
 from tests.support.volatile_disk import PowerCutError
 
 pytestmark = pytest.mark.long(15)
@@ -43,7 +43,7 @@ class Case:
         if self.newcomer is not None:
             bench.line.add(Sensor(1, format=Format(self.newcomer)))
         for slave, fault in self.ails.items():
-            bench.line.sensor(slave).add_fault(fault)
+            add_fault(bench.line.sensor(slave), fault)
         return life
 
     def ask(self, bench: Bench, life: Life) -> None:

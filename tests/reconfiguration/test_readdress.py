@@ -8,8 +8,8 @@ import pytest
 
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wind import Wind
+from tests.support.faulty_sensors import add_fault, power_cycle
 from tests.support.lives import Bench
-from tests.support.simulated import power_cycle
 
 
 def calm(bench: Bench) -> None:
@@ -27,7 +27,7 @@ def test_a_sensor_that_obeys_is_moved_and_polled_at_its_new_id(bench: Bench, man
     life = bench.sensors(3, 4, echo=echo)
     bench.go(life, 5.0)
     if manner:
-        bench.line.sensor(3).add_fault(manner)
+        add_fault(bench.line.sensor(3), manner)
     answer = bench.readdress(life, "s3", 9)
     assert (answer.status, answer.code, answer.data) == ("ok", None, {"device": "s3", "from": 3, "to": 9})
     assert {sensor.slave for sensor in bench.line.sensors} == {9, 4}
@@ -58,7 +58,7 @@ def test_one_that_does_not_obey_stays_and_the_answer_says_why(
     bench: Bench, sensor_fault: str, particulars: dict[str, Any], code: str
 ) -> None:
     life = bench.sensors(3, 4)
-    bench.line.sensor(3).add_fault(sensor_fault, **particulars)
+    add_fault(bench.line.sensor(3), sensor_fault, **particulars)
     bench.go(life, 5.0)
     answer = bench.readdress(life, "s3", 9)
     assert (answer.status, answer.code) == ("failed", code)
@@ -78,7 +78,7 @@ def test_two_sensors_that_part_are_told_and_do_not_meet_again_at_a_power_cycle(b
     life = bench.sensors(3, 4)
     calm(bench)  # two that answer bit-identically cannot be told apart before
     twin = bench.line.add(Sensor(3, source=lambda _: 0.0))
-    twin.add_fault(manner)
+    add_fault(twin, manner)
     bench.go(life, 3.0)
     answer = bench.readdress(life, "s3", 9)
     assert (answer.status, answer.code) == ("failed", "duplicate_id")

@@ -9,6 +9,7 @@ import pytest
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
+from tests.support.faulty_sensors import add_fault, believable
 from tests.support.simulated import Bench
 
 Maker = Callable[..., Bench]
@@ -63,7 +64,7 @@ def test_a_sensor_at_another_rate_is_never_understood_and_never_understands(benc
 def test_a_broken_request_upsets_nobody_at_another_rate(bench: Maker) -> None:
     line = bench(Sensor(1), Sensor(2, format=Format(19200)))
     for sensor in line.line.sensors:
-        sensor.add_fault("hangs")
+        add_fault(sensor, "hangs")
     line.port.write(b"\x01\x03")
     line.listen(0.1)
     assert [sensor.hung for sensor in line.line.sensors] == [True, False]
@@ -84,7 +85,7 @@ def test_duplicates_with_different_answers_garble_each_other(bench: Maker) -> No
     line = bench(Sensor(1), Sensor(1))
     assert line.read(1) is None
     assert len(line.heard) == 9
-    assert not line.answer.believable
+    assert not believable(line.answer)
 
 
 def test_duplicates_of_which_one_is_slower_garble_each_other(bench: Maker) -> None:

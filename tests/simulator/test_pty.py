@@ -20,6 +20,7 @@ from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import SECOND, seal, unseal
+from tests.support.faulty_sensors import add_fault
 
 PATIENCE = 5.0
 T35 = 0.0037
@@ -91,7 +92,7 @@ def test_a_master_that_returns_is_answered_again(line: SimulatedLine) -> None:
 
 
 def test_what_comes_while_nobody_listens_is_lost(line: SimulatedLine) -> None:
-    line.sensor(1).add_fault("late", delay=0.2)
+    add_fault(line.sensor(1), "late", delay=0.2)
     with PtyLine(line) as port:
         with opened(port.path) as descriptor:
             os.write(descriptor, REQUEST)

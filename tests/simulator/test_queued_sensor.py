@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from lfs10d.simulator.wire import Format
+from tests.support.faulty_sensors import add_fault
 from tests.support.queued_sensor import QueuedSensor
 
 READ = bytes((1, 3, 0, 1, 0, 2))
@@ -12,7 +13,7 @@ LASTS = Format().span(9)
 
 def test_an_answer_waits_until_the_one_before_is_over_and_silence_was_kept() -> None:
     sensor = QueuedSensor(1, turnaround=0.005)
-    sensor.add_fault("late", delay=0.5, last=1.0)
+    add_fault(sensor, "late", delay=0.5, last=1.0)
     first = sensor.hear(READ, 900_000_000)
     second = sensor.hear(READ, 1_100_000_000)
     assert first is not None

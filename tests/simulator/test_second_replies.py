@@ -8,6 +8,7 @@ import pytest
 
 from lfs10d.simulator.sensor import Reply, Sensor
 from lfs10d.simulator.wire import Format, nanoseconds
+from tests.support.faulty_sensors import add_fault, believable
 from tests.support.queued_sensor import QueuedSensor
 from tests.support.simulated import Bench
 
@@ -18,7 +19,7 @@ READ = bytes((1, 3, 0, 1, 0, 2))
 
 def answers(bench: Maker, kind: str, **particulars: float) -> list[Reply]:
     line = bench(Sensor(1))
-    line.line.sensor(1).add_fault(kind, **particulars)
+    add_fault(line.line.sensor(1), kind, **particulars)
     line.read(1, wait=0.4)
     return line.line.log[0].answers
 
@@ -34,8 +35,8 @@ def test_a_twin_answers_with_a_value_of_its_own_after_the_first(
     first, second = answers(bench, "twin", **particulars)
     assert (first.second, second.second) == (False, True)
     assert apart(first, second) == nanoseconds(delay)
-    assert first.believable
-    assert second.believable
+    assert believable(first)
+    assert believable(second)
     assert first.values != second.values
     assert len(second.values) == 1
 
@@ -59,7 +60,7 @@ def test_a_gateway_refuses_at_once_and_its_target_answers_later(
     assert bytes(refusal.burst.data)[:3] == bytes((1, 0x83, code))
     assert refusal.values == ()
     assert apart(refusal, late) == nanoseconds(delay)
-    assert late.believable
+    assert believable(late)
     assert not late.second  # it is the first that answers with a value
     assert len(late.values) == 1
 
@@ -68,7 +69,7 @@ def test_a_write_is_answered_once_by_a_twin_and_twice_by_a_repeater() -> None:
     """Two sensors echo one write with the same bits at the same time."""
     for kind, following in (("twin", 0), ("repeated", 1)):
         sensor = Sensor(1)
-        sensor.add_fault(kind)
+        add_fault(sensor, kind)
         reply = sensor.hear(WRITE_ID, 0)
         assert reply is not None
         assert len(reply.following) == following
@@ -76,8 +77,8 @@ def test_a_write_is_answered_once_by_a_twin_and_twice_by_a_repeater() -> None:
 
 def test_what_follows_is_postponed_with_the_reply_and_later_replies_wait_for_the_sensors_own_only() -> None:
     sensor = QueuedSensor(1, turnaround=0.005)
-    sensor.add_fault("late", delay=0.3, last=1.0)
-    sensor.add_fault("twin", delay=0.2)
+    add_fault(sensor, "late", delay=0.3, last=1.0)
+    add_fault(sensor, "twin", delay=0.2)
     first, second = sensor.hear(READ, 900_000_000), sensor.hear(READ, 1_100_000_000)
     assert first is not None
     assert second is not None
@@ -87,7 +88,7 @@ def test_what_follows_is_postponed_with_the_reply_and_later_replies_wait_for_the
 
 def test_a_queued_gateway_answers_the_next_request_after_its_targets_reply() -> None:
     sensor = QueuedSensor(1, turnaround=0.005)
-    sensor.add_fault("gateway", last=1.0)
+    add_fault(sensor, "gateway", last=1.0)
     first, second = sensor.hear(READ, 900_000_000), sensor.hear(READ, 1_000_000_001)
     assert first is not None
     assert second is not None

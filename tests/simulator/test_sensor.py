@@ -11,15 +11,15 @@ from lfs10d.simulator.faults import FaultKind
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.signals import Signal
 from lfs10d.simulator.wire import Format
+from tests.support.faulty_sensors import add_fault, believable, power_cycle
 from tests.support.sensor_values import ID, RATE, Maker, wind_in
-from tests.support.simulated import power_cycle
 
 
 def test_a_well_sensor_sends_the_value_that_the_log_tells(bench: Maker) -> None:
     line = bench(Sensor(1), Sensor(2))
     for slave in (1, 2, 1):
         body = line.read(slave)
-        assert line.answer.believable
+        assert believable(line.answer)
         assert line.answer.sensor.slave == slave
         assert wind_in(body) == pytest.approx(line.answer.values[0], rel=1e-6)
     assert len({request.answers[0].values for request in line.line.log}) == 3
@@ -71,7 +71,7 @@ def test_a_request_of_another_length_is_ignored(bench: Maker) -> None:
 
 def test_silence_begins_and_ends_when_told(bench: Maker) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).add_fault("silent", first=2.0, last=3.0)
+    add_fault(line.line.sensor(1), "silent", first=2.0, last=3.0)
     heard = []
     for seconds in (1.0, 2.0, 2.5, 3.0):
         line.reach(seconds)
@@ -81,8 +81,8 @@ def test_silence_begins_and_ends_when_told(bench: Maker) -> None:
 
 def test_a_healed_sensor_keeps_its_other_faults() -> None:
     sensor = Sensor(1)
-    sensor.add_fault("silent")
-    kept = sensor.add_fault("noisy", 0.5)
+    add_fault(sensor, "silent")
+    kept = add_fault(sensor, "noisy", 0.5)
     sensor.faults = [one for one in sensor.faults if one.kind != "silent"]
     assert sensor.faults == [kept]
     sensor.faults.clear()
@@ -101,7 +101,7 @@ def test_without_power_nothing_answers(bench: Maker) -> None:
 def test_one_that_hangs_is_silent_after_an_exception_until_the_next_power_cycle(bench: Maker) -> None:
     line = bench(Sensor(1))
     sensor = line.line.sensor(1)
-    sensor.add_fault("hangs")
+    add_fault(sensor, "hangs")
     assert line.id_of(1) == 1
     assert line.read(1, 3, 1) == bytes.fromhex("01 83 02")
     assert line.id_of(1) is None
@@ -111,7 +111,7 @@ def test_one_that_hangs_is_silent_after_an_exception_until_the_next_power_cycle(
 
 def test_one_that_hangs_is_silent_after_a_frame_it_could_not_read(bench: Maker) -> None:
     line = bench(Sensor(1), Sensor(2))
-    line.line.sensor(1).add_fault("hangs")
+    add_fault(line.line.sensor(1), "hangs")
     line.port.write(b"\x01\x03\x00\x01")
     line.listen(0.1)
     assert line.id_of(1) is None
@@ -120,7 +120,7 @@ def test_one_that_hangs_is_silent_after_a_frame_it_could_not_read(bench: Maker) 
 
 def test_a_shy_sensor_ignores_the_request_after_one_to_the_dead(bench: Maker) -> None:
     line = bench(Sensor(1), Sensor(2))
-    line.line.sensor(1).add_fault("shy")
+    add_fault(line.line.sensor(1), "shy")
     line.read(77)
     assert line.id_of(1) is None
     assert line.id_of(1) == 1
@@ -130,7 +130,7 @@ def test_a_shy_sensor_ignores_the_request_after_one_to_the_dead(bench: Maker) ->
 
 def test_a_sensor_that_needs_rest_ignores_what_comes_too_soon_after_its_answer(bench: Maker) -> None:
     line = bench(Sensor(1), Sensor(2))
-    line.line.sensor(1).add_fault("needs_rest", delay=0.2)
+    add_fault(line.line.sensor(1), "needs_rest", delay=0.2)
     assert line.id_of(1) == 1
     assert line.id_of(1) is None
     for _ in range(20):
@@ -140,7 +140,7 @@ def test_a_sensor_that_needs_rest_ignores_what_comes_too_soon_after_its_answer(b
 
 def test_a_sensor_that_sleeps_loses_the_request_that_wakes_it(bench: Maker) -> None:
     line = bench(Sensor(1), Sensor(2))
-    line.line.sensor(1).add_fault("sleeps", delay=0.2)
+    add_fault(line.line.sensor(1), "sleeps", delay=0.2)
     assert line.id_of(1) is None
     assert line.id_of(1) == 1
     for _ in range(20):
@@ -158,7 +158,7 @@ def test_a_broadcast_is_obeyed_by_all_and_answered_by_nobody(bench: Maker) -> No
 
 def test_an_echo_at_once_of_a_broadcast_is_none(bench: Maker) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).add_fault("at_once")
+    add_fault(line.line.sensor(1), "at_once")
     line.write(0, ID, 4)
     assert line.heard == b""
     assert line.id_of(4) == 4
@@ -167,7 +167,7 @@ def test_an_echo_at_once_of_a_broadcast_is_none(bench: Maker) -> None:
 def test_a_wildcard_answers_255_too(bench: Maker) -> None:
     line = bench(Sensor(1))
     assert line.id_of(255) is None
-    line.line.sensor(1).add_fault("wildcard")
+    add_fault(line.line.sensor(1), "wildcard")
     assert line.id_of(255) == 1
     assert line.id_of(254) is None
 
@@ -190,7 +190,7 @@ def test_other_devices_are_just_data(bench: Maker) -> None:
     assert line.read(5, 30, 1) == bytes.fromhex("05 03 02 00 08")
     power_cycle(sensor)
     assert repr(sensor) == "<Sensor 5 at 9600>"
-    sensor.add_fault(FaultKind.NAN)
+    add_fault(sensor, FaultKind.NAN)
     assert line.read(5, 10, 1) == bytes.fromhex("05 03 02 FF FF")
 
 

@@ -13,6 +13,7 @@ from lfs10d.profiles.profile import Profile
 from lfs10d.simulator.blueprint import blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import unseal
+from tests.support.faulty_sensors import add_fault, believable
 from tests.support.sensor_values import ID, Maker, wind_in
 
 
@@ -27,20 +28,20 @@ from tests.support.sensor_values import ID, Maker, wind_in
 )
 def test_a_broken_value_is_sent_as_such(bench: Maker, kind: str, holds: Callable[[float], bool]) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).add_fault(kind)
+    add_fault(line.line.sensor(1), kind)
     assert holds(wind_in(line.read(1)))
     assert line.answer.values == ()
 
 
 def test_a_stuck_sensor_repeats_its_value(bench: Maker) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).add_fault("stuck")
+    add_fault(line.line.sensor(1), "stuck")
     assert wind_in(line.read(1)) == wind_in(line.read(1))
 
 
 def test_a_refusal_has_the_code_it_was_given(bench: Maker) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).add_fault("exception", code=6)
+    add_fault(line.line.sensor(1), "exception", code=6)
     assert line.read(1) == bytes.fromhex("01 83 06")
 
 
@@ -56,29 +57,29 @@ def test_a_refusal_has_the_code_it_was_given(bench: Maker) -> None:
 )
 def test_a_wrong_answer_has_a_right_check(bench: Maker, kind: str, particulars: dict[str, int], first: str) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).add_fault(kind, **particulars)
+    add_fault(line.line.sensor(1), kind, **particulars)
     body = line.read(1)
     assert body is not None
     assert body[:3] == bytes.fromhex(first)
     assert len(body) == 3 + body[2]
-    assert not line.answer.believable
+    assert not believable(line.answer)
 
 
 def test_a_wrong_echo_carries_another_value(bench: Maker) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).add_fault("wrong_echo")
-    line.line.sensor(1).add_fault("wrong_count")
+    add_fault(line.line.sensor(1), "wrong_echo")
+    add_fault(line.line.sensor(1), "wrong_count")
     assert line.write(1, ID, 1) == bytes.fromhex("01 06 00 05 00 00")
 
 
 @pytest.mark.parametrize("framing", ["rtu", "ascii"])
 def test_a_noisy_answer_never_passes_its_check(bench: Maker, framing: str) -> None:
     line = bench(Sensor(1, framing=framing), framing=framing)  # type: ignore[arg-type]  # a literal
-    line.line.sensor(1).add_fault("noisy")
+    add_fault(line.line.sensor(1), "noisy")
     for _ in range(200):
         assert line.read(1) is None
         assert line.heard
-    assert not line.answer.believable
+    assert not believable(line.answer)
 
 
 @pytest.mark.parametrize(
@@ -94,7 +95,7 @@ def test_a_spoilt_answer_has_the_length_it_was_given(
     bench: Maker, kind: str, particulars: dict[str, int], lengths: set[int]
 ) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).add_fault(kind, **particulars)
+    add_fault(line.line.sensor(1), kind, **particulars)
     seen = set()
     for _ in range(100):
         assert line.read(1) is None
@@ -105,26 +106,26 @@ def test_a_spoilt_answer_has_the_length_it_was_given(
 @pytest.mark.parametrize(("kind", "part"), [("leading_noise", slice(5, None)), ("trailing_noise", slice(9))])
 def test_noise_around_an_answer_leaves_it_whole(bench: Maker, kind: str, part: slice) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).add_fault(kind, length=5)
+    add_fault(line.line.sensor(1), kind, length=5)
     line.read(1)
     assert len(line.heard) == 14
     assert unseal(line.heard[part]) is not None
-    assert line.answer.believable
+    assert believable(line.answer)
 
 
 def test_a_late_answer_comes_into_the_next_request(bench: Maker) -> None:
     line = bench(Sensor(1), Sensor(2))
-    line.line.sensor(1).add_fault("late", delay=0.2)
+    add_fault(line.line.sensor(1), "late", delay=0.2)
     assert line.read(1, wait=0.1) is None
     assert line.read(2, wait=0.05) is not None
     line.listen(0.1)
     assert unseal(line.heard) is not None
-    assert line.line.log[0].answers[0].believable
+    assert believable(line.line.log[0].answers[0])
 
 
 def test_bytes_can_come_with_pauses(bench: Maker) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).add_fault("slow_bytes", delay=0.002)
+    add_fault(line.line.sensor(1), "slow_bytes", delay=0.002)
     line.read(1)
     ends = line.answer.burst.ends
     assert {after - before for before, after in pairwise(ends)} <= {3_041_666, 3_041_667}
@@ -132,7 +133,7 @@ def test_bytes_can_come_with_pauses(bench: Maker) -> None:
 
 def test_a_fault_shows_at_its_rate(bench: Maker) -> None:
     line = bench(Sensor(1))
-    line.line.sensor(1).add_fault("silent", 0.3)
+    add_fault(line.line.sensor(1), "silent", 0.3)
     answers = sum(line.id_of(1) is not None for _ in range(300))
     assert 170 < answers < 250
 
@@ -153,7 +154,7 @@ def built(*values: dict[str, object], **keys: object) -> Sensor:
 def test_a_part_of_a_register_says_that_it_has_no_value(bench: Maker, nothing: int, sent: int) -> None:
     part = {"name": "a", "register": 7, "type": "uint16", "unit": "x", "bits": [0, 7], "unavailable": [nothing]}
     sensor = built(part)
-    sensor.add_fault("unavailable", values=("a",))
+    add_fault(sensor, "unavailable", values=("a",))
     assert bench(sensor).read(1, 7, 1) == struct.pack(">BBBH", 1, 3, 2, sent)
 
 
@@ -176,7 +177,7 @@ def test_a_part_without_a_value_leaves_the_rest_of_its_register_alone(bench: Mak
     low = {"name": "a", "register": 7, "type": "uint16", "unit": "x", "bits": [0, 7], "unavailable": [0xFFFF]}
     sensor = built(low, {"name": "b", "register": 7, "type": "uint16", "unit": "x", "bits": [10, 14]})
     sensor.words[7] = 0x8000
-    sensor.add_fault("unavailable", values=("a",))
+    add_fault(sensor, "unavailable", values=("a",))
     line = bench(sensor)
     assert line.read(1, 7, 1) == bytes((1, 3, 2, 0xFF, 0xFF))
     assert dict(line.answer.measured) == {"a": None, "b": None}  # all ones do not say what b measures

@@ -8,6 +8,7 @@ from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import SECOND, Format, seal
 from soak.line import SLAVES, ail, answers_of
 from soak.oracle import Numbered, Sent
+from tests.support.faulty_sensors import add_fault
 
 WIND = seal(bytes((1, 3, 0, 1, 0, 2)))
 ID = seal(bytes((1, 3, 0, 5, 0, 1)))
@@ -31,7 +32,7 @@ def asked(sensor: Sensor, *requests: tuple[float, bytes], stray: float | None = 
 def late(delay: float) -> Sensor:
     """Return a sensor that answers late."""
     sensor = Sensor(1)
-    sensor.add_fault(FaultKind.LATE, delay=delay)
+    add_fault(sensor, FaultKind.LATE, delay=delay)
     return sensor
 
 
@@ -56,7 +57,7 @@ def test_a_struck_answer_is_not_believable() -> None:
 
 def test_answers_without_a_value_are_none() -> None:
     broken = Sensor(1)
-    broken.add_fault(FaultKind.NAN)
+    add_fault(broken, FaultKind.NAN)
     assert asked(broken, (1.0, WIND)) == []
     assert asked(Sensor(1), (1.0, ID)) == []
 

@@ -15,6 +15,7 @@ The wire (`modbus`)
 The simulator
     `simulated`          a simulated line, asked byte by byte
     `virtual_port`       the master's port on it in virtual time, and what drives a master through that
+    `faulty_sensors`     faults of a simulated sensor, its power, and which of its replies may be believed
     `queued_sensor`      a simulated sensor that answers one request after the other, however late
     `sensor_values`      wind speeds in the replies of a simulated sensor
 

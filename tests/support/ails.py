@@ -6,6 +6,7 @@ from typing import Any, TypeAlias
 
 from lfs10d.simulator.faults import FaultKind
 from lfs10d.simulator.sensor import Sensor
+from tests.support.faulty_sensors import add_fault
 
 Ail: TypeAlias = tuple[str, dict[str, Any]]
 """A fault of a sensor and its particulars; "none" is well."""
@@ -16,7 +17,7 @@ def ail(sensor: Sensor, *ails: Ail) -> None:
     """Give a sensor these faults."""
     for kind, particulars in ails:
         if kind != "none":
-            sensor.add_fault(kind, **particulars)
+            add_fault(sensor, kind, **particulars)
 
 
 def has_a_twin(sensor: Sensor) -> bool:

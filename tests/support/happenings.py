@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from tests.support.ails import ail
+from tests.support.faulty_sensors import power_cycle
 from tests.support.foreigners import Foreigner
 from tests.support.second_masters import passing_master
-from tests.support.simulated import power_cycle
 
 if TYPE_CHECKING:
     from tests.support.story import Story

@@ -13,6 +13,7 @@ from lfs10d.simulator.burst import MASTER
 from lfs10d.simulator.judge import JudgeReport
 from lfs10d.simulator.line import HeardRequest
 from lfs10d.simulator.line_faults import second_master
+from tests.support.faulty_sensors import add_fault
 from tests.support.lines import Rig, Rigs
 
 KINDS = ("none", "twin", "repeated", "second_master", "gateway", "late", "twin and noise")
@@ -90,15 +91,15 @@ def _trouble(rig: Rig, kind: str, random: Random) -> None:
     for sensor in rig.line.sensors[: random.randint(1, len(rig.line.sensors))]:
         match kind:
             case "twin" | "repeated":
-                sensor.add_fault(kind, rate, delay=delay, first=first)
+                add_fault(sensor, kind, rate, delay=delay, first=first)
             case "twin and noise":
-                sensor.add_fault("twin", rate, delay=delay, first=first)
-                sensor.add_fault("noisy", 0.05)
+                add_fault(sensor, "twin", rate, delay=delay, first=first)
+                add_fault(sensor, "noisy", 0.05)
             case "gateway":
                 after = random.choice((0.01, 0.05, 0.1, 0.3, 0.6))
-                sensor.add_fault(kind, min(rate, 0.3), code=random.choice((5, 10, 11)), delay=after, first=first)
+                add_fault(sensor, kind, min(rate, 0.3), code=random.choice((5, 10, 11)), delay=after, first=first)
             case "late":
-                sensor.add_fault(kind, min(rate, 0.3), delay=random.uniform(0.02, 0.9), first=first)
+                add_fault(sensor, kind, min(rate, 0.3), delay=random.uniform(0.02, 0.9), first=first)
 
 
 def _judge(rig: Rig, where: str, count: Count) -> None:

@@ -23,6 +23,7 @@ from lfs10d.simulator.wind import Unique
 from lfs10d.simulator.wire import Check, Format, Framing, unseal
 from tests.support import forked
 from tests.support.brokers import Mosquitto
+from tests.support.faulty_sensors import add_fault
 from tests.support.sites import Site, View, good, tell
 
 ROOT = Path(__file__).parents[2]
@@ -279,7 +280,7 @@ def _fall_ill(made: Recording) -> None:
     def ail(sensors: SimulatedLine) -> None:
         for slave, kind in ill.items():
             sensor = sensors.sensor(slave)
-            sensor.add_fault("exception", code=6) if kind == "busy" else sensor.add_fault(kind)
+            add_fault(sensor, "exception", code=6) if kind == "busy" else add_fault(sensor, kind)
 
     def heal(sensors: SimulatedLine) -> None:
         for sensor in sensors.sensors:

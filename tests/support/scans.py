@@ -19,6 +19,7 @@ from lfs10d.profiles.library import builtin_names, load_profile
 from lfs10d.reading import Event, Exchanged
 from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.sensor import Sensor
+from tests.support.faulty_sensors import add_fault
 from tests.support.virtual_port import SimulatedPort, VirtualClock, run
 
 BUILTIN = {name: load_profile(name, relative_to=Path()) for name in builtin_names()}
@@ -43,7 +44,7 @@ def line_of(*sensors: Sensor | int) -> SimulatedLine:
 
 def ill(slave: int, kind: str, **particulars: float) -> Sensor:
     sensor = Sensor(slave)
-    sensor.add_fault(kind, **particulars)
+    add_fault(sensor, kind, **particulars)
     return sensor
 
 

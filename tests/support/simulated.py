@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from lfs10d.simulator.judge import Judge, JudgeReport
 from lfs10d.simulator.line import SimulatedLine
-from lfs10d.simulator.sensor import Reply, Sensor
+from lfs10d.simulator.sensor import Reply
 from lfs10d.simulator.wire import Framing, seal, unseal
 from tests.support.virtual_port import SimulatedPort, VirtualClock
 
@@ -15,12 +15,6 @@ READ, WRITE = 3, 6
 
 WIND, RATE, ID = 1, 4, 5
 """Registers of an LFS10."""
-
-
-def power_cycle(sensor: Sensor) -> None:
-    """Switch a sensor's power off and on."""
-    sensor.power_cut()
-    sensor.power_up()
 
 
 def violations(judge: Judge) -> int:

@@ -9,10 +9,10 @@ from typing import Any
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from tests.support.ails import NO_AIL, Ail, ail, has_a_twin
+from tests.support.faulty_sensors import power_cycle
 from tests.support.foreigners import Foreigner, Stranger
 from tests.support.happenings import happen
 from tests.support.lives import Bench, Life
-from tests.support.simulated import power_cycle
 from tests.support.volatile_disk import PowerCutError
 
 IDS = (3, 4, 5)

@@ -12,8 +12,8 @@ from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from tests.support.brokers import Mosquitto
+from tests.support.faulty_sensors import add_fault, power_cycle
 from tests.support.shells import BASE, Shell, typed
-from tests.support.simulated import power_cycle
 from tests.support.sites import QUICK, Run, Site, eventually, tell
 
 REPEAT = ("line/adopt", "--repeat")
@@ -36,7 +36,7 @@ def mounted(site: Site, **mqtt: Any) -> tuple[PtyLine, Run]:  # noqa: ANN401 - a
 def plug(served: PtyLine, fault: str | None = None, baudrate: int = 9600) -> Sensor:
     sensor = Sensor(1, format=Format(baudrate), turnaround=0.003)
     if fault is not None:
-        sensor.add_fault(fault)
+        add_fault(sensor, fault)
     tell(served, lambda line: line.add(sensor))
     return sensor
 

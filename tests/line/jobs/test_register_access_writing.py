@@ -9,6 +9,7 @@ from lfs10d.line.jobs.job import Hold
 from lfs10d.line.jobs.register_access import DIFFERING, ECHO_READS, VERIFY_WITHIN
 from lfs10d.modbus.request import WriteRegister
 from lfs10d.reading import Exchanged, Fault, FaultCode, Purpose, Reading
+from tests.support.faulty_sensors import add_fault
 from tests.support.register_accesses import AVERAGING, Rig, read
 
 
@@ -45,21 +46,21 @@ def test_where_the_echo_cannot_be_learned_nothing_is_written() -> None:
 
 def test_a_slave_that_falls_silent_while_the_echo_is_learned_is_not_written() -> None:
     rig = Rig(echo="auto")
-    rig.vane.add_fault("silent", first=0.04)
+    add_fault(rig.vane, "silent", first=0.04)
     access = rig.do(write())
     assert (access.end, access.sent, access.before, rig.writes) == (End.UNANSWERED, False, 1, [])
 
 
 def test_a_silent_slave_is_not_written() -> None:
     rig = Rig()
-    rig.vane.add_fault("silent")
+    add_fault(rig.vane, "silent")
     access = rig.do(write())
     assert (access.end, access.sent, rig.writes) == (End.UNANSWERED, False, [])
 
 
 def test_a_busy_slave_is_not_written() -> None:
     rig = Rig()
-    rig.vane.add_fault("exception", code=6)
+    add_fault(rig.vane, "exception", code=6)
     access = rig.do(write())
     assert (access.end, access.sent, rig.writes) == (End.BUSY, False, [])
 
@@ -82,7 +83,7 @@ def test_a_register_that_can_be_written_but_not_read_is_not_verified() -> None:
 
 def test_a_write_that_is_answered_busy_is_not_tried_again() -> None:
     rig = Rig()
-    rig.vane.add_fault("exception", code=6, first=0.03)
+    add_fault(rig.vane, "exception", code=6, first=0.03)
     access = rig.do(write())
     assert (access.end, access.sent, len(rig.writes)) == (End.BUSY, True, 1)
     assert rig.asked[-1] == rig.writes[0]
@@ -99,21 +100,21 @@ def test_a_write_that_the_slave_confirms_but_does_not_make_is_not_verified() -> 
 @pytest.mark.parametrize("kind", ["echo_losing", "wrong_echo"])
 def test_a_write_without_its_answer_is_sent_once_and_read_back(kind: str) -> None:
     rig = Rig()
-    rig.vane.add_fault(kind)
+    add_fault(rig.vane, kind)
     access = rig.do(write(10))
     assert (access.end, access.registers, len(rig.writes)) == (End.DONE, (10,), 1)
 
 
 def test_a_slave_that_stores_slowly_is_asked_until_it_answers() -> None:
     rig = Rig()
-    rig.vane.add_fault("slow_flash", delay=4.0)
+    add_fault(rig.vane, "slow_flash", delay=4.0)
     access = rig.do(write(10))
     assert (access.end, access.registers, len(rig.writes)) == (End.DONE, (10,), 1)
 
 
 def test_a_slave_silent_after_a_write_is_given_up_after_a_while() -> None:
     rig = Rig()
-    rig.vane.add_fault("slow_flash", delay=60.0)
+    add_fault(rig.vane, "slow_flash", delay=60.0)
     access = rig.do(write(10))
     assert (access.end, access.sent, access.registers) == (End.UNANSWERED, True, None)
     assert VERIFY_WITHIN < rig.clock.now < VERIFY_WITHIN + 3
@@ -121,7 +122,7 @@ def test_a_slave_silent_after_a_write_is_given_up_after_a_while() -> None:
 
 def test_a_lost_port_ends_it_and_says_whether_a_write_was_sent() -> None:
     rig = Rig()
-    rig.vane.add_fault("slow_flash", delay=60.0)
+    add_fault(rig.vane, "slow_flash", delay=60.0)
     access = rig.begin(write(10))
     rig.pass_time(0.5)
     rig.port.unplug()
@@ -135,7 +136,7 @@ def test_nobody_polls_the_slave_between_a_write_and_its_verification() -> None:
     rig = Rig(polled=True)
     rig.pass_time(2.0)
     begun = len(rig.events)
-    rig.vane.add_fault("slow_flash", delay=1.0)
+    add_fault(rig.vane, "slow_flash", delay=1.0)
     rig.do(write(10))
     assert {each.purpose for each in rig.events[begun:] if isinstance(each, Exchanged)} == {Purpose.REQUEST}
     rig.vane.faults.clear()

@@ -9,6 +9,7 @@ from lfs10d.profiles.library import builtin_names
 from lfs10d.simulator.blueprint import blueprint_of
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
+from tests.support.faulty_sensors import add_fault
 from tests.support.scans import ALL, BUILTIN, PROFILES, by_id, found_ids, ill, line_of, scanned
 
 # -- who is found
@@ -84,8 +85,8 @@ def test_every_built_in_device_is_recognised_or_told_with_what_cannot_be_told_fr
         Sensor(41, blueprint=blueprint_of(BUILTIN["ecowitt-wn90lp"])),
     )
     sensors = {sensor.slave: sensor for sensor in line.sensors}
-    sensors[40].add_fault("absent", values=("wind_force",))
-    sensors[41].add_fault("absent", values=("rain_counter",))
+    add_fault(sensors[40], "absent", values=("wind_force",))
+    add_fault(sensors[41], "absent", values=("rain_counter",))
     found = by_id(scanned(line, range(1, 50), rates).scan)
     told = {str(names[slave - 10] if slave < 30 else slave): _names(finding) for slave, finding in found.items()}
     sure = {name: [name] for name in ("lfs10", "ld-e", "fuling-dzb", "eh600", "ecowitt-wn90lp", "dfrobot-sen0483")}
