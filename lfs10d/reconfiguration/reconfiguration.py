@@ -18,7 +18,6 @@ from lfs10d.reconfiguration.adopt_request import AdoptRequest
 from lfs10d.reconfiguration.journal import OpenChange
 from lfs10d.reconfiguration.journal_commands import command_record
 from lfs10d.reconfiguration.locate import Locator
-from lfs10d.reconfiguration.procedure_run import ProcedureRun
 from lfs10d.reconfiguration.recovery import Recovery
 from lfs10d.reconfiguration.runner import ChangeRunner
 
@@ -35,6 +34,8 @@ class Reconfiguration:
         self, runner: ChangeRunner, *, act: Callable[[str | None], None], repoll: Callable[[Config], None]
     ) -> None:
         self.journal = runner.journal
+        self.recall = runner.recall
+        self.new_run = runner.new_run
         self._runner = runner
         self._act = act
         self._recovery = Recovery(runner)
@@ -43,10 +44,6 @@ class Reconfiguration:
         if trouble is not None:
             log.error("%s", trouble)
         runner.reservations.update()
-
-    def recall(self) -> None:
-        """Restore the commands of earlier runs: those with a result for their repeats, and those without one yet."""
-        self._runner.recall()
 
     # -- one at a time
 
@@ -78,10 +75,6 @@ class Reconfiguration:
     def reserved(self) -> Mapping[int, str]:
         """Return the slave ids that no device may be given now, with the reason."""
         return self._runner.reservations.reserved
-
-    def new_run(self) -> ProcedureRun:
-        """Return a runner of procedures on the line, one after the other."""
-        return self._runner.new_run()
 
     # -- the commands
 
@@ -126,9 +119,8 @@ class Reconfiguration:
 
     def follow(self) -> None:
         """Search for the sensors of every open change, and for devices with several possible places."""
-        if not self._runner.ending:
-            self._locator.begin()
-            self._recovery.begin()
+        self._locator.begin()
+        self._recovery.begin()
 
     async def reconfigured(self, before: Config, after: Config) -> None:
         """Take another configuration: open changes of removed devices are dropped."""
@@ -140,8 +132,7 @@ class Reconfiguration:
                 self._recovery.leave(frozenset({change.number}))
                 with contextlib.suppress(StateError):
                     await self._runner.drop(change, f"{', '.join(sorted(change.devices))} was removed")
-        if not self._runner.ending:
-            self._locator.begin()
+        self._locator.begin()
 
     async def stop(self) -> None:
         """Send no new frame of any change."""

@@ -19,7 +19,7 @@ from collections import Counter
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from collections.abc import Set as AbstractSet
 from dataclasses import replace
-from typing import Annotated, TypeVar
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import from_json
@@ -40,7 +40,6 @@ LARGEST = 4096
 _Baudrate = Annotated[
     int, next(kind for kind in LineConfig.model_fields["baudrate"].metadata if isinstance(kind, Choice))
 ]
-M = TypeVar("M", bound="_Payload")
 
 
 class _Payload(BaseModel):
@@ -48,13 +47,8 @@ class _Payload(BaseModel):
 
     model_config = ConfigDict(strict=True, extra="ignore", frozen=True)
 
-
-class _Config(_Payload):
-    slave: Annotated[int, Whole(1, 255)]
-
-
-class _LineState(_Payload):
-    baudrate: _Baudrate
+    slave: Annotated[int, Whole(1, 255)] | None = None
+    baudrate: _Baudrate | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,21 +124,22 @@ def retained_state(payloads: Mapping[str, bytes]) -> RetainedState:
     slaves: dict[str, int] = {}
     baudrate = None
     for topic, payload in payloads.items():
+        found = _parsed(payload)
         if topic == LINE_STATE:
-            state = _parsed(_LineState, payload)
-            baudrate = None if state is None else state.baudrate
-        elif (device := device_of(topic, CONFIG)) is not None and (config := _parsed(_Config, payload)) is not None:
-            slaves[device] = config.slave
+            baudrate = found.baudrate
+        elif (device := device_of(topic, CONFIG)) is not None and found.slave is not None:
+            slaves[device] = found.slave
     return RetainedState(slaves, baudrate)
 
 
-def _parsed(model: type[M], payload: bytes) -> M | None:
+def _parsed(payload: bytes) -> _Payload:
+    """Return what is read of a payload; nothing of one that is not in our form."""
     if len(payload) > LARGEST:
-        return None
+        return _Payload()
     try:
-        return model.model_validate(from_json(payload, allow_inf_nan=False))
+        return _Payload.model_validate(from_json(payload, allow_inf_nan=False))
     except (ValueError, ValidationError):
-        return None
+        return _Payload()
 
 
 def restored(
