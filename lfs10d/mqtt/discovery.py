@@ -128,7 +128,7 @@ class Discovery:
             if reason >= REFUSED_FROM and self._wanted:
                 log.warning("the broker refuses to let us subscribe to %s: %s", topic, reason_in_words(reason))
         if reasons and reasons[0] >= REFUSED_FROM:
-            self._search.refused()
+            self._search.is_refused = True
             self._end(self._search)
 
     def on_message(self, message: Incoming) -> bool:

@@ -20,7 +20,7 @@ import json
 import struct
 import zlib
 from collections.abc import Mapping
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from lfs10d.profiles.decimals import shortest
 from lfs10d.reading import NOTHING, FaultCode, Value
@@ -186,8 +186,7 @@ def values_of(sample: Sample) -> tuple[Cell, ...]:
     return tuple(cells)
 
 
-@dataclass(frozen=True, slots=True)
-class Content:
+class Content(NamedTuple):
     """What a sample says of its values, as in `Sample`."""
 
     values: Mapping[str, Value | None] | None

@@ -164,7 +164,6 @@ class SampleFile:
         era, series = self._catalogue.find(series_id)
         if check(series.text, seq, at, rtt, value, *others) != checked:
             raise DamagedError("a sample is not what was written")
-        content = content_of(series, (value, *others))
         form = WindRecord if is_record(series.source) else Sample
         sample = form(
             device=device_of_source(series.source),
@@ -172,14 +171,12 @@ class SampleFile:
             seq=seq,
             ts=era.base + at,
             clock=era.clock,
-            values=content.values,
             units=dict(series.units),
             names=series.names,
             quality=series.quality,
             error=series.error,
             rtt_ms=unpack_rtt(rtt),
-            errors=content.errors,
-            ages=content.ages,
+            **content_of(series, (value, *others))._asdict(),
         )
         return StoredRow(key, sample, era.shift if era.boot == self._boot else None, series.repeated)
 

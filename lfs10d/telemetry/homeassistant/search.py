@@ -35,19 +35,12 @@ class DiscoverySearch:
     """The components of each payload by its full topic."""
     is_refused: bool = False
     """The broker refused the subscription."""
-    _last_at: float = 0.0
-
-    def __post_init__(self) -> None:
-        self._last_at = self.begun
+    _last_at: float | None = None
 
     @property
     def filter(self) -> str:
         """What to subscribe to."""
         return config_topic(self.prefix, "+" if self.wide else object_id(self.base))
-
-    def refused(self) -> None:
-        """Note that the broker refused the subscription."""
-        self.is_refused = True
 
     def on_message(self, topic: str, payload: bytes, now: float) -> bool:
         """Take one retained message; return False if it is no discovery payload."""
@@ -72,4 +65,5 @@ class DiscoverySearch:
     @property
     def due(self) -> float:
         """When it is over."""
-        return self.begun if self.is_refused else min(self._last_at + QUIET, self.begun + LONGEST)
+        last_at = self.begun if self._last_at is None else self._last_at
+        return self.begun if self.is_refused else min(last_at + QUIET, self.begun + LONGEST)

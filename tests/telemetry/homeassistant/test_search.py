@@ -64,5 +64,5 @@ def test_it_is_over_when_nothing_more_comes_or_the_broker_refuses() -> None:
     assert looking.due == 101.0 + QUIET
     looking.on_message(MAST, payload(), 500.0)
     assert looking.due == 100.0 + LONGEST
-    looking.refused()
+    looking.is_refused = True
     assert looking.due == 100.0
