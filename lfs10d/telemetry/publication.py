@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import field
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
-from typing import Literal, NamedTuple, TypeAlias
+from typing import ClassVar, Literal, NamedTuple, TypeAlias
 
 from lfs10d.reading import NOTHING, FaultCode, Value
 from lfs10d.system.clock_step import ClockState
@@ -117,6 +117,11 @@ class Sample:
     errors: Mapping[str, FaultCode] = field(default_factory=lambda: NOTHING)
     ages: Mapping[str, float] = field(default_factory=lambda: NOTHING)
 
+    late_leaf: ClassVar = HISTORY
+    """The last level of its topic when it is no longer live."""
+    grouped: ClassVar = True
+    """There it goes in an array with others; False: alone, as an object."""
+
     @property
     def source(self) -> str:
         """The series that `seq` counts: a device, or the records of a device."""
@@ -125,12 +130,7 @@ class Sample:
     @property
     def history_topic(self) -> str:
         """The topic under `B` when it is no longer live."""
-        return device_topic(self.device, HISTORY)
-
-    @property
-    def grouped(self) -> bool:
-        """On `history_topic` it goes in an array with others; False: alone, as an object."""
-        return True
+        return device_topic(self.device, self.late_leaf)
 
     def header(self, line: str) -> dict[str, object]:
         """Return the first keys of every payload of a device."""

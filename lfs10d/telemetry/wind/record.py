@@ -7,11 +7,11 @@ the new time gives it, which may have been recorded under the old time already: 
 
 from __future__ import annotations
 
-from typing import Final
+from typing import ClassVar, Final
 
 from lfs10d.reading import Value
 from lfs10d.system.dataclass import dataclass
-from lfs10d.telemetry.publication import HISTORY, RECORD, Sample, device_of, device_topic
+from lfs10d.telemetry.publication import HISTORY, RECORD, Sample, device_of
 
 EVEN_WITHIN: Final = 1000
 """Milliseconds by which a clock that is slewed may be away from where the record before ended."""
@@ -59,20 +59,14 @@ class RecordSpans:
 class WindRecord(Sample):
     """One record. `ts` is its end; `values` are figures of `record_figures`, their times in ms before that."""
 
+    late_leaf: ClassVar = RECORD
+    grouped: ClassVar = False
+    """Each record is a message."""
+
     @property
     def source(self) -> str:
         """The records of its device."""
         return f"{self.device}{_SUFFIX}"
-
-    @property
-    def history_topic(self) -> str:
-        """The topic it always goes to."""
-        return device_topic(self.device, RECORD)
-
-    @property
-    def grouped(self) -> bool:
-        """Never: each record is a message."""
-        return False
 
     def payload(self, line: str, *, historical: bool = False) -> dict[str, object]:
         """Return the JSON object; figures that are not among the values are null."""
