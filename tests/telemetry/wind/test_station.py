@@ -57,6 +57,15 @@ def test_no_reading_of_another_device_a_failed_poll_or_an_older_value_counts() -
     assert line.newest("wind")["samples_10m"] == 0
 
 
+def test_values_that_run_out_after_another_device_is_due_move_no_tick() -> None:
+    line = weather(with_wind(ANEMOMETER, every=2.0), replace(with_wind(ANEMOMETER, every=100.0), name="b"))
+    before = line.station.due
+    line.station.on_reading(reading("b", 0.5, wind_speed=5.0), line.instant(0.5))
+    assert line.station.due == before
+    line.run(3.0)
+    assert [each.topic for each in line.published] == ["device/a/wind"]
+
+
 def test_a_device_without_wind_has_neither_topic_nor_figures() -> None:
     line = weather(ONE_VALUE)
     assert line.station.topics() == []
