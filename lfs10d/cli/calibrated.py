@@ -12,6 +12,7 @@ import click
 
 from lfs10d.cli import config_option, state_option
 from lfs10d.cli.effective_file import with_changes
+from lfs10d.config.credentials import DENIED
 from lfs10d.config.effective import Effective
 from lfs10d.config.loader import load
 from lfs10d.config.models import SlaveConfig
@@ -107,7 +108,8 @@ def _found(port: str, file: Path, state_dir: Path | None, *, named: bool) -> tup
     except StateError as error:
         if not any(slave.calibration for slave in loaded.config.slaves):
             return NONE, None
-        return NONE, f"{error}; so it is not known which slave id each sensor has now (call it as root)"
+        remedy = " (call it as root)" if DENIED in str(error) else ""
+        return NONE, f"{error}; so it is not known which slave id each sensor has now{remedy}"
 
 
 def _by_place(now: Effective) -> tuple[Calibrations, str | None]:

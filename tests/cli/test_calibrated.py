@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from pathlib import Path
 
 import click
@@ -170,10 +172,26 @@ def test_without_the_changes_nothing_is_calibrated(file: Path, capsys: pytest.Ca
     assert called(file) == NONE
     told = capsys.readouterr().err
     assert told.startswith("lfs10d: the changes made by request cannot be read: ")
-    assert told.endswith("which slave id each sensor has now (call it as root); raw values alone are shown\n")
+    assert told.endswith("which slave id each sensor has now; raw values alone are shown\n")
     file.write_text(TEXT.replace(", calibration: {wind_speed: {scale: 1.01, offset: 0.06}}", ""))
     assert called(file) == NONE
     assert capsys.readouterr().err == ""
+
+
+def test_who_may_not_read_the_changes_is_told_who_may(
+    file: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stat = Path.stat
+
+    def look(self: Path, *, follow_symlinks: bool = True) -> os.stat_result:
+        if self.name == "state":
+            raise PermissionError(errno.EACCES, "Permission denied", str(self))
+        return stat(self, follow_symlinks=follow_symlinks)
+
+    monkeypatch.setattr(Path, "stat", look)
+    assert called(file) == NONE
+    told = capsys.readouterr().err
+    assert "permission denied; so it is not known which slave id each sensor has now (call it as root); raw" in told
 
 
 def test_the_state_may_be_elsewhere(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
