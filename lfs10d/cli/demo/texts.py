@@ -16,7 +16,7 @@ NEWEST: Final = "5"
 
 def remarks(broker: Broker, page: Page | None) -> tuple[str, ...]:
     """Return the lines below the table: what is shown, which sensors are faulty, the page, how to subscribe."""
-    seen = ("The page in a browser needs the extra: pip install 'lfs10d[web]'",)
+    seen = ("The page in a browser needs starlette and uvicorn: install lfs10d[web], as docs/web.md shows.",)
     if page is not None:
         seen = (f"In a browser: {page.address} (token for its controls: {page.token})",)
     return (

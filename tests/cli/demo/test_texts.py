@@ -24,7 +24,7 @@ def test_the_remarks_name_the_faulty_sensors_and_how_to_subscribe() -> None:
 
 
 def test_without_its_extra_the_page_is_named_with_what_to_do() -> None:
-    assert "needs the extra: pip install 'lfs10d[web]'" in "\n".join(remarks(Broker("mosquitto", "5", 1), None))
+    assert "install lfs10d[web], as docs/web.md shows" in "\n".join(remarks(Broker("mosquitto", "5", 1), None))
 
 
 def test_a_broker_of_mqtt_3_1_1_is_named_with_what_shows_mqtt_5() -> None:
