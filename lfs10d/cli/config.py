@@ -20,7 +20,6 @@ from lfs10d.config.effective import Effective, effective, merged_data
 from lfs10d.config.json_schema import json_schema
 from lfs10d.config.loader import LoadedConfig, leaves, load
 from lfs10d.config.models import Config
-from lfs10d.config.sections import Section
 from lfs10d.daemon.state_directory import state_directory
 from lfs10d.errors import FailedError, StateError
 from lfs10d.schema.document import path_text
@@ -126,7 +125,5 @@ def _kind(config: Config, path: tuple[str | int, ...]) -> object:
     section: Any = config
     for step in path[:-1]:
         section = section[step] if isinstance(step, int) else getattr(section, step)
-    if not isinstance(section, Section):
-        return None
     metadata = type(section).model_fields[str(path[-1])].metadata
     return next((kind for kind in metadata if isinstance(kind, Duration | Size)), None)
