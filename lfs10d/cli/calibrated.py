@@ -16,7 +16,6 @@ from lfs10d.config.credentials import DENIED
 from lfs10d.config.effective import Effective
 from lfs10d.config.loader import load
 from lfs10d.config.models import SlaveConfig
-from lfs10d.daemon.state_directory import state_directory
 from lfs10d.errors import ConfigError, StateError
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Fault, Value
@@ -102,9 +101,8 @@ def _found(port: str, file: Path, state_dir: Path | None, *, named: bool) -> tup
     line = loaded.config.line
     if os.path.realpath(line.port) != os.path.realpath(port):
         return NONE, f"{file} is for another port, {line.port}" if named else None
-    directory = state_directory(file, line.name, chosen=state_dir, environment=os.environ)
     try:
-        return _by_place(with_changes(loaded, directory, chosen=state_dir is not None))
+        return _by_place(with_changes(loaded, state_dir))
     except StateError as error:
         if not any(slave.calibration for slave in loaded.config.slaves):
             return NONE, None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,6 @@ from lfs10d.config.effective import Effective, effective, merged_data
 from lfs10d.config.json_schema import json_schema
 from lfs10d.config.loader import LoadedConfig, leaves, load
 from lfs10d.config.models import Config
-from lfs10d.daemon.state_directory import state_directory
 from lfs10d.errors import FailedError, StateError
 from lfs10d.schema.document import path_text
 from lfs10d.schema.fields import Duration, Size
@@ -56,10 +54,9 @@ def command(config: Path, state_dir: Path | None, *, merged: bool, as_json: bool
     if merged and as_json:
         raise click.UsageError("--merged prints YAML; leave --json out")
     file = load(config, files=False)
-    directory = state_directory(config, file.config.line.name, chosen=state_dir, environment=os.environ)
     missing = None
     try:
-        now = with_changes(file, directory, chosen=state_dir is not None)
+        now = with_changes(file, state_dir)
     except StateError as error:
         if merged or DENIED not in str(error):
             raise

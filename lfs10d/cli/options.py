@@ -17,10 +17,6 @@ from lfs10d.profiles.library import builtin_names
 from lfs10d.schema.quantities import BAUDRATES, duration_text, seconds
 from lfs10d.system.dataclass import dataclass
 
-TIMEOUTS = (0.01, 10.0)
-"""The shortest and the longest time-out, in s."""
-
-
 _NUMBER = re.compile(r"[0-9]{1,15}(\.[0-9]{1,20})?")
 
 # What an argument may be
@@ -131,7 +127,9 @@ def baudrate(context: click.Context, parameter: click.Parameter, value: str) -> 
 def line_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options of the line to a command that has the argument `port`; `take` returns them as one value."""
     for option in (
-        click.option("--timeout", type=DurationType("200ms or 1s", *TIMEOUTS), help="How long to wait for each reply."),
+        click.option(
+            "--timeout", type=DurationType("200ms or 1s", 0.01, 10.0), help="How long to wait for each reply."
+        ),
         FRAMING,
         STOPBITS,
         click.option(

@@ -80,16 +80,15 @@ def text(lines: Iterable[LineModel], wall: float, *, openmetrics: bool) -> str:
     families.gauge("lfs10d_build_info", "The version of lfs10d that serves these metrics.", 1, version=__version__)
     for line in lines:
         _add_line(families, line, wall)
-    written = [row for family in families for row in _written(family, openmetrics=openmetrics)]
+    written = [row for family in families.values() for row in _written(family, openmetrics=openmetrics)]
     return "".join(f"{row}\n" for row in written) + ("# EOF\n" if openmetrics else "")
 
 
-class _Families:
-    def __init__(self) -> None:
-        self._families: dict[str, Family] = {}
+class _Families(dict[str, Family]):
+    """By name, in order."""
 
     def of(self, name: str, kind: str, words: str, unit: str = "") -> Family:
-        return self._families.setdefault(name, Family(name, kind, words, unit))
+        return self.setdefault(name, Family(name, kind, words, unit))
 
     def gauge(self, name: str, words: str, value: object, unit: str = "", **labels: str) -> None:
         self.of(name, "gauge", words, unit).add(value, **labels)
@@ -104,9 +103,6 @@ class _Families:
             if figure is not None:
                 per_second = _PER_SECOND[name]
                 self.of(name, "summary", words, "seconds").add(figure / per_second, **labels, quantile=quantile)
-
-    def __iter__(self) -> Iterator[Family]:
-        return iter(self._families.values())
 
 
 def _add_line(families: _Families, line: LineModel, wall: float) -> None:

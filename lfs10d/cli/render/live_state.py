@@ -97,7 +97,7 @@ class LiveState:
         """Whether the devices of a daemon are known."""
         self._by_name: dict[str, ShownDevice] = {}
         """Every device with a message: a broker sends retained messages in any order."""
-        self._ahead = 0.0
+        self.ahead = 0.0
         """Seconds our clock is ahead of the daemon's."""
 
     # -- from MQTT
@@ -156,7 +156,7 @@ class LiveState:
         if not isinstance(units, dict):
             units = dict.fromkeys(values, sample.get("unit") or "")
         if not old:
-            self._ahead = wall - ts / 1000
+            self.ahead = wall - ts / 1000
         device.seq, device.boot, device.ts = seq, boot, ts
         _sample(device, sample, values, units)
         if device.good:
@@ -201,11 +201,6 @@ class LiveState:
 
     # -- what is shown
 
-    @property
-    def ahead(self) -> float:
-        """Seconds our clock is ahead of the daemon's."""
-        return self._ahead
-
     @staticmethod
     def first_value(sample: Mapping[str, Any]) -> float | None:
         """Return the first value of a sample or of a device in the status file; None where it has none."""
@@ -226,7 +221,7 @@ class LiveState:
         """
         if device.good_ts is None or (device.error == FaultCode.STARTING and device.good_ts >= device.ts):
             return None
-        return max(0.0, wall - self._ahead - device.good_ts / 1000)
+        return max(0.0, wall - self.ahead - device.good_ts / 1000)
 
     def late(self, device: ShownDevice, wall: float) -> bool:
         """Whether its last good value is older than it should be."""
