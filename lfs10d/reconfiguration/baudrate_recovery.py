@@ -19,6 +19,7 @@ from lfs10d.reconfiguration.procedures.baudrate import (
     BaudrateEnding,
     BaudrateReport,
     RateSensor,
+    Where,
 )
 from lfs10d.reconfiguration.procedures.recover_baudrate import (
     CameUp,
@@ -73,8 +74,7 @@ class _Undo:
         self._run = run
         self._old, self._to = change.facts.old, change.facts.to
         self._sensors = baudrate.rate_sensors(runner, [move.device for move in change.moves], run.clock)
-        self._where: dict[str, int | None] = {}
-        """The rate at which each sensor was found last, None where it was not."""
+        self._where: Where = {}
         self._report: BaudrateReport | None = None
         self._twins: set[str] = set()
         """Sensors for which a second one with the same id was announced."""

@@ -23,9 +23,10 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Annotated, Literal, TypeAlias
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from lfs10d.errors import ConfigError, Problem
+from lfs10d.profiles.facts import Facts
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.schema.document import Document, decode, parse
@@ -42,11 +43,7 @@ Share: TypeAlias = Annotated[float, Field(ge=0, le=1)]
 Length: TypeAlias = Annotated[int, Whole(1, LONGEST_NOISE)]
 
 
-class _Entry(BaseModel):
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class WindowEntry(_Entry):
+class WindowEntry(Facts):
     """A window of time; without keys always."""
 
     after: Time = Field(0.0, description="When it begins, after the simulator's start.")
@@ -102,7 +99,7 @@ Faults: TypeAlias = Annotated[
 ]
 
 
-class SlaveEntry(_Entry):
+class SlaveEntry(Facts):
     """The faults of one sensor, and its own settings."""
 
     profile: Annotated[str, Text(4096)] | None = Field(
@@ -131,7 +128,7 @@ class NoiseEntry(WindowEntry):
     delay: Time = Field(0.001, description="Time after the request.")
 
 
-class SecondMasterEntry(_Entry):
+class SecondMasterEntry(Facts):
     """Another master that does not listen before it speaks."""
 
     slave: Annotated[int, Whole(0, 255)] = Field(description="Slave id that it reads.")
@@ -139,7 +136,7 @@ class SecondMasterEntry(_Entry):
     after: Time = Field(0.0, description="Time of its first request.")
 
 
-class LineEntry(_Entry):
+class LineEntry(Facts):
     """The faults of the whole line."""
 
     echo: Annotated[bool, Flag()] = Field(default=False, description="The adapter returns the bytes of the master.")
@@ -153,7 +150,7 @@ class LineEntry(_Entry):
     )
 
 
-class FaultFile(_Entry):
+class FaultFile(Facts):
     """The whole file."""
 
     line: LineEntry = Field(LineEntry(), description="Faults of the line.")

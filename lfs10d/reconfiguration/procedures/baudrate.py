@@ -20,6 +20,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, replace
 from enum import StrEnum
 from itertools import takewhile
+from typing import TypeAlias
 
 from lfs10d.line.jobs.job import Hold
 from lfs10d.line.jobs.procedure import Await, LineLostError, Steps
@@ -32,6 +33,10 @@ ROLL_BACK = 60.0
 """Longest time in s for moving sensors back."""
 FIRST_PAUSE = 1.0
 """Pause between two rounds of reads of missing sensors, in s; doubled after each."""
+
+
+Where: TypeAlias = dict[str, int | None]
+"""The rate at which each sensor was found last, None for one that was not."""
 
 
 class BaudrateEnding(StrEnum):
@@ -125,7 +130,7 @@ def change_rate(wish: RateWish, echo_known: Callable[[], bool]) -> Steps[Baudrat
             return BaudrateReport(BaudrateEnding.UNWRITTEN, why=str(why))
     except LineLostError:
         return BaudrateReport(BaudrateEnding.LOST_BEFORE)
-    where: dict[str, int | None] = {sensor.name: wish.old for sensor in wish.sensors}
+    where: Where = {sensor.name: wish.old for sensor in wish.sensors}
     try:
         if wish.power_cycle:
             return (yield from _all_written(wish, where))
@@ -152,7 +157,7 @@ def _check_before_write(wish: RateWish, echo_known: Callable[[], bool]) -> Steps
     return BaudrateReport(BaudrateEnding.FREE) if wish.dry_run else None
 
 
-def _one_by_one(wish: RateWish, where: dict[str, int | None]) -> Steps[BaudrateReport]:
+def _one_by_one(wish: RateWish, where: Where) -> Steps[BaudrateReport]:
     for n, sensor in enumerate(wish.sensors):
         exception, rate, twins = yield from write_rate(sensor, wish.old, wish.to)
         where[sensor.name] = rate
@@ -175,14 +180,14 @@ def _one_by_one(wish: RateWish, where: dict[str, int | None]) -> Steps[BaudrateR
     return BaudrateReport(BaudrateEnding.MOVED, where)
 
 
-def _twins(wish: RateWish, last: int, where: dict[str, int | None]) -> Steps[BaudrateReport]:
+def _twins(wish: RateWish, last: int, where: Where) -> Steps[BaudrateReport]:
     """Move all sensors back, because the last one written turned out to be two."""
     report = yield from roll_back(wish.touched(last), wish.old, wish.to, where)
     names, back = (wish.sensors[last].name,), report.ended is BaudrateEnding.ROLLED_BACK
     return replace(report, ended=BaudrateEnding.TWINS, names=names) if back else report
 
 
-def _all_written(wish: RateWish, where: dict[str, int | None]) -> Steps[BaudrateReport]:
+def _all_written(wish: RateWish, where: Where) -> Steps[BaudrateReport]:
     for n, sensor in enumerate(wish.sensors):
         exception = yield from write(sensor.at(wish.old), sensor.register, sensor.code(wish.to), sensor.query)
         says, rate = yield from find_rate(sensor, (wish.to, wish.old))
@@ -240,9 +245,7 @@ def write_back(sensor: RateSensor, rate: int) -> Steps[bool]:
     return False
 
 
-def roll_back(
-    sensors: Sequence[RateSensor], rate: int, other: int, where: dict[str, int | None]
-) -> Steps[BaudrateReport]:
+def roll_back(sensors: Sequence[RateSensor], rate: int, other: int, where: Where) -> Steps[BaudrateReport]:
     """Bring these sensors to `rate`, for up to `ROLL_BACK`; `where` learns where they are.
 
     All are looked for at the other rate in the end, after `VERIFY`, during which none is polled.

@@ -18,6 +18,7 @@ from lfs10d.reconfiguration.procedures.baudrate import (
     BaudrateEnding,
     BaudrateReport,
     RateSensor,
+    Where,
     find_rate,
     restore_rate,
     write_back,
@@ -48,9 +49,7 @@ class Twins:
     name: str
 
 
-def look_back(
-    sensors: Sequence[RateSensor], rate: int, other: int, where: dict[str, int | None], *, own: int
-) -> Steps[dict[str, int | None]]:
+def look_back(sensors: Sequence[RateSensor], rate: int, other: int, where: Where, *, own: int) -> Steps[Where]:
     """Look once for each sensor after a change of rate that was cut short, at the line's `own` rate first.
 
     One that answers at `rate` and has stored another is written back at once, before it comes up there: none waits
@@ -64,9 +63,7 @@ def look_back(
     return where
 
 
-def put_back(
-    sensors: Sequence[RateSensor], rate: int, other: int, where: dict[str, int | None]
-) -> Steps[BaudrateReport]:
+def put_back(sensors: Sequence[RateSensor], rate: int, other: int, where: Where) -> Steps[BaudrateReport]:
     """Bring those of these sensors that were found to `rate`; the report is of all in `where`.
 
     One that answers at the `other` rate too is two sensors: that is awaited, and it counts as being there.
