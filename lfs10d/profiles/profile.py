@@ -252,9 +252,13 @@ class Profile(Facts):
     @property
     def rates(self) -> tuple[int, ...]:
         """The known rates of a device: those that can be set, and the factory's."""
-        codes = () if self.baudrate is None else tuple(self.baudrate.codes)
         factory = () if self.factory is None else (self.factory.baudrate,)
-        return tuple(dict.fromkeys((*factory, *codes)))
+        return tuple(dict.fromkeys((*factory, *self.rate_codes)))
+
+    @property
+    def rate_codes(self) -> Mapping[int, int]:
+        """The content of its rate register for each rate; empty where none can be set."""
+        return {} if self.baudrate is None else self.baudrate.codes
 
     @property
     def most_words(self) -> int:

@@ -131,8 +131,7 @@ def _wish(runner: ChangeRunner, request: AdoptRequest, profile: Profile, now: Ef
     if not candidates and request.to is not None:
         message = f"name: the default {default_device_name(request.to)} is taken; give it another name"
         return rejected("invalid_param", message, param="name")
-    codes = profile.baudrate.codes if profile.baudrate else ()
-    rates = tuple(dict.fromkeys((line_rate, profile.factory.baudrate, *codes)))
+    rates = tuple(dict.fromkeys((line_rate, profile.factory.baudrate, *profile.rate_codes)))
     return adopt.AdoptWish(factory, candidates, line_rate, rates)
 
 
@@ -221,7 +220,7 @@ def _unfit(profile: Profile, line: LineConfig) -> str | None:
     if line.framing not in profile.framings:
         return f"it does not support {line.framing}"
     at_factory = profile.factory is not None and profile.factory.baudrate == line.baudrate
-    if not at_factory and (profile.baudrate is None or line.baudrate not in profile.baudrate.codes):
+    if not at_factory and line.baudrate not in profile.rate_codes:
         return f"it cannot be set to the {line.baudrate} baud of this line"
     return None
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Collection, Iterable
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
 
@@ -12,7 +12,6 @@ from lfs10d.config.changes import Changes, Rate
 from lfs10d.config.effective import Effective
 from lfs10d.errors import StateError
 from lfs10d.line.jobs.procedure import ProcedureClock
-from lfs10d.profiles.profile import Profile
 from lfs10d.reconfiguration import baudrate_answers
 from lfs10d.reconfiguration.journal import BaudrateFacts, CommandRecord, Move, OpenBaudrate
 from lfs10d.reconfiguration.procedures.baudrate import (
@@ -105,7 +104,7 @@ def unsettled(runner: ChangeRunner, device: str | None = None) -> Result | None:
 def _unfit(runner: ChangeRunner, to: int, now: Effective) -> Result | None:
     """Return why the command is rejected without an exchange on the line; None if it is not."""
     config, profiles = now.config, now.loaded.profiles
-    able = [slave for slave in config.slaves if to in _rates(profiles[slave.profile])]
+    able = [slave for slave in config.slaves if to in profiles[slave.profile].rate_codes]
     if not able and any(profiles[slave.profile].baudrate for slave in config.slaves):
         return rejected("invalid_param", f"to: no sensor of this line can be set to {to} baud", param="to")
     unable = ", ".join(slave.name for slave in config.slaves if slave not in able)
@@ -162,7 +161,3 @@ async def save_rate(runner: ChangeRunner, old: int, to: int) -> None:
     await runner.change(edit)
     log.info("the line is at %d baud now", to)
     runner.announce("baudrate_changed", {"from": old, "to": to})
-
-
-def _rates(profile: Profile) -> Collection[int]:
-    return () if profile.baudrate is None else profile.baudrate.codes

@@ -65,8 +65,7 @@ async def perform(
     """
     now = runner.running()
     profile, rate = now.loaded.profiles[slave.profile], now.config.line.baudrate
-    rates = tuple(profile.baudrate.codes) if profile.baudrate else ()
-    wish = ReaddressWish(Endpoint(slave=slave.id, baudrate=rate), to, rates, dry_run)
+    wish = ReaddressWish(Endpoint(slave=slave.id, baudrate=rate), to, tuple(profile.rate_codes), dry_run)
     run = runner.new_run()
     steps = readdress(wish, runner.query(slave, run.clock), runner.wire().echo_known)
 

@@ -186,8 +186,8 @@ def _last_rate(now: Effective, state: RetainedState) -> int:
     """Return the rate last published where a command can have given it to the line, else the file's."""
     if state.baudrate is None or now.changes.baudrate is not None:
         return now.file_values.baudrate
-    used = (now.loaded.profiles[slave.profile].baudrate for slave in now.config.slaves)
-    settable = frozenset(rate for baudrate in used if baudrate is not None for rate in baudrate.codes)
+    used = (now.loaded.profiles[slave.profile] for slave in now.config.slaves)
+    settable = frozenset().union(*(profile.rate_codes for profile in used))
     return state.baudrate if state.baudrate in settable else now.file_values.baudrate
 
 

@@ -115,7 +115,7 @@ def blueprint_of(profile: Profile) -> Blueprint:
         check=profile.checksum,
         id_register=profile.slave_id.register if profile.slave_id else None,
         rate_register=profile.baudrate.register if profile.baudrate else None,
-        rate_codes=profile.baudrate.codes if profile.baudrate else {},
+        rate_codes=profile.rate_codes,
     )
 
 

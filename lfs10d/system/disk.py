@@ -26,7 +26,11 @@ class Files:
 
     def sync(self, path: Path) -> None:
         """Wait until the content is on the disk."""
-        self._synced(path, os.O_RDONLY)
+        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
 
     def rename(self, source: Path, target: Path) -> None:
         """Put one file in place of another, in one step."""
@@ -38,14 +42,7 @@ class Files:
 
     def sync_folder(self, folder: Path) -> None:
         """Wait until the folder's names are on the disk."""
-        self._synced(folder, os.O_RDONLY | os.O_DIRECTORY)
-
-    def _synced(self, path: Path, flags: int) -> None:
-        descriptor = os.open(path, flags | os.O_CLOEXEC)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+        self.sync(folder)
 
     def exists(self, path: Path) -> bool:
         """Return whether there is such a file."""
