@@ -24,7 +24,7 @@ from operator import itemgetter
 from typing import Any
 
 from lfs10d.simulator.burst import MASTER
-from lfs10d.simulator.line import HeardRequest
+from lfs10d.simulator.judge import HeardRequest
 from lfs10d.simulator.sensor import Reply
 from lfs10d.simulator.wire import SECOND, unseal
 from tests.support.faulty_sensors import believable

@@ -11,7 +11,8 @@ from pathlib import Path
 from lfs10d.simulator.builder import LinePlan, build
 from lfs10d.simulator.burst import MASTER
 from lfs10d.simulator.faults import FaultKind
-from lfs10d.simulator.line import HeardRequest, SimulatedLine
+from lfs10d.simulator.judge import HeardRequest
+from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.line_faults import stray
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.sensor import Sensor

@@ -18,6 +18,8 @@ from dataclasses import field
 from enum import StrEnum
 from typing import Final
 
+from lfs10d.simulator.burst import MASTER
+from lfs10d.simulator.sensor import Reply
 from lfs10d.simulator.wire import SECOND, Format, Framing, unseal
 from lfs10d.system.dataclass import dataclass
 
@@ -58,8 +60,8 @@ FIGURES: Final[Mapping[str, JudgeReport]] = {
 
 
 @dataclass(slots=True)
-class Hearing:
-    """A request as far as it has come."""
+class HeardRequest:
+    """One request as it was on the line, as far as it has come, and what was sent in answer: the oracle of a test."""
 
     format: Format
     begun: int
@@ -69,6 +71,10 @@ class Hearing:
     """Silence before it; None if nothing was ever sent before."""
     verdict: JudgeReport | None = None
     """None: nothing against it yet."""
+    speaker: str = MASTER
+    body: bytes = b""
+    """Without the check; empty if it was not heard."""
+    answers: list[Reply] = field(default_factory=list)
 
 
 @dataclass(slots=True)
@@ -82,12 +88,12 @@ class Judge:
     min_excess: int | None = None
     """The smallest gap less what it had to be; negative is a violation."""
     histogram: list[int] = field(default_factory=lambda: [0] * (len(EXCESS_EDGES_US) + 1))
-    _open: Hearing | None = None
+    _open: HeardRequest | None = None
     _torn_off: bytes = b""
 
     def listen(
         self, data: bytes, start: int, shape: Format, *, quiet_since: int | None, slower: Format, busy: bool
-    ) -> Hearing:
+    ) -> HeardRequest:
         """Hear bytes that begin at `start` and follow each other; return the request they belong to.
 
         `quiet_since` is the end of the last byte on the line before (None: there was none), `slower` the format
@@ -100,7 +106,7 @@ class Judge:
             hearing = None
         if hearing is None:
             gap = None if quiet_since is None else start - quiet_since
-            hearing = self._open = Hearing(shape, start, ended, data, gap)
+            hearing = self._open = HeardRequest(shape, start, ended, data, gap)
             if not busy:
                 self._measure(hearing, slower)
         else:
@@ -114,7 +120,7 @@ class Judge:
             hearing.verdict = hearing.verdict or JudgeReport.COLLISION
         return hearing
 
-    def settle(self, hearing: Hearing, *, struck: bool) -> JudgeReport | None:
+    def settle(self, hearing: HeardRequest, *, struck: bool) -> JudgeReport | None:
         """Decide at its end whether a request was heard; None while it is incomplete and may go on.
 
         `struck`: another's bytes fell into it.
@@ -127,17 +133,17 @@ class Judge:
             return None
         return self._count(hearing, hearing.verdict or JudgeReport.HEARD)
 
-    def patience(self, hearing: Hearing) -> int:
+    def patience(self, hearing: HeardRequest) -> int:
         """Return until when an incomplete request may still go on."""
         return hearing.ended + self._longest_silence(hearing.format) + 1
 
-    def expire(self, hearing: Hearing, now: int) -> JudgeReport | None:
+    def expire(self, hearing: HeardRequest, now: int) -> JudgeReport | None:
         """End a request that was not completed in time; None if it has ended or went on since."""
         if hearing is not self._open or now < self.patience(hearing):
             return None
         return self._close(hearing)
 
-    def _close(self, hearing: Hearing) -> JudgeReport:
+    def _close(self, hearing: HeardRequest) -> JudgeReport:
         torn = hearing.verdict is None and self._complete(self._torn_off + hearing.frame)
         return self._count(hearing, hearing.verdict or (JudgeReport.TORN if torn else JudgeReport.MALFORMED))
 
@@ -158,7 +164,7 @@ class Judge:
         """Return the pause after which what follows is another request."""
         return shape.t35 - ROUNDING - 1 if self.framing == "rtu" else ASCII_PAUSE
 
-    def _measure(self, hearing: Hearing, slower: Format) -> None:
+    def _measure(self, hearing: HeardRequest, slower: Format) -> None:
         if hearing.gap is None:
             return
         excess = hearing.gap - slower.t35
@@ -174,7 +180,7 @@ class Judge:
     def _complete(self, frame: bytes) -> bool:
         return any(unseal(frame, self.framing, check) is not None for check in ("crc", "sum"))
 
-    def _count(self, hearing: Hearing, verdict: JudgeReport) -> JudgeReport:
+    def _count(self, hearing: HeardRequest, verdict: JudgeReport) -> JudgeReport:
         self._open = None
         self._torn_off = hearing.frame if verdict is JudgeReport.MALFORMED else b""
         hearing.verdict = verdict

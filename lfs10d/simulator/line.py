@@ -7,31 +7,14 @@ collects what has arrived by a time. In virtual time and on a pseudo terminal it
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import field
 from heapq import heappop, heappush
 from random import Random
 
 from lfs10d.simulator.burst import MASTER, Burst, Receiver, collide
-from lfs10d.simulator.judge import Hearing, Judge, JudgeReport
+from lfs10d.simulator.judge import HeardRequest, Judge, JudgeReport
 from lfs10d.simulator.sensor import Reply, Sensor
 from lfs10d.simulator.wind import Unique
 from lfs10d.simulator.wire import Format, Framing, nanoseconds, unseal
-from lfs10d.system.dataclass import dataclass
-
-
-@dataclass(slots=True)
-class HeardRequest:
-    """One request as it was on the line, and what was sent in answer: the oracle of a test."""
-
-    speaker: str
-    frame: bytes
-    begun: int
-    ended: int
-    gap: int | None
-    verdict: JudgeReport
-    body: bytes = b""
-    """Without the check; empty if it was not heard."""
-    answers: list[Reply] = field(default_factory=list)
 
 
 class SimulatedLine:
@@ -190,22 +173,20 @@ class SimulatedLine:
             for receiver in self._receivers:
                 receiver.offer(burst)
 
-    def _settle(self, hearing: Hearing, burst: Burst, now: int) -> None:
+    def _settle(self, hearing: HeardRequest, burst: Burst, now: int) -> None:
         """Judge the master's request at the end of its bytes; if it is heard, let the sensors hear it."""
-        verdict = self.judge.settle(hearing, struck=burst.struck)
-        if verdict is None:
+        if self.judge.settle(hearing, struck=burst.struck) is None:
             self.at_nanosecond(self.judge.patience(hearing), lambda when: self._give_up(hearing, when))
             return
-        request = HeardRequest(MASTER, hearing.frame, hearing.begun, now, hearing.gap, verdict)
-        self.carry(request, burst, now)
+        hearing.ended = now
+        self.carry(hearing, burst, now)
 
-    def _give_up(self, hearing: Hearing, now: int) -> None:
+    def _give_up(self, hearing: HeardRequest, now: int) -> None:
         """Let what was never completed be no request; sensors that such things upset are upset."""
-        verdict = self.judge.expire(hearing, now)
-        if verdict is None:
+        if self.judge.expire(hearing, now) is None:
             return
         if self.keep_log:
-            self.log.append(HeardRequest(MASTER, hearing.frame, hearing.begun, hearing.ended, hearing.gap, verdict))
+            self.log.append(hearing)
         for sensor in self.sensors:
             if sensor.format == hearing.format:
                 sensor.disturb(now)

@@ -6,8 +6,8 @@ from typing import Final
 
 from lfs10d.simulator.burst import NOISE, SECOND_MASTER
 from lfs10d.simulator.faults import ALWAYS, Window
-from lfs10d.simulator.judge import JudgeReport
-from lfs10d.simulator.line import HeardRequest, SimulatedLine
+from lfs10d.simulator.judge import HeardRequest, JudgeReport
+from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.wire import SECOND, nanoseconds, seal
 
 BABBLE_PIECE: Final = SECOND // 10
@@ -61,5 +61,5 @@ def ask_as_second_master(line: SimulatedLine, frame: bytes, now: int) -> None:
     """Let another master send a frame at `now` (ns), whatever else is on the line."""
     ended = now + line.format.span(len(frame))
     burst = line.speak(SECOND_MASTER, frame, now)
-    request = HeardRequest(SECOND_MASTER, frame, now, ended, None, JudgeReport.HEARD)
+    request = HeardRequest(line.format, now, ended, frame, None, JudgeReport.HEARD, SECOND_MASTER)
     line.at_nanosecond(ended, lambda when: line.carry(request, burst, when))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -95,8 +96,9 @@ def test_the_answer_to_another_master_is_right_by_construction() -> None:
     wire = Wire()
     ours = wire.ask(1)
     wire.line.log[0].speaker = "second master"
+    theirs = wire.line.log[0]
     wire.line.log.append(
-        wire.line.log[0].__class__("master", seal(b"\x01" + READ), 1, 2, None, wire.line.log[0].verdict)
+        replace(theirs, speaker="master", frame=seal(b"\x01" + READ), begun=1, ended=2, gap=None, body=b"", answers=[])
     )
     found = wire.judge(1, ours)
     assert (found.good, found.by_construction, found.wrong) == (0, 1, [])

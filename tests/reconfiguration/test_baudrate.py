@@ -8,7 +8,7 @@ import pytest
 
 from lfs10d.command import Command, Result
 from lfs10d.reconfiguration.adopt_request import AdoptRequest
-from lfs10d.simulator.line import HeardRequest
+from lfs10d.simulator.judge import HeardRequest
 from lfs10d.simulator.sensor import Sensor
 from tests.support.faulty_sensors import add_fault, power_cycle
 from tests.support.lives import Bench, Life

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from lfs10d.simulator.line import HeardRequest
+from lfs10d.simulator.judge import HeardRequest
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import Format
 from tests.support.faulty_sensors import add_fault, power_cycle

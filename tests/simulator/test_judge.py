@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.simulator.judge import ROUNDING, Judge, JudgeReport
-from lfs10d.simulator.line import HeardRequest, SimulatedLine
+from lfs10d.simulator.judge import ROUNDING, HeardRequest, Judge, JudgeReport
+from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wire import SECOND, Format, seal
 from tests.support.simulated import violations

@@ -10,8 +10,7 @@ from random import Random
 from lfs10d.line.device import PollRules
 from lfs10d.modbus.bus import Wait
 from lfs10d.simulator.burst import MASTER
-from lfs10d.simulator.judge import JudgeReport
-from lfs10d.simulator.line import HeardRequest
+from lfs10d.simulator.judge import HeardRequest, JudgeReport
 from lfs10d.simulator.line_faults import second_master
 from tests.support.faulty_sensors import add_fault
 from tests.support.lines import Rig, Rigs

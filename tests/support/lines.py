@@ -18,7 +18,8 @@ from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.reading import Event, Exchanged, FaultCode, PortChanged, Reading
 from lfs10d.simulator.burst import MASTER
-from lfs10d.simulator.line import HeardRequest, SimulatedLine
+from lfs10d.simulator.judge import HeardRequest
+from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.sensor import Reply, Sensor
 from lfs10d.simulator.wire import Format
 from tests.support.queued_sensor import QueuedSensor

@@ -16,7 +16,8 @@ from typing import Any
 from lfs10d.profiles.library import load_profile
 from lfs10d.profiles.profile import Profile
 from lfs10d.simulator.blueprint import blueprint_of
-from lfs10d.simulator.line import HeardRequest, SimulatedLine
+from lfs10d.simulator.judge import HeardRequest
+from lfs10d.simulator.line import SimulatedLine
 from lfs10d.simulator.pty import PtyLine
 from lfs10d.simulator.sensor import Sensor
 from lfs10d.simulator.wind import Unique
