@@ -75,12 +75,9 @@ class LiveQueue:
     def take_old(self, now: float) -> list[LiveSample]:
         """Take the samples that are history by now."""
         old = []
-        for live in self.waiting:
-            if now - live.queued.since <= LIVE_FOR:
-                break
-            old.append(live)
-        for _ in old:
+        while (live := self.oldest()) is not None and now - live.queued.since > LIVE_FOR:
             self.take_oldest()
+            old.append(live)
         return old
 
     def correct(self, shift: int, clock: ClockState = "synced") -> None:

@@ -28,15 +28,14 @@ class Losses:
 
     def add(self, sample: Sample) -> None:
         """Note that this sample will never be delivered."""
-        self.total += 1
-        self.restore(Loss(sample.source, sample.boot, sample.seq, sample.seq, 1))
+        self.evicted([Loss(sample.source, sample.boot, sample.seq, sample.seq, 1)])
 
     def restore(self, loss: Loss) -> None:
         """Put back a loss whose declaration was not acknowledged."""
         self.waiting[loss.key] = joined([*self.waiting.get(loss.key, ()), loss], MOST_RANGES)
 
     def evicted(self, losses: Iterable[Loss]) -> None:
-        """Note that the store had no room for these."""
+        """Note that these are lost: the store had no room for them."""
         for loss in losses:
             self.total += loss.count
             self.restore(loss)
