@@ -57,7 +57,7 @@ class Spooler:
         self._thread = WorkerThread("store")
         self._poked = asyncio.Event()
         self._tasks = BackgroundTasks(self._failed)
-        self._task: asyncio.Task[None] | None = None
+        self._task: asyncio.Task[None]  # begun at the start
         self._ending = False
         self._opened = False
         self._open_at = float("-inf")
@@ -79,13 +79,12 @@ class Spooler:
         self._report_trouble(f"nothing is kept on disk until a restart; {FULL_DISK}")
 
     async def stop(self, within: float) -> None:
-        """Keep what waits on disk, in at most `within` seconds."""
+        """Keep what waits on disk, in at most `within` seconds; after `start`."""
         self._ending = True
         self.poke()
         try:
             async with asyncio.timeout(within):
-                if self._task is not None:
-                    await asyncio.wait([self._task])
+                await asyncio.wait([self._task])
                 await self._keep_everything()
         except TimeoutError:
             log.warning(
@@ -93,8 +92,7 @@ class Spooler:
             )
         finally:
             self._thread.end()
-            if self._task is not None:
-                self._task.cancel()
+            self._task.cancel()
 
     def poke(self) -> None:
         """Look again what is to be done: something has happened."""
