@@ -15,7 +15,7 @@ import click
 from lfs10d.cli import config_option, event_loop, examples, json_option
 from lfs10d.cli.client import RETAINED_WITHIN, CommandClient, content
 from lfs10d.cli.login import Login, log_in, login_options
-from lfs10d.cli.render.live_state import FRESH, LiveState
+from lfs10d.cli.render.live_state import FRESH, TOPICS, LiveState
 from lfs10d.cli.render.live_table import DataSource, age_text
 from lfs10d.cli.render.live_view import LiveView, live_view
 from lfs10d.cli.render.spinner import spinning
@@ -24,7 +24,6 @@ from lfs10d.daemon.state_directory import status_places
 from lfs10d.errors import BrokerError, FailedError
 from lfs10d.mqtt.messages import Filter, Incoming
 from lfs10d.system.dataclass import dataclass
-from lfs10d.telemetry import publication
 
 EVERY: Final = 0.5
 """s between two updates: fast enough to follow a cup that is turned by hand."""
@@ -91,20 +90,8 @@ class Watch:
         self._heard_at = 0.0
         """When the last message came by MQTT, epoch s."""
         self._status: _Status | None = None
-        topics = login.topics
-        once = [publication.DEVICES, publication.LINE_STATE, publication.LINE_ERROR, publication.LINE_STATS]
-        leaves = (
-            publication.STATE,
-            publication.TELEMETRY,
-            publication.AVAILABILITY,
-            publication.STATS,
-            publication.ERROR,
-            publication.WIND,
-        )
-        filters = [*once, *(publication.device_topic("+", leaf) for leaf in leaves)]
-        self._client = CommandClient(
-            login, [Filter(topics.full(each), qos=0, retain_as_published=False) for each in filters], self._arrived
-        )
+        filters = [Filter(login.topics.full(each), qos=0, retain_as_published=False) for each in TOPICS]
+        self._client = CommandClient(login, filters, self._arrived)
 
     @property
     def online(self) -> bool:

@@ -12,30 +12,19 @@ from typing import Final
 
 from lfs10d.cli.client import CommandClient, content
 from lfs10d.cli.login import Login
+from lfs10d.cli.render.live_state import TOPICS
 from lfs10d.cli.status_source import read_status
 from lfs10d.daemon.state_directory import status_places
 from lfs10d.errors import BrokerError, FailedError
 from lfs10d.mqtt.messages import Filter, Incoming
 from lfs10d.mqtt.topics import Topics
-from lfs10d.telemetry import publication
 from lfs10d.web.line_model import LineModel
 from lfs10d.web.site_model import SiteModel
 
 CONNECTS_WITHIN: Final = 6.0
 LARGEST_PAYLOAD: Final = 2**18
 """Bytes."""
-_LEAVES: Final = ("state", "telemetry", "history", "availability", "stats", "error", "config", "wind")
-RELATIVE: Final = (
-    publication.AVAILABILITY,
-    publication.INFO,
-    publication.DEVICES,
-    publication.LINE_STATE,
-    publication.LINE_ERROR,
-    publication.LINE_STATS,
-    publication.EVENT,
-    publication.TRACE,
-    *(publication.device_topic("+", leaf) for leaf in _LEAVES),
-)
+RELATIVE: Final = (*TOPICS, "availability", "info", "event", "trace", "device/+/history", "device/+/config")
 """Topics under a line that are shown."""
 
 

@@ -26,6 +26,11 @@ LATE_AFTER: Final = 3.0
 """s beyond three intervals after which a good value counts as old."""
 
 
+_LEAVES: Final = ("state", "telemetry", "availability", "stats", "error", "wind")
+TOPICS: Final = ("devices", "line/state", "line/error", "line/stats", *(f"device/+/{leaf}" for leaf in _LEAVES))
+"""Those that `LiveState.on_message` takes, under B."""
+
+
 @dataclass(slots=True)
 class ShownDevice:
     """One slave. `values` are those of the last sample, `good_ts` (epoch ms, its clock) when there were any.
