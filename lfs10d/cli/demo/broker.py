@@ -83,14 +83,11 @@ def _ports() -> Iterator[int]:
 
 def is_free(port: int) -> bool:
     """Say whether a program of ours could listen on this port of the loopback now."""
-    with socket.socket() as probe:
-        # As brokers do: a connection of before that is still fading away is no hindrance.
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((LOOPBACK, port))
-            probe.listen(1)
-        except OSError:
-            return False
+    try:
+        # It sets SO_REUSEADDR, as brokers do: a connection of before that is still fading away is no hindrance.
+        socket.create_server((LOOPBACK, port)).close()
+    except OSError:
+        return False
     return True
 
 

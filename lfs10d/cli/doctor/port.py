@@ -79,14 +79,14 @@ def there(path: Path) -> bool:
 def look(port: str, root: Root | None = None) -> PortState:
     """Return the state of a port without opening it."""
     root = root or Root()
-    programs = set(_programs(root))
+    running = RUNNING & {root.read(f"proc/{process.name}/comm") for process in (root.path / "proc").glob("[0-9]*")}
     container = any(there(root.path / mark) for mark in CONTAINER_MARKS)
     path = root.path / port.lstrip("/")
     try:
         device = path.resolve(strict=True)
         status = device.stat()
     except (OSError, RuntimeError):
-        return PortState(port, running=frozenset(programs & RUNNING), container=container)
+        return PortState(port, running=running, container=container)
     name = device.name
     sys_device = root.path / "sys/class/tty" / name / "device"
     found = holder(str(device), proc=root.path / "proc")
@@ -105,7 +105,7 @@ def look(port: str, root: Root | None = None) -> PortState:
         held_by_daemon=found is not None and daemon_behind(found, proc=root.path / "proc") is not None,
         console=_console(name, root),
         mini_uart=name == "ttyS0" and "Raspberry Pi" in root.read("proc/device-tree/model"),
-        running=frozenset(programs & RUNNING),
+        running=running,
         container=container,
     )
 
@@ -138,11 +138,6 @@ def _usb_id(sys_device: Path, root: Root) -> str:
             return f"{vendor}:{product}"
         folder = folder.parent
     return ""
-
-
-def _programs(root: Root) -> Iterator[str]:
-    for process in (root.path / "proc").glob("[0-9]*"):
-        yield root.read(f"proc/{process.name}/comm")
 
 
 def _console(name: str, root: Root) -> str:
