@@ -153,11 +153,11 @@ def announce_twins(runner: ChangeRunner, device: str, sensors: Iterable[RateSens
 
 async def save_rate(runner: ChangeRunner, old: int, to: int) -> None:
     """Let the line use the rate at which its sensors were found; saved to disk first."""
-
-    def edit(now: Effective) -> Changes:
-        filed = now.file_values.baudrate
-        return replace(now.changes, baudrate=None if to == filed else Rate(filed, to))
-
-    await runner.change(edit)
+    await runner.change(lambda now: at_rate(now.changes, to, now.file_values.baudrate))
     log.info("the line is at %d baud now", to)
     runner.announce("baudrate_changed", {"from": old, "to": to})
+
+
+def at_rate(changes: Changes, rate: int, filed: int) -> Changes:
+    """Return the changes with another rate of the line; `filed` is that of the file."""
+    return replace(changes, baudrate=None if rate == filed else Rate(filed, rate))

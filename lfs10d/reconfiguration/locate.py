@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import partial
 
-from lfs10d.config.changes import Changes, Place, Rate
+from lfs10d.config.changes import Changes, Place
 from lfs10d.config.effective import Effective
 from lfs10d.reading import Purpose
+from lfs10d.reconfiguration.baudrate import at_rate
 from lfs10d.reconfiguration.journal import Endpoint
 from lfs10d.reconfiguration.procedure_run import ProcedureRun
 from lfs10d.reconfiguration.procedures.locate import locate
@@ -98,11 +98,8 @@ class Locator:
             if now.slave(name) is None:
                 return now.changes
             changes = now.changes.moving(name, Place(endpoint.slave), now.file_values)
-            filed = now.file_values.baudrate
             if endpoint.baudrate != now.config.line.baudrate or changes.baudrate is not None:
-                changes = replace(
-                    changes, baudrate=None if endpoint.baudrate == filed else Rate(filed, endpoint.baudrate)
-                )
+                return at_rate(changes, endpoint.baudrate, now.file_values.baudrate)
             return changes
 
         await self._runner.learn(edit)
