@@ -29,12 +29,11 @@ PATIENCE = 0.05
 
 LEVELS = {"debug": logging.DEBUG, "info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
 
-_PRIORITIES = ((logging.CRITICAL, 2), (logging.ERROR, 3), (logging.WARNING, 4), (logging.INFO, 6))
-_DEBUG_PRIORITY = 7
+_PRIORITIES = ((logging.CRITICAL, 2), (logging.ERROR, 3), (logging.WARNING, 4), (logging.INFO, 6), (0, 7))
 """Priorities of syslog(3), each from that level on."""
 
-_COLOURS = ((logging.ERROR, "\x1b[31m"), (logging.WARNING, "\x1b[33m"), (logging.INFO, ""))
 _DIM, _RESET = "\x1b[2m", "\x1b[0m"
+_COLOURS = ((logging.ERROR, "\x1b[31m"), (logging.WARNING, "\x1b[33m"), (logging.INFO, ""), (0, _DIM))
 
 _CUT = b" ... "
 
@@ -113,10 +112,10 @@ class LineFormatter(logging.Formatter):
         words = escape(self._said(record))
         level = record.levelname.lower()
         if self._look is Style.JOURNAL:
-            return f"<{_at_level(_PRIORITIES, record.levelno, _DEBUG_PRIORITY)}>{words}"
+            return f"<{_at_level(_PRIORITIES, record.levelno)}>{words}"
         if self._look is Style.COLOUR:
             stamp = time.strftime("%H:%M:%S %Z", time.localtime(record.created))
-            colour = _at_level(_COLOURS, record.levelno, _DIM)
+            colour = _at_level(_COLOURS, record.levelno)
             return f"{_DIM}{stamp}{_RESET} {colour}{level:<7} {words}{_RESET}"
         if self._look is Style.BARE:
             return f"{level} {words}"
@@ -225,8 +224,8 @@ def _log_stray(words: str, error: BaseException | None) -> None:
     logging.getLogger(OUR_PACKAGE).error("%s", words, exc_info=error)
 
 
-def _at_level(ladder: tuple[tuple[int, T], ...], level: int, below: T) -> T:
-    return next((value for least, value in ladder if level >= least), below)
+def _at_level(ladder: tuple[tuple[int, T], ...], level: int) -> T:
+    return next(value for least, value in ladder if level >= least)
 
 
 def _utc(seconds: float) -> str:
