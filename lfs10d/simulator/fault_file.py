@@ -32,7 +32,8 @@ from lfs10d.profiles.profile import Profile
 from lfs10d.schema.document import Document, decode, parse
 from lfs10d.schema.fields import Choice, Duration, Flag, Text, Whole
 from lfs10d.schema.quantities import BAUDRATES
-from lfs10d.simulator.faults import FaultKind, SensorFault, sensor_fault
+from lfs10d.simulator.faults import DEFAULT_DELAYS, FaultKind, SensorFault, window
+from lfs10d.simulator.wire import nanoseconds
 
 DAY = 86400
 MOST_COPIES = 8
@@ -84,8 +85,11 @@ class FaultEntry(WindowEntry):
     @property
     def sensor_fault(self) -> SensorFault:
         """The fault as the simulator plays it."""
-        particulars = self.model_dump(exclude={"fault", "rate", "after", "lasts"})
-        return sensor_fault(self.fault, self.rate, first=self.after, last=self.last, **particulars)
+        kind = FaultKind(self.fault)
+        delay = DEFAULT_DELAYS.get(kind, 0.0) if self.delay is None else self.delay
+        particulars = self.model_dump(include={"code", "value", "length", "answer", "reads", "values"})
+        when = window(self.after, self.last, self.every)
+        return SensorFault(kind, self.rate, when, nanoseconds(delay), **particulars)
 
 
 def _named(item: object) -> object:

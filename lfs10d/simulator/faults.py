@@ -8,7 +8,6 @@ seeded random source, so a run can be repeated exactly.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from enum import StrEnum
 from random import Random
 from typing import Literal, TypeAlias
@@ -171,23 +170,3 @@ DEFAULT_DELAYS = {
     FaultKind.GATEWAY: 0.1,
 }
 """Seconds, where none is given."""
-
-
-def sensor_fault(
-    kind: FaultKind | str,
-    rate: float = 1.0,
-    *,
-    delay: float | None = None,
-    first: float = 0.0,
-    last: float | None = None,
-    every: float | None = None,
-    **particulars: int | str | tuple[str, ...] | None,
-) -> SensorFault:
-    """Return a fault with times in seconds; `particulars` are code, value, length, answer, reads and values.
-
-    Raises ValueError for an unknown kind, TypeError for an unknown particular.
-    """
-    kind = FaultKind(kind)
-    seconds = DEFAULT_DELAYS.get(kind, 0.0) if delay is None else delay
-    plain = SensorFault(kind, rate, window(first, last, every), nanoseconds(seconds))
-    return replace(plain, **particulars)  # type: ignore[arg-type]  # replace checks the names, the kinds use them

@@ -8,7 +8,10 @@ import pytest
 
 from lfs10d.errors import ConfigError
 from lfs10d.simulator.fault_file import FaultFile, load_faults, parse_faults
-from lfs10d.simulator.faults import FaultKind, sensor_fault
+from lfs10d.simulator.faults import FaultKind, SensorFault
+from tests.support.faulty_sensors import sensor_fault
+
+LATE, TWIN = FaultKind.LATE, FaultKind.TWIN
 
 
 def problems(text: str) -> list[str]:
@@ -22,6 +25,7 @@ def problems(text: str) -> list[str]:
     [
         ("slaves: {3: silent}", (sensor_fault("silent"),)),
         ("slaves: {3: [silent, nan]}", (sensor_fault("silent"), sensor_fault("nan"))),
+        ("slaves: {3: [late, twin]}", (SensorFault(LATE, delay=600_000_000), SensorFault(TWIN, delay=37_000_000))),
         ("slaves: {3: {fault: late, delay: 700ms, rate: 0.1}}", (sensor_fault("late", 0.1, delay=0.7),)),
         ("slaves: {3: {faults: [{fault: exception, code: 6}]}}", (sensor_fault("exception", code=6),)),
         (

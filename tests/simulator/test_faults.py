@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lfs10d.simulator.faults import ALWAYS, FaultKind, Window, sensor_fault, window
+from lfs10d.simulator.faults import ALWAYS, FaultKind, Window, window
 from lfs10d.simulator.wire import SECOND
+from tests.support.faulty_sensors import sensor_fault
 
 TIMES = st.integers(min_value=0, max_value=1000)
 

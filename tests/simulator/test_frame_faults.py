@@ -6,8 +6,9 @@ from random import Random
 
 import pytest
 
-from lfs10d.simulator.faults import FaultKind, sensor_fault
+from lfs10d.simulator.faults import FaultKind
 from lfs10d.simulator.frame_faults import broken_float, distorted, spoilt
+from tests.support.faulty_sensors import sensor_fault
 
 READ = bytes((3, 3, 4, 65, 32, 0, 0))
 WRITE = bytes((3, 6, 0, 5, 0, 7))

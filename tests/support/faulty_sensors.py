@@ -2,8 +2,31 @@
 
 from __future__ import annotations
 
-from lfs10d.simulator.faults import FaultKind, SensorFault, sensor_fault
+from dataclasses import replace
+
+from lfs10d.simulator.faults import DEFAULT_DELAYS, FaultKind, SensorFault, window
 from lfs10d.simulator.sensor import Reply, Sensor
+from lfs10d.simulator.wire import nanoseconds
+
+
+def sensor_fault(
+    kind: FaultKind | str,
+    rate: float = 1.0,
+    *,
+    delay: float | None = None,
+    first: float = 0.0,
+    last: float | None = None,
+    every: float | None = None,
+    **particulars: int | str | tuple[str, ...] | None,
+) -> SensorFault:
+    """Return a fault with times in seconds; `particulars` are code, value, length, answer, reads and values.
+
+    Raises ValueError for an unknown kind, TypeError for an unknown particular.
+    """
+    kind = FaultKind(kind)
+    seconds = DEFAULT_DELAYS.get(kind, 0.0) if delay is None else delay
+    plain = SensorFault(kind, rate, window(first, last, every), nanoseconds(seconds))
+    return replace(plain, **particulars)  # type: ignore[arg-type]  # replace checks the names, the kinds use them
 
 
 def add_fault(
