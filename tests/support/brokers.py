@@ -139,7 +139,8 @@ class Listener:
     def close(self) -> None:
         """Disconnect and end the thread."""
         self._client.disconnect()
-        self._client.loop_stop()
+        with contextlib.suppress(AttributeError):  # its thread ends by itself, also between paho's look and its wait
+            self._client.loop_stop()
 
 
 @dataclass
