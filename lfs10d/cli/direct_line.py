@@ -32,12 +32,12 @@ _Message: TypeAlias = "list[Event] | BaseException"
 class DirectLine:
     """Opens the port on entering, frees it on leaving. `framing_errors` of that time, if the driver counts."""
 
-    def __init__(self, settings: PortSettings) -> None:
+    def __init__(self, settings: PortSettings, rules: LineRules | None = None) -> None:
         self.path = settings.path
         self.framing_errors: int | None = None
         self._queue: SimpleQueue[_Message] = SimpleQueue()
         self._errors_before: int | None = None
-        self._bus = Bus(SerialPort(settings), LineRules(), time.monotonic)
+        self._bus = Bus(SerialPort(settings), rules or LineRules(), time.monotonic)
         scheduler = Scheduler(self._bus.line_timing, time.monotonic())
         self._poller = Poller(self._bus, scheduler, self._take, time.monotonic)
         self._thread = LineThread(self._poller, prepare=_prepare, failed=self._queue.put)

@@ -15,8 +15,7 @@ from lfs10d.config.loader import LoadedConfig
 from lfs10d.config.models import LineConfig
 from lfs10d.errors import PortError
 from lfs10d.line.device import DeviceSpec, PollRules
-from lfs10d.line.settings import device_specs
-from lfs10d.modbus.port_settings import PortSettings
+from lfs10d.line.settings import device_specs, line_rules, port_settings
 from lfs10d.reading import Reading
 
 LINE, SENSOR, SENSORS, PORT = Area("line"), Area("sensor"), Area("sensors"), Area("port")
@@ -91,7 +90,7 @@ def by_asking(loaded: LoadedConfig) -> list[Finding]:
     if not specs:
         return [SENSORS.warn("none is configured", f"lfs10d scan {config.line.port}")]
     try:
-        readings = _polled(_settings(config.line, config.line.baudrate), specs)
+        readings = _polled(config.line, config.line.baudrate, specs)
         found = list(answers(specs, readings, config.line.port))
         if not any(reading.fault is None for reading in readings.values()):
             found += _at_another_rate(config.line, specs)
@@ -100,15 +99,11 @@ def by_asking(loaded: LoadedConfig) -> list[Finding]:
     return found
 
 
-def _settings(line: LineConfig, baudrate: int) -> PortSettings:
-    return PortSettings(line.port, baudrate, line.parity, line.databits, line.stopbits)
-
-
 def _at_another_rate(line: LineConfig, specs: Sequence[DeviceSpec]) -> Iterator[Finding]:
     """Read at the other rates of the profiles; yield the rates at which devices answer."""
     rates = {rate for spec in specs if spec.profile.baudrate is not None for rate in spec.profile.baudrate.codes}
     for rate in sorted(rates - {line.baudrate}):
-        readings = _polled(_settings(line, rate), specs)
+        readings = _polled(line, rate, specs)
         names = [name for name, reading in readings.items() if reading.fault is None]
         if names:
             yield SENSORS.fail(
@@ -118,12 +113,13 @@ def _at_another_rate(line: LineConfig, specs: Sequence[DeviceSpec]) -> Iterator[
             return
 
 
-def _polled(settings: PortSettings, specs: Sequence[DeviceSpec]) -> dict[str, Reading]:
+def _polled(line_config: LineConfig, baudrate: int, specs: Sequence[DeviceSpec]) -> dict[str, Reading]:
     """Read each until it answers, at most `ATTEMPTS` times: a reply may be lost, or slower than the first time-out."""
     readings: dict[str, Reading] = {}
     attempts = {spec.name: ATTEMPTS for spec in specs}
     rules = PollRules(retries=0, offline_after=ATTEMPTS, probe_interval_max=1.0)
-    with DirectLine(settings) as line:
+    settings = replace(port_settings(line_config), baudrate=baudrate)
+    with DirectLine(settings, line_rules(line_config)) as line:
         line.poll(specs, rules)
         until = time.monotonic() + PATIENCE * len(specs)
         while any(attempts.values()) and time.monotonic() < until:

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import time
-from typing import Any
+from pathlib import Path
+from typing import Any, NoReturn
 
 import pytest
 
-from lfs10d.cli.doctor.sensors import by_daemon
+from lfs10d.cli.doctor import sensors
+from lfs10d.cli.doctor.sensors import by_asking, by_daemon
 from lfs10d.cli.render.live_state import LiveState
+from lfs10d.config.loader import load
+from lfs10d.errors import PortGoneError
+from lfs10d.line.settings import line_rules, port_settings
+from lfs10d.modbus.bus import LineRules
+from lfs10d.modbus.port_settings import PortSettings
 
 NOW = 1.8e9
 
@@ -77,3 +84,24 @@ def test_an_old_value_and_no_sensors_are_named() -> None:
     assert [each.text for each in bad] == [f"{name}: its last good value is old" for name in ("north", "south")]
     (none,) = by_daemon(LiveState("line0"), NOW)
     assert (none.level, none.text) == ("warn", "none is configured")
+
+
+def test_a_line_is_read_as_the_daemon_would_read_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "lfs10d.yaml"
+    file.write_text(
+        "line: {name: mast, port: /dev/line0, baudrate: 19200, echo: 'off', extra_gap: 5ms, low_latency: false,\n"
+        "  rs485: {rts_on_send: true}}\n"
+        "slaves: [3]\nmqtt: {host: localhost}\n"
+    )
+    loaded = load(file)
+    opened: list[tuple[PortSettings, LineRules]] = []
+
+    def refused(settings: PortSettings, rules: LineRules) -> NoReturn:
+        opened.append((settings, rules))
+        raise PortGoneError(settings.path, "it is gone")
+
+    monkeypatch.setattr(sensors, "DirectLine", refused)
+    (found,) = by_asking(loaded)
+    assert found.level == "fail"
+    assert opened == [(port_settings(loaded.config.line), line_rules(loaded.config.line))]
+    assert opened[0][0].rs485 is not None
