@@ -49,7 +49,7 @@ class Supervision:
         try:
             while True:
                 self._look()
-                await asyncio.sleep(every - time.monotonic() % every)  # at the full second, as `mqtt.pump` does
+                await asyncio.sleep(every)
         finally:
             if self._file is not None:
                 self._file.remove()

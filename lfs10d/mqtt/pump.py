@@ -113,8 +113,6 @@ class Pump:
         self.watch_writing()
 
     def _keep_up(self) -> None:
-        # At the full second, as the daemon's supervision is: one wake-up for both.
-        now = self._loop.time()
-        self._upkeep = self._loop.call_at(now - now % UPKEEP_EVERY + UPKEEP_EVERY, self._keep_up)
+        self._upkeep = self._loop.call_later(UPKEEP_EVERY, self._keep_up)
         self._client.loop_misc()
         self.watch_writing()

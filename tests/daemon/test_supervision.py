@@ -8,7 +8,6 @@ import logging
 import time
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -95,16 +94,3 @@ def test_a_status_file_that_cannot_be_written_is_told_once(tmp_path: Path, caplo
     assert [record.message for record in caplog.records] == [
         f"{tmp_path}/file/status.json cannot be written: `lfs10d watch` needs the broker"
     ]
-
-
-def test_it_looks_at_full_seconds_of_the_loop(monkeypatch: pytest.MonkeyPatch) -> None:
-    slept: list[float] = []
-
-    async def sleep(seconds: float) -> None:
-        slept.append(seconds)
-        raise asyncio.CancelledError
-
-    monkeypatch.setattr("lfs10d.daemon.supervision.time", SimpleNamespace(monotonic=lambda: 100.25))
-    monkeypatch.setattr("lfs10d.daemon.supervision.asyncio", SimpleNamespace(sleep=sleep))
-    look(Notifier({}), None, lambda: 101.0)
-    assert slept == [0.75]
