@@ -91,8 +91,7 @@ class Reception:
 
     def foreseen(self, data: bytes, now: float) -> bool:
         """Return whether `data`, read at `now`, is plainly the beginning of the answer: then it may be sorted later."""
-        shape = self._normal.shape
-        lacking = shape.size - len(data)
+        shape, lacking = self._normal.shape, self._normal.shape.size - len(data)
         begins = shape.head.startswith(data) or (data.startswith(shape.head) and lacking > 0)
         if not (self._plain and begins) or self.heard or self._too_early(len(data), now):
             return False
@@ -136,6 +135,8 @@ class Reception:
     def _sort(self, data: bytes, now: float) -> None:
         early = self._too_early(len(data), now) if self.sent_yet and (self._line.paced or now < self._earliest) else 0
         if early:
+            if self._plain:
+                self._seek_ours()  # in what was foreseen, which was in time
             self._early_end = self._search.end + early
             if self._line.paced:
                 self._begin_at(self._early_end)
@@ -278,9 +279,8 @@ class Reception:
     @property
     def echo_changed(self) -> bool:
         """Whether an echo was expected, and something came in its place."""
-        if not self._expects_echo or self._echo_whole:
-            return False
-        return bool(self._held) or self._search.unclaimed_count(self._sent_at) > 0
+        expected = self._expects_echo and not self._echo_whole
+        return expected and (bool(self._held) or self._search.unclaimed_count(self._sent_at) > 0)
 
     @property
     def echoed(self) -> bool | None:

@@ -14,6 +14,7 @@ import importlib
 import sys
 import urllib
 from importlib.util import find_spec
+from threading import RLock
 from types import ModuleType
 from typing import cast
 
@@ -31,6 +32,10 @@ _ABSENT = cast("ModuleType", None)
 """What makes `import` say that there is no such module."""
 
 
+_LOADING = RLock()
+"""Held while a true module takes the place of its stand-in: two threads may be the first to want it."""
+
+
 class LazyModule(ModuleType):
     """Stands in for a module until one of its attributes is wanted; then the true module takes its place."""
 
@@ -38,9 +43,10 @@ class LazyModule(ModuleType):
         """Return an attribute of the true module, except to Python's import."""
         if name.startswith("__"):
             raise AttributeError(name)
-        if sys.modules.get(self.__name__) is self:
-            del sys.modules[self.__name__]
-        return getattr(importlib.import_module(self.__name__), name)
+        with _LOADING:
+            if sys.modules.get(self.__name__) is self:
+                del sys.modules[self.__name__]
+            return getattr(importlib.import_module(self.__name__), name)
 
 
 class NoPlugins(LazyModule):

@@ -172,3 +172,9 @@ def test_one_host_is_one_node() -> None:
 def test_a_list_of_hosts_is_a_list_of_nodes() -> None:
     mqtt = MqttConfig.model_validate({"host": ["gate", "[::1]:9"], "port": 1884})
     assert (mqtt.nodes, mqtt.broker) == ((("gate", 1884), ("::1", 9)), "gate:1884, [::1]:9")
+
+
+def test_a_certificate_is_given_as_scale_and_offset_by_value() -> None:
+    slave = {"id": 3, "calibration": {"wind_speed": {"scale": 1.013, "offset": 0.06}}}
+    config = Config.model_validate({"line": {"port": "/dev/x"}, "slaves": [slave], "mqtt": {"host": "h"}})
+    assert config.slaves[0].certificates == {"wind_speed": (1.013, 0.06)}

@@ -119,3 +119,11 @@ def test_every_outcome_is_the_one_of_who_sorts_at_once(
         assert keeping.heard == sorting.heard
         assert keeping.quiet_since == pytest.approx(sorting.quiet_since, abs=2 * HUSH)
         assert keeping.ended == pytest.approx(sorting.ended, abs=2 * HUSH)
+
+
+def test_a_beginning_counts_though_what_follows_is_faster_than_the_wire() -> None:
+    at = SENT_END + 2 * CHARACTER
+    arrivals = [(at, ANSWER[:3]), (at + 0.0001, bytes(40))]
+    keeping, sorting = carry_out(PLAIN, arrivals), carry_out(PLAIN, arrivals, keeps=False)
+    assert keeping.answered
+    assert (keeping.answered, code(keeping)) == (sorting.answered, code(sorting))

@@ -50,3 +50,10 @@ def test_what_comes_too_early_is_not_foreseen() -> None:
     ear = reception()
     ear.take(b"\xff", 0.02)
     assert not ear.foreseen(ANSWER[:1], 0.05)
+
+
+def test_what_follows_faster_than_the_wire_leaves_a_beginning_what_it_is() -> None:
+    ear = reception()
+    assert ear.foreseen(ANSWER[:3], 0.012)
+    ear.take(bytes(40), 0.0121, (ANSWER[:3], 0.012))
+    assert ear.begun

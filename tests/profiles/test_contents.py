@@ -4,7 +4,16 @@ from __future__ import annotations
 
 import pytest
 
-from lfs10d.profiles.contents import RegisterContent, bits_of, no_content, part_of, part_problems, says_text, width_of
+from lfs10d.profiles.contents import (
+    RegisterContent,
+    bits_of,
+    limits_of,
+    no_content,
+    part_of,
+    part_problems,
+    says_text,
+    width_of,
+)
 from lfs10d.schema.fields import FieldError
 
 
@@ -33,6 +42,7 @@ def test_a_content_fits_its_type() -> None:
     assert no_content(-1, "uint16", 16) == "uint16 holds 0 to 0xFFFF, not -1"
     assert no_content(1.5, "uint16", 16) == "uint16 holds whole numbers only"
     assert (bits_of(-1, "int16", 16), bits_of(-9999.0, "float32", 32)) == (0xFFFF, 0xC61C3C00)
+    assert (limits_of("int16", 16), limits_of("uint32", 32)) == ((-0x8000, 0x7FFF), (0, 0xFFFF_FFFF))
     assert (width_of("bool", None), width_of("uint64", None), width_of("string", 3)) == (1, 64, 48)
 
 

@@ -112,3 +112,16 @@ def test_where_python_has_no_hashes_of_its_own_those_of_openssl_stay(missing: st
     assert find_spec("_hashlib") is not None
     assert in_a_fresh_interpreter(lacking + WITHOUT_TLS + code) == "e3b0c442 _hashlib"
     assert in_a_fresh_interpreter(WITHOUT_TLS + code).startswith("e3b0c442 _sha2")
+
+
+def test_of_two_threads_that_are_the_first_to_want_a_module_both_get_it() -> None:
+    code = (
+        "import sys, threading, time; from lfs10d.system import startup; startup.begin()\n"
+        "import importlib, ssl; load = importlib.import_module; found = []\n"
+        "def slowly(name):\n    time.sleep(0.2)\n    return load(name)\n"
+        "importlib.import_module = slowly\n"
+        "threads = [threading.Thread(target=lambda: found.append(ssl.SSLContext)) for _ in range(4)]\n"
+        "[each.start() for each in threads]; [each.join() for each in threads]\n"
+        "print(len(found), found == [sys.modules['ssl'].SSLContext] * 4)"
+    )
+    assert in_a_fresh_interpreter(code) == "4 True"
