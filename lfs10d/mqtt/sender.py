@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import time
 from collections import deque
 from collections.abc import Callable
 
@@ -79,11 +80,13 @@ class Sender:
         self._sending = False
         self._alarm: asyncio.TimerHandle | None = None
         self._encoded: tuple[publication.Payload, bytes] = (None, b"")
+        self._now: Callable[[], float] = time.monotonic
 
     def connected(self, connection: Connection, accepted: Accepted) -> None:
         """Begin to send over this connection; `wake` is to follow."""
         self._connection = connection
         self._accepted = accepted
+        self._now = asyncio.get_running_loop().time
         self._outbox.connected(self._now(), window=min(IN_FLIGHT_MOST, accepted.receive_maximum))
 
     def lost(self, ended: Disconnect) -> None:
@@ -177,9 +180,6 @@ class Sender:
         elif self._outbox.refused(item, reason, self._now()):
             again = "in a second, then less often" if refusal is Refusal.LATER else "after the next connect or a reload"
             log.warning("the broker refuses %s: %s; it is tried again %s", topic, words, again)
-
-    def _now(self) -> float:
-        return asyncio.get_running_loop().time()
 
     def _send_some(self) -> None:
         self._turn = None

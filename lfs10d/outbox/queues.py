@@ -123,7 +123,9 @@ class Queues:
 
     def __bool__(self) -> bool:
         """Return whether anything but the backlog waits."""
-        return bool(self._waiting(batch=False))
+        retained, messages = self.retained, self.messages
+        waiting = self.live.waiting or retained.changes or retained.refreshes or retained.clearings
+        return bool(waiting or retained.last or messages.messages or messages.traces)
 
     def due(self) -> float | None:
         """Return when `next` may have something though nothing happens before; None: not by time alone."""
