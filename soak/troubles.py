@@ -78,11 +78,6 @@ STRUCK = "timeout late malformed crc collision wrong_slave wrong_function"
 """Where two speak at once anything but a wrong value may come of it."""
 
 
-BROKEN = "collision"
-"""Broken bytes may be a neighbour's own late answer: until they were doubted in vain three times, what was held back
-of it fails (decision 0009)."""
-
-
 def _late(delay: float, also: str = "", **faults: Particulars) -> Fault:
     """Return one that is late: whether its polls fail, and how, depends on the time-out, and that is learned."""
     return Fault(
@@ -102,12 +97,12 @@ FAMILY: Mapping[str, Fault] = {
     "late by a little": _late(0.25),
     "late, in another shape": _late(1.3, " exception", exception={}),
     "byte by byte": _ill(slow_bytes={"delay": 0.004}),
-    "a flipped bit": _ill("crc", noisy={}, neighbours=BROKEN),
-    "garbage": _ill("crc", garbage={}, neighbours=BROKEN),
-    "garbage that is too short": _ill("malformed", garbage={"length": 4}, neighbours=BROKEN),
+    "a flipped bit": _ill("crc", noisy={}),
+    "garbage": _ill("crc", garbage={}),
+    "garbage that is too short": _ill("malformed", garbage={"length": 4}),
     # Of so many bytes some may look like another master's request: a collision.
-    "garbage that is too long": _ill("crc", "collision", garbage={"length": 60}, neighbours=BROKEN),
-    "cut short": _ill("malformed", truncated={"length": 5}, neighbours=BROKEN),
+    "garbage that is too long": _ill("crc", "collision", garbage={"length": 60}),
+    "cut short": _ill("malformed", truncated={"length": 5}),
     "another slave's id": _ill("wrong_slave", wrong_id={"value": STRANGER}),
     "another function": _ill("wrong_function", wrong_function={}),
     "another count": Fault(_codes("malformed late"), faults={"wrong_count": {}}),  # a barrier's is late
@@ -124,7 +119,7 @@ FAMILY: Mapping[str, Fault] = {
         _codes("exception"), _codes("exception " + LATE), _codes("exception"), {"gateway": {"delay": 0.1}},
         neighbours=_codes(LATE),
     ),
-    "stray bytes": Fault(begin=_stray, neighbours=_codes(BROKEN)),
+    "stray bytes": Fault(begin=_stray),
     "babble": Fault(_codes("collision"), _codes(LATE), _codes("collision"), begin=_babble, neighbours=_codes(LATE),
                     in_pieces=_codes(STRUCK)),
     "a second master": Fault(_codes(STRUCK), _codes(STRUCK), begin=_second_master, neighbours=_codes(STRUCK)),
