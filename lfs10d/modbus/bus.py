@@ -237,7 +237,7 @@ class Bus:
         """Give the exchange what was read; return how to wait where that is plainly the beginning of its answer."""
         begun, self._begun = self._begun, None
         if begun is None:
-            if (listen := exchange.begun(heard, now)) is not None:
+            if (listen := exchange.foreseen(heard, now)) is not None:
                 self._begun = heard, now
                 return self._listen(listen)
             exchange.received(heard, now)

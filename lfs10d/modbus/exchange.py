@@ -207,7 +207,7 @@ class Exchange:
         self._quiet_since = self._sent_end
         self._reception.sent(begun)
 
-    def begun(self, data: bytes, now: float) -> Listen | None:
+    def foreseen(self, data: bytes, now: float) -> Listen | None:
         """Return how to listen on if `data` is plainly the beginning of the answer: it may be kept; else None."""
         if self._state is not State.LISTENING or not self._reception.foreseen(data, now):
             return None

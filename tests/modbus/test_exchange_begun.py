@@ -37,7 +37,7 @@ from tests.support.receptions import ASCII, WIND
 
 
 def begun(exchange: Exchange, data: bytes, now: float = 0.02) -> Listen | None:
-    return exchange.begun(data, now)
+    return exchange.foreseen(data, now)
 
 
 def test_the_beginning_of_an_answer_is_kept_until_all_of_it_can_be_there() -> None:

@@ -122,7 +122,7 @@ def carry_out(
     while True:
         there = b"".join(data for at, data in waiting if at <= now)
         waiting = [arrival for arrival in waiting if arrival[0] > now]
-        begun = exchange.begun(there, now) if keeps and there and kept is None else None
+        begun = exchange.foreseen(there, now) if keeps and there and kept is None else None
         if begun is not None:
             kept = there, now
         elif kept is not None and not there:
